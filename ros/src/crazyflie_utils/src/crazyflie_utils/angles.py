@@ -1,0 +1,97 @@
+"""Angles and attitudes.
+
+The workspace writes an attitude as roll, pitch, yaw with
+``R = Rx(roll) Ry(pitch) Rz(yaw)`` (intrinsic X-Y-Z), where ``R`` takes body
+(forward-left-up) coordinates to the fixed frame. This is not the default order
+of tf's helpers, so nodes convert with this module only.
+"""
+
+import math
+
+import numpy as np
+
+
+def wrap_to_pi(angle: float) -> float:
+    """Return the angle in [-pi, pi] that points the same way.
+
+    Parameters
+    ----------
+    angle : float or ndarray
+        Any finite angle, rad.
+
+    Returns
+    -------
+    float or ndarray
+        Same shape, rad.
+    """
+    wrapped = np.remainder(np.asarray(angle) + math.pi, 2.0 * math.pi) - math.pi
+    return wrapped if wrapped.ndim else float(wrapped)
+
+
+def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> tuple:
+    """Return the quaternion of ``Rx(roll) Ry(pitch) Rz(yaw)``.
+
+    Parameters
+    ----------
+    roll, pitch, yaw : float
+        rad.
+
+    Returns
+    -------
+    tuple of float
+        (x, y, z, w), of norm 1: the product of the three half-angle
+        quaternions in that order.
+    """
+    sr, cr = math.sin(roll / 2.0), math.cos(roll / 2.0)
+    sp, cp = math.sin(pitch / 2.0), math.cos(pitch / 2.0)
+    sy, cy = math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+    return (
+        sr * cp * cy + cr * sp * sy,
+        cr * sp * cy - sr * cp * sy,
+        cr * cp * sy + sr * sp * cy,
+        cr * cp * cy - sr * sp * sy,
+    )
+
+
+def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> tuple:
+    """Return the (roll, pitch, yaw) of a quaternion of any non-zero norm.
+
+    With the rotation matrix ``R`` of the quaternion: roll = atan2(-R12, R22),
+    pitch = asin(R02), yaw = atan2(-R01, R00).
+
+    Parameters
+    ----------
+    x, y, z, w : float
+        Quaternion, real part last.
+
+    Returns
+    -------
+    tuple of float
+        rad; roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2]. At pitch =
+        +-pi/2 roll and yaw are not unique.
+
+    Raises
+    ------
+    ValueError
+        The quaternion is zero.
+    """
+    norm_squared = x * x + y * y + z * z + w * w
+    if norm_squared == 0.0:
+        raise ValueError("quaternion (0, 0, 0, 0) is no rotation")
+    s = 2.0 / norm_squared
+    r00 = 1.0 - s * (y * y + z * z)
+    r01 = s * (x * y - w * z)
+    r02 = s * (x * z + w * y)
+    r12 = s * (y * z - w * x)
+    r22 = 1.0 - s * (x * x + y * y)
+    return (
+        math.atan2(-r12, r22),
+        math.asin(max(-1.0, min(1.0, r02))),
+        math.atan2(-r01, r00),
+    )
+
+
+def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple:
+    """Return the horizontal vector (x, y) turned counter-clockwise by ``yaw`` (rad)."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return c * x - s * y, s * x + c * y

@@ -1,0 +1,52 @@
+"""The two clocks a process can live by.
+
+``time()`` is for intervals: seconds that never run backwards unless a
+simulation is reset. ``stamp(time)`` is for message headers.
+"""
+
+import time
+
+import genpy
+
+
+class SteadyClock:
+    """The machine's monotonic clock; stamps are wall-clock time, as ROS has it."""
+
+    def time(self) -> float:
+        """Return seconds since some fixed moment."""
+        return time.monotonic_ns() * 1e-9
+
+    def stamp(self, moment: float | None = None) -> genpy.Time:
+        """Return the ROS time of a moment of this clock, by default now."""
+        nanoseconds = time.time_ns()
+        if moment is not None:
+            nanoseconds -= time.monotonic_ns() - round(moment * 1e9)
+        return genpy.Time(*divmod(nanoseconds, 1_000_000_000))
+
+
+class SimulatedClock:
+    """A clock that stands still until it is set: ROS's simulated time."""
+
+    def __init__(self):
+        self._time = 0.0
+        self._listeners = []
+
+    def time(self) -> float:
+        """Return simulated seconds; 0 before the first `set`."""
+        return self._time
+
+    def stamp(self, moment: float | None = None) -> genpy.Time:
+        """Return a moment of this clock, by default now, as ROS time."""
+        moment = self._time if moment is None else moment
+        return genpy.Time(*divmod(round(moment * 1e9), 1_000_000_000))
+
+    def on_change(self, listener) -> None:
+        """Have ``listener(time, is_reset)`` called after every `set`."""
+        self._listeners.append(listener)
+
+    def set(self, moment: float) -> None:
+        """Move to ``moment`` (s); a step back counts as a reset of the simulation."""
+        is_reset = moment < self._time
+        self._time = moment
+        for listener in self._listeners:
+            listener(moment, is_reset)

@@ -1,0 +1,125 @@
+"""A process without ROS, for unit tests: parameters in a dict, time by hand."""
+
+import math
+
+from crazyflie_utils.process import Process
+from crazyflie_utils.transport import Outlet, Transport
+
+
+class _Record(Outlet):
+    def __init__(self):
+        self.messages = []
+
+    def is_heard(self):
+        return True
+
+    def publish(self, message):
+        self.messages.append(message)
+
+
+class FakeTransport(Transport):
+    """An outside world that remembers everything and does nothing by itself."""
+
+    def __init__(self, parameters: dict):
+        self.parameters = dict(parameters)
+        self.outlets = {}
+        self.inlets = {}
+        self.services = {}
+        self.log_records = []
+
+    def remap(self, name):
+        """Return ``name``: nothing is remapped."""
+        return name
+
+    def get_param(self, name):
+        """Return an entry of ``parameters``."""
+        return self.parameters[name]
+
+    def advertise(self, topic, message_type, latch):
+        """Return an outlet that keeps the messages."""
+        return self.outlets.setdefault(topic, _Record())
+
+    def subscribe(self, topic, message_type, deliver):
+        """Keep ``deliver`` for `FakeProcess.publish`."""
+        self.inlets[topic] = deliver
+
+    def advertise_service(self, name, service_type, begin, settle):
+        """Keep ``begin`` for `FakeProcess.call`."""
+        self.services[name] = begin
+
+    def log(self, level, text):
+        """Keep the record."""
+        self.log_records.append((level, text))
+
+    def clock_was_set(self, stamp):
+        """Do nothing."""
+
+    def is_shutdown(self):
+        """Return False."""
+        return False
+
+
+class FakeProcess(Process):
+    """A process for tests: the real node handle, executor, timers and tf buffer.
+
+    Parameters
+    ----------
+    parameters : dict
+        Full name to raw value, such as {"/simulator/time_step": 0.01}.
+    start : float
+        Simulated time at the beginning, s.
+    """
+
+    def __init__(self, parameters: dict | None = None, start: float = 100.0):
+        super().__init__(FakeTransport(parameters or {}), use_sim_time=True)
+        self.clock.set(start)
+        self.executor.start()
+
+    def launch(self, node, name: str, parameters: dict | None = None) -> bool:
+        """Initialize a node with private parameters, as roslaunch would.
+
+        Returns
+        -------
+        bool
+            What ``node.initialize`` returned.
+        """
+        for key, value in (parameters or {}).items():
+            self.transport.parameters[f"{name}/{key}"] = value
+        return node.initialize(self.handle(name))
+
+    def publish(self, topic: str, message) -> None:
+        """Publish from outside the process."""
+        self.transport.inlets[topic](message)
+
+    def published(self, topic: str) -> list:
+        """Return all messages that left the process on a topic, oldest first."""
+        return self.transport.outlets[topic].messages
+
+    def call(self, service: str, request):
+        """Call a service from outside.
+
+        Returns
+        -------
+        response or concurrent.futures.Future
+            A future when the service takes time: let it pass with `advance`.
+
+        Raises
+        ------
+        ServiceError
+            The service refused.
+        """
+        return self.transport.services[service](request)
+
+    def logged(self, level: str) -> list:
+        """Return the texts logged at a level, oldest first."""
+        return [text for logged_at, text in self.transport.log_records if logged_at == level]
+
+    def advance(self, duration: float) -> None:
+        """Let time pass (s), stopping at every timer's deadline."""
+        end = self.clock.time() + duration
+        while True:
+            deadline = self.next_simulated_deadline()
+            if math.isinf(deadline) or deadline > end + 1e-9:
+                break
+            self.clock.set(max(deadline, self.clock.time()))
+        self.clock.set(end)

@@ -1,0 +1,260 @@
+"""The only door between a node and ROS: roscpp's NodeHandle for Python."""
+
+import time
+import traceback
+from concurrent.futures import Future
+from functools import partial
+
+import genpy
+import rosgraph.names
+from rosgraph_msgs.msg import Clock
+
+from crazyflie_utils.executor import Timer
+from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.topics import Publisher
+from crazyflie_utils.transport import ServiceError
+
+REQUIRED = object()
+"""Default of a parameter that has none."""
+
+_STALL_LIMIT = 5.0
+"""How long, in s of the machine's clock, a service waits while time stands still."""
+
+
+class NodeHandle:
+    """Names, parameters, topics, services, timers, time, tf and log of one node.
+
+    The node's callbacks, whatever calls for them, run one at a time, and never
+    at the same time as those of another node in the process. A callback that
+    raises is logged once with its traceback, and the node is told so through
+    `on_fault`; it will be called again.
+
+    Parameters
+    ----------
+    process : Process
+        What the nodes of a process share.
+    name : str
+        Absolute name of the node, such as /simulator.
+    """
+
+    def __init__(self, process, name: str):
+        self._process = process
+        self._name = name
+        self._make_safe = None
+        self._faults = {}
+        self._throttled = {}
+
+    # Names and parameters.
+
+    @property
+    def name(self) -> str:
+        """Absolute name of the node."""
+        return self._name
+
+    def resolve(self, name: str) -> str:
+        """Return the absolute name of a topic, service or parameter.
+
+        A relative name is in the node's namespace, ``~name`` is the node's own.
+        Remappings of the launch file apply.
+        """
+        return self._process.transport.remap(rosgraph.names.resolve_name(name, self._name))
+
+    def param(self, name: str, kind, default=REQUIRED):
+        """Return one of the node's own (private) parameters.
+
+        Parameters
+        ----------
+        name : str
+            Such as "frames/fixed", without the ``~``.
+        kind : callable
+            From `crazyflie_utils.parameters`: checks the value and says what
+            is expected.
+        default : object, optional
+            Taken as it is when the parameter is not set.
+
+        Raises
+        ------
+        ParameterError
+            Required but not set, or not what is expected.
+        """
+        full_name = self.resolve("~" + name)
+        try:
+            value = self._process.transport.get_param(full_name)
+        except KeyError:
+            if default is not REQUIRED:
+                return default
+            raise ParameterError(f"parameter {full_name} is not set; expected {kind}") from None
+        try:
+            return kind(value)
+        except ValueError as error:
+            reason = f" ({error})" if str(error) else ""
+            raise ParameterError(
+                f"parameter {full_name} is {value!r}; expected {kind}{reason}"
+            ) from None
+
+    # Topics and services.
+
+    def publisher(self, topic: str, message_type: type, latch: bool = False) -> Publisher:
+        """Announce a topic and return its publisher.
+
+        With ``latch``, whoever subscribes later is sent the last message.
+        """
+        return self._process.topics.publisher(self.resolve(topic), message_type, latch)
+
+    def subscribe(self, topic: str, message_type: type, callback) -> None:
+        """Have ``callback(message)`` called for every message on a topic.
+
+        The message belongs to everybody: it must not be changed.
+        """
+        guarded = self._guard(callback)
+        submit = self._process.executor.submit
+        self._process.topics.subscribe(
+            self.resolve(topic), message_type, lambda message: submit(partial(guarded, message))
+        )
+
+    def advertise_service(self, name: str, service_type: type, callback) -> None:
+        """Answer calls of a service.
+
+        ``callback(request)`` returns the response; or, for work that takes time, a
+        `concurrent.futures.Future` of it, so that the node goes on living
+        meanwhile; or raises `ServiceError` with a text for the caller.
+        """
+        self._process.transport.advertise_service(
+            self.resolve(name), service_type, partial(self._begin, callback), self._settle
+        )
+
+    def _begin(self, callback, request):
+        answer = Future()
+
+        def work():
+            try:
+                answer.set_result(callback(request))
+            except ServiceError as error:
+                answer.set_exception(error)
+            except Exception as error:
+                self._report_fault(callback, error)
+                answer.set_exception(ServiceError(f"{self._name}: {error!r}"))
+
+        self._process.executor.submit(work)
+        return self._settle(answer)
+
+    def _settle(self, outcome):
+        if not isinstance(outcome, Future):
+            return outcome
+        clock = self._process.clock
+        seen, seen_at = clock.time(), time.monotonic()
+        while True:
+            try:
+                return outcome.result(timeout=0.1)
+            except TimeoutError:
+                if self._process.transport.is_shutdown():
+                    raise ServiceError(f"{self._name} is shutting down") from None
+            if clock.time() != seen:
+                seen, seen_at = clock.time(), time.monotonic()
+            elif time.monotonic() - seen_at > _STALL_LIMIT:
+                raise ServiceError(f"{self._name}: /clock stands still")
+
+    # Time.
+
+    @property
+    def uses_sim_time(self) -> bool:
+        """Whether the node lives by simulated time (/use_sim_time)."""
+        return self._process.uses_sim_time
+
+    def time(self) -> float:
+        """Return seconds for measuring intervals: simulated, or the machine's steady clock."""
+        return self._process.clock.time()
+
+    def stamp(self, moment: float | None = None) -> genpy.Time:
+        """Return the ROS time of a moment of `time`, by default now."""
+        return self._process.clock.stamp(moment)
+
+    def timer(self, period: float, callback, steady: bool = False) -> Timer:
+        """Have ``callback()`` called every ``period`` seconds of `time`.
+
+        With ``steady`` the period is of the machine's clock also when time is
+        simulated. Ticks that are missed are skipped.
+        """
+        return self._process.add_timer(period, self._guard(callback), steady)
+
+    def clock_publisher(self):
+        """Return a function that moves simulated time to a moment (s) for everybody.
+
+        Timers of this process that are due run after the present callback,
+        before anything that is submitted later.
+        """
+        publisher = self._process.topics.publisher("/clock", Clock, latch=False)
+
+        def set_clock(moment: float) -> None:
+            stamp = self.stamp(moment)
+            self._process.transport.clock_was_set(stamp)
+            publisher.publish(Clock(stamp))
+
+        return set_clock
+
+    # tf.
+
+    def broadcast_transforms(self):
+        """Announce to tf and return ``broadcast(list of TransformStamped)``."""
+        self._process.transforms.advertise()
+        return self._process.transforms.broadcast
+
+    def listen_to_transforms(self):
+        """Begin to listen to tf and return ``lookup(target, source)``.
+
+        See `Transforms.lookup` for its result and its error.
+        """
+        self._process.transforms.listen()
+        return self._process.transforms.lookup
+
+    # Log and faults.
+
+    def info(self, text: str) -> None:
+        """Log what an operator may want to know."""
+        self._process.transport.log("info", f"{self._name}: {text}")
+
+    def warn(self, text: str, throttle: float = 0.0, key=None) -> None:
+        """Log a warning; the same ``key`` (the text) at most once in ``throttle`` seconds.
+
+        The seconds are those of the machine's clock, so that a simulation that
+        runs fast does not flood the screen.
+        """
+        now = time.monotonic()
+        key = text if key is None else key
+        if throttle and now - self._throttled.get(key, -throttle) < throttle:
+            return
+        self._throttled[key] = now
+        self._process.transport.log("warn", f"{self._name}: {text}")
+
+    def error(self, text: str) -> None:
+        """Log what makes the node fail."""
+        self._process.transport.log("error", f"{self._name}: {text}")
+
+    def on_fault(self, make_safe) -> None:
+        """Have ``make_safe()`` called after a callback of this node has raised."""
+        self._make_safe = make_safe
+
+    def _guard(self, callback):
+        def guarded(*args):
+            try:
+                callback(*args)
+            except Exception as error:
+                self._report_fault(callback, error)
+
+        return guarded
+
+    def _report_fault(self, callback, error):
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        fault = (type(error), where.filename, where.lineno)
+        count = self._faults[fault] = self._faults.get(fault, 0) + 1
+        name = getattr(callback, "__qualname__", repr(callback))
+        if count == 1:
+            self.error(f"{name} failed\n{''.join(traceback.format_exception(error))}")
+        else:
+            self.warn(f"{name} failed again: {error!r} ({count} times)", throttle=5.0, key=fault)
+        if self._make_safe is None:
+            return
+        try:
+            self._make_safe()
+        except Exception as second:
+            self.error(f"make_safe failed too: {second!r}")

@@ -1,0 +1,76 @@
+"""What the nodes of one process share, and the node handles into it."""
+
+from rosgraph_msgs.msg import Clock
+
+from crazyflie_utils.clock import SimulatedClock, SteadyClock
+from crazyflie_utils.executor import Executor, SteadyTimers, Timer, TimerQueue
+from crazyflie_utils.node_handle import NodeHandle
+from crazyflie_utils.topics import Topics
+from crazyflie_utils.transforms import Transforms
+
+
+class Process:
+    """One executor, one clock, one set of topics, one tf buffer; any number of nodes.
+
+    Parameters
+    ----------
+    transport : Transport
+        The world outside.
+    use_sim_time : bool
+        Live by simulated time, which stands still until it is set.
+    """
+
+    def __init__(self, transport, use_sim_time: bool):
+        self.transport = transport
+        self.executor = Executor()
+        self.topics = Topics(transport)
+        self.clock = SimulatedClock() if use_sim_time else SteadyClock()
+        self.transforms = Transforms(self.topics, self._warn_about_transform)
+        self._log = NodeHandle(self, "/tf")
+        self._steady_clock = SteadyClock()
+        self._steady = SteadyTimers(TimerQueue(self.executor), self._steady_clock)
+        self._simulated = TimerQueue(self.executor)
+        if use_sim_time:
+            self.clock.on_change(self._run_simulated)
+            self.topics.subscribe("/clock", Clock, self._hear_clock)
+
+    @property
+    def uses_sim_time(self) -> bool:
+        """Whether this process lives by simulated time."""
+        return isinstance(self.clock, SimulatedClock)
+
+    def handle(self, name: str) -> NodeHandle:
+        """Return the handle of the node with this absolute name."""
+        return NodeHandle(self, name)
+
+    def add_timer(self, period: float, work, steady: bool = False) -> Timer:
+        """Add a timer by this process's clock, or by the machine's if ``steady``."""
+        if self.uses_sim_time and not steady:
+            return self._simulated.add(period, work, self.clock.time())
+        return self._steady.add(period, work)
+
+    def next_simulated_deadline(self) -> float:
+        """Return when the next timer by simulated time is due, s."""
+        return self._simulated.next_deadline()
+
+    def start(self) -> None:
+        """Let callbacks run: every node is complete."""
+        self._steady.start()
+        self.executor.start()
+
+    def stop(self) -> None:
+        """Let no timer fire again."""
+        self._steady.stop()
+        self._simulated = TimerQueue(self.executor)
+
+    def _hear_clock(self, message):
+        self.clock.set(message.clock.to_sec())
+
+    def _run_simulated(self, now, is_reset):
+        if is_reset:
+            self.transforms.clear()
+            self._simulated.rebase(now)
+        self._simulated.run_due(now)
+
+    def _warn_about_transform(self, text):
+        self._log.warn(text, throttle=1.0)

@@ -1,0 +1,88 @@
+"""The world outside a process, as rospy shows it."""
+
+import rospy
+
+from crazyflie_utils.transport import Outlet, ServiceError, Transport
+
+_QUEUE_SIZE = 10
+"""Messages kept for each slow listener. With a queue rospy sends from a thread of
+its own, so that a listener that is frozen cannot stop a vehicle."""
+
+
+class _RosOutlet(Outlet):
+    def __init__(self, publisher):
+        self._publisher = publisher
+
+    def is_heard(self):
+        return self._publisher.get_num_connections() > 0
+
+    def publish(self, message):
+        self._publisher.publish(message)
+
+
+class RosTransport(Transport):
+    """rospy, for a process that has called ``rospy.init_node``."""
+
+    def __init__(self):
+        _never_connect_to_oneself()
+
+    def remap(self, name):
+        """Return what the command line maps the name to."""
+        return rospy.names.get_mappings().get(name, name)
+
+    def get_param(self, name):
+        """Return a parameter from the parameter server."""
+        return rospy.get_param(name)
+
+    def advertise(self, topic, message_type, latch):
+        """Register a publisher with the master."""
+        return _RosOutlet(rospy.Publisher(topic, message_type, latch=latch, queue_size=_QUEUE_SIZE))
+
+    def subscribe(self, topic, message_type, deliver):
+        """Register a subscriber with the master."""
+        rospy.Subscriber(topic, message_type, deliver, tcp_nodelay=True)
+
+    def advertise_service(self, name, service_type, begin, settle):
+        """Register a service with the master."""
+
+        def serve(request):
+            try:
+                return settle(begin(request))
+            except ServiceError as error:
+                raise rospy.ServiceException(str(error)) from None
+
+        rospy.Service(name, service_type, serve)
+
+    def log(self, level, text):
+        """Log to the screen, the node's log file and /rosout."""
+        _LOGGERS[level](text)
+
+    def clock_was_set(self, stamp):
+        """Set rospy's own clock, which stamps the log."""
+        rospy.rostime._set_rostime(stamp)
+
+    def is_shutdown(self):
+        """Tell whether rospy is shutting down."""
+        return rospy.is_shutdown()
+
+
+_LOGGERS = {
+    "debug": rospy.logdebug,
+    "info": rospy.loginfo,
+    "warn": rospy.logwarn,
+    "error": rospy.logerr,
+    "fatal": rospy.logfatal,
+}
+
+
+def _never_connect_to_oneself():
+    # A process that publishes and subscribes on one topic hands its messages
+    # over itself. rospy would connect to itself as well, over a socket, and
+    # every message would come twice.
+    implementation = rospy.topics._SubscriberImpl
+    has_connection = implementation.has_connection
+
+    def has_connection_or_is_own(self, endpoint_id):
+        return endpoint_id == rospy.get_node_uri() or has_connection(self, endpoint_id)
+
+    implementation.has_connection = has_connection_or_is_own

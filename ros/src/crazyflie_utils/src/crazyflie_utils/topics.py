@@ -1,0 +1,92 @@
+"""Topics within a process: messages go from hand to hand.
+
+A message that is published goes to the subscribers in this process as the very
+object, by a call, and to those outside only when there are any. Subscribers
+must therefore not change what they receive.
+"""
+
+
+class Topic:
+    """One topic as this process sees it."""
+
+    def __init__(self, name: str, message_type: type):
+        self.name = name
+        self.message_type = message_type
+        self.receivers = []
+        self.latched = None
+        self.is_subscribed_outside = False
+
+    def deliver(self, message) -> None:
+        """Hand a message to every subscriber in this process."""
+        for receiver in self.receivers:
+            receiver(message)
+
+
+class Publisher:
+    """The right to publish on a topic."""
+
+    def __init__(self, topic: Topic, outlet, latch: bool):
+        self._topic = topic
+        self._outlet = outlet
+        self._latch = latch
+
+    @property
+    def topic(self) -> str:
+        """Name of the topic, absolute."""
+        return self._topic.name
+
+    def publish(self, message) -> None:
+        """Send a message; it must not be changed afterwards."""
+        if self._latch:
+            self._topic.latched = message
+        if self._latch or self._outlet.is_heard():
+            self._outlet.publish(message)
+        self._topic.deliver(message)
+
+
+class Topics:
+    """All topics of a process.
+
+    Parameters
+    ----------
+    transport : Transport
+    """
+
+    def __init__(self, transport):
+        self._transport = transport
+        self._topics = {}
+
+    def publisher(self, name: str, message_type: type, latch: bool) -> Publisher:
+        """Return a publisher; a latched one repeats its last message to late subscribers.
+
+        Raises
+        ------
+        TypeError
+            The topic has another type in this process.
+        """
+        topic = self._topic(name, message_type)
+        return Publisher(topic, self._transport.advertise(name, message_type, latch), latch)
+
+    def subscribe(self, name: str, message_type: type, receiver) -> None:
+        """Have ``receiver(message)`` called for every message on a topic.
+
+        Raises
+        ------
+        TypeError
+            The topic has another type in this process.
+        """
+        topic = self._topic(name, message_type)
+        topic.receivers.append(receiver)
+        if topic.latched is not None:
+            receiver(topic.latched)
+        if not topic.is_subscribed_outside:
+            topic.is_subscribed_outside = True
+            self._transport.subscribe(name, message_type, topic.deliver)
+
+    def _topic(self, name, message_type):
+        topic = self._topics.setdefault(name, Topic(name, message_type))
+        if topic.message_type is not message_type:
+            raise TypeError(
+                f"topic {name} carries {topic.message_type._type}, not {message_type._type}"
+            )
+        return topic

@@ -1,0 +1,93 @@
+"""tf for a process: one tf2 buffer and one broadcaster, however many nodes."""
+
+import genpy
+import tf2_ros
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_utils.vectors import is_finite
+
+_LATEST = genpy.Time()
+
+
+class TransformError(Exception):
+    """tf does not know the transform between two frames; the text says why."""
+
+
+class _Broadcaster(tf2_ros.TransformBroadcaster):
+    """tf2's broadcaster on a publisher of this process."""
+
+    def __init__(self, publisher):
+        self.pub_tf = publisher
+
+
+class Transforms:
+    """What tf knows, and the way to tell it more.
+
+    Parameters
+    ----------
+    topics : Topics
+    warn : callable
+        Called with a text about every transform that is dropped.
+    """
+
+    def __init__(self, topics, warn):
+        self._topics = topics
+        self._warn = warn
+        self._buffer = None
+        self._broadcaster = None
+
+    def broadcast(self, transforms: list) -> None:
+        """Publish a list of geometry_msgs/TransformStamped on /tf."""
+        self._broadcaster.sendTransform(transforms)
+
+    def advertise(self) -> None:
+        """Announce that this process will `broadcast`."""
+        if self._broadcaster is None:
+            publisher = self._topics.publisher("/tf", TFMessage, latch=False)
+            self._broadcaster = _Broadcaster(publisher)
+
+    def listen(self) -> None:
+        """Begin to collect what is said on /tf and /tf_static."""
+        if self._buffer is None:
+            self._buffer = tf2_ros.Buffer(debug=False)
+            self._topics.subscribe("/tf", TFMessage, self._hear)
+            self._topics.subscribe("/tf_static", TFMessage, self._hear_static)
+
+    def clear(self) -> None:
+        """Forget everything: time has been reset."""
+        if self._buffer is not None:
+            self._buffer.clear()
+
+    def lookup(self, target: str, source: str):
+        """Return the latest transform from ``source`` to ``target`` coordinates.
+
+        Returns
+        -------
+        geometry_msgs/TransformStamped
+            The pose of frame ``source`` in frame ``target``, with its own stamp.
+
+        Raises
+        ------
+        TransformError
+            A frame is unknown, or the two are not connected.
+        """
+        try:
+            return self._buffer.lookup_transform_core(target, source, _LATEST)
+        except tf2_ros.TransformException as error:
+            raise TransformError(str(error)) from None
+
+    def _hear(self, message):
+        self._store(message, self._buffer.set_transform)
+
+    def _hear_static(self, message):
+        self._store(message, self._buffer.set_transform_static)
+
+    def _store(self, message, store):
+        for transform in message.transforms:
+            if is_finite(transform.transform):
+                store(transform, "tf")
+            else:
+                self._warn(
+                    f"ignoring a transform {transform.header.frame_id} -> "
+                    f"{transform.child_frame_id} that is not finite"
+                )

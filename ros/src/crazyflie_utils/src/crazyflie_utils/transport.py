@@ -1,0 +1,63 @@
+"""What a process needs of the world outside it.
+
+`RosTransport` is rospy; `FakeTransport` is a unit test. Everything else about a
+`NodeHandle` is the same for both.
+"""
+
+from abc import ABC, abstractmethod
+
+
+class ServiceError(Exception):
+    """A service refused or failed; the text tells the caller why."""
+
+
+class Outlet(ABC):
+    """The way out of the process for one topic."""
+
+    @abstractmethod
+    def is_heard(self) -> bool:
+        """Tell whether anyone outside this process listens."""
+
+    @abstractmethod
+    def publish(self, message) -> None:
+        """Send a message to those outside."""
+
+
+class Transport(ABC):
+    """Parameters, topics, services, logging and life time, by absolute names."""
+
+    @abstractmethod
+    def remap(self, name: str) -> str:
+        """Return the name that the launch file puts in the place of ``name``."""
+
+    @abstractmethod
+    def get_param(self, name: str):
+        """Return the raw value of a parameter; KeyError when it is not set."""
+
+    @abstractmethod
+    def advertise(self, topic: str, message_type: type, latch: bool) -> Outlet:
+        """Announce a topic to those outside."""
+
+    @abstractmethod
+    def subscribe(self, topic: str, message_type: type, deliver) -> None:
+        """Have ``deliver(message)`` called with what those outside publish."""
+
+    @abstractmethod
+    def advertise_service(self, name: str, service_type: type, begin, settle) -> None:
+        """Answer calls of a service with ``settle(begin(request))``.
+
+        ``begin`` returns a response or a Future of one, at once; ``settle`` waits for
+        it. Both may raise `ServiceError`.
+        """
+
+    @abstractmethod
+    def log(self, level: str, text: str) -> None:
+        """Log at ``level``: debug, info, warn, error or fatal."""
+
+    @abstractmethod
+    def clock_was_set(self, stamp) -> None:
+        """Take note that this process, which publishes /clock, moved to ``stamp``."""
+
+    @abstractmethod
+    def is_shutdown(self) -> bool:
+        """Tell whether the process is ending."""

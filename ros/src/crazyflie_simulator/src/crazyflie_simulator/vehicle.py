@@ -1,0 +1,97 @@
+"""A vehicle that is simulated in fixed steps, whatever calls for its state and when."""
+
+import math
+
+import numpy as np
+
+from crazyflie_simulator.dynamics import Dynamics
+from crazyflie_simulator.integrators import rk4_step
+from crazyflie_utils.held import HOLD_LIMIT
+
+STEP = 0.001
+"""Integration step, s."""
+
+OFF_LIMIT = 2.0
+"""The firmware stops its motors when it has had no setpoint for this long, s."""
+
+_OFF = np.zeros(4)
+
+
+class Vehicle:
+    """One simulated vehicle.
+
+    It stays put until the first control. When controls stop coming it does what
+    the firmware does: after `HOLD_LIMIT` it levels out with the thrust it has,
+    after `OFF_LIMIT` its motors stop.
+
+    Two vehicles that are given the same controls at the same times fly the
+    same, to the last bit, however often `advance_to` is called.
+
+    Parameters
+    ----------
+    dynamics : Dynamics
+    position : array_like, shape (3,)
+        Where it stands at the beginning, m, fixed frame.
+    time : float
+        Its time at the beginning, s.
+    """
+
+    def __init__(self, dynamics: Dynamics, position, time: float):
+        self._dynamics = dynamics
+        self._x = dynamics.initial_state(np.asarray(position, dtype=float))
+        self._u = np.zeros(dynamics.u_dim)
+        self._start = time
+        self._steps = 0
+        self._control_step = None
+
+    @property
+    def time(self) -> float:
+        """Time of the state, s: a whole number of steps after the beginning."""
+        return self._start + self._steps * STEP
+
+    @property
+    def state(self) -> np.ndarray:
+        """State of the dynamics, shape (x_dim,)."""
+        return self._x
+
+    @property
+    def pose(self) -> tuple:
+        """Position (3,) in m and quaternion (x, y, z, w) in the fixed frame."""
+        return self._dynamics.pose(self._x, self._effective_control())
+
+    def command(self, u) -> None:
+        """Take a control, shape (u_dim,), from the present step on."""
+        self._u = np.asarray(u, dtype=float)
+        self._control_step = self._steps
+
+    def advance_to(self, time: float) -> None:
+        """Integrate to the last whole step before ``time`` (s).
+
+        A ``time`` in the past counts as a reset of the clock: the vehicle goes
+        on from there.
+        """
+        steps = math.floor((time - self.time) / STEP + 1e-6)
+        if steps < -1:
+            self._start, self._steps = time, 0
+            self._control_step = None if self._control_step is None else 0
+        elif self._control_step is None:
+            self._steps += max(steps, 0)
+        else:
+            for _ in range(steps):
+                self._step()
+
+    def _step(self):
+        u = self._effective_control()
+        x = rk4_step(self._dynamics.derivative, self.time, self._x, u, STEP)
+        self._x = self._dynamics.on_ground(x)
+        self._steps += 1
+
+    def _effective_control(self):
+        if self._control_step is None:
+            return self._u
+        age = (self._steps - self._control_step) * STEP
+        if age < HOLD_LIMIT:
+            return self._u
+        if age < OFF_LIMIT:
+            return np.array([0.0, 0.0, 0.0, self._u[3]])
+        return _OFF

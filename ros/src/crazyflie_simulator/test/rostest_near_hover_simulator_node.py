@@ -1,0 +1,41 @@
+"""The simulator in a process of its own, on a real master."""
+
+import queue
+
+import pytest
+import rospy
+import tf2_ros
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_msgs.msg import Control, ControlStamped
+
+LIMIT = 10.0
+
+
+@pytest.fixture
+def transforms():
+    """Return a queue of what the simulator broadcasts."""
+    received = queue.Queue()
+    subscriber = rospy.Subscriber("/tf", TFMessage, received.put)
+    yield received
+    subscriber.unregister()
+
+
+def test_climbs_when_it_is_told_to(transforms):
+    assert transforms.get(timeout=LIMIT).transforms[0].transform.translation.z == 0.0
+    publisher = rospy.Publisher("/control/final", ControlStamped, queue_size=1)
+    for _ in range(1000):
+        publisher.publish(ControlStamped(control=Control(thrust=12.0)))
+        transform = transforms.get(timeout=LIMIT).transforms[0]
+        if transform.transform.translation.z > 0.2:
+            break
+    assert transform.transform.translation.z > 0.2
+    assert transform.transform.translation.x == 0.5
+
+
+def test_tf2_knows_the_vehicle():
+    buffer = tf2_ros.Buffer()
+    listener = tf2_ros.TransformListener(buffer)
+    transform = buffer.lookup_transform("world", "crazyflie", rospy.Time(), rospy.Duration(LIMIT))
+    assert transform.header.stamp.to_sec() == pytest.approx(rospy.get_time(), abs=LIMIT)
+    listener.unregister()

@@ -1,9 +1,10 @@
 """A process without ROS, for unit tests: parameters in a dict, time by hand."""
 
 import math
+from concurrent.futures import Future
 
 from crazyflie_utils.process import Process
-from crazyflie_utils.transport import Outlet, Transport
+from crazyflie_utils.transport import Outlet, ServiceError, Transport
 
 
 class _Record(Outlet):
@@ -46,6 +47,21 @@ class FakeTransport(Transport):
     def advertise_service(self, name, service_type, begin, settle):
         """Keep ``begin`` for `FakeProcess.call`."""
         self.services[name] = begin
+
+    def call_service(self, name, service_type, request, limit):
+        """Call a service of this process; fail when there is none."""
+        future = Future()
+        try:
+            outcome = self.services[name](request)
+        except KeyError:
+            future.set_exception(ServiceError(f"there is no service {name}"))
+        except ServiceError as error:
+            future.set_exception(error)
+        else:
+            if isinstance(outcome, Future):
+                return outcome
+            future.set_result(outcome)
+        return future
 
     def log(self, level, text):
         """Keep the record."""

@@ -123,6 +123,20 @@ class NodeHandle:
             self.resolve(name), service_type, partial(self._begin, callback), self._settle
         )
 
+    def call_service(self, name: str, service_type: type, request, limit: float) -> Future:
+        """Call a service of any process, without waiting for it.
+
+        Returns
+        -------
+        concurrent.futures.Future
+            Of the response; or of a `ServiceError` when the service refuses, is
+            not there, or has not answered after ``limit`` seconds of the
+            machine's clock.
+        """
+        return self._process.transport.call_service(
+            self.resolve(name), service_type, request, limit
+        )
+
     def _begin(self, callback, request):
         answer = Future()
 

@@ -1,5 +1,8 @@
 """The world outside a process, as rospy shows it."""
 
+import threading
+from concurrent.futures import Future
+
 import rospy
 
 from crazyflie_utils.transport import Outlet, ServiceError, Transport
@@ -53,6 +56,20 @@ class RosTransport(Transport):
 
         rospy.Service(name, service_type, serve)
 
+    def call_service(self, name, service_type, request, limit):
+        """Call in a thread of its own, and give up on it after ``limit``."""
+        future = Future()
+        threading.Thread(
+            target=_call, args=(name, service_type, request, limit, future), daemon=True
+        ).start()
+        timer = threading.Timer(
+            limit, _fail, (future, f"{name} has not answered within {limit:g} s")
+        )
+        timer.daemon = True
+        timer.start()
+        future.add_done_callback(lambda _: timer.cancel())
+        return future
+
     def log(self, level, text):
         """Log to the screen, the node's log file and /rosout."""
         _LOGGERS[level](text)
@@ -73,6 +90,22 @@ _LOGGERS = {
     "error": rospy.logerr,
     "fatal": rospy.logfatal,
 }
+
+
+def _call(name, service_type, request, limit, future):
+    try:
+        rospy.wait_for_service(name, timeout=limit)
+        response = rospy.ServiceProxy(name, service_type)(request)
+    except rospy.ROSException as error:
+        _fail(future, str(error))
+    else:
+        if not future.done():
+            future.set_result(response)
+
+
+def _fail(future, text):
+    if not future.done():
+        future.set_exception(ServiceError(text))
 
 
 def _never_connect_to_oneself():

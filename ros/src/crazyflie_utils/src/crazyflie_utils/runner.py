@@ -27,7 +27,7 @@ def run(node_class: type, default_name: str) -> None:
     default_name : str
         Name of the node unless the launch file gives another.
     """
-    process = _begin(default_name)
+    process = begin(default_name)
     _run(process, {rospy.get_name(): node_class()})
 
 
@@ -38,7 +38,7 @@ def run_composed(default_name: str) -> None:
     class as "package.module:Class". Each node has the parameters, topics and
     services it would have in a process of its own.
     """
-    process = _begin(default_name)
+    process = begin(default_name)
     handle = process.handle(rospy.get_name())
     try:
         classes = handle.param("nodes", NodeClasses())
@@ -81,9 +81,18 @@ def _import_class(path):
         raise ValueError(f"no class {path!r}: {error}") from error
 
 
-def _begin(default_name):
+def begin(default_name: str) -> Process:
+    """Make this process a ROS node and return what its nodes share, not yet started.
+
+    Exits with status 1 when there is no ROS master.
+    """
     _wait_for_master()
     rospy.init_node(default_name)
+    return ros_process()
+
+
+def ros_process() -> Process:
+    """Return what the nodes of this process share, when it is a ROS node already."""
     transport = RosTransport()
     try:
         use_sim_time = BOOLEAN(transport.get_param("/use_sim_time"))

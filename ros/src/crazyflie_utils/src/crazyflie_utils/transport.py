@@ -5,6 +5,7 @@
 """
 
 from abc import ABC, abstractmethod
+from concurrent.futures import Future
 
 
 class ServiceError(Exception):
@@ -49,6 +50,10 @@ class Transport(ABC):
         ``begin`` returns a response or a Future of one, at once; ``settle`` waits for
         it. Both may raise `ServiceError`.
         """
+
+    @abstractmethod
+    def call_service(self, name: str, service_type: type, request, limit: float) -> Future:
+        """Call a service and return at once; see `NodeHandle.call_service`."""
 
     @abstractmethod
     def log(self, level: str, text: str) -> None:

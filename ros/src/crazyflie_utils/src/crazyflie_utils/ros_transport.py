@@ -1,7 +1,8 @@
 """The world outside a process, as rospy shows it."""
 
+import contextlib
 import threading
-from concurrent.futures import Future
+from concurrent.futures import Future, InvalidStateError
 
 import rospy
 
@@ -96,15 +97,16 @@ def _call(name, service_type, request, limit, future):
     try:
         rospy.wait_for_service(name, timeout=limit)
         response = rospy.ServiceProxy(name, service_type)(request)
-    except rospy.ROSException as error:
+    except (rospy.ROSException, rospy.ServiceException) as error:
         _fail(future, str(error))
     else:
-        if not future.done():
+        with contextlib.suppress(InvalidStateError):
             future.set_result(response)
 
 
 def _fail(future, text):
-    if not future.done():
+    # The answer and the limit may come at the same moment; the first one counts.
+    with contextlib.suppress(InvalidStateError):
         future.set_exception(ServiceError(text))
 
 

@@ -1,0 +1,71 @@
+"""A picture of a flight: height, position error and controls over time."""
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from crazyflie_examples.flight_record import FlightRecord
+
+
+def save(record: FlightRecord, point, path: Path) -> None:
+    """Draw a flight into a file.
+
+    Parameters
+    ----------
+    record : FlightRecord
+    point : array_like, shape (3,)
+        Hover point, m.
+    path : Path
+        PNG file.
+    """
+    start = record.events["takeoff"]
+    figure, (height, error, tilt, thrust) = plt.subplots(
+        4, 1, figsize=(9, 10), sharex=True, layout="constrained"
+    )
+    times = record.state.times - start
+    height.plot(times, record.state.column("z"), label="height")
+    if len(record.reference):
+        height.step(
+            np.append(record.reference.times - start, times[-1]),
+            np.append(record.reference.column("z"), record.reference.column("z")[-1]),
+            where="post",
+            linestyle="--",
+            label="reference",
+        )
+    height.set_ylabel("z (m)")
+    height.legend(loc="upper right")
+
+    error.semilogy(times, np.maximum(record.position_error(point), 1e-6))
+    error.set_ylabel("distance from\nhover point (m)")
+
+    control_times = record.final_control.times - start
+    for name in ("roll", "pitch"):
+        tilt.plot(control_times, np.degrees(record.final_control.column(name)), label=name)
+    tilt.plot(
+        control_times, np.degrees(record.final_control.column("yaw_dot")), label="yaw rate (deg/s)"
+    )
+    tilt.set_ylabel("attitude (deg)")
+    tilt.legend(loc="upper right")
+
+    thrust.plot(control_times, record.final_control.column("thrust"))
+    thrust.set_ylabel("thrust (m/s²)")
+    thrust.set_xlabel("time after /takeoff (s)")
+
+    for axes in (height, error, tilt, thrust):
+        axes.grid(alpha=0.3)
+        for name, moment in record.events.items():
+            axes.axvline(moment - start, color="gray", linewidth=0.8, linestyle=":")
+            if axes is height:
+                axes.annotate(
+                    name,
+                    (moment - start, 1.0),
+                    xycoords=("data", "axes fraction"),
+                    rotation=90,
+                    va="top",
+                    ha="right",
+                    fontsize=8,
+                    color="gray",
+                )
+    figure.savefig(path, dpi=110)
+    plt.close(figure)

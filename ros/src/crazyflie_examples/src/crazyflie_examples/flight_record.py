@@ -1,0 +1,177 @@
+"""What happened in a flight, and figures to judge it by."""
+
+import csv
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+STATE_FIELDS = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
+CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
+
+GROUND_TOLERANCE = 0.01
+"""A vehicle below this height stands on the ground, m."""
+
+
+class Series:
+    """Rows of numbers with the times they belong to, growing.
+
+    Parameters
+    ----------
+    fields : tuple of str
+        Names of the columns.
+    """
+
+    def __init__(self, fields: tuple):
+        self.fields = fields
+        self._times = []
+        self._rows = []
+
+    def append(self, time: float, row) -> None:
+        """Add a row, shape (len(fields),), at ``time`` (s)."""
+        self._times.append(time)
+        self._rows.append(row)
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times, s, shape (n,)."""
+        return np.array(self._times, dtype=float)
+
+    @property
+    def values(self) -> np.ndarray:
+        """Rows, shape (n, len(fields))."""
+        return np.array(self._rows, dtype=float).reshape(-1, len(self.fields))
+
+    def column(self, name: str) -> np.ndarray:
+        """Return one column, shape (n,)."""
+        return self.values[:, self.fields.index(name)]
+
+    def between(self, start: float, end: float) -> np.ndarray:
+        """Return the rows with start <= time <= end (s), shape (m, len(fields))."""
+        times = self.times
+        return self.values[(times >= start) & (times <= end)]
+
+    @property
+    def last_time(self) -> float:
+        """Time of the newest row, s."""
+        return self._times[-1]
+
+    @property
+    def last(self):
+        """The newest row."""
+        return self._rows[-1]
+
+
+@dataclass
+class FlightRecord:
+    """Everything that was said about one flight; times in s of ROS time.
+
+    Attributes
+    ----------
+    state, final_control, takeoff_control, reference : Series
+        What was published on these topics.
+    toggles : list of float
+        When in_flight was toggled.
+    order : list of str
+        Names of the above in the order in which their messages came.
+    events : dict
+        When something was done: "takeoff" and "land" (called), "flying" and
+        "landed" (answered).
+    """
+
+    state: Series = field(default_factory=lambda: Series(STATE_FIELDS))
+    final_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
+    takeoff_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
+    reference: Series = field(default_factory=lambda: Series(STATE_FIELDS[:6]))
+    toggles: list = field(default_factory=list)
+    order: list = field(default_factory=list)
+    events: dict = field(default_factory=dict)
+
+    def position_error(self, point) -> np.ndarray:
+        """Return the distance of every recorded state from a point (m), shape (n,)."""
+        return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
+
+    def time_to_hover(self, point, tolerance: float) -> float:
+        """Return how long after the call of /takeoff the vehicle was at a point to stay.
+
+        Parameters
+        ----------
+        point : array_like, shape (3,)
+            m.
+        tolerance : float
+            Largest distance from the point until /land is called, m.
+
+        Returns
+        -------
+        float
+            s; infinity when it never stayed.
+        """
+        times, errors = self._until_landing(point)
+        outside = np.flatnonzero(errors > tolerance)
+        first = outside[-1] + 1 if outside.size else 0
+        if first >= times.size:
+            return float("inf")
+        return float(times[first] - self.events["takeoff"])
+
+    def overshoot(self, height: float) -> float:
+        """Return by how much the vehicle rose above the hover height (m), at least 0."""
+        return max(0.0, float(self.state.column("z").max()) - height)
+
+    def hover_error(self, point, duration: float) -> tuple:
+        """Return mean and maximum distance (m) from a point before /land was called.
+
+        Parameters
+        ----------
+        point : array_like, shape (3,)
+            m.
+        duration : float
+            How long before, s.
+
+        Raises
+        ------
+        ValueError
+            No state was recorded in that time.
+        """
+        times, errors = self._until_landing(point)
+        errors = errors[times >= self.events["land"] - duration]
+        if not errors.size:
+            raise ValueError("no state was recorded during the hover")
+        return float(errors.mean()), float(errors.max())
+
+    def touchdown_speed(self) -> float:
+        """Return the downward speed at which the vehicle met the ground (m/s).
+
+        The fastest of the last tenth of a second above `GROUND_TOLERANCE`.
+
+        Raises
+        ------
+        ValueError
+            It did not come down.
+        """
+        times, heights = self.state.times, self.state.column("z")
+        descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))
+        if not descending.size or descending[-1] == len(times) - 1:
+            raise ValueError("the vehicle did not reach the ground")
+        contact = times[descending[-1] + 1]
+        window = (times >= contact - 0.1) & (times <= contact)
+        return float(max(0.0, -self.state.column("z_dot")[window].min()))
+
+    def save_csv(self, path: Path) -> None:
+        """Write state and control, one row for every state, times from the call of /takeoff."""
+        control_times = self.final_control.times
+        controls = self.final_control.values
+        with path.open("w", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["time", *STATE_FIELDS, *CONTROL_FIELDS])
+            for time, state in zip(self.state.times, self.state.values, strict=True):
+                index = int(np.searchsorted(control_times, time, side="right")) - 1
+                control = controls[index] if index >= 0 else [np.nan] * len(CONTROL_FIELDS)
+                writer.writerow([f"{time - self.events['takeoff']:.3f}", *state, *control])
+
+    def _until_landing(self, point):
+        times = self.state.times
+        flight = (times >= self.events["takeoff"]) & (times <= self.events["land"])
+        return times[flight], self.position_error(point)[flight]

@@ -1,0 +1,80 @@
+"""Flies the hover example through its services, and records the flight."""
+
+import time
+
+from std_srvs.srv import Empty, EmptyRequest
+
+from crazyflie_examples.flight_record import FlightRecord
+from crazyflie_examples.flight_recorder_node import FlightRecorderNode
+from crazyflie_utils.transport import ServiceError
+
+
+class FlightError(Exception):
+    """The flight could not be flown; the text says what went wrong."""
+
+
+class Pilot:
+    """Takes off, hovers and lands.
+
+    Parameters
+    ----------
+    process : crazyflie_utils.process.Process
+        Not started yet; the pilot starts it.
+    takeoff, land : str
+        Names of the services.
+    limit : float
+        The longest that anything may take, s of the machine's clock.
+    """
+
+    def __init__(
+        self, process, takeoff: str = "/takeoff", land: str = "/land", limit: float = 60.0
+    ):
+        self._handle = process.handle("/flight_recorder")
+        self._takeoff = takeoff
+        self._land = land
+        self._limit = limit
+        self._recorder = FlightRecorderNode()
+        if not self._recorder.initialize(self._handle):
+            raise FlightError("the flight recorder could not be started; see the log")
+        process.start()
+
+    @property
+    def record(self) -> FlightRecord:
+        """What has been recorded so far."""
+        return self._recorder.record
+
+    def wait_until_ready(self) -> None:
+        """Wait for the first state and for the ground's zero thrust."""
+        self._wait_for(lambda: len(self.record.state), "no state was published")
+        self._wait_for(lambda: len(self.record.final_control), "no control was published")
+
+    def takeoff(self) -> None:
+        """Call /takeoff and wait for its answer."""
+        self._call(self._takeoff, "takeoff", "flying")
+
+    def hover(self, duration: float) -> None:
+        """Let ``duration`` seconds of flight pass."""
+        end = self.record.state.last_time + duration
+        self._wait_for(lambda: self.record.state.last_time >= end, "states stopped coming")
+
+    def land(self) -> None:
+        """Call /land and wait for its answer, and for what the vehicle does then."""
+        self._call(self._land, "land", "landed")
+        self.hover(0.5)
+
+    def _call(self, service, called, answered):
+        called_at = self.record.state.last_time
+        future = self._handle.call_service(service, Empty, EmptyRequest(), self._limit)
+        try:
+            future.result()
+        except ServiceError as error:
+            raise FlightError(str(error)) from None
+        self.record.events[called] = called_at
+        self.record.events[answered] = self.record.state.last_time
+
+    def _wait_for(self, condition, complaint):
+        deadline = time.monotonic() + self._limit
+        with self._recorder.heard:
+            while not condition():
+                if not self._recorder.heard.wait(deadline - time.monotonic()):
+                    raise FlightError(f"{complaint} for {self._limit:g} s")

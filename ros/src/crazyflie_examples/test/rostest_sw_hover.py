@@ -1,0 +1,87 @@
+"""A whole flight of the software example, from takeoff to landing."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from crazyflie_examples.flight_report import FlightReport
+from crazyflie_examples.pilot import FlightError, Pilot
+from crazyflie_utils.runner import ros_process
+from crazyflie_utils.units import GRAVITY
+
+HOVER = (0.0, 0.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    """Fly once; every test looks at the record and at how calls were refused."""
+    process = ros_process()
+    pilot = Pilot(process)
+    pilot.wait_until_ready()
+    refusals = [refusal(pilot.land)]
+    pilot.takeoff()
+    refusals.append(refusal(pilot.takeoff))
+    pilot.hover(6.0)
+    pilot.land()
+    refusals.append(refusal(pilot.land))
+    yield pilot.record, refusals
+    process.stop()
+
+
+@pytest.fixture
+def record(flight):
+    """Return what was recorded."""
+    return flight[0]
+
+
+def refusal(call):
+    """Return why a call was refused."""
+    with pytest.raises(FlightError) as error:
+        call()
+    return str(error.value)
+
+
+def test_is_a_good_flight(record):
+    assert FlightReport.of(record, HOVER).complaints() == []
+
+
+def test_calls_out_of_place_are_refused(flight):
+    land_on_ground, takeoff_in_flight, land_again = flight[1]
+    assert "ground" in land_on_ground
+    assert "fl" in takeoff_in_flight
+    assert "ground" in land_again
+
+
+def test_topics_speak_in_order(record):
+    names = [name for name in record.order if name in ("takeoff_control", "reference", "toggles")]
+    order = [name for name, _ in itertools.groupby(names)]
+    assert order[:4] == ["takeoff_control", "reference", "toggles", "reference"]
+    # The second toggle and the first control of the ramp leave together.
+    assert set(order[4:]) == {"toggles", "takeoff_control"}
+    assert order[-1] == "takeoff_control"
+    assert len(record.toggles) == 2
+
+
+def test_no_zero_thrust_from_takeoff_to_landing(record):
+    events = record.events
+    thrusts = record.takeoff_control.between(events["takeoff"] + 0.2, events["flying"])[:, 3]
+    assert thrusts.size > 50
+    np.testing.assert_allclose(thrusts, GRAVITY + 0.2)
+    assert record.takeoff_control.between(events["flying"] + 0.2, events["land"]).size == 0
+
+
+def test_thrust_ramps_down_after_the_descent(record):
+    thrusts = record.takeoff_control.between(record.events["land"], record.state.last_time)[:, 3]
+    ramp = thrusts[thrusts > 0.0]
+    assert ramp.size > 50
+    assert np.all(np.diff(ramp) < 0.0)
+    assert ramp[0] == pytest.approx(GRAVITY, abs=0.2)
+    assert ramp[-1] == pytest.approx(GRAVITY - 5.0, abs=0.2)
+    assert thrusts[-1] == 0.0
+
+
+def test_lands_by_reference(record):
+    heights = record.reference.between(record.events["land"], record.events["landed"])[:, 2]
+    assert heights.size > 50
+    assert np.all(np.diff(heights) <= 0.0)

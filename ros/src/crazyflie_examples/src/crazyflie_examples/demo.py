@@ -13,9 +13,9 @@ import matplotlib
 
 matplotlib.use("Agg")
 
-from crazyflie_examples import flight_plot, flight_report  # noqa: E402
-from crazyflie_examples.pilot import FlightError, Pilot  # noqa: E402
-from crazyflie_utils import runner  # noqa: E402
+from crazyflie_examples import flight_plot, flight_report
+from crazyflie_examples.pilot import FlightError, Pilot
+from crazyflie_utils import runner
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0

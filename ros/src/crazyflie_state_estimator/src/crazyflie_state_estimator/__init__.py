@@ -1,0 +1,1 @@
+"""From poses on /tf to states: positions, velocities, attitudes and their rates."""

@@ -1,0 +1,52 @@
+"""Filters that find the rate at which a sampled signal changes."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+
+class RateFilter(ABC):
+    """Signal and rate of n independent axes, from samples of the signal."""
+
+    @abstractmethod
+    def start(self, value: np.ndarray) -> None:
+        """Forget everything and take the first sample, shape (n,)."""
+
+    @abstractmethod
+    def step(self, dt: float, value: np.ndarray) -> tuple:
+        """Take the next sample.
+
+        Parameters
+        ----------
+        dt : float
+            Time since the last sample, s, positive.
+        value : ndarray, shape (n,)
+
+        Returns
+        -------
+        value, rate : ndarray, shape (n,)
+            The signal at the time of the sample and its rate, in units of the
+            signal and units per second.
+        """
+
+
+class FiniteDifference(RateFilter):
+    """The signal as it is sampled, and the difference quotient of its last two samples.
+
+    The quotient is exact for linear signals; otherwise it is the rate half a
+    period ago, up to second order. Independent noise of standard deviation s on
+    the samples becomes sqrt(2) s / dt on the rate.
+    """
+
+    def __init__(self):
+        self._value = None
+
+    def start(self, value: np.ndarray) -> None:
+        """See `RateFilter.start`."""
+        self._value = value
+
+    def step(self, dt: float, value: np.ndarray) -> tuple:
+        """See `RateFilter.step`."""
+        rate = (value - self._value) / dt
+        self._value = value
+        return value, rate

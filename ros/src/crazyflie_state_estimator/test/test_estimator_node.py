@@ -1,0 +1,153 @@
+"""The estimator nodes on a fake process."""
+
+import math
+
+import pytest
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_state_estimator.estimator_node import PositionVelocityYawStateEstimatorNode
+from crazyflie_utils.angles import quaternion_from_rpy
+from crazyflie_utils.fake import FakeProcess
+
+PARAMETERS = {
+    "x_dim": 7,
+    "time_step": 0.01,
+    "frames/fixed": "world",
+    "frames/robot": "crazyflie",
+    "topics/state": "/state",
+}
+
+
+def launch(**changes):
+    """Return a process with an estimator in it."""
+    process = FakeProcess()
+    node = PositionVelocityYawStateEstimatorNode()
+    assert process.launch(node, "/state_estimator", {**PARAMETERS, **changes})
+    return process
+
+
+def transform(process, position=(0.0, 0.0, 0.0), attitude=(0.0, 0.0, 0.0), frame="crazyflie"):
+    """Return a transform that is stamped now."""
+    message = TransformStamped(child_frame_id=frame)
+    message.header.frame_id = "world"
+    message.header.stamp = process.clock.stamp()
+    message.transform.translation = Vector3(*position)
+    message.transform.rotation = Quaternion(*quaternion_from_rpy(*attitude))
+    return message
+
+
+def fly(process, position, duration, period=0.01):
+    """Broadcast ``position(elapsed)`` every period, each followed by a tick of the node."""
+    for k in range(round(duration / period)):
+        pose = transform(process, *position(k * period))
+        process.publish("/tf", TFMessage([pose]))
+        process.advance(period)
+
+
+def moving(elapsed):
+    return (1.0 + elapsed, -2.0 * elapsed, 0.5 * elapsed), (0.1, -0.2, 3.0 + elapsed)
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_every_parameter_is_required(name):
+    process = FakeProcess()
+    parameters = {key: value for key, value in PARAMETERS.items() if key != name}
+    node = PositionVelocityYawStateEstimatorNode()
+    assert not process.launch(node, "/state_estimator", parameters)
+    assert f"/state_estimator/{name} is not set" in process.logged("error")[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("x_dim", 6),
+        ("x_dim", "seven"),
+        ("time_step", 0.0),
+        ("time_step", -0.01),
+        ("time_step", math.nan),
+        ("frames/fixed", ""),
+        ("frames/robot", 1),
+        ("topics/state", "/st ate"),
+    ],
+)
+def test_bad_parameters_are_named(name, value):
+    process = FakeProcess()
+    node = PositionVelocityYawStateEstimatorNode()
+    assert not process.launch(node, "/state_estimator", {**PARAMETERS, name: value})
+    assert f"/state_estimator/{name} is" in process.logged("error")[0]
+    assert "expected" in process.logged("error")[0]
+
+
+def test_publishes_the_state_with_the_transforms_stamp_and_frame():
+    process = launch()
+    start = process.clock.time()
+    fly(process, moving, 1.0)
+    messages = process.published("/state")
+    assert [message.header.stamp.to_sec() for message in messages] == pytest.approx(
+        [start + 0.01 * k for k in range(1, 100)]
+    )
+    assert {message.header.frame_id for message in messages} == {"world"}
+    state = messages[-1].state
+    assert (state.x, state.y, state.z) == pytest.approx((1.99, -1.98, 0.495))
+    assert (state.x_dot, state.y_dot, state.z_dot) == pytest.approx((1.0, -2.0, 0.5))
+    assert state.yaw == pytest.approx(3.99 - 2.0 * math.pi)
+
+
+def test_stamps_count_not_the_moments_of_reading():
+    process = launch(time_step=0.013)
+    fly(process, moving, 1.0, period=0.003)
+    speeds = [message.state.x_dot for message in process.published("/state")]
+    assert len(speeds) == 75
+    assert speeds == pytest.approx([1.0] * 75)
+
+
+def test_a_transform_that_repeats_gives_no_state():
+    process = launch()
+    fly(process, moving, 0.1, period=0.05)
+    process.advance(0.3)
+    assert len(process.published("/state")) == 1
+    assert process.published("/state")[0].state.x_dot == pytest.approx(1.0)
+    assert process.logged("warn") == []
+
+
+def test_transforms_that_stop_are_reported():
+    process = launch()
+    fly(process, moving, 0.1)
+    process.advance(2.0)
+    assert len(process.published("/state")) == 9
+    (warning,) = process.logged("warn")
+    assert "world -> crazyflie" in warning
+
+
+def test_a_frame_that_never_appears_is_reported_by_name():
+    process = launch()
+    process.publish("/tf", TFMessage([transform(process, frame="another")]))
+    process.advance(2.0)
+    assert process.published("/state") == []
+    (warning,) = process.logged("warn")
+    assert "world -> crazyflie" in warning
+
+
+def test_bad_transforms_are_passed_over():
+    process = launch()
+    fly(process, moving, 0.1)
+    bad = transform(process, position=(math.nan, 0.0, 0.0))
+    unturned = transform(process)
+    unturned.transform.rotation = Quaternion(0.0, 0.0, 0.0, 0.0)
+    process.publish("/tf", TFMessage([bad, unturned]))
+    process.advance(0.1)
+    assert len(process.published("/state")) == 9
+    assert process.logged("error") == []
+
+
+@pytest.mark.parametrize("flown", [0.01, 0.1])
+def test_begins_anew_when_time_is_reset(flown):
+    process = launch()
+    fly(process, lambda elapsed: ((50.0, 0.0, 0.0), (0.0, 0.0, 0.0)), flown)
+    process.clock.set(1.0)
+    before = len(process.published("/state"))
+    fly(process, moving, 0.02)
+    (message,) = process.published("/state")[before:]
+    assert message.header.stamp.to_sec() == pytest.approx(1.01)
+    assert message.state.x_dot == pytest.approx(1.0)

@@ -9,14 +9,20 @@ import rospy
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    FullStateStamped,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.vectors import to_vector
 
 PERIOD = 0.01
 STAMP_ERROR = 200e-9  # tf2's Python buffer keeps stamps as float seconds
 MESSAGE_TYPES = {
+    6: PositionVelocityStateStamped,
     7: PositionVelocityYawStateStamped,
+    12: FullStateStamped,
 }
 SIGNALS = ("x", "y", "z", "roll", "pitch", "yaw")
 START = np.array([1.0, 2.0, 3.0, 0.1, -0.2, 3.1])

@@ -6,9 +6,14 @@ import pytest
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_state_estimator.estimator_node import PositionVelocityYawStateEstimatorNode
+from crazyflie_state_estimator.estimator_node import (
+    FullStateEstimatorNode,
+    PositionVelocityStateEstimatorNode,
+    PositionVelocityYawStateEstimatorNode,
+)
 from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.vectors import to_vector
 
 PARAMETERS = {
     "x_dim": 7,
@@ -19,11 +24,10 @@ PARAMETERS = {
 }
 
 
-def launch(**changes):
+def launch(node_class=PositionVelocityYawStateEstimatorNode, **changes):
     """Return a process with an estimator in it."""
     process = FakeProcess()
-    node = PositionVelocityYawStateEstimatorNode()
-    assert process.launch(node, "/state_estimator", {**PARAMETERS, **changes})
+    assert process.launch(node_class(), "/state_estimator", {**PARAMETERS, **changes})
     return process
 
 
@@ -92,6 +96,44 @@ def test_publishes_the_state_with_the_transforms_stamp_and_frame():
     assert (state.x, state.y, state.z) == pytest.approx((1.99, -1.98, 0.495))
     assert (state.x_dot, state.y_dot, state.z_dot) == pytest.approx((1.0, -2.0, 0.5))
     assert state.yaw == pytest.approx(3.99 - 2.0 * math.pi)
+
+
+@pytest.mark.parametrize(
+    ("node_class", "fields"),
+    [
+        (PositionVelocityStateEstimatorNode, "x y z x_dot y_dot z_dot"),
+        (PositionVelocityYawStateEstimatorNode, "x y z x_dot y_dot z_dot yaw"),
+        (
+            FullStateEstimatorNode,
+            "x y z x_dot y_dot z_dot roll pitch yaw roll_dot pitch_dot yaw_dot",
+        ),
+    ],
+)
+def test_each_node_fills_every_field_of_its_state(node_class, fields):
+    rates = {"x": 0.5, "y": -1.0, "z": 0.25, "roll": 0.3, "pitch": -0.2, "yaw": 1.5}
+
+    def signals(elapsed):
+        values = [rate * elapsed for rate in rates.values()]
+        return values[:3], values[3:]
+
+    names = fields.split()
+    process = launch(node_class, x_dim=len(names))
+    fly(process, signals, 0.51)
+    state = process.published("/state")[-1].state
+    values = {name: 0.5 * rate for name, rate in rates.items()}
+    values |= {f"{name}_dot": rate for name, rate in rates.items()}
+    assert list(state.__slots__) == names
+    assert to_vector(state) == pytest.approx([values[name] for name in names])
+
+
+@pytest.mark.parametrize(
+    ("node_class", "x_dim"),
+    [(PositionVelocityStateEstimatorNode, 7), (FullStateEstimatorNode, 7)],
+)
+def test_each_node_has_its_own_x_dim(node_class, x_dim):
+    process = FakeProcess()
+    assert not process.launch(node_class(), "/state_estimator", {**PARAMETERS, "x_dim": x_dim})
+    assert "/state_estimator/x_dim is 7; expected the integer" in process.logged("error")[0]
 
 
 def test_stamps_count_not_the_moments_of_reading():

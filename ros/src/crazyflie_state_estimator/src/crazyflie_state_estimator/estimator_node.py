@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    FullState,
+    FullStateStamped,
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_state_estimator.motion import Motion, MotionEstimator
 from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils.angles import rpy_from_quaternion
@@ -99,6 +106,17 @@ class StateEstimatorNode(Node):
         )
 
 
+class PositionVelocityStateEstimatorNode(StateEstimatorNode):
+    """Publish x, y, z, x_dot, y_dot, z_dot."""
+
+    def __init__(self):
+        super().__init__(PositionVelocityStateStamped, PositionVelocityState)
+
+    def state(self, motion: Motion) -> np.ndarray:
+        """See `StateEstimatorNode.state`."""
+        return np.concatenate([motion.position, motion.velocity])
+
+
 class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
     """Publish x, y, z, x_dot, y_dot, z_dot, yaw."""
 
@@ -108,3 +126,14 @@ class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
     def state(self, motion: Motion) -> np.ndarray:
         """See `StateEstimatorNode.state`."""
         return np.concatenate([motion.position, motion.velocity, motion.attitude[2:]])
+
+
+class FullStateEstimatorNode(StateEstimatorNode):
+    """Publish position, velocity, attitude and the rates of the attitude's angles."""
+
+    def __init__(self):
+        super().__init__(FullStateStamped, FullState)
+
+    def state(self, motion: Motion) -> np.ndarray:
+        """See `StateEstimatorNode.state`."""
+        return np.concatenate(motion)

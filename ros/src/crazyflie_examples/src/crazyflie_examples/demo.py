@@ -1,70 +1,17 @@
 """Flies the software example from takeoff to landing and reports on the flight."""
 
 import argparse
-import contextlib
 import os
-import signal
-import socket
-import subprocess
 import sys
 from pathlib import Path
 
-import matplotlib
-
-matplotlib.use("Agg")
-
 from crazyflie_examples import flight_plot, flight_report
+from crazyflie_examples.launching import launched
 from crazyflie_examples.pilot import FlightError, Pilot
 from crazyflie_utils import runner
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0
-_END_LIMIT = 15.0
-
-
-def free_port() -> int:
-    """Return a TCP port of this machine that nobody listens on."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-@contextlib.contextmanager
-def launched(arguments: list, log: Path):
-    """Run roslaunch on a master of its own for the time of a with block.
-
-    Parameters
-    ----------
-    arguments : list of str
-        Package, launch file and its arguments.
-    log : Path
-        Receives what roslaunch and the nodes print.
-    """
-    port = free_port()
-    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
-    os.environ["ROS_IP"] = "127.0.0.1"
-    with log.open("w") as output:
-        process = subprocess.Popen(
-            ["roslaunch", "-p", str(port), *arguments],
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            start_new_session=True,
-        )
-        try:
-            yield process
-        finally:
-            _end(process)
-
-
-def _end(process):
-    for request in (signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-        if process.poll() is None:
-            os.killpg(process.pid, request)
-        try:
-            process.wait(_END_LIMIT)
-            return
-        except subprocess.TimeoutExpired:
-            continue
 
 
 def fly(folder: Path, launch_arguments: list) -> int:

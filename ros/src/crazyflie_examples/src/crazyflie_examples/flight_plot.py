@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.figure import Figure
 
 from crazyflie_examples.flight_record import FlightRecord
 
@@ -20,9 +20,8 @@ def save(record: FlightRecord, point, path: Path) -> None:
         PNG file.
     """
     start = record.events["takeoff"]
-    figure, (height, error, tilt, thrust) = plt.subplots(
-        4, 1, figsize=(9, 10), sharex=True, layout="constrained"
-    )
+    figure = Figure(figsize=(9, 10), layout="constrained")
+    height, error, tilt, thrust = figure.subplots(4, 1, sharex=True)
     times = record.state.times - start
     height.plot(times, record.state.column("z"), label="height")
     if len(record.reference):
@@ -68,4 +67,3 @@ def save(record: FlightRecord, point, path: Path) -> None:
                     color="gray",
                 )
     figure.savefig(path, dpi=110)
-    plt.close(figure)

@@ -1,0 +1,1 @@
+"""State feedback controllers of the Crazyflie, and the design of their gains."""

@@ -1,0 +1,164 @@
+"""Gain files: matrices as text.
+
+One row of the matrix a line, numbers separated by blanks; empty lines, and what
+follows a ``#``, are skipped.
+"""
+
+import math
+import os
+from dataclasses import dataclass
+
+import numpy as np
+
+from crazyflie_utils.parameters import TEXT
+
+
+class GainFileError(ValueError):
+    """A gain file is unusable; the text names the file, the line and the expected shape."""
+
+
+def load_matrix(path: str, rows: int, columns: int) -> np.ndarray:
+    """Return the matrix in a file.
+
+    Parameters
+    ----------
+    path : str
+    rows, columns : int
+        Shape that the matrix must have.
+
+    Returns
+    -------
+    ndarray, shape (rows, columns)
+
+    Raises
+    ------
+    GainFileError
+        The file cannot be read, or does not hold such a matrix of finite numbers.
+    """
+    expected = f"expected {rows} rows of {columns} numbers"
+    matrix = []
+    for number, row in _rows(path, expected):
+        if len(row) != columns:
+            raise GainFileError(f"{path}, line {number}: {_count(row)}, {expected}")
+        if len(matrix) == rows:
+            raise GainFileError(f"{path}, line {number}: row {rows + 1}, {expected}")
+        matrix.append(row)
+    if len(matrix) != rows:
+        last = number if matrix else 0
+        raise GainFileError(f"{path}: ends after {len(matrix)} rows (line {last}), {expected}")
+    return np.array(matrix)
+
+
+def load_vector(path: str, length: int) -> np.ndarray:
+    """Return the vector in a file, which may be one row or one column.
+
+    Parameters
+    ----------
+    path : str
+    length : int
+        Number of entries that the vector must have.
+
+    Returns
+    -------
+    ndarray, shape (length,)
+
+    Raises
+    ------
+    GainFileError
+        The file cannot be read, or does not hold such a vector of finite numbers.
+    """
+    expected = f"expected {length} numbers in one row or one column"
+    vector = []
+    width = None
+    for number, row in _rows(path, expected):
+        width = width or len(row)
+        vector += row
+        if len(row) != width or width not in (1, length) or len(vector) > length:
+            raise GainFileError(f"{path}, line {number}: {_count(row)}, {expected}")
+    if len(vector) != length:
+        last = number if vector else 0
+        raise GainFileError(f"{path}: ends after {_count(vector)} (line {last}), {expected}")
+    return np.array(vector)
+
+
+def save_matrix(path: str, matrix: np.ndarray, header: str = "") -> None:
+    """Write a matrix so that `load_matrix` reads it back to 12 digits.
+
+    Parameters
+    ----------
+    path : str
+    matrix : ndarray, shape (rows, columns)
+    header : str
+        Lines of comment for the top of the file, without the ``#``.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written.
+    """
+    with open(path, "w", encoding="utf-8") as file:
+        for line in header.splitlines():
+            file.write(f"# {line}".rstrip() + "\n")
+        # Adding 0 turns -0, which would read like a sign that matters, into 0.
+        for row in np.asarray(matrix) + 0.0:
+            file.write(" ".join(f"{value:.12g}" for value in row) + "\n")
+
+
+@dataclass(frozen=True)
+class MatrixFile:
+    """Kind of a parameter that is the path of a file with a matrix of this shape."""
+
+    rows: int
+    columns: int
+
+    def __call__(self, value) -> np.ndarray:
+        """Return the matrix."""
+        return load_matrix(TEXT(value), self.rows, self.columns)
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return f"the path of a text file with {self.rows} rows of {self.columns} numbers"
+
+
+@dataclass(frozen=True)
+class VectorFile:
+    """Kind of a parameter that is the path of a file with a vector of this length."""
+
+    length: int
+
+    def __call__(self, value) -> np.ndarray:
+        """Return the vector."""
+        return load_vector(TEXT(value), self.length)
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return f"the path of a text file with {self.length} numbers in one row or one column"
+
+
+def _rows(path, expected):
+    """Yield line number and numbers of every line that has any."""
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
+            lines = file.read().splitlines()
+    except OSError as error:
+        raise GainFileError(
+            f"cannot read {os.path.abspath(path)}: {error.strerror}, {expected}"
+        ) from None
+    for number, line in enumerate(lines, start=1):
+        tokens = line.partition("#")[0].split()
+        if tokens:
+            yield number, [_number(token, f"{path}, line {number}", expected) for token in tokens]
+
+
+def _number(token, where, expected):
+    try:
+        value = float(token)
+    except ValueError:
+        raise GainFileError(f"{where}: {token[:20]!r} is not a number, {expected}") from None
+    if not math.isfinite(value):
+        raise GainFileError(f"{where}: {token!r} is not finite, {expected}")
+    return value
+
+
+def _count(row):
+    return "1 number" if len(row) == 1 else f"{len(row)} numbers"

@@ -1,0 +1,140 @@
+"""Linear state feedback about a reference, in the vehicle's heading frame.
+
+States begin with x, y, z, x_dot, y_dot, z_dot in the fixed frame (m, m/s; z up)
+and have the yaw (rad) at some later index. The control is u = (roll, pitch,
+yaw_dot, thrust) in rad, rad/s and m/s^2 (mass-normalised): positive roll
+accelerates to the right of the heading, positive pitch along it.
+"""
+
+import numpy as np
+
+from crazyflie_utils.angles import rotate_by_yaw, wrap_to_pi
+
+ROLL, PITCH, YAW_DOT, THRUST = range(4)
+
+MAX_TILT = 0.2618
+"""Largest roll and pitch that `LiftController` asks for, rad (15 degrees)."""
+
+MIN_THRUST = 4.0
+MAX_THRUST = 16.0
+"""Least and most thrust that `LiftController` asks for, m/s^2."""
+
+MAX_GAP = 0.5
+"""Longest time between two states over which `LiftController` integrates, s."""
+
+
+def heading_error(x: np.ndarray, x_ref: np.ndarray, yaw_index: int) -> np.ndarray:
+    """Return the error of a state as the pilot in the vehicle sees it.
+
+    Parameters
+    ----------
+    x, x_ref : ndarray, shape (x_dim,)
+        State and reference.
+    yaw_index : int
+        Where the yaw is in the state.
+
+    Returns
+    -------
+    ndarray, shape (x_dim,)
+        ``x - x_ref``, with the horizontal position and velocity turned by
+        ``-yaw`` into the heading frame (x forward, y left), and the yaw error
+        wrapped to [-pi, pi].
+    """
+    e = x - x_ref
+    yaw = x[yaw_index]
+    e[0], e[1] = rotate_by_yaw(e[0], e[1], -yaw)
+    e[3], e[4] = rotate_by_yaw(e[3], e[4], -yaw)
+    e[yaw_index] = wrap_to_pi(e[yaw_index])
+    return e
+
+
+def at_rest(x: np.ndarray, yaw_index: int) -> np.ndarray:
+    """Return the reference, shape (x_dim,), that stays at the place and heading of a state."""
+    x_ref = np.zeros_like(x)
+    x_ref[:3] = x[:3]
+    x_ref[yaw_index] = x[yaw_index]
+    return x_ref
+
+
+class LinearFeedback:
+    """The control law u = u_ref + K e, with e of `heading_error`.
+
+    Parameters
+    ----------
+    K : ndarray, shape (u_dim, x_dim)
+        Gains, with the sign that belongs to the plus.
+    u_ref : ndarray, shape (u_dim,)
+        Control at the reference: hover.
+    yaw_index : int
+        Where the yaw is in the state.
+    """
+
+    def __init__(self, K: np.ndarray, u_ref: np.ndarray, yaw_index: int):
+        self.K = K
+        self.u_ref = u_ref
+        self.yaw_index = yaw_index
+
+    def control(self, x: np.ndarray, x_ref: np.ndarray, time: float) -> np.ndarray:
+        """Return the control for a state.
+
+        Parameters
+        ----------
+        x, x_ref : ndarray, shape (x_dim,)
+            State and reference.
+        time : float
+            When the vehicle was in this state, s: the state's stamp.
+
+        Returns
+        -------
+        ndarray, shape (u_dim,)
+        """
+        return self.u_ref + self.K @ heading_error(x, x_ref, self.yaw_index)
+
+
+class LiftController(LinearFeedback):
+    """Linear feedback with an integrator, within limits.
+
+    To the linear feedback it adds ``k I`` for each axis: that of x to the pitch,
+    that of y to the roll, that of z to the thrust. I is the integral of the
+    position error in the heading frame, where a badly trimmed attitude stays
+    the same when the vehicle turns. Roll and pitch are then limited to
+    `MAX_TILT`, thrust to `MIN_THRUST` ... `MAX_THRUST`.
+
+    Parameters
+    ----------
+    K, u_ref, yaw_index
+        See `LinearFeedback`.
+    integrator_k : array_like, shape (3,)
+        Gains of x, y, z in rad/(m s), rad/(m s), 1/s^2, with the signs of the
+        position gains in K.
+    integrator_limit : array_like, shape (3,)
+        The integral of each axis stays within +- this, m s.
+    """
+
+    def __init__(self, K, u_ref, yaw_index: int, integrator_k, integrator_limit):
+        super().__init__(K, u_ref, yaw_index)
+        self._integrator_k = np.asarray(integrator_k, dtype=float)
+        self._integrator_limit = np.asarray(integrator_limit, dtype=float)
+        self._integral = np.zeros(3)
+        self._time = None
+
+    def control(self, x: np.ndarray, x_ref: np.ndarray, time: float) -> np.ndarray:
+        """See `LinearFeedback.control`.
+
+        A state that is not younger than the last one, or comes more than
+        `MAX_GAP` after it, adds nothing to the integral.
+        """
+        e = heading_error(x, x_ref, self.yaw_index)
+        self._integrate(e[:3], time)
+        u = self.u_ref + self.K @ e
+        u[[PITCH, ROLL, THRUST]] += self._integrator_k * self._integral
+        u[[ROLL, PITCH]] = np.clip(u[[ROLL, PITCH]], -MAX_TILT, MAX_TILT)
+        u[THRUST] = np.clip(u[THRUST], MIN_THRUST, MAX_THRUST)
+        return u
+
+    def _integrate(self, error, time):
+        dt = 0.0 if self._time is None else time - self._time
+        self._time = time
+        if 0.0 < dt <= MAX_GAP:
+            limit = self._integrator_limit
+            self._integral = np.clip(self._integral + error * dt, -limit, limit)

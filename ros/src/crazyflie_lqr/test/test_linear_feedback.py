@@ -1,0 +1,132 @@
+"""The control laws against matrices that are multiplied out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from crazyflie_lqr.linear_feedback import (
+    MAX_THRUST,
+    MAX_TILT,
+    MIN_THRUST,
+    LiftController,
+    LinearFeedback,
+    heading_error,
+)
+
+U_REF = np.array([0.0, 0.0, 0.0, 9.81])
+GENTLE = 0.001 * np.arange(1.0, 29.0).reshape(4, 7)
+states = arrays(float, 7, elements=st.floats(-20.0, 20.0))
+
+
+def lift(k=(0.0, 0.0, 0.0), limit=(0.0, 0.0, 0.0), K=GENTLE):
+    """Return a lift controller."""
+    return LiftController(K, U_REF, 6, k, limit)
+
+
+def state(**values):
+    """Return a state with these entries."""
+    names = ["x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw"]
+    return np.array([values.get(name, 0.0) for name in names])
+
+
+@given(states, states)
+def test_the_error_is_turned_into_the_heading_frame(x, x_ref):
+    c, s = math.cos(x[6]), math.sin(x[6])
+    to_heading = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    turned = np.zeros((7, 7))
+    turned[:3, :3] = turned[3:6, 3:6] = to_heading
+    expected = turned @ (x - x_ref)
+    error = heading_error(x, x_ref, 6)
+    np.testing.assert_allclose(error[:6], expected[:6], atol=1e-12)
+    assert abs(error[6]) <= math.pi + 1e-12
+    assert math.cos(error[6] - (x[6] - x_ref[6])) == pytest.approx(1.0)
+
+
+def test_north_of_the_reference_and_looking_north_is_ahead_of_it():
+    error = heading_error(state(y=2.0, x_dot=1.0, yaw=math.pi / 2.0), np.zeros(7), 6)
+    np.testing.assert_allclose(error, state(x=2.0, y_dot=-1.0, yaw=math.pi / 2.0), atol=1e-12)
+
+
+@given(states, states)
+def test_inputs_are_left_alone(x, x_ref):
+    before = x.copy(), x_ref.copy()
+    lift(limit=(1.0, 1.0, 1.0)).control(x, x_ref, 0.0)
+    np.testing.assert_array_equal(before, (x, x_ref))
+
+
+def test_yaw_may_be_anywhere_in_the_state():
+    x = np.zeros(12)
+    x[[0, 8]] = 1.0, math.pi / 2.0
+    error = heading_error(x, np.zeros(12), 8)
+    assert error[1] == pytest.approx(-1.0)
+    assert error[8] == pytest.approx(math.pi / 2.0)
+
+
+@given(states, states)
+def test_linear_feedback_is_k_times_the_error(x, x_ref):
+    u = LinearFeedback(GENTLE, U_REF, 6).control(x, x_ref, 0.0)
+    np.testing.assert_allclose(u, U_REF + GENTLE @ heading_error(x, x_ref, 6))
+
+
+@given(states, st.floats(-1.0, 1.0))
+def test_a_quarter_turn_of_the_world_does_not_change_the_control(x, yaw):
+    x[6] = yaw
+    turned = np.array([-x[1], x[0], x[2], -x[4], x[3], x[5], yaw + math.pi / 2.0])
+    feedback = LinearFeedback(GENTLE, U_REF, 6)
+    np.testing.assert_allclose(
+        feedback.control(turned, state(yaw=math.pi / 2.0), 0.0),
+        feedback.control(x, np.zeros(7), 0.0),
+        atol=1e-12,
+    )
+
+
+@given(states, states)
+def test_lift_control_is_limited_linear_feedback(x, x_ref):
+    K = 100.0 * GENTLE
+    u = lift(K=K).control(x, x_ref, 0.0)
+    linear = LinearFeedback(K, U_REF, 6).control(x, x_ref, 0.0)
+    low = [-MAX_TILT, -MAX_TILT, -math.inf, MIN_THRUST]
+    high = [MAX_TILT, MAX_TILT, math.inf, MAX_THRUST]
+    np.testing.assert_array_equal(u, np.minimum(np.maximum(linear, low), high))
+
+
+def test_limits():
+    assert (MAX_TILT, MIN_THRUST, MAX_THRUST) == (0.2618, 4.0, 16.0)
+
+
+def test_integrator_acts_on_pitch_roll_and_thrust():
+    controller = lift(k=(-0.01, 0.02, -0.3), limit=(9.0, 9.0, 9.0), K=np.zeros((4, 7)))
+    x = state(x=1.0, y=2.0, z=3.0)
+    for time in np.arange(0.0, 1.05, 0.1):
+        u = controller.control(x, np.zeros(7), time)
+    np.testing.assert_allclose(u, U_REF + [0.02 * 2.0, -0.01 * 1.0, 0.0, -0.3 * 3.0])
+
+
+def test_integrator_is_clamped_and_comes_back_at_once():
+    controller = lift(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 0.5), K=np.zeros((4, 7)))
+    for time in np.arange(0.0, 20.0, 0.1):
+        u = controller.control(state(z=1.0), np.zeros(7), time)
+    assert u[3] == pytest.approx(9.81 + 0.5)
+    u = controller.control(state(z=-1.0), np.zeros(7), time + 0.1)
+    assert u[3] == pytest.approx(9.81 + 0.4)
+
+
+@pytest.mark.parametrize("step", [0.0, -0.1, -100.0, 0.51, 3600.0])
+def test_integrator_skips_time_that_cannot_be(step):
+    controller = lift(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 5.0), K=np.zeros((4, 7)))
+    for time in (10.0, 10.1, 10.1 + step):
+        u = controller.control(state(z=1.0), np.zeros(7), time)
+    assert u[3] == pytest.approx(9.81 + 0.1)
+    u = controller.control(state(z=1.0), np.zeros(7), 10.1 + step + 0.1)
+    assert u[3] == pytest.approx(9.81 + 0.2)
+
+
+def test_integrator_is_off_by_default():
+    controller = lift(k=(1.0, 1.0, 1.0))
+    for time in (0.0, 0.1, 0.2):
+        u = controller.control(state(z=0.1), np.zeros(7), time)
+    np.testing.assert_allclose(u, U_REF + GENTLE @ state(z=0.1))

@@ -25,7 +25,7 @@ def flight():
     pilot.hover(6.0)
     pilot.land()
     refusals.append(refusal(pilot.land))
-    yield pilot.record, refusals
+    yield pilot.finish(), refusals
     process.stop()
 
 

@@ -35,7 +35,7 @@ def fly(folder: Path, launch_arguments: list) -> int:
         except FlightError as error:
             print(f"the flight failed: {error}; see {log}", file=sys.stderr)
             return 1
-    record = pilot.record
+    record = pilot.finish()
     record.save_csv(folder / "sw_hover.csv")
     flight_plot.save(record, HOVER, folder / "sw_hover.png")
     report = flight_report.FlightReport.of(record, HOVER)

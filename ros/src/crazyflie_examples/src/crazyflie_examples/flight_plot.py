@@ -33,7 +33,7 @@ def save(record: FlightRecord, point, path: Path) -> None:
             label="reference",
         )
     height.set_ylabel("z (m)")
-    height.legend(loc="upper right")
+    height.legend(loc="center")
 
     error.semilogy(times, np.maximum(record.position_error(point), 1e-6))
     error.set_ylabel("distance from\nhover point (m)")
@@ -46,6 +46,8 @@ def save(record: FlightRecord, point, path: Path) -> None:
     )
     tilt.set_ylabel("attitude (deg)")
     tilt.legend(loc="upper right")
+    largest = max(1.0, np.abs(tilt.get_ylim()).max())
+    tilt.set_ylim(-largest, largest)
 
     thrust.plot(control_times, record.final_control.column("thrust"))
     thrust.set_ylabel("thrust (m/s²)")
@@ -58,12 +60,10 @@ def save(record: FlightRecord, point, path: Path) -> None:
             if axes is height:
                 axes.annotate(
                     name,
-                    (moment - start, 1.0),
+                    (moment - start, 1.02),
                     xycoords=("data", "axes fraction"),
-                    rotation=90,
-                    va="top",
-                    ha="right",
-                    fontsize=8,
+                    ha="center",
+                    fontsize=9,
                     color="gray",
                 )
     figure.savefig(path, dpi=110)

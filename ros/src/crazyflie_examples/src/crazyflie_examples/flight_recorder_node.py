@@ -31,6 +31,7 @@ class FlightRecorderNode(Node):
         self.record = FlightRecord()
         self.heard = threading.Condition()
         self._topics = {}
+        self._stopped = False
 
     def load_parameters(self, handle) -> None:
         """See `Node.load_parameters`."""
@@ -57,11 +58,18 @@ class FlightRecorderNode(Node):
             handle.subscribe(self._topics[name], message_type, callback)
         handle.subscribe(self._topics["in_flight"], Empty, self._on_toggle)
 
+    def stop(self) -> None:
+        """Let the record be as it is."""
+        with self.heard:
+            self._stopped = True
+
     def _appender(self, name, content):
         series = getattr(self.record, name)
 
         def append(message):
             with self.heard:
+                if self._stopped:
+                    return
                 self.record.order.append(name)
                 series.append(message.header.stamp.to_sec(), to_vector(getattr(message, content)))
                 self.heard.notify_all()
@@ -70,6 +78,8 @@ class FlightRecorderNode(Node):
 
     def _on_toggle(self, message):
         with self.heard:
+            if self._stopped:
+                return
             self.record.order.append("toggles")
             self.record.toggles.append(self._handle.stamp().to_sec())
             self.heard.notify_all()

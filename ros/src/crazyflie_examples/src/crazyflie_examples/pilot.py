@@ -39,14 +39,20 @@ class Pilot:
         process.start()
 
     @property
-    def record(self) -> FlightRecord:
-        """What has been recorded so far."""
+    def position(self):
+        """Where the vehicle was last, m, shape (3,)."""
+        return self._recorder.record.state.last[:3]
+
+    def finish(self) -> FlightRecord:
+        """Stop recording and return the record."""
+        self._recorder.stop()
         return self._recorder.record
 
     def wait_until_ready(self) -> None:
         """Wait for the first state and for the ground's zero thrust."""
-        self._wait_for(lambda: len(self.record.state), "no state was published")
-        self._wait_for(lambda: len(self.record.final_control), "no control was published")
+        record = self._recorder.record
+        self._wait_for(lambda: len(record.state), "no state was published")
+        self._wait_for(lambda: len(record.final_control), "no control was published")
 
     def takeoff(self) -> None:
         """Call /takeoff and wait for its answer."""
@@ -54,8 +60,9 @@ class Pilot:
 
     def hover(self, duration: float) -> None:
         """Let ``duration`` seconds of flight pass."""
-        end = self.record.state.last_time + duration
-        self._wait_for(lambda: self.record.state.last_time >= end, "states stopped coming")
+        state = self._recorder.record.state
+        end = state.last_time + duration
+        self._wait_for(lambda: state.last_time >= end, "states stopped coming")
 
     def land(self) -> None:
         """Call /land and wait for its answer, and for what the vehicle does then."""
@@ -63,14 +70,15 @@ class Pilot:
         self.hover(0.5)
 
     def _call(self, service, called, answered):
-        called_at = self.record.state.last_time
+        record = self._recorder.record
+        called_at = record.state.last_time
         future = self._handle.call_service(service, Empty, EmptyRequest(), self._limit)
         try:
             future.result()
         except ServiceError as error:
             raise FlightError(str(error)) from None
-        self.record.events[called] = called_at
-        self.record.events[answered] = self.record.state.last_time
+        record.events[called] = called_at
+        record.events[answered] = record.state.last_time
 
     def _wait_for(self, condition, complaint):
         deadline = time.monotonic() + self._limit

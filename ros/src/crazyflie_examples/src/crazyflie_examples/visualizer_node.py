@@ -1,0 +1,124 @@
+"""What RViz cannot draw by itself: the path a vehicle has flown, and its reference."""
+
+import genpy
+from geometry_msgs.msg import Point
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker, MarkerArray
+
+from crazyflie_examples.flown_path import FlownPath, circle
+from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_utils.held import Held
+from crazyflie_utils.node import Node
+from crazyflie_utils.parameters import FRAME, TOPIC
+from crazyflie_utils.transforms import TransformError
+from crazyflie_utils.vectors import is_finite
+
+PERIOD = 0.05
+"""Between two looks at the vehicle's pose, s."""
+
+SPACING = 0.01
+"""Between two points of the path, m."""
+
+CAPACITY = 2000
+"""Points of the path that are kept: at least 20 m of flight."""
+
+PATH_COLOUR = ColorRGBA(0.05, 0.45, 0.90, 1.0)
+REFERENCE_COLOUR = ColorRGBA(0.00, 0.55, 0.30, 1.0)
+
+_LINE_WIDTH = 0.0025
+_RING_RADIUS = 0.10  # The vehicle, 7 cm from its middle to its tips, is inside.
+_RING_CORNERS = 64
+_TEXT_SIZE = 0.016
+_LABEL_HEIGHT = 0.075
+
+
+class VisualizerNode(Node):
+    """Publish a vehicle's path and reference as markers.
+
+    Every message holds the whole picture and the topic is latched, so that an
+    RViz that is started late shows all of it.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self._fixed_frame = None
+        self._robot_frame = None
+        self._reference_topic = None
+        self._markers_topic = None
+        self._publisher = None
+        self._lookup = None
+        self._path = FlownPath(SPACING, CAPACITY)
+        self._reference = Held()
+        self._shown_reference = None
+
+    def load_parameters(self, handle) -> None:
+        """See `Node.load_parameters`."""
+        self._fixed_frame = handle.param("frames/fixed", FRAME)
+        self._robot_frame = handle.param("frames/robot", FRAME)
+        self._reference_topic = handle.param("topics/reference", TOPIC)
+        self._markers_topic = handle.param("topics/markers", TOPIC)
+
+    def register_callbacks(self, handle) -> None:
+        """See `Node.register_callbacks`."""
+        self._publisher = handle.publisher(self._markers_topic, MarkerArray, latch=True)
+        self._lookup = handle.listen_to_transforms()
+        handle.subscribe(self._reference_topic, PositionVelocityStateStamped, self._on_reference)
+        handle.timer(PERIOD, self._on_timer)
+
+    def _on_reference(self, message):
+        if is_finite(message.state):
+            self._reference.good((message.state.x, message.state.y, message.state.z))
+            return
+        self._reference.bad(self._handle.time())
+        self._handle.warn(
+            f"ignoring a reference on {self._reference_topic} that is not finite", throttle=1.0
+        )
+
+    def _on_timer(self):
+        path_changed = self._extend_path()
+        reference = self._reference.value(self._handle.time())
+        if path_changed or reference != self._shown_reference:
+            self._shown_reference = reference
+            self._publisher.publish(self._markers())
+
+    def _extend_path(self):
+        try:
+            transform = self._lookup(self._fixed_frame, self._robot_frame)
+        except TransformError as error:
+            self._handle.warn(
+                f"no transform {self._fixed_frame} -> {self._robot_frame}: {error}",
+                throttle=5.0,
+                key="no transform",
+            )
+            return False
+        translation = transform.transform.translation
+        return self._path.add(transform.header.stamp, (translation.x, translation.y, translation.z))
+
+    def _markers(self):
+        path = self._marker("path", Marker.LINE_STRIP, PATH_COLOUR)
+        path.points = [Point(*position) for position in self._path.positions]
+        ring = self._marker("reference", Marker.LINE_STRIP, REFERENCE_COLOUR)
+        label = self._marker("reference label", Marker.TEXT_VIEW_FACING, REFERENCE_COLOUR)
+        if self._shown_reference is None:
+            ring.action = label.action = Marker.DELETE
+        else:
+            x, y, z = self._shown_reference
+            ring.points = [
+                Point(*corner) for corner in circle((x, y, z), _RING_RADIUS, _RING_CORNERS)
+            ]
+            label.text = f"reference ({x:.2f}, {y:.2f}, {z:.2f}) m"
+            label.scale.z = _TEXT_SIZE
+            label.pose.position = Point(x, y, z + _LABEL_HEIGHT)
+        if len(path.points) < 2:
+            path.action = Marker.DELETE
+        return MarkerArray([path, ring, label])
+
+    def _marker(self, name, kind, colour):
+        marker = Marker(ns=name, type=kind, color=colour)
+        marker.header.frame_id = self._fixed_frame
+        # The time 0 asks for the latest transform, so that RViz draws markers
+        # with any fixed frame at once, also after simulated time was reset.
+        marker.header.stamp = genpy.Time()
+        marker.pose.orientation.w = 1.0
+        marker.scale.x = _LINE_WIDTH
+        return marker

@@ -1,6 +1,7 @@
 """Draws the picture of the README: RViz on a virtual display, during a hover."""
 
 import argparse
+import math
 import os
 import sys
 import tempfile
@@ -13,8 +14,9 @@ import rospkg
 import yaml
 from matplotlib import image
 
-from crazyflie_examples import demo
+from crazyflie_examples.demo import HOVER
 from crazyflie_examples.flight_report import HOVER_TOLERANCE
+from crazyflie_examples.launching import launched
 from crazyflie_examples.pilot import FlightError, Pilot
 from crazyflie_examples.virtual_display import DisplayError, virtual_display
 from crazyflie_examples.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
@@ -152,7 +154,7 @@ def render(output: Path, log: Path, launch_arguments: list) -> None:
         scene = Scene(display, description)
         arguments = ["crazyflie_examples", "sw_hover.launch", "rviz:=true", *launch_arguments]
         say(f"launching {' '.join(arguments)} on display {display.name}")
-        with demo.launched(arguments, log):
+        with launched(arguments, log):
             pilot = Pilot(runner.begin("render_pilot"))
             pilot.wait_until_ready()
             say("waiting for RViz to draw the vehicle")
@@ -160,7 +162,7 @@ def render(output: Path, log: Path, launch_arguments: list) -> None:
             say("taking off")
             pilot.takeoff()
             pilot.hover(1.0)
-            error = pilot.record.position_error(demo.HOVER)[-1]
+            error = math.dist(pilot.position, HOVER)
             if error > HOVER_TOLERANCE:
                 raise FlightError(f"it hovers {error:.3f} m from where it should")
             say("waiting for RViz to draw vehicle, path and reference")

@@ -7,6 +7,7 @@ In a .test file::
 """
 
 import sys
+import warnings
 
 import pytest
 import rosgraph
@@ -25,6 +26,7 @@ def main() -> int:
         print("pytest_node needs a ROS master: run it with rostest", file=sys.stderr)
         return 1
     rospy.init_node("pytest_node", anonymous=True, disable_signals=True)
-    # rospy itself calls what Python 3.10 has deprecated, with every /clock.
-    quiet = ["-W", "ignore::DeprecationWarning:rospy"]
+    # rospy calls notifyAll, which Python 3.10 has deprecated, with every /clock.
+    warnings.filterwarnings("ignore", message="notifyAll", category=DeprecationWarning)
+    quiet = ["-W", "ignore:notifyAll:DeprecationWarning"]
     return pytest.main([*files, *reports, *quiet, "-p", "no:cacheprovider", "-v"])

@@ -2,10 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
+from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_state_estimator.estimator_node import (
     FullStateEstimatorNode,
     PositionVelocityStateEstimatorNode,
@@ -73,12 +75,19 @@ def test_every_parameter_is_required(name):
         ("frames/fixed", ""),
         ("frames/robot", 1),
         ("topics/state", "/st ate"),
+        ("filter/type", "median"),
+        ("filter/position_noise", 0.0),
+        ("filter/angle_noise", "small"),
+        ("filter/acceleration_walk", -1.0),
+        ("filter/angular_acceleration_walk", math.inf),
+        ("topics/control", 5),
     ],
 )
 def test_bad_parameters_are_named(name, value):
     process = FakeProcess()
     node = PositionVelocityYawStateEstimatorNode()
-    assert not process.launch(node, "/state_estimator", {**PARAMETERS, name: value})
+    parameters = {**PARAMETERS, "filter/type": "kalman", name: value}
+    assert not process.launch(node, "/state_estimator", parameters)
     assert f"/state_estimator/{name} is" in process.logged("error")[0]
     assert "expected" in process.logged("error")[0]
 
@@ -193,3 +202,71 @@ def test_begins_anew_when_time_is_reset(flown):
     (message,) = process.published("/state")[before:]
     assert message.header.stamp.to_sec() == pytest.approx(1.01)
     assert message.state.x_dot == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("axis", ["x", "z", "yaw"])
+def test_the_kalman_filter_smooths(axis):
+    rng = np.random.default_rng(5)
+
+    def noisily(elapsed):
+        position, attitude = moving(elapsed)
+        return position + 0.001 * rng.normal(size=3), attitude + 0.005 * rng.normal(size=3)
+
+    def deviation(kind):
+        process = launch(FullStateEstimatorNode, x_dim=12, **{"filter/type": kind})
+        fly(process, noisily, 3.0)
+        states = [message.state for message in process.published("/state")]
+        assert len(states) == 299
+        return np.std([getattr(state, f"{axis}_dot") for state in states[100:]])
+
+    assert 3.0 * deviation("kalman") < deviation("finite_difference")
+
+
+def test_the_kalman_filter_begins_with_the_second_transform():
+    process = launch(**{"filter/type": "kalman"})
+    fly(process, moving, 0.02)
+    (message,) = process.published("/state")
+    assert message.state.x_dot == pytest.approx(1.0, abs=0.01)
+    assert message.state.yaw == pytest.approx(3.01)
+
+
+def thrown(process, thrust):
+    """Hover for a second and then accelerate upwards; return the errors of z_dot while doing so."""
+    acceleration, height, speed, errors = 0.0, 1.0, 0.0, []
+    for k in range(120):
+        process.publish("/tf", TFMessage([transform(process, (0.0, 0.0, height))]))
+        process.advance(0.01)
+        if k >= 100:
+            errors.append(abs(process.published("/state")[-1].state.z_dot - speed))
+            acceleration = 5.0
+        control = Control(thrust=thrust + acceleration)
+        if "/control" in process.transport.inlets:
+            process.publish("/control", ControlStamped(control=control))
+        height += 0.01 * speed + 0.5 * 0.01**2 * acceleration
+        speed += 0.01 * acceleration
+    return errors
+
+
+def test_the_kalman_filter_uses_the_control_it_is_given():
+    untold = thrown(launch(**{"filter/type": "kalman"}), 9.81)
+    told = thrown(launch(**{"filter/type": "kalman", "topics/control": "/control"}), 9.81)
+    assert max(untold) > 0.1
+    assert max(told) < 0.001
+
+
+def test_controls_that_are_not_finite_are_ignored():
+    process = launch(**{"filter/type": "kalman", "topics/control": "/control"})
+    errors = thrown(process, math.nan)
+    assert max(errors) < 1.0
+    (warning,) = process.logged("warn")
+    assert "/control" in warning
+
+
+def test_the_kalman_filter_begins_anew_when_time_is_reset():
+    process = launch(**{"filter/type": "kalman", "topics/control": "/control"})
+    thrown(process, 9.81)
+    process.clock.set(1.0)
+    before = len(process.published("/state"))
+    fly(process, moving, 0.02)
+    (message,) = process.published("/state")[before:]
+    assert message.state.x_dot == pytest.approx(1.0, abs=0.01)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from crazyflie_msgs.msg import (
+    ControlStamped,
     FullState,
     FullStateStamped,
     PositionVelocityState,
@@ -10,14 +11,18 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_state_estimator import kalman
+from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.motion import Motion, MotionEstimator
 from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils.angles import rpy_from_quaternion
 from crazyflie_utils.held import HOLD_LIMIT
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import FRAME, TIME_STEP, TOPIC, Integer
+from crazyflie_utils.parameters import FRAME, TIME_STEP, TOPIC, Integer, Number, Text
 from crazyflie_utils.transforms import TransformError
-from crazyflie_utils.vectors import from_vector
+from crazyflie_utils.vectors import from_vector, is_finite, to_vector
+
+FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
 
 
 class StateEstimatorNode(Node):
@@ -37,6 +42,8 @@ class StateEstimatorNode(Node):
         self._fixed_frame = None
         self._robot_frame = None
         self._state_topic = None
+        self._control_topic = None
+        self._control = ControlInput()
         self._estimator = None
         self._publisher = None
         self._lookup = None
@@ -54,14 +61,52 @@ class StateEstimatorNode(Node):
         self._fixed_frame = handle.param("frames/fixed", FRAME)
         self._robot_frame = handle.param("frames/robot", FRAME)
         self._state_topic = handle.param("topics/state", TOPIC)
-        self._estimator = MotionEstimator(FiniteDifference(), FiniteDifference())
+        kind = handle.param("filter/type", Text((FINITE_DIFFERENCE, KALMAN)), FINITE_DIFFERENCE)
+        if kind == KALMAN:
+            self._estimator = self._load_kalman_filters(handle)
+        else:
+            self._estimator = MotionEstimator(FiniteDifference(), FiniteDifference())
+
+    def _load_kalman_filters(self, handle):
+        self._control_topic = handle.param("topics/control", TOPIC, None)
+
+        def positive(name, unit, default):
+            return handle.param(f"filter/{name}", Number(unit=unit, above=0.0), default)
+
+        walk = kalman.ACCELERATION_WALK
+        if self._control_topic is not None:
+            walk = kalman.ACCELERATION_WALK_WITH_CONTROL
+        return MotionEstimator(
+            kalman.ConstantAccelerationFilter(
+                positive("position_noise", "m", kalman.POSITION_NOISE),
+                positive("acceleration_walk", "m/s^2/sqrt(s)", walk),
+            ),
+            kalman.ConstantAccelerationFilter(
+                positive("angle_noise", "rad", kalman.ANGLE_NOISE),
+                positive(
+                    "angular_acceleration_walk",
+                    "rad/s^2/sqrt(s)",
+                    kalman.ANGULAR_ACCELERATION_WALK,
+                ),
+            ),
+        )
 
     def register_callbacks(self, handle) -> None:
         """See `Node.register_callbacks`."""
         self._publisher = handle.publisher(self._state_topic, self._stamped_type)
         self._lookup = handle.listen_to_transforms()
+        if self._control_topic is not None:
+            handle.subscribe(self._control_topic, ControlStamped, self._on_control)
         self._last_success = handle.time()
         handle.timer(self._time_step, self._on_timer)
+
+    def _on_control(self, message):
+        if is_finite(message.control):
+            self._control.command(to_vector(message.control), self._handle.time())
+        else:
+            self._handle.warn(
+                f"ignoring a control on {self._control_topic} that is not finite", throttle=1.0
+            )
 
     def _on_timer(self):
         now = self._handle.time()
@@ -74,7 +119,7 @@ class StateEstimatorNode(Node):
         except TransformError as error:
             self._report_no_state(now, str(error))
             return
-        motion = self._update(transform)
+        motion = self._update(transform, now)
         if motion is None:
             stamp = transform.header.stamp.to_sec()
             self._report_no_state(now, f"the latest is still that of {stamp:.3f} s")
@@ -85,12 +130,14 @@ class StateEstimatorNode(Node):
         message.header.frame_id = self._fixed_frame
         self._publisher.publish(message)
 
-    def _update(self, transform):
+    def _update(self, transform, now):
         translation, rotation = transform.transform.translation, transform.transform.rotation
+        attitude = rpy_from_quaternion(rotation.x, rotation.y, rotation.z, rotation.w)
         return self._estimator.update(
             transform.header.stamp.to_nsec(),
             (translation.x, translation.y, translation.z),
-            rpy_from_quaternion(rotation.x, rotation.y, rotation.z, rotation.w),
+            attitude,
+            self._control.acceleration(attitude[2], now),
         )
 
     def _report_no_state(self, now, reason):

@@ -33,15 +33,19 @@ class Motion(NamedTuple):
 class MotionEstimator:
     """Motion from a sequence of poses, by the poses' own stamps.
 
-    A pose whose stamp repeats is ignored, and so is one that is not
-    finite. One whose stamp goes back is the first of a new sequence: tf hands
-    out the latest pose, so its stamp goes back only when time does.
+    A pose whose stamp repeats is ignored, and so is one that is not finite. One
+    whose stamp goes back is the first of a new sequence: tf hands out the latest
+    pose, so its stamp goes back only when time does.
 
     Parameters
     ----------
-    position_filter, angle_filter : RateFilter
-        What turns positions into velocities, and angles (unwrapped: without
-        jumps by 2 pi) into their rates.
+    position_filter : RateFilter
+        What turns positions into positions and velocities.
+    angle_filter : RateFilter
+        What turns roll, pitch and yaw (unwrapped: without jumps by 2 pi) into
+        their rates. The angles themselves are passed on as they are: their noise
+        is small beside what a controller does with them, and smoothing would
+        cost the yaw loop its phase.
     """
 
     def __init__(self, position_filter: RateFilter, angle_filter: RateFilter):
@@ -54,7 +58,7 @@ class MotionEstimator:
         """Forget everything: the next pose is the first."""
         self._stamp = None
 
-    def update(self, stamp: int, position, attitude) -> Motion | None:
+    def update(self, stamp: int, position, attitude, acceleration=None) -> Motion | None:
         """Take the next pose and return the motion at its time.
 
         Parameters
@@ -66,6 +70,9 @@ class MotionEstimator:
             m.
         attitude : array_like, shape (3,)
             Roll, pitch, yaw in rad.
+        acceleration : ndarray, shape (3,), optional
+            What the control has asked for since the last pose, if it is known,
+            m/s^2.
 
         Returns
         -------
@@ -82,18 +89,18 @@ class MotionEstimator:
         if stamp == self._stamp:
             return None
         with np.errstate(over="ignore", invalid="ignore"):
-            motion = self._step((stamp - self._stamp) * 1e-9, position, attitude)
+            motion = self._step((stamp - self._stamp) * 1e-9, position, attitude, acceleration)
         self._stamp = stamp
         if not all(np.isfinite(part).all() for part in motion):
             self.reset()
             return None
         return motion
 
-    def _step(self, dt, position, attitude):
+    def _step(self, dt, position, attitude, acceleration):
         self._angles = self._angles + wrap_to_pi(attitude - self._angles)
-        position, velocity = self._position_filter.step(dt, position)
-        angles, rate = self._angle_filter.step(dt, self._angles)
-        return Motion(position, velocity, wrap_to_pi(angles), rate)
+        position, velocity = self._position_filter.step(dt, position, acceleration)
+        _, attitude_rate = self._angle_filter.step(dt, self._angles)
+        return Motion(position, velocity, wrap_to_pi(attitude), attitude_rate)
 
     def _start(self, stamp, position, attitude):
         self._stamp = stamp

@@ -13,7 +13,7 @@ class RateFilter(ABC):
         """Forget everything and take the first sample, shape (n,)."""
 
     @abstractmethod
-    def step(self, dt: float, value: np.ndarray) -> tuple:
+    def step(self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None) -> tuple:
         """Take the next sample.
 
         Parameters
@@ -21,6 +21,9 @@ class RateFilter(ABC):
         dt : float
             Time since the last sample, s, positive.
         value : ndarray, shape (n,)
+        acceleration : ndarray, shape (n,), optional
+            What the axes were told to accelerate at since the last sample, if
+            that is known. Not every filter has a use for it.
 
         Returns
         -------
@@ -45,8 +48,8 @@ class FiniteDifference(RateFilter):
         """See `RateFilter.start`."""
         self._value = value
 
-    def step(self, dt: float, value: np.ndarray) -> tuple:
-        """See `RateFilter.step`."""
+    def step(self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None) -> tuple:
+        """See `RateFilter.step`; the acceleration is not used."""
         rate = (value - self._value) / dt
         self._value = value
         return value, rate

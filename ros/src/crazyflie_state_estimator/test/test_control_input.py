@@ -1,0 +1,75 @@
+"""What a control says about acceleration, against rotation matrices and by its limits."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from crazyflie_state_estimator.control_input import ControlInput, acceleration_from_control
+from crazyflie_utils.held import HOLD_LIMIT
+from crazyflie_utils.units import GRAVITY
+
+HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
+tilts = st.floats(-0.5, 0.5)
+
+
+def test_signs():
+    assert acceleration_from_control((0.1, 0.0, 0.0, GRAVITY), 0.0)[1] < 0.0
+    assert acceleration_from_control((0.0, 0.1, 0.0, GRAVITY), 0.0)[0] > 0.0
+    assert acceleration_from_control((0.0, 0.1, 0.0, GRAVITY), np.pi / 2.0)[1] > 0.0
+    np.testing.assert_allclose(acceleration_from_control(HOVER, 1.0), 0.0)
+
+
+@given(tilts, st.floats(-3.0, 3.0), st.floats(4.0, 16.0))
+def test_pitch_alone_is_a_rotation_of_the_thrust(pitch, yaw, thrust):
+    thrust_axis = (Rotation.from_euler("z", yaw) * Rotation.from_euler("y", pitch)).apply([0, 0, 1])
+    np.testing.assert_allclose(
+        acceleration_from_control((0.0, pitch, 0.0, thrust), yaw),
+        thrust * thrust_axis - [0.0, 0.0, GRAVITY],
+        atol=1e-12,
+    )
+
+
+@given(tilts, st.floats(-3.0, 3.0), st.floats(4.0, 16.0))
+def test_roll_alone_is_a_rotation_of_the_thrust(roll, yaw, thrust):
+    thrust_axis = (Rotation.from_euler("z", yaw) * Rotation.from_euler("x", roll)).apply([0, 0, 1])
+    np.testing.assert_allclose(
+        acceleration_from_control((roll, 0.0, 0.0, thrust), yaw),
+        thrust * thrust_axis - [0.0, 0.0, GRAVITY],
+        atol=1e-12,
+    )
+
+
+def test_nothing_is_known_without_a_control():
+    assert ControlInput().acceleration(0.0, 1.0) is None
+
+
+def test_a_control_is_known_until_it_is_old():
+    control = ControlInput()
+    control.command(np.array([0.0, 0.0, 0.0, GRAVITY + 1.0]), 10.0)
+    for time in (10.0, 10.0 + HOLD_LIMIT):
+        np.testing.assert_allclose(control.acceleration(0.0, time), [0.0, 0.0, 1.0])
+    assert control.acceleration(0.0, 10.01 + HOLD_LIMIT) is None
+
+
+def test_a_control_from_before_a_reset_of_time_says_nothing():
+    control = ControlInput()
+    control.command(HOVER, 10.0)
+    assert control.acceleration(0.0, 1.0) is None
+
+
+@pytest.mark.parametrize(
+    ("thrust", "acceleration"), [(100.0, 16.0 - GRAVITY), (4.0, 4.0 - GRAVITY)]
+)
+def test_thrust_is_taken_for_no_more_than_a_vehicle_has(thrust, acceleration):
+    control = ControlInput()
+    control.command(np.array([0.0, 0.0, 0.0, thrust]), 0.0)
+    assert control.acceleration(0.0, 0.0)[2] == pytest.approx(acceleration)
+
+
+@pytest.mark.parametrize("thrust", [0.0, -5.0, 3.9])
+def test_less_thrust_than_in_flight_says_nothing(thrust):
+    control = ControlInput()
+    control.command(np.array([0.1, 0.1, 0.0, thrust]), 0.0)
+    assert control.acceleration(0.0, 0.0) is None

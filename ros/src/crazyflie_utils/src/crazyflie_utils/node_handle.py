@@ -9,8 +9,8 @@ import genpy
 import rosgraph.names
 from rosgraph_msgs.msg import Clock
 
-from crazyflie_utils.executor import Timer
 from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.transport import ServiceError
 

@@ -3,8 +3,9 @@
 from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
-from crazyflie_utils.executor import Executor, SteadyTimers, Timer, TimerQueue
+from crazyflie_utils.executor import Executor
 from crazyflie_utils.node_handle import NodeHandle
+from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
 from crazyflie_utils.topics import Topics
 from crazyflie_utils.transforms import Transforms
 

@@ -1,0 +1,171 @@
+"""Timers, by whatever clock, whose callbacks run on an `Executor`."""
+
+import heapq
+import itertools
+import math
+import threading
+from collections.abc import Callable
+from functools import partial
+
+from crazyflie_utils.executor import Executor
+
+_TOLERANCE = 1e-6
+"""A timer is due this much early, s: more than the rounding of a float that holds
+the seconds since 1970, less than anyone can notice."""
+
+
+class Timer:
+    """A callback that is due every ``period`` seconds; ends with `stop`."""
+
+    def __init__(self, period: float, work: Callable[[], None], now: float):
+        self.deadline = math.nan
+        self.stopped = False
+        self._period = period
+        self._work = work
+        self.restart(now)
+
+    def stop(self) -> None:
+        """Let the timer never fire again, not even if it is due already."""
+        self.stopped = True
+
+    def restart(self, now: float) -> None:
+        """Make it due one period from ``now`` (s)."""
+        self._start = now
+        self._count = 1
+        self.deadline = now + self._period
+
+    def skip_to(self, now: float) -> None:
+        """Make it due at the first moment of its phase after ``now`` (s)."""
+        if self._period == 0.0:
+            self.deadline = now
+            return
+        # Multiples of the period do not add up rounding errors as sums do.
+        passed = math.floor((now - self._start + _TOLERANCE) / self._period)
+        self._count = max(self._count, passed) + 1
+        self.deadline = self._start + self._count * self._period
+
+    def fire(self) -> None:
+        """Call back, unless stopped."""
+        if not self.stopped:
+            self._work()
+
+
+class TimerQueue:
+    """Timers in the order of their deadlines.
+
+    Parameters
+    ----------
+    executor : Executor
+        Where their callbacks run.
+    """
+
+    def __init__(self, executor: Executor):
+        self._executor = executor
+        self._lock = threading.Lock()
+        self._heap = []
+        self._order = itertools.count()
+        self._stopped = False
+
+    def add(self, period: float, work: Callable[[], None], now: float) -> Timer:
+        """Add a timer whose first deadline is one period from ``now`` (s).
+
+        Raises
+        ------
+        ValueError
+            The period is negative or not finite.
+        """
+        if not 0.0 <= period < math.inf:
+            raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
+        timer = Timer(period, work, now)
+        with self._lock:
+            self._push(timer)
+        return timer
+
+    def next_deadline(self) -> float:
+        """Return when the next timer is due; infinity without timers."""
+        with self._lock:
+            return self._heap[0][0] if self._heap else math.inf
+
+    def run_due(self, now: float) -> None:
+        """Submit every timer that is due at ``now`` (s), in order, each once.
+
+        A timer that is late by more than a period skips what it missed and
+        keeps its phase.
+        """
+        for timer in self._take_due(now):
+            self._executor.submit(partial(self._fire, timer))
+
+    def rebase(self, now: float) -> None:
+        """Make every timer due one period from ``now`` (s): time has been reset."""
+        with self._lock:
+            timers = [timer for _, _, timer in sorted(self._heap)]
+            self._heap.clear()
+            for timer in timers:
+                timer.restart(now)
+                self._push(timer)
+
+    def stop(self) -> None:
+        """Let no timer fire again, not even those that are due already."""
+        self._stopped = True
+
+    def _push(self, timer):
+        heapq.heappush(self._heap, (timer.deadline, next(self._order), timer))
+
+    def _take_due(self, now):
+        due = []
+        with self._lock:
+            while self._heap and self._heap[0][0] <= now + _TOLERANCE:
+                timer = heapq.heappop(self._heap)[2]
+                if not timer.stopped:
+                    due.append(timer)
+            for timer in due:
+                timer.skip_to(now)
+                self._push(timer)
+        return due
+
+    def _fire(self, timer):
+        if not self._stopped:
+            timer.fire()
+
+
+class SteadyTimers:
+    """A thread that runs a queue of timers by a steady clock.
+
+    Parameters
+    ----------
+    queue : TimerQueue
+    clock : SteadyClock
+    """
+
+    def __init__(self, queue: TimerQueue, clock):
+        self._queue = queue
+        self._clock = clock
+        self._wake = threading.Condition()
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name="timers", daemon=True)
+
+    def start(self) -> None:
+        """Begin to fire."""
+        self._thread.start()
+
+    def add(self, period: float, work: Callable[[], None]) -> Timer:
+        """Add a timer; its first deadline is one period from now."""
+        timer = self._queue.add(period, work, self._clock.time())
+        with self._wake:
+            self._wake.notify()
+        return timer
+
+    def stop(self) -> None:
+        """Let no timer fire again, and end the thread."""
+        self._queue.stop()
+        with self._wake:
+            self._stopped = True
+            self._wake.notify()
+
+    def _run(self) -> None:
+        while not self._stopped:
+            with self._wake:
+                wait = self._queue.next_deadline() - self._clock.time()
+                if wait > 0.0 and not self._stopped:
+                    self._wake.wait(min(wait, 1.0))
+            self._queue.run_due(self._clock.time())

@@ -106,7 +106,7 @@ class NodeHandle:
 
         The message belongs to everybody: it must not be changed.
         """
-        guarded = self._guard(callback)
+        guarded = self.guard(callback)
         submit = self._process.executor.submit
         self._process.topics.subscribe(
             self.resolve(topic), message_type, lambda message: submit(partial(guarded, message))
@@ -189,13 +189,13 @@ class NodeHandle:
         With ``steady`` the period is of the machine's clock also when time is
         simulated. Ticks that are missed are skipped.
         """
-        return self._process.add_timer(period, self._guard(callback), steady)
+        return self._process.add_timer(period, self.guard(callback), steady)
 
     def clock_publisher(self):
         """Return a function that moves simulated time to a moment (s) for everybody.
 
-        Timers of this process that are due run after the present callback,
-        before anything that is submitted later.
+        In this process time moves after the present callback; then the timers
+        that are due run.
         """
         publisher = self._process.topics.publisher("/clock", Clock, latch=False)
 
@@ -248,7 +248,9 @@ class NodeHandle:
         """Have ``make_safe()`` called after a callback of this node has raised."""
         self._make_safe = make_safe
 
-    def _guard(self, callback):
+    def guard(self, callback):
+        """Return ``callback`` such that what it raises is reported and goes no further."""
+
         def guarded(*args):
             try:
                 callback(*args)

@@ -1,5 +1,7 @@
 """What the nodes of one process share, and the node handles into it."""
 
+from functools import partial
+
 from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
@@ -45,8 +47,17 @@ class Process:
         return NodeHandle(self, name)
 
     def add_timer(self, period: float, work, steady: bool = False) -> Timer:
-        """Add a timer by this process's clock, or by the machine's if ``steady``."""
+        """Add a timer by this process's clock, or by the machine's if ``steady``.
+
+        Raises
+        ------
+        ValueError
+            The period is negative or not finite; or zero by simulated time,
+            where the moment would never end.
+        """
         if self.uses_sim_time and not steady:
+            if period == 0.0:
+                raise ValueError("a timer by simulated time needs a period > 0")
             return self._simulated.add(period, work, self.clock.time())
         return self._steady.add(period, work)
 
@@ -62,10 +73,24 @@ class Process:
     def stop(self) -> None:
         """Let no timer fire again."""
         self._steady.stop()
-        self._simulated = TimerQueue(self.executor)
+        self._simulated.stop()
+
+    def shut_down(self, nodes: dict) -> None:
+        """Let no timer fire again, and every node leave its vehicle safe.
+
+        Parameters
+        ----------
+        nodes : dict of str to Node
+            By absolute name.
+        """
+        self.stop()
+        for name, node in nodes.items():
+            self.executor.submit(self.handle(name).guard(node.shutdown))
 
     def _hear_clock(self, message):
-        self.clock.set(message.clock.to_sec())
+        # As work among the other work: time does not move within a callback, and
+        # a reset is not overtaken by what the last simulation still said.
+        self.executor.submit(partial(self.clock.set, message.clock.to_sec()))
 
     def _run_simulated(self, now, is_reset):
         if is_reset:

@@ -1,5 +1,6 @@
 """A process without ROS, for unit tests: parameters in a dict, time by hand."""
 
+import io
 import math
 from concurrent.futures import Future
 
@@ -15,6 +16,8 @@ class _Record(Outlet):
         return True
 
     def publish(self, message):
+        # What cannot be sent must fail here as it would on a wire.
+        message.serialize(io.BytesIO())
         self.messages.append(message)
 
 
@@ -42,7 +45,7 @@ class FakeTransport(Transport):
 
     def subscribe(self, topic, message_type, deliver):
         """Keep ``deliver`` for `FakeProcess.publish`."""
-        self.inlets[topic] = deliver
+        self.inlets.setdefault(topic, []).append(deliver)
 
     def advertise_service(self, name, service_type, begin, settle):
         """Keep ``begin`` for `FakeProcess.call`."""
@@ -50,17 +53,10 @@ class FakeTransport(Transport):
 
     def call_service(self, name, service_type, request, limit):
         """Call a service of this process; fail when there is none."""
+        if name in self.services:
+            return self.services[name](request)
         future = Future()
-        try:
-            outcome = self.services[name](request)
-        except KeyError:
-            future.set_exception(ServiceError(f"there is no service {name}"))
-        except ServiceError as error:
-            future.set_exception(error)
-        else:
-            if isinstance(outcome, Future):
-                return outcome
-            future.set_result(outcome)
+        future.set_exception(ServiceError(f"there is no service {name}"))
         return future
 
     def log(self, level, text):
@@ -101,15 +97,19 @@ class FakeProcess(Process):
         """
         for key, value in (parameters or {}).items():
             self.transport.parameters[f"{name}/{key}"] = value
-        return node.initialize(self.handle(name))
+        outcome = []
+        # As work: a latched message must wait until the node is complete.
+        self.executor.submit(lambda: outcome.append(node.initialize(self.handle(name))))
+        return outcome[0]
 
     def publish(self, topic: str, message) -> None:
         """Publish from outside the process."""
-        self.transport.inlets[topic](message)
+        for deliver in _named(self.transport.inlets, topic, "subscriber of"):
+            deliver(message)
 
     def published(self, topic: str) -> list:
         """Return all messages that left the process on a topic, oldest first."""
-        return self.transport.outlets[topic].messages
+        return _named(self.transport.outlets, topic, "publisher of").messages
 
     def call(self, service: str, request):
         """Call a service from outside.
@@ -124,7 +124,8 @@ class FakeProcess(Process):
         ServiceError
             The service refused.
         """
-        return self.transport.services[service](request)
+        answer = _named(self.transport.services, service, "service")(request)
+        return answer.result() if answer.done() else answer
 
     def logged(self, level: str) -> list:
         """Return the texts logged at a level, oldest first."""
@@ -139,3 +140,10 @@ class FakeProcess(Process):
                 break
             self.clock.set(max(deadline, self.clock.time()))
         self.clock.set(end)
+
+
+def _named(things, name, kind):
+    try:
+        return things[name]
+    except KeyError:
+        raise KeyError(f"there is no {kind} {name}; known: {sorted(things)}") from None

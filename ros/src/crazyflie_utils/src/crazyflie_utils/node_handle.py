@@ -1,8 +1,9 @@
 """The only door between a node and ROS: roscpp's NodeHandle for Python."""
 
+import math
 import time
 import traceback
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from functools import partial
 
 import genpy
@@ -131,42 +132,63 @@ class NodeHandle:
         concurrent.futures.Future
             Of the response; or of a `ServiceError` when the service refuses, is
             not there, or has not answered after ``limit`` seconds of the
-            machine's clock.
+            machine's clock. What is added to it with ``add_done_callback`` runs
+            like any callback; none may wait for it.
         """
-        return self._process.transport.call_service(
+        outcome = Future()
+        reply = self._process.transport.call_service(
             self.resolve(name), service_type, request, limit
         )
+        submit = self._process.executor.submit
+        reply.add_done_callback(lambda reply: submit(partial(self._pass_on, reply, outcome)))
+        return outcome
 
     def _begin(self, callback, request):
         answer = Future()
 
         def work():
             try:
-                answer.set_result(callback(request))
+                response = callback(request)
             except ServiceError as error:
                 answer.set_exception(error)
             except Exception as error:
                 self._report_fault(callback, error)
                 answer.set_exception(ServiceError(f"{self._name}: {error!r}"))
+            else:
+                if isinstance(response, Future):
+                    response.add_done_callback(lambda done: self._pass_on(done, answer))
+                else:
+                    answer.set_result(response)
 
         self._process.executor.submit(work)
-        return self._settle(answer)
+        return answer
 
-    def _settle(self, outcome):
-        if not isinstance(outcome, Future):
-            return outcome
+    def _pass_on(self, done, to):
+        if not to.set_running_or_notify_cancel():
+            return
+        if done.cancelled():
+            to.set_exception(ServiceError(f"{self._name}: cancelled"))
+            return
+        error = done.exception()
+        if error is None:
+            to.set_result(done.result())
+        elif isinstance(error, ServiceError):
+            to.set_exception(error)
+        else:
+            self.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
+            to.set_exception(ServiceError(f"{self._name}: {error!r}"))
+
+    def _settle(self, answer):
         clock = self._process.clock
         seen, seen_at = clock.time(), time.monotonic()
-        while True:
-            try:
-                return outcome.result(timeout=0.1)
-            except TimeoutError:
-                if self._process.transport.is_shutdown():
-                    raise ServiceError(f"{self._name} is shutting down") from None
+        while not wait([answer], timeout=0.1).done:
+            if self._process.transport.is_shutdown():
+                raise ServiceError(f"{self._name} is shutting down")
             if clock.time() != seen:
                 seen, seen_at = clock.time(), time.monotonic()
             elif time.monotonic() - seen_at > _STALL_LIMIT:
                 raise ServiceError(f"{self._name}: /clock stands still")
+        return answer.result()
 
     # Time.
 
@@ -235,9 +257,10 @@ class NodeHandle:
         """
         now = time.monotonic()
         key = text if key is None else key
-        if throttle and now - self._throttled.get(key, -throttle) < throttle:
-            return
-        self._throttled[key] = now
+        if throttle > 0.0:
+            if now - self._throttled.get(key, -math.inf) < throttle:
+                return
+            self._throttled[key] = now
         self._process.transport.log("warn", f"{self._name}: {text}")
 
     def error(self, text: str) -> None:

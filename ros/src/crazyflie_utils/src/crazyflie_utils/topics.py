@@ -14,7 +14,6 @@ class Topic:
         self.message_type = message_type
         self.receivers = []
         self.latched = None
-        self.is_subscribed_outside = False
 
     def deliver(self, message) -> None:
         """Hand a message to every subscriber in this process."""
@@ -36,7 +35,18 @@ class Publisher:
         return self._topic.name
 
     def publish(self, message) -> None:
-        """Send a message; it must not be changed afterwards."""
+        """Send a message; it must not be changed afterwards.
+
+        Raises
+        ------
+        TypeError
+            The message is not of the topic's type.
+        """
+        if not isinstance(message, self._topic.message_type):
+            raise TypeError(
+                f"topic {self.topic} carries {self._topic.message_type._type}, "
+                f"not {type(message).__name__}"
+            )
         if self._latch:
             self._topic.latched = message
         if self._latch or self._outlet.is_heard():
@@ -79,9 +89,9 @@ class Topics:
         topic.receivers.append(receiver)
         if topic.latched is not None:
             receiver(topic.latched)
-        if not topic.is_subscribed_outside:
-            topic.is_subscribed_outside = True
-            self._transport.subscribe(name, message_type, topic.deliver)
+        # Each receiver for itself, so that one that comes late is sent what an
+        # outside publisher has latched; the connection is shared all the same.
+        self._transport.subscribe(name, message_type, receiver)
 
     def _topic(self, name, message_type):
         topic = self._topics.setdefault(name, Topic(name, message_type))

@@ -41,14 +41,17 @@ class Transport(ABC):
 
     @abstractmethod
     def subscribe(self, topic: str, message_type: type, deliver) -> None:
-        """Have ``deliver(message)`` called with what those outside publish."""
+        """Have ``deliver(message)`` called with what those outside publish.
+
+        Also with what they have latched; a topic may be subscribed more than once.
+        """
 
     @abstractmethod
     def advertise_service(self, name: str, service_type: type, begin, settle) -> None:
         """Answer calls of a service with ``settle(begin(request))``.
 
-        ``begin`` returns a response or a Future of one, at once; ``settle`` waits for
-        it. Both may raise `ServiceError`.
+        ``begin`` returns a Future of the response at once; ``settle`` waits for it
+        and may raise `ServiceError`.
         """
 
     @abstractmethod

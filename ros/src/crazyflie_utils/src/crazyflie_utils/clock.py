@@ -8,9 +8,22 @@ import time
 
 import genpy
 
+_QUIET = 100_000
+"""Two readings of clocks that are this close, in ns, were not interrupted."""
+
+_OFFSET_TOLERANCE = 1_000_000
+"""Wall clock and monotonic clock may drift apart by this, in ns, before stamps follow."""
+
 
 class SteadyClock:
-    """The machine's monotonic clock; stamps are wall-clock time, as ROS has it."""
+    """The machine's monotonic clock; stamps are wall-clock time, as ROS has it.
+
+    The same moment always has the same stamp, unless somebody sets the machine's
+    wall clock.
+    """
+
+    def __init__(self):
+        self._offset = time.time_ns() - time.monotonic_ns()
 
     def time(self) -> float:
         """Return seconds since some fixed moment."""
@@ -18,9 +31,14 @@ class SteadyClock:
 
     def stamp(self, moment: float | None = None) -> genpy.Time:
         """Return the ROS time of a moment of this clock, by default now."""
-        nanoseconds = time.time_ns()
-        if moment is not None:
-            nanoseconds -= time.monotonic_ns() - round(moment * 1e9)
+        before = time.monotonic_ns()
+        offset = time.time_ns() - before
+        # Between two readings another thread may run for milliseconds; a
+        # wall clock that was set is seen in the next quiet moment.
+        is_quiet = time.monotonic_ns() - before < _QUIET
+        if is_quiet and abs(offset - self._offset) > _OFFSET_TOLERANCE:
+            self._offset = offset
+        nanoseconds = (before if moment is None else round(moment * 1e9)) + self._offset
         return genpy.Time(*divmod(nanoseconds, 1_000_000_000))
 
 

@@ -38,11 +38,15 @@ class Number:
         """Return the value as float."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ValueError
-        if not math.isfinite(value) or not self.minimum <= value <= self.maximum:
+        try:
+            number = float(value)
+        except OverflowError as error:
+            raise ValueError(error) from None
+        if not math.isfinite(number) or not self.minimum <= number <= self.maximum:
             raise ValueError
-        if value <= self.above:
+        if number <= self.above:
             raise ValueError
-        return float(value)
+        return number
 
     def __str__(self) -> str:
         """Return what is expected."""

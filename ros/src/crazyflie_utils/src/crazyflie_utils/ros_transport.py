@@ -6,6 +6,7 @@ from concurrent.futures import Future, InvalidStateError
 
 import rospy
 
+from crazyflie_utils import rospy_internals
 from crazyflie_utils.transport import Outlet, ServiceError, Transport
 
 _QUEUE_SIZE = 10
@@ -28,11 +29,12 @@ class RosTransport(Transport):
     """rospy, for a process that has called ``rospy.init_node``."""
 
     def __init__(self):
-        _never_connect_to_oneself()
+        rospy_internals.never_connect_to_oneself()
+        self._remappings = rospy_internals.take_over_remappings()
 
     def remap(self, name):
         """Return what the command line maps the name to."""
-        return rospy.names.get_mappings().get(name, name)
+        return self._remappings.get(name, name)
 
     def get_param(self, name):
         """Return a parameter from the parameter server."""
@@ -77,11 +79,11 @@ class RosTransport(Transport):
 
     def clock_was_set(self, stamp):
         """Set rospy's own clock, which stamps the log."""
-        rospy.rostime._set_rostime(stamp)
+        rospy_internals.set_time(stamp)
 
     def is_shutdown(self):
         """Tell whether rospy is shutting down."""
-        return rospy.is_shutdown()
+        return rospy.core.is_shutdown_requested()
 
 
 _LOGGERS = {
@@ -97,7 +99,8 @@ def _call(name, service_type, request, limit, future):
     try:
         rospy.wait_for_service(name, timeout=limit)
         response = rospy.ServiceProxy(name, service_type)(request)
-    except (rospy.ROSException, rospy.ServiceException) as error:
+    except Exception as error:
+        # rospy has many, of which not all are its own.
         _fail(future, str(error))
     else:
         with contextlib.suppress(InvalidStateError):
@@ -108,16 +111,3 @@ def _fail(future, text):
     # The answer and the limit may come at the same moment; the first one counts.
     with contextlib.suppress(InvalidStateError):
         future.set_exception(ServiceError(text))
-
-
-def _never_connect_to_oneself():
-    # A process that publishes and subscribes on one topic hands its messages
-    # over itself. rospy would connect to itself as well, over a socket, and
-    # every message would come twice.
-    implementation = rospy.topics._SubscriberImpl
-    has_connection = implementation.has_connection
-
-    def has_connection_or_is_own(self, endpoint_id):
-        return endpoint_id == rospy.get_node_uri() or has_connection(self, endpoint_id)
-
-    implementation.has_connection = has_connection_or_is_own

@@ -1,18 +1,30 @@
 """Main programs: one node in a process, or many."""
 
 import importlib
+import os
+import signal
 import sys
 import threading
+import time
+import traceback
 
 import rosgraph
 import rospy
 
-from crazyflie_utils.parameters import BOOLEAN, ParameterError
+from crazyflie_utils.node import Node
+from crazyflie_utils.parameters import BOOLEAN, GraphName, ParameterError
 from crazyflie_utils.process import Process
 from crazyflie_utils.ros_transport import RosTransport
 
 _MASTER_LIMIT = 10.0
 """How long, in s, a node waits for a ROS master."""
+
+_SHUTDOWN_LIMIT = 2.0
+"""How long, in s, shutdown waits for a callback that does not return."""
+
+_FAREWELL = 0.2
+"""How long, in s, the last messages have to be sent by rospy's threads and to be
+read: a subscriber hangs up as soon as the master tells it of the publisher's end."""
 
 
 def run(node_class: type, default_name: str) -> None:
@@ -27,8 +39,7 @@ def run(node_class: type, default_name: str) -> None:
     default_name : str
         Name of the node unless the launch file gives another.
     """
-    process = begin(default_name)
-    _run(process, {rospy.get_name(): node_class()})
+    _run(begin(default_name), lambda handle: {handle.name: node_class()})
 
 
 def run_composed(default_name: str) -> None:
@@ -38,14 +49,12 @@ def run_composed(default_name: str) -> None:
     class as "package.module:Class". Each node has the parameters, topics and
     services it would have in a process of its own.
     """
-    process = begin(default_name)
-    handle = process.handle(rospy.get_name())
-    try:
+
+    def make_nodes(handle):
         classes = handle.param("nodes", NodeClasses())
-    except ParameterError as error:
-        handle.error(str(error))
-        _fail()
-    _run(process, {handle.resolve(name): node() for name, node in classes.items()})
+        return {handle.resolve(name): make() for name, make in classes.items()}
+
+    _run(begin(default_name), make_nodes)
 
 
 class NodeClasses:
@@ -55,7 +64,7 @@ class NodeClasses:
         """Return node name -> node class."""
         if not isinstance(value, dict) or not value:
             raise ValueError
-        return {name: _import_class(path) for name, path in _flatten(value).items()}
+        return {GraphName()(name): _node_class(path) for name, path in _flatten(value).items()}
 
     def __str__(self) -> str:
         """Return what is expected."""
@@ -73,12 +82,15 @@ def _flatten(tree, prefix=""):
     return leaves
 
 
-def _import_class(path):
+def _node_class(path):
     module, _, name = str(path).partition(":")
     try:
-        return getattr(importlib.import_module(module), name)
-    except (ImportError, AttributeError, ValueError) as error:
-        raise ValueError(f"no class {path!r}: {error}") from error
+        found = getattr(importlib.import_module(module), name)
+    except Exception as error:
+        raise ValueError(f"no class {path!r}: {error!r}") from error
+    if not (isinstance(found, type) and issubclass(found, Node)):
+        raise ValueError(f"{path!r} is not a subclass of Node")
+    return found
 
 
 def begin(default_name: str) -> Process:
@@ -119,20 +131,68 @@ def _wait_for_master():
         waited += 0.5
 
 
-def _run(process, nodes):
-    for name, node in nodes.items():
-        if not node.initialize(process.handle(name)):
-            process.transport.log("fatal", f"{name}: not initialized; the process exits")
-            _fail()
-
-    def end():
-        process.stop()
-        process.executor.submit(lambda: [node.shutdown() for node in nodes.values()])
-
-    rospy.on_shutdown(end)
-    process.start()
-    rospy.spin()
+def _run(process, make_nodes):
+    handle = process.handle(rospy.get_name())
+    try:
+        nodes = make_nodes(handle)
+        for name, node in nodes.items():
+            if not node.initialize(process.handle(name)):
+                process.transport.log("fatal", f"{name}: not initialized; the process exits")
+                _fail()
+    except ParameterError as error:
+        handle.error(str(error))
+        _fail()
+    except Exception:
+        handle.error(f"failed to initialize\n{traceback.format_exc()}")
+        _fail()
+    ending = _Ending(process, nodes)
+    rospy.on_shutdown(ending.run)
+    signals = _catch_signals()
+    # Not in this thread, which must stay free to end a callback that does not.
+    threading.Thread(target=process.start, name="start", daemon=True).start()
+    while not signals and not rospy.is_shutdown():
+        time.sleep(0.1)
+    rospy.signal_shutdown(f"signal {signals}")
+    if ending.is_stuck:
+        # The threads that wait for the callback would keep the process alive.
+        os._exit(1)
     sys.exit(0)
+
+
+class _Ending:
+    """What a process does before rospy closes its connections."""
+
+    def __init__(self, process, nodes):
+        self._process = process
+        self._nodes = nodes
+        self.is_stuck = False
+
+    def run(self):
+        work = threading.Thread(target=self._process.shut_down, args=(self._nodes,), daemon=True)
+        work.start()
+        work.join(_SHUTDOWN_LIMIT)
+        self.is_stuck = work.is_alive()
+        if self.is_stuck:
+            self._process.transport.log(
+                "fatal", f"a callback has not returned within {_SHUTDOWN_LIMIT:g} s; exiting"
+            )
+        time.sleep(_FAREWELL)
+
+
+def _catch_signals():
+    # rospy's own handlers shut down inside the handler, where any lock may be
+    # held by the very code that was interrupted. A second signal kills.
+    caught = []
+
+    def note(number, _frame):
+        caught.append(number)
+        for each in ends:
+            signal.signal(each, signal.SIG_DFL)
+
+    ends = (signal.SIGINT, signal.SIGTERM)
+    for each in ends:
+        signal.signal(each, note)
+    return caught
 
 
 def _fail():

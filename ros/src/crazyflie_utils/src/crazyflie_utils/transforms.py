@@ -8,6 +8,9 @@ from crazyflie_utils.vectors import is_finite
 
 _LATEST = genpy.Time()
 
+_NORM_TOLERANCE = 0.01
+"""How far tf2 lets the squared norm of a quaternion be from 1."""
+
 
 class TransformError(Exception):
     """tf does not know the transform between two frames; the text says why."""
@@ -84,10 +87,21 @@ class Transforms:
 
     def _store(self, message, store):
         for transform in message.transforms:
-            if is_finite(transform.transform):
+            complaint = _complaint(transform.transform)
+            if complaint is None:
                 store(transform, "tf")
             else:
                 self._warn(
                     f"ignoring a transform {transform.header.frame_id} -> "
-                    f"{transform.child_frame_id} that is not finite"
+                    f"{transform.child_frame_id} that {complaint}"
                 )
+
+
+def _complaint(transform):
+    # tf2 refuses both, too, but says so without a throttle.
+    if not is_finite(transform):
+        return "is not finite"
+    q = transform.rotation
+    if abs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0) > _NORM_TOLERANCE:
+        return "has no unit quaternion"
+    return None

@@ -22,8 +22,13 @@ def to_vector(message) -> np.ndarray:
     -------
     ndarray, shape (number of fields,)
         In the order of the message definition; units as there.
+
+    Raises
+    ------
+    TypeError
+        A field is not a number but, say, a header.
     """
-    return np.array([getattr(message, field) for field in message.__slots__])
+    return np.array([getattr(message, field) for field in message.__slots__], dtype=float)
 
 
 def from_vector(message_type: type, vector):
@@ -51,12 +56,15 @@ def from_vector(message_type: type, vector):
 
 
 def is_finite(message) -> bool:
-    """Tell whether every number of a message, nested ones included, is finite."""
-    for field in message.__slots__:
-        value = getattr(message, field)
-        if isinstance(value, float):
-            if not math.isfinite(value):
-                return False
-        elif hasattr(value, "__slots__") and not is_finite(value):
-            return False
+    """Tell whether every number of a message, of nested ones and of lists, is finite."""
+    return all(_is_finite(getattr(message, field)) for field in message.__slots__)
+
+
+def _is_finite(value):
+    if isinstance(value, (float, np.floating)):
+        return math.isfinite(value)
+    if hasattr(value, "__slots__"):
+        return is_finite(value)
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return all(map(_is_finite, value))
     return True

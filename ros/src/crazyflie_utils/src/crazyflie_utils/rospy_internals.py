@@ -1,0 +1,44 @@
+"""All that is touched of rospy without being offered by it (seen in rospy 1.15 to 1.17).
+
+Each of these is needed because a process may hold many nodes, which rospy does
+not provide for. The rostests of this package notice when a rospy differs.
+"""
+
+import functools
+
+import rospy
+from rospy import rostime
+
+
+@functools.cache
+def never_connect_to_oneself() -> None:
+    """Keep rospy from connecting a process's subscribers to its own publishers.
+
+    Such messages are handed over within the process; over a socket every one
+    would come twice.
+    """
+    implementation = rospy.topics._SubscriberImpl
+    has_connection = implementation.has_connection
+
+    def has_connection_or_is_own(self, endpoint_id):
+        return endpoint_id == rospy.get_node_uri() or has_connection(self, endpoint_id)
+
+    implementation.has_connection = has_connection_or_is_own
+
+
+@functools.cache
+def take_over_remappings() -> dict:
+    """Return the launch file's remappings, absolute name to absolute name.
+
+    rospy no longer applies them: it would remap a name that has been remapped
+    already, which goes wrong when two names are exchanged.
+    """
+    table = rospy.names.get_resolved_mappings()
+    remappings = dict(table)
+    table.clear()
+    return remappings
+
+
+def set_time(stamp) -> None:
+    """Set rospy's simulated clock, which stamps the log."""
+    rostime._set_rostime(stamp)

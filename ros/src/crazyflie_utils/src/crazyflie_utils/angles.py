@@ -10,6 +10,9 @@ import math
 
 import numpy as np
 
+_SMALLEST_COSINE = 1e-6
+"""Of a pitch from which roll and yaw can still be told apart."""
+
 
 def wrap_to_pi(angle: float) -> float:
     """Return the angle in [-pi, pi] that points the same way.
@@ -68,7 +71,7 @@ def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> tuple:
     -------
     tuple of float
         rad; roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2]. At pitch =
-        +-pi/2 roll and yaw are not unique.
+        +-pi/2, where only their sum or difference is defined, roll is 0.
 
     Raises
     ------
@@ -84,11 +87,12 @@ def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> tuple:
     r02 = s * (x * z + w * y)
     r12 = s * (y * z - w * x)
     r22 = 1.0 - s * (x * x + y * y)
-    return (
-        math.atan2(-r12, r22),
-        math.asin(max(-1.0, min(1.0, r02))),
-        math.atan2(-r01, r00),
-    )
+    pitch = math.asin(max(-1.0, min(1.0, r02)))
+    if math.hypot(r00, r01) < _SMALLEST_COSINE:
+        r10 = s * (x * y + w * z)
+        r11 = 1.0 - s * (x * x + z * z)
+        return 0.0, pitch, math.atan2(r10, r11)
+    return math.atan2(-r12, r22), pitch, math.atan2(-r01, r00)
 
 
 def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple:

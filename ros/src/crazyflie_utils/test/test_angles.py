@@ -1,0 +1,112 @@
+"""Angles against scipy, closed forms and each other."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from crazyflie_utils.angles import (
+    quaternion_from_rpy,
+    rotate_by_yaw,
+    rpy_from_quaternion,
+    wrap_to_pi,
+)
+
+ANGLE = st.floats(-math.pi, math.pi)
+PITCH = st.floats(-1.5, 1.5)
+FINITE = st.floats(-1e6, 1e6)
+
+
+def same_rotation(p, q, tolerance=1e-12):
+    """Tell whether two quaternions turn alike: q and -q do."""
+    return abs(abs(np.dot(p, q)) - 1.0) < tolerance
+
+
+@given(ANGLE, ANGLE, ANGLE)
+def test_quaternion_is_scipys(roll, pitch, yaw):
+    quaternion = quaternion_from_rpy(roll, pitch, yaw)
+    assert same_rotation(quaternion, Rotation.from_euler("XYZ", (roll, pitch, yaw)).as_quat())
+    assert np.linalg.norm(quaternion) == pytest.approx(1.0)
+
+
+@given(ANGLE, PITCH, ANGLE)
+def test_rpy_comes_back(roll, pitch, yaw):
+    back = rpy_from_quaternion(*quaternion_from_rpy(roll, pitch, yaw))
+    errors = [wrap_to_pi(a - b) for a, b in zip(back, (roll, pitch, yaw), strict=True)]
+    assert errors == pytest.approx([0.0, 0.0, 0.0], abs=1e-7)
+
+
+@given(st.tuples(*[st.floats(-1.0, 1.0)] * 4), st.floats(0.1, 10.0))
+def test_any_quaternion_comes_back(quaternion, scale):
+    norm = np.linalg.norm(quaternion)
+    if norm < 1e-3:
+        return
+    roll, pitch, yaw = rpy_from_quaternion(*(scale * q for q in quaternion))
+    assert abs(pitch) <= math.pi / 2
+    back = quaternion_from_rpy(roll, pitch, yaw)
+    # At pitch = +-pi/2 the asin costs half of the digits.
+    assert same_rotation(np.array(quaternion) / norm, back, tolerance=1e-6)
+
+
+@pytest.mark.parametrize("pitch", [-math.pi / 2, math.pi / 2])
+def test_gimbal_lock_still_gives_the_rotation(pitch):
+    quaternion = quaternion_from_rpy(0.3, pitch, 0.4)
+    assert same_rotation(quaternion, quaternion_from_rpy(*rpy_from_quaternion(*quaternion)), 1e-6)
+
+
+def test_order_is_not_that_of_tf():
+    rotation = Rotation.from_quat(quaternion_from_rpy(0.3, -0.4, 1.1))
+    assert rotation.as_euler("XYZ") == pytest.approx([0.3, -0.4, 1.1])
+    assert rotation.as_euler("xyz") != pytest.approx([0.3, -0.4, 1.1], abs=0.01)
+
+
+def test_rotation_matrix_is_as_documented():
+    roll, pitch, yaw = 0.3, -0.4, 1.1
+    matrix = Rotation.from_quat(quaternion_from_rpy(roll, pitch, yaw)).as_matrix()
+    axes = [
+        Rotation.from_euler(axis, angle).as_matrix()
+        for axis, angle in zip("xyz", (roll, pitch, yaw), strict=True)
+    ]
+    np.testing.assert_allclose(matrix, axes[0] @ axes[1] @ axes[2], atol=1e-15)
+    assert math.atan2(-matrix[1, 2], matrix[2, 2]) == pytest.approx(roll)
+    assert math.asin(matrix[0, 2]) == pytest.approx(pitch)
+    assert math.atan2(-matrix[0, 1], matrix[0, 0]) == pytest.approx(yaw)
+
+
+def test_zero_quaternion_is_refused():
+    with pytest.raises(ValueError, match="no rotation"):
+        rpy_from_quaternion(0.0, 0.0, 0.0, 0.0)
+
+
+@given(FINITE)
+def test_wrapping_keeps_the_direction(angle):
+    wrapped = wrap_to_pi(angle)
+    assert isinstance(wrapped, float)
+    assert -math.pi <= wrapped <= math.pi
+    assert math.cos(wrapped) == pytest.approx(math.cos(angle), abs=1e-9)
+    assert math.sin(wrapped) == pytest.approx(math.sin(angle), abs=1e-9)
+
+
+@given(ANGLE)
+def test_wrapping_leaves_what_is_in_range(angle):
+    assert abs(wrap_to_pi(angle)) == pytest.approx(abs(angle), abs=1e-15)
+
+
+def test_wrapping_works_on_arrays():
+    angles = np.array([[0.0, 3.5], [-3.5, 7.0]])
+    expected = [[0.0, 3.5 - 2 * math.pi], [2 * math.pi - 3.5, 7.0 - 2 * math.pi]]
+    np.testing.assert_allclose(wrap_to_pi(angles), expected, atol=1e-15)
+
+
+@given(FINITE, FINITE, ANGLE)
+def test_rotation_by_yaw_is_scipys(x, y, yaw):
+    expected = Rotation.from_euler("z", yaw).apply([x, y, 0.0])[:2]
+    assert rotate_by_yaw(x, y, yaw) == pytest.approx(expected, abs=1e-6)
+
+
+@given(FINITE, FINITE, ANGLE)
+def test_rotation_by_yaw_is_undone(x, y, yaw):
+    assert rotate_by_yaw(*rotate_by_yaw(x, y, yaw), -yaw) == pytest.approx((x, y), abs=1e-6)

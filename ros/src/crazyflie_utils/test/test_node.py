@@ -1,0 +1,138 @@
+"""The base class of all nodes."""
+
+import pytest
+from std_msgs.msg import String
+
+from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.node import Node
+from crazyflie_utils.parameters import POSITIVE
+
+
+class Echo(Node):
+    """Repeats what it hears, and says "safe" when it must be safe."""
+
+    def __init__(self, fails_in=""):
+        super().__init__()
+        self._fails_in = fails_in
+        self._publisher = None
+        self.order = []
+
+    def load_parameters(self, handle):
+        self.order.append("parameters")
+        self.gain = handle.param("gain", POSITIVE)
+        if self._fails_in == "parameters":
+            raise RuntimeError("no algorithm")
+
+    def register_callbacks(self, handle):
+        self.order.append("callbacks")
+        self._publisher = handle.publisher("out", String, latch=True)
+        handle.subscribe("in", String, self._on_message)
+        if self._fails_in == "callbacks":
+            raise TypeError("topic clash")
+        self.order.append("complete")
+
+    def make_safe(self):
+        self._publisher.publish(String("safe"))
+        if self._fails_in == "make_safe":
+            raise RuntimeError("not safe")
+
+    def _on_message(self, message):
+        self.order.append(message.data)
+        if message.data == "fail":
+            raise RuntimeError(message.data)
+        self._publisher.publish(message)
+
+
+@pytest.fixture
+def process():
+    return FakeProcess()
+
+
+def texts(process):
+    return [message.data for message in process.published("/ns/out")]
+
+
+def test_loads_then_registers_then_lives(process):
+    node = Echo()
+    assert process.launch(node, "/ns/echo", {"gain": 2})
+    assert node.order == ["parameters", "callbacks", "complete"]
+    process.publish("/ns/in", String("x"))
+    assert texts(process) == ["x"]
+    assert process.logged("error") == []
+
+
+def test_bad_parameter_is_named_and_nothing_is_registered(process):
+    assert not process.launch(Echo(), "/ns/echo", {"gain": -1.0})
+    assert process.logged("error") == [
+        "/ns/echo: parameter /ns/echo/gain is -1.0; expected a finite number > 0"
+    ]
+    assert process.transport.outlets == {}
+    assert list(process.transport.inlets) == ["/clock"]
+
+
+@pytest.mark.parametrize(
+    ("step", "error"), [("parameters", "no algorithm"), ("callbacks", "topic clash")]
+)
+def test_any_other_error_stops_the_node_with_a_traceback(process, step, error):
+    assert not process.launch(Echo(fails_in=step), "/ns/echo", {"gain": 1.0})
+    (text,) = process.logged("error")
+    assert text.startswith("/ns/echo: failed to initialize\nTraceback")
+    assert error in text
+
+
+def test_a_latched_message_waits_until_the_node_is_complete(process):
+    process.handle("/other").publisher("/ns/in", String, latch=True).publish(String("early"))
+    node = Echo()
+    assert process.launch(node, "/ns/echo", {"gain": 1.0})
+    assert node.order == ["parameters", "callbacks", "complete", "early"]
+
+
+def test_is_made_safe_after_a_fault_and_lives_on(process):
+    assert process.launch(Echo(), "/ns/echo", {"gain": 1.0})
+    for text in ("a", "fail", "b"):
+        process.publish("/ns/in", String(text))
+    assert texts(process) == ["a", "safe", "b"]
+
+
+def test_shutdown_makes_safe(process):
+    node = Echo()
+    assert process.launch(node, "/ns/echo", {"gain": 1.0})
+    node.shutdown()
+    assert texts(process) == ["safe"]
+
+
+def test_every_node_is_shut_down_though_one_fails(process):
+    nodes = {"/ns/a": Echo(fails_in="make_safe"), "/ns/b": Echo()}
+    for name, node in nodes.items():
+        assert process.launch(node, name, {"gain": 1.0})
+    ticks = []
+    process.handle("/ns/a").timer(0.1, lambda: ticks.append(1))
+    process.shut_down(nodes)
+    assert texts(process) == ["safe", "safe"]
+    (error,) = process.logged("error")
+    assert "shutdown failed" in error
+    assert "not safe" in error
+    process.advance(1.0)
+    assert ticks == []
+
+
+def test_messages_of_shutdown_still_reach_the_other_nodes(process):
+    node = Echo()
+    assert process.launch(node, "/ns/echo", {"gain": 1.0})
+    heard = []
+    process.handle("/other").subscribe(
+        "/ns/out", String, lambda message: heard.append(message.data)
+    )
+    process.shut_down({"/ns/echo": node})
+    assert heard == ["safe"]
+
+
+def test_default_is_silence():
+    Node().make_safe()
+    Node().shutdown()
+
+
+@pytest.mark.parametrize("method", ["load_parameters", "register_callbacks"])
+def test_subclasses_must_say_what_they_do(method):
+    with pytest.raises(NotImplementedError):
+        getattr(Node(), method)(None)

@@ -1,0 +1,251 @@
+"""Timers in the order of their deadlines."""
+
+import math
+import threading
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crazyflie_utils.clock import SteadyClock
+from crazyflie_utils.executor import Executor
+from crazyflie_utils.timers import SteadyTimers, TimerQueue
+
+LIMIT = 20.0
+
+
+@pytest.fixture
+def queue():
+    """Return a queue on an executor that has been started."""
+    executor = Executor()
+    executor.start()
+    return TimerQueue(executor)
+
+
+def run(queue, *moments):
+    for moment in moments:
+        queue.run_due(moment)
+
+
+def test_first_tick_is_one_period_after_the_beginning(queue):
+    ticks = []
+    queue.add(0.5, lambda: ticks.append(1), now=10.0)
+    assert queue.next_deadline() == 10.5
+    run(queue, 10.0, 10.4)
+    assert ticks == []
+    run(queue, 10.5)
+    assert ticks == [1]
+    assert queue.next_deadline() == 11.0
+
+
+def test_without_timers_nothing_is_due(queue):
+    assert queue.next_deadline() == math.inf
+    run(queue, 1e9)
+
+
+def test_ticks_run_in_the_order_of_their_deadlines(queue):
+    order = []
+    queue.add(0.3, lambda: order.append("slow"), now=0.0)
+    queue.add(0.2, lambda: order.append("fast"), now=0.0)
+    queue.add(0.3, lambda: order.append("slow too"), now=0.0)
+    run(queue, 0.3)
+    assert order == ["fast", "slow", "slow too"]
+
+
+def test_missed_ticks_are_skipped_and_the_phase_is_kept(queue):
+    ticks = []
+    queue.add(0.1, lambda: ticks.append(1), now=0.0)
+    run(queue, 0.55)
+    assert ticks == [1]
+    assert queue.next_deadline() == pytest.approx(0.6)
+
+
+def test_rounding_makes_no_tick_late_or_double(queue):
+    # As with /clock in steps of 1 ms, at the stamps that its messages can hold.
+    ticks = []
+    now = 0.0
+    queue.add(0.01, lambda: ticks.append(now), now=now)
+    for step in range(1, 200_001):
+        now = step * 1_000_000 * 1e-9
+        queue.run_due(now)
+    assert ticks == [k * 10_000_000 * 1e-9 for k in range(1, 20_001)]
+
+
+def test_times_as_large_as_wall_time_are_met(queue):
+    ticks = []
+    start = 1_700_000_000
+    queue.add(0.01, lambda: ticks.append(1), now=float(start))
+    for step in range(1, 1001):
+        queue.run_due((start * 1000 + step * 10) * 1e-3)
+    assert len(ticks) == 1000
+
+
+@given(
+    st.floats(1e-3, 10.0),
+    st.floats(0.0, 1e6),
+    st.lists(st.floats(1e-4, 50.0), min_size=1, max_size=40),
+)
+def test_phase_and_count(period, start, steps):
+    executor = Executor()
+    executor.start()
+    queue = TimerQueue(executor)
+    ticks = []
+    now = start
+    queue.add(period, lambda: ticks.append(now), now=start)
+    expected = 0
+    for step in steps:
+        before = math.floor((now - start + 1e-6) / period)
+        now += step
+        after = math.floor((now - start + 1e-6) / period)
+        expected += after > before
+        queue.run_due(now)
+        assert queue.next_deadline() > now
+        assert queue.next_deadline() <= now + period * (1.0 + 1e-9) + 1e-6
+        phase = (queue.next_deadline() - start) / period
+        assert phase == pytest.approx(round(phase), abs=1e-6 * max(1.0, phase))
+    # A step can end within rounding of a deadline.
+    assert abs(len(ticks) - expected) <= 1
+    assert len(set(ticks)) == len(ticks)
+
+
+def test_period_of_zero_is_due_every_time(queue):
+    ticks = []
+    queue.add(0.0, lambda: ticks.append(1), now=1.0)
+    run(queue, 1.0, 1.0, 1.5)
+    assert len(ticks) == 3
+
+
+@pytest.mark.parametrize("period", [-1.0, math.nan, math.inf])
+def test_other_periods_are_refused(queue, period):
+    with pytest.raises(ValueError, match=f"period of a timer is {period}"):
+        queue.add(period, lambda: None, now=0.0)
+
+
+def test_stopped_timer_never_fires_again(queue):
+    ticks = []
+    timer = queue.add(1.0, lambda: ticks.append(1), now=0.0)
+    run(queue, 1.0)
+    timer.stop()
+    run(queue, 2.0, 3.0)
+    assert ticks == [1]
+    assert queue.next_deadline() == math.inf
+
+
+def test_timer_stopped_by_an_earlier_tick_does_not_fire_in_the_same_moment():
+    executor = Executor()
+    executor.start()
+    queue = TimerQueue(executor)
+    ticks = []
+    queue.add(1.0, lambda: later.stop(), now=0.0)
+    later = queue.add(1.0, lambda: ticks.append(1), now=0.0)
+    executor.submit(lambda: queue.run_due(1.0))
+    assert ticks == []
+
+
+def test_stopped_queue_never_fires_again():
+    executor = Executor()
+    queue = TimerQueue(executor)
+    ticks = []
+    queue.add(1.0, lambda: ticks.append(1), now=0.0)
+    queue.run_due(1.0)
+    queue.stop()
+    executor.start()
+    queue.run_due(2.0)
+    assert ticks == []
+
+
+def test_rebase_after_a_reset(queue):
+    ticks = []
+    queue.add(0.5, lambda: ticks.append("a"), now=100.0)
+    queue.add(0.2, lambda: ticks.append("b"), now=100.0)
+    run(queue, 100.2)
+    queue.rebase(0.0)
+    assert queue.next_deadline() == 0.2
+    run(queue, 0.2, 0.4, 0.5)
+    assert ticks == ["b", "b", "b", "a"]
+
+
+def test_reset_while_ticks_run_loses_no_timer(queue):
+    ticks = []
+    queue.add(1.0, lambda: queue.rebase(0.0), now=50.0)
+    queue.add(1.0, lambda: ticks.append(1), now=50.0)
+    run(queue, 51.0)
+    assert queue.next_deadline() == 1.0
+    run(queue, 1.0)
+    assert ticks == [1, 1]
+
+
+def test_timers_may_be_added_and_stopped_by_ticks(queue):
+    ticks = []
+
+    def tick():
+        timer.stop()
+        queue.add(0.1, lambda: ticks.append(1), now=1.0)
+
+    timer = queue.add(1.0, tick, now=0.0)
+    run(queue, 1.0, 1.1, 1.2)
+    assert ticks == [1, 1]
+
+
+@pytest.fixture
+def steady():
+    """Return timers by the machine's clock."""
+    executor = Executor()
+    executor.start()
+    steady = SteadyTimers(TimerQueue(executor), SteadyClock())
+    yield steady
+    steady.stop()
+
+
+def test_steady_timers_fire_after_start(steady):
+    fired = threading.Event()
+    steady.add(0.001, fired.set)
+    assert not fired.is_set()
+    steady.start()
+    assert fired.wait(LIMIT)
+
+
+def test_steady_timer_added_later_wakes_the_thread(steady):
+    steady.start()
+    steady.add(1e6, lambda: None)
+    fired = threading.Semaphore(0)
+    steady.add(0.001, fired.release)
+    for _ in range(3):
+        assert fired.acquire(timeout=LIMIT)
+
+
+def test_steady_timers_do_not_fire_early(steady):
+    clock = SteadyClock()
+    moments = []
+    done = threading.Event()
+
+    def tick():
+        moments.append(clock.time())
+        if len(moments) == 5:
+            done.set()
+
+    begin = clock.time()
+    steady.add(0.005, tick)
+    steady.start()
+    assert done.wait(LIMIT)
+    for number, moment in enumerate(moments, start=1):
+        assert moment >= begin + number * 0.005 - 1e-5
+
+
+def test_no_steady_timer_fires_after_stop(steady):
+    ticks = []
+    fired = threading.Event()
+
+    def tick():
+        ticks.append(1)
+        fired.set()
+
+    steady.add(0.0, tick)
+    steady.start()
+    assert fired.wait(LIMIT)
+    steady.stop()
+    steady._thread.join(LIMIT)
+    assert not steady._thread.is_alive()
+    count = len(ticks)
+    steady._queue.run_due(1e12)
+    assert len(ticks) == count

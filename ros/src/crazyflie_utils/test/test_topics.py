@@ -1,0 +1,140 @@
+"""Hand-over of messages within a process."""
+
+import pytest
+from std_msgs.msg import Empty, String
+
+from crazyflie_utils.topics import Topics
+from crazyflie_utils.transport import Outlet
+
+
+class Wire(Outlet):
+    """The way out of one topic, with a listener or without."""
+
+    def __init__(self, latch):
+        self.latch = latch
+        self.heard = False
+        self.sent = []
+
+    def is_heard(self):
+        return self.heard
+
+    def publish(self, message):
+        self.sent.append(message)
+
+
+class World:
+    """The part of a transport that topics need."""
+
+    def __init__(self):
+        self.wires = []
+        self.subscribed = []
+
+    def advertise(self, topic, message_type, latch):
+        self.wires.append(Wire(latch))
+        return self.wires[-1]
+
+    def subscribe(self, topic, message_type, deliver):
+        self.subscribed.append((topic, message_type, deliver))
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+@pytest.fixture
+def topics(world):
+    return Topics(world)
+
+
+def test_hands_over_the_very_object_once_to_everybody(topics):
+    received = []
+    topics.subscribe("/a", String, lambda message: received.append(("first", message)))
+    publisher = topics.publisher("/a", String, latch=False)
+    topics.subscribe("/a", String, lambda message: received.append(("second", message)))
+    topics.subscribe("/b", String, lambda message: received.append(("other", message)))
+    message = String("x")
+    publisher.publish(message)
+    assert [name for name, _ in received] == ["first", "second"]
+    assert all(each is message for _, each in received)
+
+
+def test_several_publishers_of_a_topic(topics):
+    received = []
+    topics.subscribe("/a", String, received.append)
+    publishers = [topics.publisher("/a", String, latch=False) for _ in range(2)]
+    messages = [String("1"), String("2")]
+    for publisher, message in zip(publishers, messages, strict=True):
+        publisher.publish(message)
+    assert received == messages
+
+
+def test_leaves_the_process_only_for_listeners(topics, world):
+    publisher = topics.publisher("/a", String, latch=False)
+    publisher.publish(String("nobody listens"))
+    world.wires[0].heard = True
+    message = String("heard")
+    publisher.publish(message)
+    assert world.wires[0].sent == [message]
+    assert not world.wires[0].latch
+
+
+def test_latched_messages_always_leave_for_those_who_come_later(topics, world):
+    publisher = topics.publisher("/a", String, latch=True)
+    message = String("x")
+    publisher.publish(message)
+    assert world.wires[0].latch
+    assert world.wires[0].sent == [message]
+
+
+def test_latched_message_reaches_late_subscribers_in_the_process(topics):
+    publisher = topics.publisher("/a", String, latch=True)
+    publisher.publish(String("old"))
+    last = String("last")
+    publisher.publish(last)
+    received = []
+    topics.subscribe("/a", String, received.append)
+    assert len(received) == 1
+    assert received[0] is last
+
+
+def test_what_is_not_latched_does_not_reach_late_subscribers(topics):
+    topics.publisher("/a", String, latch=False).publish(String("x"))
+    received = []
+    topics.subscribe("/a", String, received.append)
+    assert received == []
+
+
+def test_every_subscriber_hears_those_outside(topics, world):
+    # Each is announced, so that a late one is sent what is latched outside.
+    received = []
+    for name in ("first", "second"):
+        topics.subscribe("/a", String, lambda message, name=name: received.append(name))
+    assert [(topic, kind) for topic, kind, _ in world.subscribed] == [("/a", String)] * 2
+    for _, _, deliver in world.subscribed:
+        deliver(String("from outside"))
+    assert received == ["first", "second"]
+
+
+def test_type_clashes_are_named(topics):
+    topics.publisher("/a", String, latch=False)
+    topics.subscribe("/a", String, lambda message: None)
+    expected = "topic /a carries std_msgs/String, not std_msgs/Empty"
+    with pytest.raises(TypeError, match=expected):
+        topics.publisher("/a", Empty, latch=False)
+    with pytest.raises(TypeError, match=expected):
+        topics.subscribe("/a", Empty, lambda message: None)
+
+
+def test_message_of_another_type_is_refused(topics):
+    publisher = topics.publisher("/a", String, latch=False)
+    received = []
+    topics.subscribe("/a", String, received.append)
+    for wrong in (Empty(), "text", String):
+        with pytest.raises(TypeError, match="topic /a carries std_msgs/String, not"):
+            publisher.publish(wrong)
+    assert received == []
+
+
+def test_publisher_knows_its_topic(topics):
+    assert topics.publisher("/a", String, latch=False).topic == "/a"

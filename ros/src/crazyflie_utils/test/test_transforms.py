@@ -1,0 +1,143 @@
+"""tf within a process: tf2's semantics, and no nonsense let in."""
+
+import math
+
+import genpy
+import pytest
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_utils.angles import quaternion_from_rpy
+from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.transforms import TransformError
+
+
+def transform(parent, child, time, x=0.0, yaw=0.0):
+    """Return a transform by ``x`` along x, then ``yaw`` about z."""
+    message = TransformStamped()
+    message.header.frame_id = parent
+    message.header.stamp = genpy.Time.from_sec(time)
+    message.child_frame_id = child
+    message.transform.translation = Vector3(x, 0.0, 0.0)
+    message.transform.rotation = Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw))
+    return message
+
+
+@pytest.fixture
+def process():
+    return FakeProcess()
+
+
+@pytest.fixture
+def lookup(process):
+    return process.handle("/node").listen_to_transforms()
+
+
+def hear(process, *transforms, topic="/tf"):
+    process.publish(topic, TFMessage(list(transforms)))
+
+
+def test_latest_transform_with_its_own_stamp(process, lookup):
+    hear(process, transform("world", "crazyflie", 100.0, x=1.0))
+    hear(process, transform("world", "crazyflie", 100.5, x=2.0))
+    found = lookup("world", "crazyflie")
+    assert found.transform.translation.x == 2.0
+    assert found.header.stamp.to_sec() == 100.5
+    assert (found.header.frame_id, found.child_frame_id) == ("world", "crazyflie")
+
+
+def test_looks_in_both_directions(process, lookup):
+    hear(process, transform("world", "crazyflie", 100.0, x=1.0))
+    assert lookup("crazyflie", "world").transform.translation.x == -1.0
+
+
+def test_chains_frames_at_their_latest_common_time(process, lookup):
+    for time, x in ((100.0, 1.0), (101.0, 2.0)):
+        hear(process, transform("world", "cage", time, x=x))
+    hear(process, transform("cage", "crazyflie", 100.5, x=10.0))
+    found = lookup("world", "crazyflie")
+    assert found.header.stamp.to_sec() == 100.5
+    assert found.transform.translation.x == pytest.approx(11.5)
+
+
+def test_static_transforms_hold_at_any_time(process, lookup):
+    hear(process, transform("crazyflie", "base", 0.0, x=0.1), topic="/tf_static")
+    hear(process, transform("world", "crazyflie", 100.0, yaw=math.pi / 2))
+    found = lookup("world", "base").transform.translation
+    assert (found.x, found.y) == pytest.approx((0.0, 0.1), abs=1e-12)
+
+
+def test_unknown_and_unconnected_frames_are_named(process, lookup):
+    with pytest.raises(TransformError, match="world"):
+        lookup("world", "crazyflie")
+    hear(process, transform("world", "crazyflie", 100.0), transform("map", "other", 100.0))
+    with pytest.raises(TransformError, match="nowhere"):
+        lookup("world", "nowhere")
+    with pytest.raises(TransformError, match=r"world.*other|other.*world"):
+        lookup("world", "other")
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("field", ["translation.x", "rotation.w"])
+def test_what_is_not_finite_is_dropped_with_a_warning(process, lookup, field, bad):
+    hear(process, transform("world", "crazyflie", 100.0, x=1.0))
+    wrong = transform("world", "crazyflie", 100.1, x=2.0)
+    part, name = field.split(".")
+    setattr(getattr(wrong.transform, part), name, bad)
+    hear(process, wrong, transform("world", "other", 100.1, x=3.0))
+    assert lookup("world", "crazyflie").transform.translation.x == 1.0
+    assert lookup("world", "other").transform.translation.x == 3.0
+    assert process.logged("warn") == [
+        "/tf: ignoring a transform world -> crazyflie that is not finite"
+    ]
+
+
+def test_what_is_no_rotation_is_dropped_with_a_warning(process, lookup):
+    wrong = transform("world", "crazyflie", 100.0)
+    wrong.transform.rotation.w = 0.0
+    hear(process, wrong)
+    with pytest.raises(TransformError):
+        lookup("world", "crazyflie")
+    assert process.logged("warn") == [
+        "/tf: ignoring a transform world -> crazyflie that has no unit quaternion"
+    ]
+
+
+def test_the_same_warning_is_throttled(process, lookup):
+    wrong = transform("world", "crazyflie", 100.0, x=math.nan)
+    for _ in range(100):
+        hear(process, wrong)
+    hear(process, transform("world", "other", 100.0, x=math.nan))
+    assert len(process.logged("warn")) == 2
+
+
+def test_reset_of_time_forgets_what_moves_and_keeps_what_is_static(process, lookup):
+    hear(process, transform("crazyflie", "base", 0.0, x=0.1), topic="/tf_static")
+    hear(process, transform("world", "crazyflie", 100.0, x=1.0))
+    process.clock.set(1.0)
+    with pytest.raises(TransformError):
+        lookup("world", "crazyflie")
+    hear(process, transform("world", "crazyflie", 1.0, x=5.0))
+    assert lookup("world", "base").transform.translation.x == pytest.approx(5.1)
+    assert lookup("world", "crazyflie").header.stamp.to_sec() == 1.0
+
+
+def test_broadcasts_leave_the_process_and_are_known_in_it(process):
+    broadcast = process.handle("/simulator").broadcast_transforms()
+    lookup = process.handle("/estimator").listen_to_transforms()
+    batch = [transform("world", f"cf{n}", 100.0, x=float(n)) for n in range(3)]
+    broadcast(batch)
+    (message,) = process.published("/tf")
+    assert message.transforms == batch
+    assert lookup("world", "cf2").transform.translation.x == 2.0
+
+
+def test_nodes_share_one_buffer_and_one_broadcaster(process):
+    lookups = [process.handle(name).listen_to_transforms() for name in ("/a", "/b")]
+    broadcasts = [process.handle(name).broadcast_transforms() for name in ("/a", "/b")]
+    broadcasts[0]([transform("world", "cf1", 100.0)])
+    broadcasts[1]([transform("world", "cf2", 100.0)])
+    assert len(process.published("/tf")) == 2
+    assert len(process.transport.inlets["/tf"]) == 1
+    for lookup in lookups:
+        assert lookup("cf1", "cf2").header.stamp.to_sec() == 100.0

@@ -46,6 +46,14 @@ def test_latest_transform_with_its_own_stamp(process, lookup):
     assert (found.header.frame_id, found.child_frame_id) == ("world", "crazyflie")
 
 
+def test_stamps_come_back_to_the_nanosecond(process, lookup):
+    exact = genpy.Time(1_700_000_000, 123_456_789)
+    message = transform("world", "crazyflie", 0.0)
+    message.header.stamp = exact
+    hear(process, message)
+    assert lookup("world", "crazyflie").header.stamp == exact
+
+
 def test_looks_in_both_directions(process, lookup):
     hear(process, transform("world", "crazyflie", 100.0, x=1.0))
     assert lookup("crazyflie", "world").transform.translation.x == -1.0

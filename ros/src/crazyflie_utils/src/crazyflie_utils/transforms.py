@@ -8,6 +8,9 @@ from crazyflie_utils.vectors import is_finite
 
 _LATEST = genpy.Time()
 
+_MOST_STAMPS = 10_000
+"""Stamps that are remembered: the last ten seconds of a vehicle at 1 kHz."""
+
 _NORM_TOLERANCE = 0.01
 """How far tf2 lets the squared norm of a quaternion be from 1."""
 
@@ -38,6 +41,9 @@ class Transforms:
         self._warn = warn
         self._buffer = None
         self._broadcaster = None
+        # tf2's Python buffer keeps stamps as floats, to 0.1 us; this gives them back
+        # as they came.
+        self._stamps = {}
 
     def broadcast(self, transforms: list) -> None:
         """Publish a list of geometry_msgs/TransformStamped on /tf."""
@@ -60,6 +66,7 @@ class Transforms:
         """Forget everything: time has been reset."""
         if self._buffer is not None:
             self._buffer.clear()
+            self._stamps.clear()
 
     def lookup(self, target: str, source: str):
         """Return the latest transform from ``source`` to ``target`` coordinates.
@@ -75,9 +82,12 @@ class Transforms:
             A frame is unknown, or the two are not connected.
         """
         try:
-            return self._buffer.lookup_transform_core(target, source, _LATEST)
+            found = self._buffer.lookup_transform_core(target, source, _LATEST)
         except tf2_ros.TransformException as error:
             raise TransformError(str(error)) from None
+        stamp = found.header.stamp
+        found.header.stamp = self._stamps.get(stamp.to_sec(), stamp)
+        return found
 
     def _hear(self, message):
         self._store(message, self._buffer.set_transform)
@@ -90,11 +100,17 @@ class Transforms:
             complaint = _complaint(transform.transform)
             if complaint is None:
                 store(transform, "tf")
+                self._remember(transform.header.stamp)
             else:
                 self._warn(
                     f"ignoring a transform {transform.header.frame_id} -> "
                     f"{transform.child_frame_id} that {complaint}"
                 )
+
+    def _remember(self, stamp):
+        self._stamps[stamp.to_sec()] = stamp
+        if len(self._stamps) > _MOST_STAMPS:
+            del self._stamps[next(iter(self._stamps))]
 
 
 def _complaint(transform):

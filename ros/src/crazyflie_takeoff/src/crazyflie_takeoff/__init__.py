@@ -1,0 +1,1 @@
+"""Takeoff and landing."""

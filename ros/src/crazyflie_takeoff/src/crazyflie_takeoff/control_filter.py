@@ -1,0 +1,108 @@
+"""The choice between the takeoff server's control and the controller's."""
+
+import math
+
+from crazyflie_takeoff.flight_state import FlightState
+
+TAKEOFF_CONTROL_LIMIT = 0.5
+"""A takeoff control older than this no longer keeps the controller out, s."""
+
+
+class ControlFilter:
+    """Pass takeoff controls always, commanded ones when the vehicle is the controller's.
+
+    That is in flight, or when the last takeoff control is older than
+    `TAKEOFF_CONTROL_LIMIT`. Otherwise the last takeoff control is repeated.
+
+    Whether the vehicle is in flight is what the toggle says, until a flight
+    state has been heard; from then on only the flight state counts, so that a
+    toggle and a state that tell the same event cannot cancel each other. Who
+    knows by the flight state that the vehicle is on the ground also keeps the
+    controller out when zero thrust is no longer repeated, because the server
+    has died: the controller may hold a reference high above.
+
+    A filter that has just started does not know yet how old the last takeoff
+    control is. So it listens first, until one comes or `stop_listening` is called; only
+    the flight state can tell it before that the controller is to be passed.
+
+    Controls are passed on as they are; they can be of any type.
+    """
+
+    def __init__(self):
+        self._state = None
+        self._toggled = False
+        self._listening = True
+        self._waiting = None
+        self._takeoff_control = None
+        self._takeoff_thrust = 0.0
+        self._takeoff_time = math.inf
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether the vehicle is in flight, as far as is known."""
+        return self._toggled if self._state is None else self._state.in_flight
+
+    @property
+    def remembered(self) -> FlightState | None:
+        """The flight state to tell a server that has been restarted; None if unknown.
+
+        A toggle that says "on the ground" is not remembered: who has missed
+        one takes flight for ground.
+        """
+        if self._state is None and self._toggled:
+            return FlightState.FLYING
+        return self._state
+
+    def toggle(self) -> None:
+        """Take note of a toggle of in_flight."""
+        self._toggled = not self._toggled
+
+    def hear_state(self, state: FlightState) -> None:
+        """Take note of the server's flight state."""
+        self._state = state
+
+    def takeoff(self, time: float, control, thrust: float):
+        """Return what to pass on when a takeoff control has come.
+
+        Parameters
+        ----------
+        time : float
+            Now, s.
+        control : object
+        thrust : float
+            Its thrust, m/s^2.
+        """
+        self._listening = False
+        self._waiting = None
+        self._takeoff_control = control
+        self._takeoff_thrust = thrust
+        self._takeoff_time = time
+        return control
+
+    def commanded(self, time: float, control):
+        """Return what to pass on when a commanded control has come at ``time`` (s), or None."""
+        # After a reset of the clock the age counts from there.
+        self._takeoff_time = min(self._takeoff_time, time)
+        self._waiting = None
+        if self.in_flight:
+            return control
+        if self._takeoff_control is None and self._listening:
+            self._waiting = control
+            return None
+        if self._is_kept_on_ground():
+            return self._takeoff_control
+        if self._takeoff_control is None:
+            return control
+        if time - self._takeoff_time > TAKEOFF_CONTROL_LIMIT:
+            return control
+        return self._takeoff_control
+
+    def stop_listening(self, time: float):
+        """Return what to pass on of what has waited until now, ``time`` (s), or None."""
+        self._listening = False
+        return None if self._waiting is None else self.commanded(time, self._waiting)
+
+    def _is_kept_on_ground(self):
+        # A thrust above zero came from a server that lifts the vehicle off
+        # without telling a flight state; the state that is known is then old.
+        return self._state is FlightState.ON_GROUND and self._takeoff_thrust <= 0.0

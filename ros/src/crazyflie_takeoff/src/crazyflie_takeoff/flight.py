@@ -1,0 +1,270 @@
+"""Takeoff and landing as a state machine that lives by calls of `Flight.tick`.
+
+Heights and positions are in the fixed frame (z up), m. Times are s of any clock
+that does not run backwards; if it is reset, what was under way goes on from there.
+"""
+
+import math
+from dataclasses import dataclass
+
+from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_utils.units import GRAVITY
+
+LIFT_OFF_THRUST = GRAVITY + 0.2
+"""Thrust of the open-loop part of a takeoff, m/s^2."""
+
+RAMP_RATE = 5.0
+"""How fast the thrust of a landing goes down from hover, m/s^2 per s."""
+
+RAMP_DURATION = 1.0
+"""How long the ramp lasts, s; zero thrust follows."""
+
+ZERO_THRUST_PERIOD = 0.1
+"""Period at which zero thrust is repeated on the ground, s."""
+
+TOUCHDOWN_HEIGHT = 0.05
+"""A vehicle less than this above the ground counts as down, m."""
+
+DESCENT_MARGIN = 3.0
+"""How much longer than calculated a descent may take, s."""
+
+TOUCHDOWN_LIMIT = 2.0
+"""How long after the ramp a vehicle may take to come down, s."""
+
+PRESS_DEPTH = 0.3
+"""How far below the ground a descent's reference goes, m, so that the vehicle
+meets the ground with its speed also when it hangs above the reference."""
+
+_ROUNDING = 1e-6
+"""Tolerance of comparisons between times, s."""
+
+_REFUSALS = {
+    FlightState.ON_GROUND: "the vehicle is on the ground",
+    FlightState.TAKING_OFF: "a takeoff is under way",
+    FlightState.FLYING: "the vehicle is in flight; land first",
+    FlightState.DESCENDING: "a landing is under way",
+    FlightState.LANDING: "a landing is under way",
+}
+
+
+class RefusalError(Exception):
+    """A takeoff or landing makes no sense now; the text says why. Nothing has changed."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How to take off and land.
+
+    Attributes
+    ----------
+    hover : tuple of float
+        Hover point x, y, z, m.
+    open_loop : float
+        How long `LIFT_OFF_THRUST` is given, s.
+    settle : float
+        How long the controller has to reach the hover point, s.
+    descent_speed : float
+        Speed of the descent, m/s; 0 for none: a landing is the bare ramp.
+    """
+
+    hover: tuple
+    open_loop: float
+    settle: float
+    descent_speed: float
+
+
+@dataclass(frozen=True)
+class Output:
+    """What is to be published after a tick.
+
+    Attributes
+    ----------
+    state : FlightState
+    thrust : float or None
+        Takeoff control with level attitude, m/s^2.
+    reference : tuple or None
+        x, y, z in m and x_dot, y_dot, z_dot in m/s.
+    toggle : bool
+        in_flight changes.
+    """
+
+    state: FlightState
+    thrust: float | None = None
+    reference: tuple | None = None
+    toggle: bool = False
+
+
+class Flight:
+    """The vehicle's flight, from the ground to the ground.
+
+    Parameters
+    ----------
+    plan : Plan
+    state : FlightState
+        Where the flight stands; not TAKING_OFF.
+    announced : bool, optional
+        Whether the world has been told (by toggles) that the vehicle is in
+        flight. By default it has been told the truth.
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        state: FlightState = FlightState.ON_GROUND,
+        announced: bool | None = None,
+    ):
+        self._plan = plan
+        self._state = state
+        self._announced = state.in_flight if announced is None else announced
+        self._ground = 0.0
+        self._time = -math.inf
+        self._entered = None
+        self._hover_sent = False
+        self._descent = None
+        self._zero_sent = -math.inf
+
+    @property
+    def state(self) -> FlightState:
+        """Where the flight stands."""
+        return self._state
+
+    def takeoff(self) -> None:
+        """Begin to take off.
+
+        Raises
+        ------
+        RefusalError
+            The vehicle is not on the ground.
+        """
+        if self._state is not FlightState.ON_GROUND:
+            raise RefusalError(_REFUSALS[self._state])
+        self._enter(FlightState.TAKING_OFF)
+
+    def land(self) -> None:
+        """Begin to land.
+
+        Raises
+        ------
+        RefusalError
+            The vehicle is not flying, or is landing or taking off already.
+        """
+        if self._state is not FlightState.FLYING:
+            raise RefusalError(_REFUSALS[self._state])
+        self._enter(self._way_down())
+
+    def abort(self) -> None:
+        """Turn a takeoff into a landing; anything else goes on as it is."""
+        if self._state is FlightState.TAKING_OFF:
+            self._enter(self._way_down())
+
+    def tick(self, time: float, position: tuple | None = None) -> Output:
+        """Go on.
+
+        Parameters
+        ----------
+        time : float
+            Now, s.
+        position : tuple of float or None
+            Measured x, y, z, m; None when it is not known at present.
+
+        Returns
+        -------
+        Output
+        """
+        self._follow_clock(time)
+        thrust, reference = self._ACTIONS[self._state](self, time, position)
+        toggle = self._state.in_flight != self._announced
+        self._announced = self._state.in_flight
+        return Output(self._state, thrust, reference, toggle)
+
+    # One action for each state: it returns thrust and reference, or None for them.
+
+    def _stay_on_ground(self, time, position):
+        if position is not None:
+            self._ground = position[2]
+        return self._zero_thrust(time), None
+
+    def _take_off(self, time, position):
+        elapsed = time - self._entered + _ROUNDING
+        if elapsed < self._plan.open_loop:
+            return LIFT_OFF_THRUST, None
+        reference = None
+        if not self._hover_sent:
+            self._hover_sent = True
+            reference = (*self._plan.hover, 0.0, 0.0, 0.0)
+        if elapsed >= self._plan.open_loop + self._plan.settle:
+            self._enter(FlightState.FLYING)
+        return None, reference
+
+    def _fly(self, time, position):
+        return None, None
+
+    def _descend(self, time, position):
+        if position is not None and self._descent is None:
+            self._descent = _Descent(position, self._ground, self._plan.descent_speed)
+        elapsed = time - self._entered
+        if self._is_down(position) or elapsed > self._descent.limit:
+            self._enter(FlightState.LANDING)
+            self._follow_clock(time)
+            return self._ramp_down(time, position)
+        return None, self._descent.reference(elapsed)
+
+    def _ramp_down(self, time, position):
+        elapsed = time - self._entered + _ROUNDING
+        if elapsed < RAMP_DURATION:
+            return GRAVITY - RAMP_RATE * (time - self._entered), None
+        if self._is_down(position) or elapsed > RAMP_DURATION + TOUCHDOWN_LIMIT:
+            self._enter(FlightState.ON_GROUND)
+        return self._zero_thrust(time), None
+
+    _ACTIONS = {
+        FlightState.ON_GROUND: _stay_on_ground,
+        FlightState.TAKING_OFF: _take_off,
+        FlightState.FLYING: _fly,
+        FlightState.DESCENDING: _descend,
+        FlightState.LANDING: _ramp_down,
+    }
+
+    def _enter(self, state):
+        self._state = state
+        self._entered = None
+        self._hover_sent = False
+        self._descent = None
+        self._zero_sent = -math.inf
+
+    def _follow_clock(self, time):
+        if self._entered is None:
+            self._entered = time
+        elif time < self._time:
+            self._entered += time - self._time
+            self._zero_sent += time - self._time
+        self._time = time
+
+    def _way_down(self):
+        return FlightState.DESCENDING if self._plan.descent_speed > 0.0 else FlightState.LANDING
+
+    def _is_down(self, position):
+        # Who does not know the height has to take it for reached.
+        return position is None or position[2] - self._ground < TOUCHDOWN_HEIGHT
+
+    def _zero_thrust(self, time):
+        if time - self._zero_sent < ZERO_THRUST_PERIOD - _ROUNDING:
+            return None
+        self._zero_sent = time
+        return 0.0
+
+
+class _Descent:
+    """A reference that sinks straight down from where the vehicle is."""
+
+    def __init__(self, position, ground, speed):
+        self._x, self._y, self._z = position
+        self._speed = speed
+        self._lowest = min(ground - PRESS_DEPTH, self._z)
+        self.limit = max(self._z - ground, 0.0) / speed + DESCENT_MARGIN
+
+    def reference(self, elapsed):
+        z = self._z - self._speed * elapsed
+        if z <= self._lowest:
+            return (self._x, self._y, self._lowest, 0.0, 0.0, 0.0)
+        return (self._x, self._y, z, 0.0, 0.0, -self._speed)

@@ -1,0 +1,32 @@
+"""The words in which server and filter speak about a flight."""
+
+import enum
+
+
+class FlightState(enum.Enum):
+    """Where a flight stands; the values are what is published.
+
+    A landing has two states, because the vehicle is still in flight in the
+    first: the controller brings it down (`DESCENDING`) before the server takes
+    over and ramps the thrust down (`LANDING`).
+    """
+
+    ON_GROUND = "on_ground"
+    TAKING_OFF = "taking_off"
+    FLYING = "flying"
+    DESCENDING = "descending"
+    LANDING = "landing"
+
+    @property
+    def in_flight(self) -> bool:
+        """Whether the vehicle is the controller's: what the topic in_flight toggles."""
+        return self in (FlightState.FLYING, FlightState.DESCENDING)
+
+    @property
+    def is_settled(self) -> bool:
+        """Whether no takeoff or landing is under way."""
+        return self in (FlightState.ON_GROUND, FlightState.FLYING)
+
+
+UNKNOWN = "unknown"
+"""What a filter publishes that has not been told a flight state."""

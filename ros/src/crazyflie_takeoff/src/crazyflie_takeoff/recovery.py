@@ -1,0 +1,74 @@
+"""How a server that has just started finds out where the flight stands.
+
+It may be the first on the ground, or take the place of one that died at any moment.
+There are two witnesses: the control filter, which remembers the flight state
+that the former server published; and the measured height.
+"""
+
+from dataclasses import dataclass
+
+from crazyflie_takeoff.flight import TOUCHDOWN_HEIGHT
+from crazyflie_takeoff.flight_state import FlightState
+
+FLYING_HEIGHT = 0.15
+"""A vehicle above this height is flying if nobody knows better, m."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Where a flight stands.
+
+    Attributes
+    ----------
+    state : FlightState
+        ON_GROUND, FLYING or, to finish what the former server began, DESCENDING or LANDING.
+    announced : bool
+        Whether the world has been told (by toggles) that the vehicle is in flight.
+    reason : str
+        For the log.
+    """
+
+    state: FlightState
+    announced: bool
+    reason: str
+
+
+def find_state(
+    remembered: FlightState | None, height: float | None, can_descend: bool = True
+) -> Finding:
+    """Conclude from what the witnesses say where the flight stands.
+
+    In doubt it is FLYING: the controller keeps the vehicle, and the operator can
+    land. An interrupted takeoff or landing is landed if the height is known: on the
+    ground its caller, who got an error, expects the vehicle to be safe.
+
+    Parameters
+    ----------
+    remembered : FlightState or None
+        What the filter remembers; None when it knows nothing, or there is none.
+    height : float or None
+        Measured z, m; None when it is not known.
+    can_descend : bool
+        Whether landings begin with a descent.
+
+    Returns
+    -------
+    Finding
+    """
+    seen = "the height is not known" if height is None else f"the height is {height:.2f} m"
+    said = "nothing is remembered" if remembered is None else f"{remembered.value} is remembered"
+    state = _conclude(remembered, height, can_descend)
+    announced = state.in_flight if remembered is None else remembered.in_flight
+    return Finding(state, announced, f"{said}, {seen}")
+
+
+def _conclude(remembered, height, can_descend):
+    if remembered is not None and not remembered.is_settled:
+        if height is not None and height < TOUCHDOWN_HEIGHT:
+            return FlightState.LANDING
+        if height is not None and can_descend:
+            return FlightState.DESCENDING
+        return FlightState.FLYING
+    if height is not None and height > FLYING_HEIGHT:
+        return FlightState.FLYING
+    return FlightState.ON_GROUND if remembered is None else remembered

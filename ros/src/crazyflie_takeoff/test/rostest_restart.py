@@ -1,0 +1,122 @@
+"""Server and filter are killed in flight and on the ground, and started again."""
+
+import os
+import queue
+import signal
+from xmlrpc.client import ServerProxy
+
+import pytest
+import rosgraph
+import rospy
+from std_msgs.msg import String
+from std_srvs.srv import Empty as EmptyService
+
+from crazyflie_msgs.msg import Control, ControlStamped
+
+LIMIT = 30.0
+COMMANDED = 9.0
+SERVER, FILTER = "/takeoff_server", "/takeoff_control_filter"
+
+
+@pytest.fixture(scope="module")
+def heard():
+    """Return a queue for each topic, while a controller is publishing."""
+    topics = {
+        "/in_flight_state": String,
+        "/in_flight_filter": String,
+        "/control/takeoff": ControlStamped,
+        "/control/final": ControlStamped,
+    }
+    queues = {topic: queue.Queue() for topic in topics}
+    for topic, message_type in topics.items():
+        rospy.Subscriber(topic, message_type, queues[topic].put)
+    publisher = rospy.Publisher("/control/lqr", ControlStamped, queue_size=10)
+    control = ControlStamped(control=Control(thrust=COMMANDED))
+    timer = rospy.Timer(rospy.Duration(0.02), lambda _: publisher.publish(control))
+    yield queues
+    timer.shutdown()
+
+
+def kill(node):
+    """Let a node die in the middle of whatever it is doing; roslaunch starts another one."""
+    uri = rosgraph.Master("/rostest_restart").lookupNode(node)
+    _, _, pid = ServerProxy(uri).getPid("/rostest_restart")
+    os.kill(pid, signal.SIGKILL)
+
+
+def service(name):
+    rospy.wait_for_service(name, timeout=LIMIT)
+    return rospy.ServiceProxy(name, EmptyService)
+
+
+def call_when_there(name):
+    """Call a service of a node that may just be starting again."""
+    for _ in range(int(LIMIT / 0.1)):
+        try:
+            return service(name)()
+        except rospy.ServiceException as error:
+            if "refused:" in str(error):
+                raise
+            rospy.sleep(0.1)
+    raise AssertionError(f"{name} did not come back")
+
+
+def wait_for(heard, topic, word):
+    while heard[topic].get(timeout=LIMIT).data != word:
+        pass
+
+
+def forget(heard):
+    for messages in heard.values():
+        while not messages.empty():
+            messages.get()
+
+
+def thrusts(heard, topic, count):
+    """Return the next ``count`` thrusts on a topic, and those that have come before."""
+    messages = heard[topic]
+    return [messages.get(timeout=LIMIT).control.thrust for _ in range(messages.qsize() + count)]
+
+
+def test_on_the_ground_first(heard):
+    wait_for(heard, "/in_flight_filter", "on_ground")
+    forget(heard)
+    kill(SERVER)
+    wait_for(heard, "/in_flight_state", "on_ground")
+    assert set(thrusts(heard, "/control/final", 50)) == {0.0}
+    forget(heard)
+    kill(FILTER)
+    wait_for(heard, "/in_flight_filter", "on_ground")
+    assert set(thrusts(heard, "/control/final", 50)) == {0.0}
+    with pytest.raises(rospy.ServiceException, match="on the ground"):
+        call_when_there("/land")
+
+
+def test_then_in_flight(heard):
+    call_when_there("/takeoff")
+    wait_for(heard, "/in_flight_filter", "flying")
+    forget(heard)
+    kill(SERVER)
+    wait_for(heard, "/in_flight_state", "flying")
+    assert set(thrusts(heard, "/control/final", 50)) == {COMMANDED}
+    kill(FILTER)
+    forget(heard)
+    wait_for(heard, "/in_flight_filter", "flying")
+    assert set(thrusts(heard, "/control/final", 50)) == {COMMANDED}
+    with pytest.raises(rospy.ServiceException, match="in flight"):
+        call_when_there("/takeoff")
+    assert heard["/control/takeoff"].empty()
+
+
+def test_and_on_the_ground_again(heard):
+    call_when_there("/land")
+    wait_for(heard, "/in_flight_filter", "on_ground")
+    thrusts(heard, "/control/final", 20)
+    kill(FILTER)
+    forget(heard)
+    wait_for(heard, "/in_flight_filter", "on_ground")
+    assert set(thrusts(heard, "/control/final", 50)) == {0.0}
+    forget(heard)
+    kill(SERVER)
+    wait_for(heard, "/in_flight_state", "on_ground")
+    assert set(thrusts(heard, "/control/final", 50)) == {0.0}

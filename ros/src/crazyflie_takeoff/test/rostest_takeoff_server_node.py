@@ -1,0 +1,84 @@
+"""The takeoff server in a process of its own, on a real master."""
+
+import queue
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+import rospy
+from std_msgs.msg import Empty, String
+from std_srvs.srv import Empty as EmptyService
+
+from crazyflie_msgs.msg import ControlStamped, PositionVelocityStateStamped
+
+LIMIT = 15.0
+
+
+@pytest.fixture(scope="module")
+def heard():
+    """Return a queue of what is said on each topic."""
+    topics = {
+        "/in_flight_state": String,
+        "/in_flight": Empty,
+        "/control/takeoff": ControlStamped,
+    }
+    queues = {topic: queue.Queue() for topic in topics}
+    for topic, message_type in topics.items():
+        rospy.Subscriber(topic, message_type, queues[topic].put)
+    return queues
+
+
+def service(name):
+    rospy.wait_for_service(name, timeout=LIMIT)
+    return rospy.ServiceProxy(name, EmptyService)
+
+
+def refusal(name):
+    with pytest.raises(rospy.ServiceException) as error:
+        service(name)()
+    return str(error.value)
+
+
+def wait_for_state(heard, state):
+    while heard["/in_flight_state"].get(timeout=LIMIT).data != state:
+        pass
+
+
+def thrusts(heard):
+    """Return what has been said since the last time."""
+    messages = heard["/control/takeoff"]
+    return [messages.get().control.thrust for _ in range(messages.qsize())]
+
+
+def test_takes_off_and_lands_and_says_why_it_refuses(heard):
+    wait_for_state(heard, "on_ground")
+    assert heard["/control/takeoff"].get(timeout=LIMIT).control.thrust == 0.0
+    assert "/land refused: the vehicle is on the ground" in refusal("/land")
+
+    with ThreadPoolExecutor() as threads:
+        takeoff = threads.submit(service("/takeoff"))
+        wait_for_state(heard, "taking_off")
+        assert "/takeoff refused: a takeoff is under way" in refusal("/takeoff")
+        assert "/land refused: a takeoff is under way" in refusal("/land")
+        takeoff.result(timeout=LIMIT)
+    heard["/in_flight"].get(timeout=LIMIT)
+    said = thrusts(heard)
+    lift_off = said.index(pytest.approx(10.01))
+    assert set(said[:lift_off]) <= {0.0}
+    assert said[lift_off:] == pytest.approx([10.01] * len(said[lift_off:]))
+    assert "/takeoff refused: the vehicle is in flight" in refusal("/takeoff")
+
+    # Who comes late is told the reference.
+    message = rospy.wait_for_message("/ref", PositionVelocityStateStamped, timeout=LIMIT)
+    assert (message.state.x, message.state.y, message.state.z) == (0.0, 0.5, 1.0)
+
+    service("/land")()
+    heard["/in_flight"].get(timeout=LIMIT)
+    wait_for_state(heard, "on_ground")
+    ramp = []
+    while not ramp or ramp[-1] != 0.0:
+        ramp.append(heard["/control/takeoff"].get(timeout=LIMIT).control.thrust)
+    assert ramp[0] == pytest.approx(9.81)
+    assert ramp == sorted(ramp, reverse=True)
+    assert len(ramp) > 10
+    assert ramp[-2] > 4.8
+    assert "/land refused: the vehicle is on the ground" in refusal("/land")

@@ -1,0 +1,126 @@
+"""Which control is passed on, with a clock moved by hand."""
+
+import pytest
+
+from crazyflie_takeoff.control_filter import ControlFilter
+from crazyflie_takeoff.flight_state import FlightState
+
+ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
+
+
+@pytest.fixture
+def control_filter():
+    """Return a filter that has listened."""
+    control_filter = ControlFilter()
+    assert control_filter.stop_listening(0.0) is None
+    return control_filter
+
+
+def test_takeoff_control_is_always_passed_on(control_filter):
+    assert control_filter.takeoff(0.0, "t1", 10.0) == "t1"
+    control_filter.toggle()
+    assert control_filter.takeoff(0.1, "t2", 10.0) == "t2"
+    control_filter.hear_state(FLYING)
+    assert control_filter.takeoff(0.2, "t3", 10.0) == "t3"
+
+
+def test_commanded_control_is_passed_on_in_flight(control_filter):
+    control_filter.takeoff(0.0, "t", 10.0)
+    control_filter.toggle()
+    assert control_filter.commanded(0.01, "c") == "c"
+    control_filter.toggle()
+    assert control_filter.commanded(0.02, "c") == "t"
+
+
+def test_commanded_control_is_passed_on_when_takeoff_control_is_old(control_filter):
+    control_filter.takeoff(1.0, "t", 10.0)
+    assert control_filter.commanded(1.01, "c") == "t"
+    assert control_filter.commanded(1.5, "c") == "t"
+    assert control_filter.commanded(1.5001, "c") == "c"
+    control_filter.takeoff(2.0, "t2", 0.0)
+    assert control_filter.commanded(2.01, "c") == "t2"
+    assert control_filter.commanded(2.6, "c") == "c"
+
+
+def test_commanded_control_is_passed_on_without_any_takeoff_control(control_filter):
+    assert control_filter.commanded(0.0, "c") == "c"
+
+
+def test_a_clock_that_is_reset_does_not_keep_the_controller_out(control_filter):
+    control_filter.takeoff(5000.0, "t", 10.0)
+    assert control_filter.commanded(0.0, "c") == "t"
+    assert control_filter.commanded(0.6, "c") == "c"
+
+
+def test_listens_before_it_passes_a_controller():
+    control_filter = ControlFilter()
+    assert control_filter.commanded(0.0, "c1") is None
+    assert control_filter.commanded(0.1, "c2") is None
+    assert control_filter.stop_listening(0.2) == "c2"
+    assert control_filter.commanded(0.21, "c3") == "c3"
+
+
+def test_a_takeoff_control_ends_the_listening():
+    control_filter = ControlFilter()
+    assert control_filter.commanded(0.0, "c") is None
+    assert control_filter.takeoff(0.1, "t", 10.0) == "t"
+    assert control_filter.commanded(0.11, "c") == "t"
+    assert control_filter.stop_listening(0.2) is None
+
+
+def test_the_flight_state_tells_a_listening_filter_to_pass_the_controller():
+    control_filter = ControlFilter()
+    assert control_filter.commanded(0.0, "c1") is None
+    control_filter.hear_state(FLYING)
+    assert control_filter.commanded(0.01, "c2") == "c2"
+    # What has waited is older by now than what has been passed on.
+    assert control_filter.stop_listening(0.2) is None
+
+
+@pytest.mark.parametrize("state", FlightState)
+def test_the_flight_state_decides(control_filter, state):
+    control_filter.takeoff(0.0, "t", 10.0)
+    control_filter.hear_state(state)
+    assert control_filter.commanded(0.1, "c") == ("c" if state in (FLYING, DESCENDING) else "t")
+    assert control_filter.in_flight == state.in_flight
+
+
+@pytest.mark.parametrize("toggle_first", [True, False])
+def test_state_and_toggle_of_one_event_do_not_cancel_each_other(control_filter, toggle_first):
+    def happen(state):
+        if toggle_first:
+            control_filter.toggle()
+        control_filter.hear_state(state)
+        if not toggle_first:
+            control_filter.toggle()
+
+    for state in (FLYING, LANDING, ON_GROUND, TAKING_OFF, FLYING):
+        happen(state)
+        assert control_filter.in_flight == state.in_flight
+
+
+def test_on_the_ground_the_controller_stays_out_when_the_server_dies(control_filter):
+    control_filter.hear_state(ON_GROUND)
+    assert control_filter.commanded(0.0, "c") is None
+    control_filter.takeoff(1.0, "zero", 0.0)
+    assert control_filter.commanded(60.0, "c") == "zero"
+
+
+def test_a_server_without_flight_state_may_take_over(control_filter):
+    control_filter.hear_state(ON_GROUND)
+    control_filter.takeoff(0.0, "zero", 0.0)
+    control_filter.takeoff(60.0, "lift", 10.01)
+    assert control_filter.commanded(60.4, "c") == "lift"
+    assert control_filter.commanded(60.6, "c") == "c"
+
+
+def test_remembers_what_it_has_been_told(control_filter):
+    assert control_filter.remembered is None
+    control_filter.toggle()
+    assert control_filter.remembered is FLYING
+    control_filter.toggle()
+    assert control_filter.remembered is None
+    for state in FlightState:
+        control_filter.hear_state(state)
+        control_filter.toggle()
+        assert control_filter.remembered is state

@@ -1,0 +1,287 @@
+"""Server or filter dies at any moment of a flight, and another one takes its place.
+
+Every node is in a process of its own; messages that nobody hears are lost.
+"""
+
+import pytest
+from std_msgs.msg import Empty, String
+from takeoff_helpers import BARE, FILTER, SERVER, HoverNetwork, Network, control, state
+
+from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
+from crazyflie_utils.transport import ServiceError
+
+GAP = 1.0
+"""How long there is no server or filter, s."""
+
+
+@pytest.fixture(params=[SERVER, BARE], ids=["height known", "height unknown"])
+def network(request):
+    """Return a network on the ground."""
+    network = HoverNetwork(request.param)
+    network.advance(1.5)
+    return network
+
+
+@pytest.fixture
+def seeing():
+    """Return a network on the ground whose server knows the height."""
+    network = HoverNetwork(SERVER)
+    network.advance(1.5)
+    return network
+
+
+def restart(network, name, gap=GAP):
+    """Kill server or filter, let time pass, start another one."""
+    network.kill(name)
+    network.advance(gap)
+    getattr(network, f"start_{name}")()
+
+
+def thrusts(network, topic, since):
+    return [message.control.thrust for _, message in network.on(topic, since)]
+
+
+def refusal(network, service):
+    with pytest.raises(ServiceError) as error:
+        network.call(service)
+    return str(error.value)
+
+
+def test_server_on_the_ground(network):
+    begun = network.time
+    restart(network, "server")
+    network.advance(1.2)
+    assert network.last("/in_flight_state") == "on_ground"
+    assert set(thrusts(network, "/control/final", begun)) == {0.0}
+    assert "on the ground" in refusal(network, "/land")
+    network.take_off()
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
+
+
+def test_server_on_the_ground_after_a_flight(network):
+    """The controller still has a reference, and must not fly there."""
+    network.take_off()
+    land = network.call("/land")
+    network.advance_until(land.done)
+    network.advance(1.0)
+    begun = network.time
+    network.kill("server")
+    for _ in range(50):
+        network.advance(0.1)
+        assert network.vehicle.z == 0.0
+    assert len(network.on("/control/lqr", begun)) > 400
+    assert set(thrusts(network, "/control/final", begun)) == {0.0}
+    network.start_server()
+    network.advance(1.2)
+    assert network.last("/in_flight_state") == "on_ground"
+    network.take_off()
+
+
+def test_server_in_flight(network):
+    network.take_off()
+    toggles = len(network.on("/in_flight"))
+    begun = network.time
+    restart(network, "server")
+    for _ in range(50):
+        network.advance(0.1)
+        assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
+    assert network.last("/in_flight_state") == "flying"
+    assert thrusts(network, "/control/takeoff", begun) == []
+    assert len(network.on("/in_flight")) == toggles
+    assert network.on("/ref", begun) == []
+    assert "in flight" in refusal(network, "/takeoff")
+    land = network.call("/land")
+    network.advance_until(land.done)
+    network.advance(0.2)
+    assert network.vehicle.z == 0.0
+    assert thrusts(network, "/control/final", 0.0)[-1] == 0.0
+
+
+@pytest.mark.parametrize("gap", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("moment", [0.02, 0.5, 0.99, 1.2, 3.0, 5.98])
+def test_server_during_takeoff_when_the_height_is_known(seeing, moment, gap):
+    """What was begun ends on the ground, as softly as a landing."""
+    seeing.call("/takeoff")
+    seeing.advance(moment)
+    begun = seeing.time
+    restart(seeing, "server", gap)
+    seeing.advance_until(lambda: seeing.on("/in_flight_state", begun) != [])
+    seeing.advance_until(lambda: seeing.last("/in_flight_state") == "on_ground")
+    seeing.advance(0.5)
+    assert seeing.vehicle.z == 0.0
+    # Long after the server's death the vehicle may have fallen by itself.
+    if gap < 1.0 or moment > 1.0:
+        assert seeing.vehicle.touchdown_speed < 0.5
+    assert len(seeing.on("/in_flight")) in (0, 2)
+    seeing.take_off()
+
+
+@pytest.mark.parametrize("moment", [1.2, 3.0, 5.98])
+def test_server_during_takeoff_when_the_height_is_unknown(moment):
+    """The controller keeps the vehicle; nobody drops it."""
+    network = HoverNetwork(BARE)
+    network.advance(1.5)
+    network.call("/takeoff")
+    network.advance(moment)
+    begun = network.time
+    restart(network, "server")
+    network.advance(6.0)
+    assert network.last("/in_flight_state") == "flying"
+    assert thrusts(network, "/control/takeoff", begun) == []
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
+    assert len(network.on("/in_flight")) == 1
+    land = network.call("/land")
+    network.advance_until(land.done)
+    network.advance(0.2)
+    assert network.vehicle.z == 0.0
+    assert len(network.on("/in_flight")) == 2
+
+
+@pytest.mark.parametrize("gap", [0.1, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("moment", [0.02, 1.0, 3.0, 3.25, 3.6, 4.1])
+def test_server_during_landing_when_the_height_is_known(seeing, moment, gap):
+    seeing.take_off()
+    seeing.call("/land")
+    seeing.advance(moment)
+    begun = seeing.time
+    restart(seeing, "server", gap)
+    seeing.advance_until(lambda: seeing.on("/in_flight_state", begun) != [])
+    seeing.advance_until(lambda: seeing.last("/in_flight_state") == "on_ground")
+    seeing.advance(0.5)
+    assert seeing.vehicle.z == 0.0
+    assert 0.0 < seeing.vehicle.touchdown_speed < 0.5
+    assert len(seeing.on("/in_flight")) == 2
+    seeing.take_off()
+
+
+def test_server_during_the_ramp_when_the_height_is_unknown():
+    """The filter gives the vehicle to the controller, the server leaves it there."""
+    network = HoverNetwork(BARE)
+    network.advance(1.5)
+    network.take_off()
+    network.call("/land")
+    network.advance(0.3)
+    begun = network.time
+    restart(network, "server")
+    network.advance(6.0)
+    assert network.last("/in_flight_state") == "flying"
+    assert thrusts(network, "/control/takeoff", begun) == []
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
+    land = network.call("/land")
+    network.advance_until(land.done)
+
+
+@pytest.mark.parametrize("gap", [0.05, 0.4])
+def test_filter_in_flight(network, gap):
+    network.take_off()
+    restart(network, "filter", gap)
+    begun = network.time
+    network.advance(0.05)
+    # At once: the flight state is latched.
+    assert len(thrusts(network, "/control/final", begun)) >= 4
+    network.advance(5.0)
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
+    assert network.last("/in_flight_filter") == "flying"
+    land = network.call("/land")
+    network.advance_until(land.done)
+    network.advance(1.0)
+    assert network.vehicle.z == 0.0
+    assert network.vehicle.touchdown_speed < 0.5 or network.server_parameters is BARE
+
+
+def test_filter_on_the_ground(network):
+    network.take_off()
+    land = network.call("/land")
+    network.advance_until(land.done)
+    network.advance(1.0)
+    restart(network, "filter")
+    begun = network.time
+    network.advance(3.0)
+    # Not a single one of the controller's commands.
+    assert len(network.on("/control/lqr", begun)) > 250
+    assert set(thrusts(network, "/control/final", begun)) == {0.0}
+    network.take_off()
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
+
+
+def test_filter_during_takeoff_and_landing(network):
+    takeoff = network.call("/takeoff")
+    for _ in range(5):
+        network.advance(1.0)
+        restart(network, "filter", 0.1)
+    network.advance_until(takeoff.done)
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.05)
+    land = network.call("/land")
+    while not land.done():
+        network.advance(0.7)
+        restart(network, "filter", 0.1)
+    network.advance(1.0)
+    assert network.vehicle.z == 0.0
+    assert thrusts(network, "/control/final", 0.0)[-1] == 0.0
+
+
+def test_both_in_flight_when_the_height_is_known(seeing):
+    seeing.take_off()
+    begun = seeing.time
+    seeing.kill("server")
+    seeing.kill("filter")
+    seeing.advance(0.3)
+    seeing.start_filter()
+    seeing.start_server()
+    seeing.advance(2.0)
+    assert seeing.last("/in_flight_state") == "flying"
+    assert 0.0 not in thrusts(seeing, "/control/final", begun)
+    assert seeing.vehicle.z == pytest.approx(1.0, abs=0.02)
+
+
+def test_server_with_a_foreign_filter_in_flight():
+    """Without a memory, the height decides; it takes a second."""
+    network = Network()
+    network.start("server", TakeoffServerNode(), SERVER)
+    for _ in range(150):
+        network.process("server").publish("/state", state(1.0))
+        network.advance(0.01)
+    assert network.last("/in_flight_state") == "flying"
+    assert network.on("/control/takeoff") == []
+    assert network.on("/in_flight_state")[0][0] == pytest.approx(101.0, abs=0.03)
+
+
+def test_filter_with_a_foreign_server():
+    """Toggles alone decide, and a restart in flight costs a fifth of a second."""
+    network = Network()
+    network.start("filter", TakeoffControlFilterNode(), FILTER)
+    process = network.process("filter")
+    for _ in range(30):
+        process.publish("/control/lqr", control(9.0))
+        network.advance(0.01)
+    first = network.on("/control/final")[0][0]
+    assert first == pytest.approx(100.2, abs=0.02)
+    process.publish("/in_flight", Empty())
+    network.advance(0.01)
+    assert network.last("/in_flight_filter") == "flying"
+    process.publish("/in_flight", Empty())
+    network.advance(0.01)
+    assert network.last("/in_flight_filter") == "unknown"
+
+
+def test_server_takes_the_place_of_a_foreign_one_in_flight():
+    """The filter knows from the toggle that the vehicle flies."""
+    network = HoverNetwork(BARE)
+    network.kill("server")
+    network.kill("filter")
+    network.start_filter()
+    network.process("filter").publish("/in_flight", Empty())
+    network.start_server()
+    network.advance(2.0)
+    assert network.last("/in_flight_state") == "flying"
+    assert network.on("/in_flight") == []
+
+
+def test_a_dead_servers_flight_state_is_not_news():
+    network = HoverNetwork(BARE)
+    network.advance(1.5)
+    network.kill("server")
+    network.process("filter").publish("/in_flight_state", String("on_ground"))
+    network.advance(1.0)
+    assert [m.data for _, m in network.on("/in_flight_filter")] == ["unknown", "on_ground"]

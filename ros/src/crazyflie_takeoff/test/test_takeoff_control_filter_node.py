@@ -1,0 +1,124 @@
+"""The takeoff control filter on a fake process."""
+
+import math
+
+import pytest
+from std_msgs.msg import Empty, String
+from takeoff_helpers import FILTER, control
+
+from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_utils.fake import FakeProcess
+
+
+def launch():
+    """Return a process with a filter in it that has just started."""
+    process = FakeProcess()
+    assert process.launch(TakeoffControlFilterNode(), "/filter", FILTER)
+    return process
+
+
+@pytest.fixture
+def process():
+    """Return a process with a filter that has listened."""
+    process = launch()
+    process.advance(0.2)
+    return process
+
+
+def thrusts(process):
+    return [message.control.thrust for message in process.published("/control/final")]
+
+
+def memory(process):
+    return [message.data for message in process.published("/in_flight_filter")]
+
+
+@pytest.mark.parametrize("name", FILTER)
+def test_required_parameters(name):
+    process = FakeProcess()
+    parameters = {key: value for key, value in FILTER.items() if key != name}
+    assert not process.launch(TakeoffControlFilterNode(), "/filter", parameters)
+    assert f"/filter/{name} is not set" in process.logged("error")[0]
+
+
+@pytest.mark.parametrize("name", [*FILTER, "topics/flight_state", "topics/filter_state"])
+@pytest.mark.parametrize("value", ["", 3, "no name"])
+def test_bad_parameters_are_named(name, value):
+    process = FakeProcess()
+    assert not process.launch(TakeoffControlFilterNode(), "/filter", {**FILTER, name: value})
+    assert f"/filter/{name} is {value!r}; expected" in process.logged("error")[0]
+
+
+def test_contract_with_toggles(process):
+    process.publish("/control/lqr", control(1.0))
+    process.publish("/control/takeoff", control(10.0))
+    process.publish("/control/lqr", control(2.0))
+    assert thrusts(process) == [1.0, 10.0, 10.0]
+    process.advance(0.51)
+    process.publish("/control/lqr", control(3.0))
+    process.publish("/in_flight", Empty())
+    process.publish("/control/takeoff", control(11.0))
+    process.publish("/control/lqr", control(4.0))
+    process.publish("/in_flight", Empty())
+    process.publish("/control/lqr", control(5.0))
+    assert thrusts(process)[3:] == [3.0, 11.0, 4.0, 11.0]
+
+
+def test_messages_are_passed_on_as_they_are(process):
+    message = control(1.0)
+    message.header.stamp.secs = 42
+    process.publish("/control/lqr", message)
+    assert process.published("/control/final") == [message]
+
+
+@pytest.mark.parametrize("field", ["roll", "pitch", "yaw_dot", "thrust"])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_controls_that_are_not_finite_are_never_passed_on(process, field, bad):
+    for topic in ("/control/takeoff", "/control/lqr"):
+        for _ in range(10):
+            message = control(9.0)
+            setattr(message.control, field, bad)
+            process.publish(topic, message)
+    assert thrusts(process) == []
+    # Throttled, one for each topic.
+    assert len(process.logged("warn")) == 2
+    assert "/control/takeoff" in process.logged("warn")[0]
+
+
+def test_a_takeoff_control_that_is_not_finite_does_not_keep_the_controller_out(process):
+    process.publish("/control/takeoff", control(10.0))
+    process.advance(0.4)
+    process.publish("/control/takeoff", control(math.nan))
+    process.advance(0.2)
+    process.publish("/control/lqr", control(2.0))
+    assert thrusts(process) == [10.0, 2.0]
+
+
+def test_listens_at_first():
+    process = launch()
+    process.publish("/control/lqr", control(1.0))
+    process.publish("/control/lqr", control(2.0))
+    assert thrusts(process) == []
+    process.advance(0.2)
+    assert thrusts(process) == [2.0]
+    process.publish("/control/lqr", control(3.0))
+    process.advance(1.0)
+    assert thrusts(process) == [2.0, 3.0]
+
+
+def test_remembers_the_flight_state_for_the_server(process):
+    assert memory(process) == ["unknown"]
+    process.publish("/in_flight_state", String("taking_off"))
+    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight", Empty())
+    assert memory(process) == ["unknown", "taking_off", "flying"]
+
+
+def test_a_word_that_is_no_flight_state_is_ignored(process):
+    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight_state", String("asleep"))
+    process.publish("/control/takeoff", control(1.0))
+    process.publish("/control/lqr", control(2.0))
+    assert thrusts(process) == [1.0, 2.0]
+    assert "asleep" in process.logged("warn")[0]
+    assert memory(process) == ["unknown", "flying"]

@@ -1,4 +1,4 @@
-"""Run a pytest file as the test node of a rostest.
+"""Run pytest files as the test node of a rostest.
 
 In a .test file::
 
@@ -14,19 +14,34 @@ import rosgraph
 import rospy
 
 _OUTPUT = "--gtest_output=xml:"
+_TEXT = "--text"
+
+
+def pytest_arguments(arguments: list) -> list:
+    """Return what pytest is told when rostest says ``arguments``.
+
+    rostest names a file for the results, in the way of gtest; with ``rostest -t``
+    there is none.
+    """
+    told = []
+    for argument in arguments:
+        if argument.startswith(_OUTPUT):
+            told.append("--junit-xml=" + argument.removeprefix(_OUTPUT))
+        elif argument != _TEXT:
+            told.append(argument)
+    return [*told, "-p", "no:cacheprovider", "-v"]
 
 
 def main() -> int:
     """Run pytest on the files named on the command line; return its exit status."""
-    arguments = rospy.myargv(sys.argv)[1:]
-    outputs = [a.removeprefix(_OUTPUT) for a in arguments if a.startswith(_OUTPUT)]
-    files = [a for a in arguments if not a.startswith(_OUTPUT)]
-    reports = [f"--junit-xml={outputs[-1]}"] if outputs else []
     if not rosgraph.is_master_online():
         print("pytest_node needs a ROS master: run it with rostest", file=sys.stderr)
         return 1
     rospy.init_node("pytest_node", anonymous=True, disable_signals=True)
     # rospy calls notifyAll, which Python 3.10 has deprecated, with every /clock.
     warnings.filterwarnings("ignore", message="notifyAll", category=DeprecationWarning)
-    quiet = ["-W", "ignore:notifyAll:DeprecationWarning"]
-    return pytest.main([*files, *reports, *quiet, "-p", "no:cacheprovider", "-v"])
+    try:
+        return pytest.main(pytest_arguments(rospy.myargv(sys.argv)[1:]))
+    finally:
+        # rospy's sending threads would keep the process alive.
+        rospy.signal_shutdown("tests are through")

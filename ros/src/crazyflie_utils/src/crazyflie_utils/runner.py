@@ -1,6 +1,7 @@
 """Main programs: one node in a process, or many."""
 
 import importlib
+import logging
 import os
 import signal
 import sys
@@ -154,8 +155,7 @@ def _run(process, make_nodes):
         time.sleep(0.1)
     rospy.signal_shutdown(f"signal {signals}")
     if ending.is_stuck:
-        # The threads that wait for the callback would keep the process alive.
-        os._exit(1)
+        _exit_at_once(1)
     sys.exit(0)
 
 
@@ -197,4 +197,13 @@ def _catch_signals():
 
 def _fail():
     rospy.signal_shutdown("failed to initialize")
-    sys.exit(1)
+    _exit_at_once(1)
+
+
+def _exit_at_once(status):
+    # Otherwise threads, of rospy or stuck in a callback, keep the process alive
+    # for half a second or for ever.
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)

@@ -1,0 +1,109 @@
+"""Small nodes for the rostests; run this file with a class's name to run one."""
+
+import json
+import sys
+import threading
+
+from std_msgs.msg import Float64, Int64
+from std_srvs.srv import Trigger, TriggerResponse
+
+from crazyflie_utils import Node, ServiceError, run
+from crazyflie_utils.parameters import TIME_STEP, TOPIC, Integer
+
+SAFE = -1.0
+"""What a `Ticker` says at last."""
+
+
+class Relay(Node):
+    """Passes on every number, increased by ~offset."""
+
+    def load_parameters(self, handle):
+        self._offset = handle.param("offset", Integer(0, 10**9))
+        self._topics = [handle.param(f"topics/{name}", TOPIC) for name in ("in", "out")]
+
+    def register_callbacks(self, handle):
+        self._publisher = handle.publisher(self._topics[1], Int64)
+        handle.subscribe(self._topics[0], Int64, self._on_number)
+
+    def _on_number(self, message):
+        self._publisher.publish(Int64(message.data + self._offset))
+
+
+class Ledger(Node):
+    """Writes down every number; ~report tells them."""
+
+    def load_parameters(self, handle):
+        self._topic = handle.param("topics/in", TOPIC)
+
+    def register_callbacks(self, handle):
+        self._numbers = []
+        handle.advertise_service("~report", Trigger, self._report)
+        handle.advertise_service("~refuse", Trigger, self._refuse)
+        handle.subscribe(self._topic, Int64, lambda message: self._numbers.append(message.data))
+
+    def _report(self, request):
+        return TriggerResponse(True, json.dumps(self._numbers))
+
+    def _refuse(self, request):
+        raise ServiceError("the ledger is closed")
+
+
+class Herald(Node):
+    """Says 42 once, latched."""
+
+    def load_parameters(self, handle):
+        self._topic = handle.param("topics/out", TOPIC)
+
+    def register_callbacks(self, handle):
+        handle.publisher(self._topic, Int64, latch=True).publish(Int64(42))
+
+
+class Ticker(Node):
+    """Tells the time every ~time_step."""
+
+    def load_parameters(self, handle):
+        self._time_step = handle.param("time_step", TIME_STEP)
+
+    def register_callbacks(self, handle):
+        self._publisher = handle.publisher("~time", Float64)
+        handle.timer(self._time_step, self._on_timer)
+
+    def _on_timer(self):
+        self._publisher.publish(Float64(self._handle.time()))
+
+    def make_safe(self):
+        self._publisher.publish(Float64(SAFE))
+
+
+class Clockwork(Node):
+    """Moves simulated time by 10 ms every millisecond."""
+
+    def load_parameters(self, handle):
+        self._steps = 0
+
+    def register_callbacks(self, handle):
+        self._set_clock = handle.clock_publisher()
+        handle.timer(0.001, self._on_timer, steady=True)
+
+    def _on_timer(self):
+        self._steps += 1
+        self._set_clock(self._steps * 0.01)
+
+
+class Stuck(Ticker):
+    """A ticker whose first tick never returns."""
+
+    def _on_timer(self):
+        super()._on_timer()
+        threading.Event().wait()
+
+
+class Broken(Node):
+    """A node that cannot even be made."""
+
+    def __init__(self):
+        raise RuntimeError("broken by design")
+
+
+if __name__ == "__main__":
+    run(globals()[sys.argv[1]], "small_node")

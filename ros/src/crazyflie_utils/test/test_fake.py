@@ -95,3 +95,21 @@ def test_log_by_level(process):
     handle.info("c")
     assert process.logged("info") == ["/node: a", "/node: c"]
     assert process.logged("error") == []
+
+
+def test_the_machines_time_is_moved_by_hand_too(process):
+    calls = []
+    process.handle("/node").timer(1.0, lambda: calls.append(process.clock.time()), steady=True)
+    process.advance(2.5)
+    assert calls == pytest.approx([101.0, 102.0])
+
+
+def test_time_never_steps_back(process):
+    """A deadline just past the end by a rounding error is no reset of the simulation."""
+    times = []
+    process.clock.on_change(lambda time, is_reset: times.append((time, is_reset)))
+    process.handle("/node").timer(0.01, lambda: None)
+    for _ in range(500):
+        process.advance(0.07)
+    assert times == sorted(times)
+    assert not any(is_reset for _, is_reset in times)

@@ -1,57 +1,87 @@
-"""Equations of motion of the 7-dimensional vehicle models.
+"""What a simulated vehicle needs to know of its model; the 7-dimensional models.
 
 State x = (x, y, z, x_dot, y_dot, z_dot, yaw) in the fixed frame (z up), m, m/s
 and rad. Control u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2
 (mass-normalised): the attitude is taken to follow its command at once.
-
-All functions take single vectors or batches: the last axis counts state or
-control, the axes before it vehicles.
 """
 
 from abc import ABC, abstractmethod
 
 import numpy as np
 
+from crazyflie_simulator.elementwise import functions, join, split, where
+from crazyflie_simulator.integrators import rk4_step
 from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.units import GRAVITY
 
+STEP = 0.001
+"""Integration step of every model, s."""
+
 
 class Dynamics(ABC):
-    """What a simulated vehicle needs to know of its model."""
+    """A model, for one vehicle or for many.
+
+    States and controls are lists of components (see `elementwise`), but for
+    `derivative`, which takes arrays whose last axis counts the components.
+    """
 
     x_dim: int
     u_dim: int = 4
 
     @abstractmethod
-    def derivative(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the time derivative of the state.
+    def initial_state(self, position) -> list:
+        """Return the state at rest at a position, three components in m."""
+
+    @abstractmethod
+    def rates(self, t: float, x: list, u: list) -> list:
+        """Return the time derivative of every component of the state.
 
         Parameters
         ----------
         t : float
-            Time, s.
-        x : ndarray, shape (..., x_dim)
-        u : ndarray, shape (..., u_dim)
-
-        Returns
-        -------
-        ndarray, shape (..., x_dim)
+            Time since the beginning, s.
+        x : list, x_dim components
+        u : list, u_dim components
         """
 
     @abstractmethod
-    def initial_state(self, position) -> np.ndarray:
-        """Return the state at rest at a position (m), shape (x_dim,)."""
-
-    @abstractmethod
-    def on_ground(self, x: np.ndarray) -> np.ndarray:
+    def on_ground(self, x: list) -> list:
         """Return the state with the ground, z = 0, taken into account.
 
         A vehicle below the ground is put on it and loses its downward speed.
         """
 
     @abstractmethod
-    def pose(self, x: np.ndarray, u: np.ndarray) -> tuple:
-        """Return the position (3,) in m and the quaternion (x, y, z, w) of one vehicle."""
+    def pose(self, x: list, u: list) -> tuple:
+        """Return the position, in m, and the quaternion (x, y, z, w) of one vehicle."""
+
+    def step(self, count: int, x: list, u: list) -> list:
+        """Return the state one `STEP` later.
+
+        Parameters
+        ----------
+        count : int
+            How many steps have been done since the beginning.
+        x, u : list
+            State, and control, constant over the step.
+        """
+        return self.on_ground(rk4_step(self.rates, count * STEP, x, u, STEP))
+
+    def derivative(self, t: float, x, u) -> np.ndarray:
+        """Return the time derivative of states as arrays.
+
+        Parameters
+        ----------
+        t : float
+            Time since the beginning, s.
+        x : array_like, shape (x_dim,) or (..., x_dim)
+        u : array_like, shape (u_dim,) or (..., u_dim)
+
+        Returns
+        -------
+        ndarray, shape (x_dim,) or (..., x_dim)
+        """
+        return join(self.rates(t, split(x), split(u)))
 
 
 class SevenDimensional(Dynamics):
@@ -59,38 +89,87 @@ class SevenDimensional(Dynamics):
 
     x_dim = 7
 
-    def initial_state(self, position) -> np.ndarray:
+    def initial_state(self, position) -> list:
         """See `Dynamics.initial_state`; yaw is 0."""
-        return np.concatenate([position, np.zeros(4)])
+        x, y, z = position
+        return [x, y, z, 0.0, 0.0, 0.0, 0.0]
 
-    def on_ground(self, x: np.ndarray) -> np.ndarray:
+    def on_ground(self, x: list) -> list:
         """See `Dynamics.on_ground`."""
-        below = x[..., 2] <= 0.0
-        if not below.any():
-            return x
-        x = x.copy()
-        x[..., 2] = np.where(below, 0.0, x[..., 2])
-        x[..., 5] = np.where(below, np.maximum(x[..., 5], 0.0), x[..., 5])
-        return x
+        x, y, z, x_dot, y_dot, z_dot, yaw = x
+        below = z <= 0.0
+        z = where(below, 0.0, z)
+        z_dot = where(below & (z_dot < 0.0), 0.0, z_dot)
+        return [x, y, z, x_dot, y_dot, z_dot, yaw]
 
-    def pose(self, x: np.ndarray, u: np.ndarray) -> tuple:
+    def pose(self, x: list, u: list) -> tuple:
         """See `Dynamics.pose`: roll and pitch are those of the control, yaw is the state's."""
-        return x[:3], quaternion_from_rpy(u[0], u[1], x[6])
+        return tuple(x[:3]), quaternion_from_rpy(u[0], u[1], x[6])
 
 
 class NearHover(SevenDimensional):
     """Small angles about hover, yaw kept apart: tilt does not cost lift."""
 
-    def derivative(self, t: float, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """See `Dynamics.derivative`.
+    def rates(self, t: float, x: list, u: list) -> list:
+        """See `Dynamics.rates`.
 
         x_ddot = g tan(pitch), y_ddot = -g tan(roll), z_ddot = thrust - g, and
         the yaw rate is commanded.
         """
-        x_dot = np.empty(np.broadcast_shapes(x.shape[:-1], u.shape[:-1]) + (7,))
-        x_dot[..., 0:3] = x[..., 3:6]
-        x_dot[..., 3] = GRAVITY * np.tan(u[..., 1])
-        x_dot[..., 4] = -GRAVITY * np.tan(u[..., 0])
-        x_dot[..., 5] = u[..., 3] - GRAVITY
-        x_dot[..., 6] = u[..., 2]
-        return x_dot
+        _, _, _, x_dot, y_dot, z_dot, _ = x
+        roll, pitch, yaw_dot, thrust = u
+        tan = functions(roll).tan
+        return [
+            x_dot,
+            y_dot,
+            z_dot,
+            GRAVITY * tan(pitch),
+            -GRAVITY * tan(roll),
+            thrust - GRAVITY,
+            yaw_dot,
+        ]
+
+    def step(self, count: int, x: list, u: list) -> list:
+        """See `Dynamics.step`: exact, as acceleration and yaw rate are constant, and quick."""
+        px, py, pz, _, _, _, yaw = x
+        vx, vy, vz, ax, ay, az, yaw_dot = self.rates(count * STEP, x, u)
+        half = STEP / 2.0
+        return self.on_ground(
+            [
+                px + STEP * (vx + half * ax),
+                py + STEP * (vy + half * ay),
+                pz + STEP * (vz + half * az),
+                vx + STEP * ax,
+                vy + STEP * ay,
+                vz + STEP * az,
+                yaw + STEP * yaw_dot,
+            ]
+        )
+
+
+class Coupled7D(SevenDimensional):
+    """Tilt in the heading frame, and at the cost of lift: thrust, tilt and yaw are coupled."""
+
+    def rates(self, t: float, x: list, u: list) -> list:
+        """See `Dynamics.rates`.
+
+        With T = thrust: x_ddot = T (sin(pitch) cos(yaw) + sin(roll) sin(yaw)),
+        y_ddot = T (-sin(roll) cos(yaw) + sin(pitch) sin(yaw)),
+        z_ddot = T cos(roll) cos(pitch) - g, and the yaw rate is commanded.
+        """
+        _, _, _, x_dot, y_dot, z_dot, yaw = x
+        roll, pitch, yaw_dot, thrust = u
+        trigonometry = functions(roll)
+        forward = thrust * trigonometry.sin(pitch)
+        right = thrust * trigonometry.sin(roll)
+        lift = thrust * trigonometry.cos(roll) * trigonometry.cos(pitch)
+        c, s = functions(yaw).cos(yaw), functions(yaw).sin(yaw)
+        return [
+            x_dot,
+            y_dot,
+            z_dot,
+            forward * c + right * s,
+            forward * s - right * c,
+            lift - GRAVITY,
+            yaw_dot,
+        ]

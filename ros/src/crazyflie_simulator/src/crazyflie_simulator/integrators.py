@@ -2,32 +2,35 @@
 
 from collections.abc import Callable
 
-import numpy as np
 
-
-def rk4_step(derivative: Callable, t: float, x: np.ndarray, u: np.ndarray, dt: float) -> np.ndarray:
+def rk4_step(rates: Callable, t: float, x: list, u: list, dt: float) -> list:
     """Return the state one classical Runge-Kutta step (4th order) later.
 
     Parameters
     ----------
-    derivative : callable
-        ``derivative(t, x, u)``, shape of x.
+    rates : callable
+        ``rates(t, x, u)``, the time derivative of every component of x.
     t : float
         Time at the beginning of the step, s.
-    x : ndarray, shape (..., x_dim)
-        State at ``t``.
-    u : ndarray, shape (..., u_dim)
+    x : list of float or ndarray
+        State at ``t``, by components (see `elementwise`).
+    u : list of float or ndarray
         Control, constant over the step.
     dt : float
         Step, s.
 
     Returns
     -------
-    ndarray, shape (..., x_dim)
+    list of float or ndarray
         State at ``t + dt``.
     """
-    k1 = derivative(t, x, u)
-    k2 = derivative(t + dt / 2.0, x + dt / 2.0 * k1, u)
-    k3 = derivative(t + dt / 2.0, x + dt / 2.0 * k2, u)
-    k4 = derivative(t + dt, x + dt * k3, u)
-    return x + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+    half = dt / 2.0
+    sixth = dt / 6.0
+    k1 = rates(t, x, u)
+    k2 = rates(t + half, [xi + half * ki for xi, ki in zip(x, k1, strict=True)], u)
+    k3 = rates(t + half, [xi + half * ki for xi, ki in zip(x, k2, strict=True)], u)
+    k4 = rates(t + dt, [xi + dt * ki for xi, ki in zip(x, k3, strict=True)], u)
+    return [
+        xi + sixth * (a + 2.0 * (b + c) + d)
+        for xi, a, b, c, d in zip(x, k1, k2, k3, k4, strict=True)
+    ]

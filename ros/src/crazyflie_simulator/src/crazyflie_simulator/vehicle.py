@@ -4,17 +4,16 @@ import math
 
 import numpy as np
 
-from crazyflie_simulator.dynamics import Dynamics
-from crazyflie_simulator.integrators import rk4_step
+from crazyflie_simulator.dynamics import STEP, Dynamics
+from crazyflie_simulator.elementwise import split
 from crazyflie_utils.held import HOLD_LIMIT
-
-STEP = 0.001
-"""Integration step, s."""
 
 OFF_LIMIT = 2.0
 """The firmware stops its motors when it has had no setpoint for this long, s."""
 
-_OFF = np.zeros(4)
+_HOLD_STEPS = round(HOLD_LIMIT / STEP)
+_OFF_STEPS = round(OFF_LIMIT / STEP)
+_OFF = [0.0, 0.0, 0.0, 0.0]
 
 
 class Vehicle:
@@ -38,8 +37,8 @@ class Vehicle:
 
     def __init__(self, dynamics: Dynamics, position, time: float):
         self._dynamics = dynamics
-        self._x = dynamics.initial_state(np.asarray(position, dtype=float))
-        self._u = np.zeros(dynamics.u_dim)
+        self._x = dynamics.initial_state(split(position))
+        self._u = _OFF
         self._start = time
         self._steps = 0
         self._control_step = None
@@ -52,16 +51,16 @@ class Vehicle:
     @property
     def state(self) -> np.ndarray:
         """State of the dynamics, shape (x_dim,)."""
-        return self._x
+        return np.array(self._x)
 
     @property
     def pose(self) -> tuple:
-        """Position (3,) in m and quaternion (x, y, z, w) in the fixed frame."""
+        """Position (x, y, z) in m and quaternion (x, y, z, w) in the fixed frame."""
         return self._dynamics.pose(self._x, self._effective_control())
 
     def command(self, u) -> None:
         """Take a control, shape (u_dim,), from the present step on."""
-        self._u = np.asarray(u, dtype=float)
+        self._u = split(u)
         self._control_step = self._steps
 
     def advance_to(self, time: float) -> None:
@@ -78,20 +77,15 @@ class Vehicle:
             self._steps += max(steps, 0)
         else:
             for _ in range(steps):
-                self._step()
-
-    def _step(self):
-        u = self._effective_control()
-        x = rk4_step(self._dynamics.derivative, self.time, self._x, u, STEP)
-        self._x = self._dynamics.on_ground(x)
-        self._steps += 1
+                self._x = self._dynamics.step(self._steps, self._x, self._effective_control())
+                self._steps += 1
 
     def _effective_control(self):
         if self._control_step is None:
             return self._u
-        age = (self._steps - self._control_step) * STEP
-        if age < HOLD_LIMIT:
+        age = self._steps - self._control_step
+        if age < _HOLD_STEPS:
             return self._u
-        if age < OFF_LIMIT:
-            return np.array([0.0, 0.0, 0.0, self._u[3]])
+        if age < _OFF_STEPS:
+            return [0.0, 0.0, 0.0, self._u[3]]
         return _OFF

@@ -1,0 +1,51 @@
+"""One vehicle in floats or many in arrays, by the same formulas.
+
+The models take a state or a control as the list of its *components*: floats
+for one vehicle, on which Python is several times quicker than numpy; arrays of
+shape (n,), or of any shape that broadcasts, for many. What differs between the
+two is in this module.
+"""
+
+import math
+
+import numpy as np
+
+
+def split(vectors) -> list:
+    """Return the components of a vector, or of vectors along the last axis.
+
+    Parameters
+    ----------
+    vectors : array_like, shape (m,) or (..., m)
+
+    Returns
+    -------
+    list of float, or of ndarray, shape (...)
+        m entries.
+    """
+    vectors = np.asarray(vectors, dtype=float)
+    return vectors.tolist() if vectors.ndim == 1 else list(np.moveaxis(vectors, -1, 0))
+
+
+def join(components) -> np.ndarray:
+    """Return components as one array, shape (m,) or (..., m); inverse of `split`."""
+    return np.stack(np.broadcast_arrays(*components), axis=-1)
+
+
+def functions(value):
+    """Return the module, math or numpy, whose sin, cos, ... take ``value``."""
+    return math if isinstance(value, float) else np
+
+
+def where(condition, value, other):
+    """Return ``value`` where a condition, bool or array of bool, holds, else ``other``."""
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, value, other)
+    return value if condition else other
+
+
+def clip(value, low: float, high: float):
+    """Return ``value`` limited to [low, high]."""
+    if isinstance(value, np.ndarray):
+        return np.clip(value, low, high)
+    return low if value < low else high if value > high else value

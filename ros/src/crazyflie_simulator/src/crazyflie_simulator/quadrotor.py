@@ -1,0 +1,220 @@
+"""The airframe of a quadrotor: a rigid body with four rotors, without any control.
+
+Frames: fixed (z up) and body (forward-left-up). The rotors are numbered as on
+the Crazyflie, seen from above: 1 front right, 2 back right, 3 back left, 4
+front left; 1 and 3 turn counter-clockwise, 2 and 4 clockwise.
+
+State, 17 components: position (3) in m and velocity (3) in m/s in the fixed
+frame, attitude quaternion (x, y, z, w) from body to fixed frame, body rates (3)
+in rad/s, rotor speeds (4) in rad/s. Input, 7 components: commanded rotor speeds
+(4) in rad/s, velocity of the air (3) in m/s in the fixed frame.
+"""
+
+import math
+from dataclasses import dataclass
+
+from crazyflie_simulator.elementwise import clip, functions, where
+from crazyflie_simulator.integrators import rk4_step
+from crazyflie_utils.units import GRAVITY
+
+BODY_DIM = 17
+"""Components of the airframe's state."""
+
+
+@dataclass(frozen=True)
+class QuadrotorParameters:
+    """Figures of a vehicle; the defaults are those of the Crazyflie 2.1.
+
+    Sources:
+
+    [L] C. Luis and J. Le Ny, Design of a trajectory tracking controller for a
+    nanoquadcopter, 2016, arXiv:1608.05786 (thrust there per rpm^2).
+    [F] J. Förster, System identification of the Crazyflie 2.0 nano
+    quadrocopter, bachelor thesis, ETH Zurich, 2015.
+    [B] Bitcraze, Crazyflie 2.1 data sheet, and the firmware's constants, which
+    agree with [F] in the torque of a rotor. [L] has four times as much.
+
+    Attributes
+    ----------
+    mass : float
+        kg, with battery [B, L].
+    inertia_x, inertia_y, inertia_z : float
+        Principal moments about forward, left and up, kg m^2 [L].
+    arm : float
+        From the centre to a rotor's axis, m: half of motor to motor [B].
+    thrust_constant : float
+        Thrust of a rotor over its speed squared, N s^2 [L].
+    torque_per_thrust : float
+        Torque of a rotor over its thrust, m [F].
+    drag_horizontal, drag_vertical : float
+        Drag over airspeed over the sum of the rotor speeds, across and along
+        the rotors' axes, kg [F].
+    motor_time_constant : float
+        Of the first-order lag between commanded and true speed, s [F: discrete
+        pole at 0.9695404 with 500 Hz].
+    max_rotor_speed : float
+        rad/s [L, at full PWM].
+    """
+
+    mass: float = 0.027
+    inertia_x: float = 1.395e-5
+    inertia_y: float = 1.436e-5
+    inertia_z: float = 2.173e-5
+    arm: float = 0.046
+    thrust_constant: float = 3.1582e-10 * (30.0 / math.pi) ** 2
+    torque_per_thrust: float = 0.005964552
+    drag_horizontal: float = 9.1785e-7
+    drag_vertical: float = 10.311e-7
+    motor_time_constant: float = -0.002 / math.log(0.9695404)
+    max_rotor_speed: float = (0.2685 * 65535.0 + 4070.3) * math.pi / 30.0
+
+    @property
+    def hover_speed(self) -> float:
+        """Speed of all four rotors at which they carry the vehicle, rad/s."""
+        return math.sqrt(self.mass * GRAVITY / (4.0 * self.thrust_constant))
+
+
+CRAZYFLIE = QuadrotorParameters()
+"""The Crazyflie 2.1."""
+
+
+class Airframe:
+    """Equations of motion of a rigid body with four rotors.
+
+    Thrust and torque of a rotor go with the square of its speed, drag with the
+    airspeed and the speed of the rotors [F, chapter 3]. A rotor without command
+    runs down; one that has failed is one that is commanded zero.
+
+    Parameters
+    ----------
+    parameters : QuadrotorParameters
+    """
+
+    def __init__(self, parameters: QuadrotorParameters):
+        self.parameters = parameters
+
+    def initial_state(self, position) -> list:
+        """Return the state at rest and level, heading along x.
+
+        On the ground the rotors stand still; in the air they carry the vehicle.
+        """
+        x, y, z = position
+        speed = where(z > 0.0, self.parameters.hover_speed, 0.0)
+        return [x, y, z] + [0.0] * 6 + [1.0] + [0.0] * 3 + [speed] * 4
+
+    def wrench(self, rotor_speeds) -> tuple:
+        """Return thrust (N) and torque about forward, left and up (N m) of the rotors."""
+        parameters = self.parameters
+        w1, w2, w3, w4 = rotor_speeds
+        k = parameters.thrust_constant
+        f1, f2, f3, f4 = k * w1 * w1, k * w2 * w2, k * w3 * w3, k * w4 * w4
+        lever = parameters.arm * math.sqrt(0.5)
+        return (
+            f1 + f2 + f3 + f4,
+            lever * (f3 + f4 - f1 - f2),
+            lever * (f2 + f3 - f1 - f4),
+            parameters.torque_per_thrust * (f2 + f4 - f1 - f3),
+        )
+
+    def rates(self, t: float, x: list, u: list) -> list:
+        """Return the time derivative of the state; see the module for x and u."""
+        parameters = self.parameters
+        _, _, _, vx, vy, vz, qx, qy, qz, qw, p, q, r, w1, w2, w3, w4 = x
+        c1, c2, c3, c4, wind_x, wind_y, wind_z = u
+        thrust, torque_x, torque_y, torque_z = self.wrench((w1, w2, w3, w4))
+
+        # The body's up axis in the fixed frame, third column of R(q).
+        up_x, up_y = 2.0 * (qx * qz + qw * qy), 2.0 * (qy * qz - qw * qx)
+        up_z = 1.0 - 2.0 * (qx * qx + qy * qy)
+        air_x, air_y, air_z = vx - wind_x, vy - wind_y, vz - wind_z
+        # Drag is the same in all directions across the rotors, so that R(q) is
+        # not needed: all of it with the horizontal constant, the rest along up.
+        speeds = w1 + w2 + w3 + w4
+        drag = parameters.drag_horizontal * speeds / parameters.mass
+        extra = (parameters.drag_vertical - parameters.drag_horizontal) * speeds
+        climb = air_x * up_x + air_y * up_y + air_z * up_z
+        lift = (thrust - extra * climb) / parameters.mass
+
+        ix, iy, iz = parameters.inertia_x, parameters.inertia_y, parameters.inertia_z
+        lag = 1.0 / parameters.motor_time_constant
+        return [
+            vx,
+            vy,
+            vz,
+            lift * up_x - drag * air_x,
+            lift * up_y - drag * air_y,
+            lift * up_z - drag * air_z - GRAVITY,
+            0.5 * (qw * p + qy * r - qz * q),
+            0.5 * (qw * q + qz * p - qx * r),
+            0.5 * (qw * r + qx * q - qy * p),
+            -0.5 * (qx * p + qy * q + qz * r),
+            (torque_x - (iz - iy) * q * r) / ix,
+            (torque_y - (ix - iz) * r * p) / iy,
+            (torque_z - (iy - ix) * p * q) / iz,
+            lag * (c1 - w1),
+            lag * (c2 - w2),
+            lag * (c3 - w3),
+            lag * (c4 - w4),
+        ]
+
+    def step(self, t: float, x: list, rotor_speeds: list, wind: tuple, dt: float) -> list:
+        """Return the state one step later, with the quaternion of norm 1, on or above ground.
+
+        Parameters
+        ----------
+        t : float
+            Time at the beginning of the step, s.
+        x : list, 17 components
+        rotor_speeds : list, 4 components
+            Commanded, rad/s; limited to what the motors can do.
+        wind : tuple, 3 components
+            Velocity of the air in the fixed frame, m/s.
+        dt : float
+            Step, s.
+        """
+        top = self.parameters.max_rotor_speed
+        commands = [clip(speed, 0.0, top) for speed in rotor_speeds]
+        x = rk4_step(self.rates, t, x, [*commands, *wind], dt)
+        qx, qy, qz, qw = x[6:10]
+        norm = functions(qx).sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
+        x[6:10] = qx / norm, qy / norm, qz / norm, qw / norm
+        return self.on_ground(x)
+
+    def on_ground(self, x: list) -> list:
+        """Return the state with the ground, z = 0, taken into account.
+
+        A vehicle that is not above the ground stands on it, upright and still;
+        it keeps its heading and an upward speed, and its rotors may turn.
+        """
+        on_ground = x[2] <= 0.0
+        if on_ground is False:
+            return x
+        qz, qw = x[8], x[9]
+        norm = functions(qz).hypot(qz, qw)
+        # Upside down, heading is lost.
+        lost = norm == 0.0
+        norm = where(lost, 1.0, norm)
+        upright = [0.0, 0.0, where(lost, 0.0, qz / norm), where(lost, 1.0, qw / norm)]
+        climb = where(x[5] > 0.0, x[5], 0.0)
+        standing = [x[0], x[1], 0.0, 0.0, 0.0, climb, *upright, 0.0, 0.0, 0.0, *x[13:]]
+        return [where(on_ground, after, before) for after, before in zip(standing, x, strict=True)]
+
+
+def euler_angles(quaternion) -> tuple:
+    """Return (roll, pitch, yaw) with ``R = Rz(yaw) Ry(pitch) Rx(roll)``, rad.
+
+    This is the order of the firmware, whose roll and pitch are those in the
+    heading frame; messages use the order of `crazyflie_utils.angles`.
+
+    Parameters
+    ----------
+    quaternion : sequence, 4 components
+        (x, y, z, w), of norm 1.
+    """
+    x, y, z, w = quaternion
+    f = functions(x)
+    return (
+        f.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        f.asin(clip(2.0 * (w * y - x * z), -1.0, 1.0)),
+        f.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )

@@ -1,0 +1,101 @@
+"""The full vehicle: airframe and inner loops behind the interface of all models."""
+
+from dataclasses import replace
+
+from crazyflie_simulator import inner_loops
+from crazyflie_simulator.dynamics import STEP, Dynamics
+from crazyflie_simulator.elementwise import functions, where
+from crazyflie_simulator.quadrotor import (
+    BODY_DIM,
+    CRAZYFLIE,
+    Airframe,
+    QuadrotorParameters,
+    euler_angles,
+)
+from crazyflie_simulator.wind import STILL_AIR, Wind
+from crazyflie_utils.units import HOVER_PWM
+
+_STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)
+
+
+class StabilizedQuadrotor(Dynamics):
+    """A quadrotor that takes the control (roll, pitch, yaw_dot, thrust) to its motors.
+
+    State: the airframe's (see `quadrotor`), the memory of the inner loops (see
+    `inner_loops`), and the four motor speeds commanded last, rad/s. The inner
+    loops sample every second step; between samples the latter two stay.
+
+    Thrust is normalised with the *nominal* mass and thrust constant, as is the
+    radio link's: a true vehicle that differs from them hovers at
+    ``GRAVITY * (1 + mass_error) / (1 + thrust_error)``. Roll and pitch are
+    those in the heading frame.
+
+    Parameters
+    ----------
+    parameters : QuadrotorParameters
+        Nominal.
+    mass_error, thrust_error : float
+        How much more mass and thrust constant the true vehicle has, as a
+        fraction of the nominal ones, > -1.
+    wind : Wind
+    """
+
+    x_dim = BODY_DIM + inner_loops.MEMORY_DIM + 4
+
+    def __init__(
+        self,
+        parameters: QuadrotorParameters = CRAZYFLIE,
+        mass_error: float = 0.0,
+        thrust_error: float = 0.0,
+        wind: Wind = STILL_AIR,
+    ):
+        true = replace(
+            parameters,
+            mass=parameters.mass * (1.0 + mass_error),
+            thrust_constant=parameters.thrust_constant * (1.0 + thrust_error),
+        )
+        self.airframe = Airframe(true)
+        self._wind = wind
+        self._speed_squared_per_pwm = parameters.hover_speed**2 / HOVER_PWM
+
+    def initial_state(self, position) -> list:
+        """See `Dynamics.initial_state`; in the air the rotors carry the vehicle."""
+        body = self.airframe.initial_state(position)
+        return body + inner_loops.initial_memory(0.0) + body[-4:]
+
+    def rates(self, t: float, x: list, u: list) -> list:
+        """See `Dynamics.rates`: of what is continuous; the rest is constant between samples."""
+        body = self.airframe.rates(t, x[:BODY_DIM], [*x[-4:], *self._wind.velocity(t)])
+        return body + [0.0] * (self.x_dim - BODY_DIM)
+
+    def on_ground(self, x: list) -> list:
+        """See `Dynamics.on_ground` and `Airframe.on_ground`."""
+        return self.airframe.on_ground(x[:BODY_DIM]) + x[BODY_DIM:]
+
+    def pose(self, x: list, u: list) -> tuple:
+        """See `Dynamics.pose`."""
+        return tuple(x[:3]), tuple(x[6:10])
+
+    def step(self, count: int, x: list, u: list) -> list:
+        """See `Dynamics.step`."""
+        body, memory, commands = x[:BODY_DIM], x[BODY_DIM:-4], x[-4:]
+        if count % _STEPS_PER_SAMPLE == 0:
+            memory, commands = self._sample(body, memory, u)
+        t = count * STEP
+        body = self.airframe.step(t, body, commands, self._wind.velocity(t), STEP)
+        return body + memory + commands
+
+    def _sample(self, body, memory, u):
+        attitude = euler_angles(body[6:10])
+        # A real vehicle rocks on its feet until its loops are content. This one
+        # stands upright, so its loops rest, or they would wind up.
+        standing = body[2] <= 0.0
+        resting = inner_loops.initial_memory(attitude[2])
+        memory = [where(standing, a, b) for a, b in zip(resting, memory, strict=True)]
+        setpoint = [where(standing, 0.0, part) for part in u[:3]] + [u[3]]
+        memory, pwm = inner_loops.update(memory, setpoint, attitude, body[10:13])
+        return memory, [self._rotor_speed(motor) for motor in pwm]
+
+    def _rotor_speed(self, pwm):
+        # The firmware's thrust is linear in its command, through zero.
+        return functions(pwm).sqrt(self._speed_squared_per_pwm * pwm)

@@ -1,0 +1,50 @@
+"""Moving air: a constant wind and gusts on top."""
+
+import math
+
+import numpy as np
+
+_WAVES = 64
+"""Waves that a gust is made of, along each axis."""
+
+
+class Wind:
+    """Velocity of the air, everywhere the same, as a function of time.
+
+    Along each axis the gust is a sum of cosines of equal amplitude and random
+    phase, whose frequencies are spread over the spectrum of a first-order
+    Gauss-Markov process (M. Shinozuka and G. Deodatis, Simulation of stochastic
+    processes by spectral representation, 1991): zero mean, standard deviation
+    ``gust``, autocorrelation ``exp(-|t| / gust_time)``.
+
+    Parameters
+    ----------
+    mean : array_like, shape (3,)
+        m/s, fixed frame.
+    gust : float
+        Standard deviation of the gust along each axis, m/s.
+    gust_time : float
+        Correlation time of the gust, s.
+    seed : int or sequence of int
+        The same seed gives the same gust.
+    """
+
+    def __init__(self, mean=(0.0, 0.0, 0.0), gust: float = 0.0, gust_time: float = 1.0, seed=0):
+        self._mean = tuple(map(float, mean))
+        self._amplitude = gust * math.sqrt(2.0 / _WAVES)
+        random = np.random.default_rng(seed)
+        # One frequency out of each of equally likely intervals.
+        quantiles = (np.arange(_WAVES) + random.uniform(size=(3, _WAVES))) / _WAVES
+        self._frequencies = np.tan(math.pi / 2.0 * quantiles) / gust_time
+        self._phases = random.uniform(0.0, 2.0 * math.pi, size=(3, _WAVES))
+
+    def velocity(self, t: float) -> tuple:
+        """Return the velocity of the air (3 components) at time ``t`` (s), m/s."""
+        if self._amplitude == 0.0:
+            return self._mean
+        gust = self._amplitude * np.cos(self._frequencies * t + self._phases).sum(axis=1)
+        return tuple(mean + part for mean, part in zip(self._mean, gust.tolist(), strict=True))
+
+
+STILL_AIR = Wind()
+"""No wind."""

@@ -1,0 +1,124 @@
+"""The 7-dimensional models against closed forms and scipy's integrator."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.integrate import solve_ivp
+
+from crazyflie_simulator.dynamics import STEP, Coupled7D, NearHover
+from crazyflie_simulator.elementwise import join, split
+from crazyflie_utils.angles import rpy_from_quaternion
+from crazyflie_utils.units import GRAVITY
+
+MODELS = pytest.mark.parametrize("dynamics", [NearHover(), Coupled7D()], ids=["near", "coupled"])
+
+STATES = arrays(float, 7, elements=st.floats(-5.0, 5.0))
+CONTROLS = st.tuples(
+    st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3.0, 3.0), st.floats(0.0, 16.0)
+)
+
+
+def flown(dynamics, x, u, duration):
+    """Return the state, as an array, a number of seconds later."""
+    x, u = split(x), split(u)
+    for count in range(round(duration / STEP)):
+        x = dynamics.step(count, x, u)
+    return join(x)
+
+
+@MODELS
+@pytest.mark.parametrize("control", [(0.1, 0.2, 0.5, 10.0), (-0.2, 0.05, -1.0, 9.9)])
+def test_agrees_with_scipy(dynamics, control):
+    start = np.array([0.3, -0.2, 5.0, 0.5, -1.0, 1.0, 0.7])
+    solution = solve_ivp(
+        lambda t, x: dynamics.derivative(t, x, control), (0.0, 2.0), start, rtol=1e-11, atol=1e-12
+    )
+    np.testing.assert_allclose(flown(dynamics, start, control, 2.0), solution.y[:, -1], atol=1e-9)
+
+
+@MODELS
+@given(thrust=st.floats(10.0, 16.0), yaw_dot=st.floats(-2.0, 2.0))
+def test_thrust_alone_is_a_parabola(dynamics, thrust, yaw_dot):
+    expected = [0, 0, 1.0 + 0.5 * (thrust - GRAVITY) * 0.25, 0, 0, 0.5 * (thrust - GRAVITY)]
+    state = flown(dynamics, [0, 0, 1.0, 0, 0, 0, 0], [0, 0, yaw_dot, thrust], 0.5)
+    np.testing.assert_allclose(state, [*expected, 0.5 * yaw_dot], atol=1e-12)
+
+
+def test_near_hover_tilt_is_a_parabola_that_costs_no_lift():
+    state = flown(NearHover(), [0, 0, 1, 0, 0, 0, 1.0], [0.1, 0.2, 0, GRAVITY], 1.0)
+    ax, ay = GRAVITY * np.tan(0.2), -GRAVITY * np.tan(0.1)
+    np.testing.assert_allclose(state, [ax / 2, ay / 2, 1, ax, ay, 0, 1.0], atol=1e-12)
+
+
+def test_coupled_tilt_turns_with_the_heading():
+    # Pitched forward while turning: the velocity goes round a circle.
+    pitch, yaw_dot, thrust, t = 0.2, 1.5, GRAVITY / np.cos(0.2), 1.2
+    state = flown(Coupled7D(), [0, 0, 1, 0, 0, 0, 0], [0, pitch, yaw_dot, thrust], t)
+    speed = thrust * np.sin(pitch) / yaw_dot
+    expected = [speed * np.sin(yaw_dot * t), speed * (1.0 - np.cos(yaw_dot * t)), 0.0]
+    np.testing.assert_allclose(state[3:6], expected, atol=1e-9)
+    assert state[6] == pytest.approx(yaw_dot * t)
+
+
+def test_coupled_tilt_costs_lift():
+    state = flown(Coupled7D(), [0, 0, 9, 0, 0, 0, 0], [0.3, -0.2, 0, GRAVITY], 1.0)
+    assert state[5] == pytest.approx(GRAVITY * (np.cos(0.3) * np.cos(0.2) - 1.0))
+
+
+@MODELS
+def test_signs(dynamics):
+    hover = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    assert flown(dynamics, hover, [0.1, 0, 0, GRAVITY], 0.5)[4] < 0.0
+    assert flown(dynamics, hover, [0, 0.1, 0, GRAVITY], 0.5)[3] > 0.0
+    assert flown(dynamics, hover, [0, 0, 0.1, GRAVITY], 0.5)[6] > 0.0
+
+
+@given(x=STATES, u=CONTROLS)
+def test_the_models_agree_about_hover(x, u):
+    # To first order in tilt and yaw, about hover, they are one.
+    small = 1e-5
+    x = x * [1, 1, 1, 1, 1, 1, small]
+    u = np.array(u) * [small, small, 1.0, 0.0] + [0, 0, 0, GRAVITY]
+    np.testing.assert_allclose(
+        NearHover().derivative(0.0, x, u), Coupled7D().derivative(0.0, x, u), atol=1e-7
+    )
+
+
+@MODELS
+def test_batches_fly_like_single_vehicles(dynamics):
+    rng = np.random.default_rng(2)
+    x, u = rng.normal(size=(6, 7)), rng.uniform(-0.3, 0.3, size=(6, 4))
+    # Below ground, both falling and climbing, and in the air.
+    x[:, 2] = [-0.1, -0.1, 0.0, 0.0, 1.0, 1.0]
+    x[:, 5] = [-1.0, 1.0] * 3
+    singly = [dynamics.derivative(0.0, xi, ui) for xi, ui in zip(x, u, strict=True)]
+    np.testing.assert_allclose(dynamics.derivative(0.0, x, u), singly, rtol=1e-14)
+    stepped = [join(dynamics.step(0, split(xi), split(ui))) for xi, ui in zip(x, u, strict=True)]
+    np.testing.assert_allclose(join(dynamics.step(0, split(x), split(u))), stepped, rtol=1e-14)
+
+
+@MODELS
+def test_derivative_takes_any_batch(dynamics):
+    x, u = np.ones((2, 3, 7)), np.full(4, 0.1)
+    assert dynamics.derivative(0.0, x, u).shape == (2, 3, 7)
+    np.testing.assert_allclose(
+        dynamics.derivative(0.0, x, u)[1, 2], dynamics.derivative(0.0, x[0, 0], u), rtol=1e-14
+    )
+
+
+@MODELS
+@given(x=STATES, u=CONTROLS)
+def test_never_below_ground(dynamics, x, u):
+    state = flown(dynamics, x, u, 0.05)
+    assert state[2] >= 0.0
+    assert state[2] > 0.0 or state[5] >= 0.0
+
+
+@MODELS
+@given(u=CONTROLS, yaw=st.floats(-3.0, 3.0))
+def test_the_attitude_is_the_control_s_and_the_state_s(dynamics, u, yaw):
+    position, quaternion = dynamics.pose([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, yaw], list(u))
+    assert position == (1.0, 2.0, 3.0)
+    assert rpy_from_quaternion(*quaternion) == pytest.approx((u[0], u[1], yaw), abs=1e-9)

@@ -1,0 +1,154 @@
+"""The full vehicle: hover, answers to steps, and a hover in closed loop."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from crazyflie_simulator.elementwise import join, split
+from crazyflie_simulator.quadrotor import euler_angles
+from crazyflie_simulator.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_simulator.vehicle import Vehicle
+from crazyflie_simulator.wind import Wind
+from crazyflie_utils.units import GRAVITY
+
+HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
+
+
+def answer(control, duration=3.0, height=100.0, **options):
+    """Return the states, 100 a second, after a control is given to a vehicle in hover."""
+    vehicle = Vehicle(StabilizedQuadrotor(**options), (0.0, 0.0, height), 0.0)
+    states = []
+    for moment in np.arange(0.0, duration, 0.01):
+        vehicle.advance_to(moment)
+        vehicle.command(control)
+        states.append(vehicle.state)
+    return np.array(states)
+
+
+def attitudes(states):
+    """Return roll, pitch, yaw in the heading frame, shape (n, 3)."""
+    return np.array([euler_angles(split(quaternion)) for quaternion in states[:, 6:10]])
+
+
+def test_hover_is_an_equilibrium():
+    states = answer(HOVER)
+    np.testing.assert_allclose(states[-1], states[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("mass_error", [-0.1, 0.0, 0.1])
+@pytest.mark.parametrize("thrust_error", [-0.1, 0.0, 0.1])
+def test_hover_thrust_of_a_vehicle_that_is_not_nominal(mass_error, thrust_error):
+    thrust = GRAVITY * (1.0 + mass_error) / (1.0 + thrust_error)
+    # The rotors begin at the speed that carries the true vehicle.
+    states = answer([0.0, 0.0, 0.0, thrust], 2.0, mass_error=mass_error, thrust_error=thrust_error)
+    np.testing.assert_allclose(states[-1, :6], [0, 0, 100, 0, 0, 0], atol=1e-9)
+    assert answer(HOVER, 0.5, mass_error=0.1)[-1, 5] < -0.2
+    assert answer(HOVER, 0.5, thrust_error=0.1)[-1, 5] > 0.2
+
+
+@pytest.mark.parametrize(("axis", "sideways"), [(0, (4, -1.0)), (1, (3, 1.0))])
+def test_a_step_of_tilt_settles(axis, sideways):
+    control = HOVER.copy()
+    control[axis] = 0.2
+    states = answer(control, 4.0)
+    tilt = attitudes(states)[:, axis]
+    assert tilt.max() < 0.2 * 1.35
+    np.testing.assert_allclose(tilt[200:], 0.2, rtol=0.08)
+    assert tilt[50] == pytest.approx(0.2, rel=0.35)
+    others = np.delete(attitudes(states), axis, axis=1)
+    np.testing.assert_allclose(others, 0.0, atol=0.02)
+    column, sign = sideways
+    assert sign * states[100, column] > 0.5
+
+
+def test_a_step_of_yaw_rate_settles_and_is_held():
+    states = answer([0.0, 0.0, 0.5, GRAVITY], 4.0)
+    np.testing.assert_allclose(states[150:, 12], 0.5, rtol=0.1)
+    # The heading is commanded, not only its rate: none is lost on the way.
+    assert attitudes(states)[-1, 2] == pytest.approx(0.5 * 3.99, abs=0.1)
+    np.testing.assert_allclose(states[-1, :3], [0.0, 0.0, 100.0], atol=0.1)
+
+
+def test_tilt_is_in_the_heading_frame():
+    vehicle = Vehicle(StabilizedQuadrotor(), (0.0, 0.0, 100.0), 0.0)
+    for control, end in (([0, 0, 1.0, GRAVITY], np.pi / 2), ([0, 0.2, 0, GRAVITY], np.pi / 2 + 1)):
+        while vehicle.time < end:
+            vehicle.command(control)
+            vehicle.advance_to(vehicle.time + 0.0101)
+    # Nose to the left, nose down: it goes left.
+    assert vehicle.state[4] > 1.0
+    assert abs(vehicle.state[3]) < 0.3
+
+
+def test_thrust_changes_as_fast_as_the_motors():
+    states = answer([0.0, 0.0, 0.0, 12.0], 1.0)
+    first, last = states[0, 13], states[-1, 13]
+    assert last == pytest.approx(first * np.sqrt(12.0 / GRAVITY), rel=1e-3)
+    risen = (states[6, 13] - first) / (last - first)
+    assert risen == pytest.approx(1.0 - np.exp(-0.06 / 0.0647), abs=0.03)
+
+
+def test_climbs_from_the_ground_whatever_tilt_is_asked_for_there():
+    vehicle = Vehicle(StabilizedQuadrotor(), (0.0, 0.0, 0.0), 0.0)
+    for thrust in (8.0, 12.0):
+        for _ in range(200):
+            vehicle.command([0.2, -0.2, 0.5, thrust])
+            vehicle.advance_to(vehicle.time + 0.0101)
+        if thrust < GRAVITY:
+            np.testing.assert_array_equal(vehicle.state[:13], [0] * 9 + [1] + [0] * 3)
+            assert vehicle.state[13] > 1000.0
+    assert vehicle.state[2] > 0.5
+
+
+@settings(max_examples=30)
+@given(
+    controls=st.lists(
+        st.tuples(
+            st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-6.0, 6.0), st.floats(0.0, 16.0)
+        ),
+        min_size=1,
+        max_size=8,
+    ),
+    height=st.floats(0.0, 2.0),
+)
+def test_whatever_is_commanded_the_state_is_one(controls, height):
+    vehicle = Vehicle(StabilizedQuadrotor(wind=Wind(gust=1.0)), (0.0, 0.0, height), 0.0)
+    for control in controls:
+        vehicle.command(control)
+        vehicle.advance_to(vehicle.time + 0.0501)
+        assert np.isfinite(vehicle.state).all()
+        assert np.linalg.norm(vehicle.state[6:10]) == pytest.approx(1.0, abs=1e-14)
+        assert vehicle.state[2] >= 0.0
+        assert (vehicle.state[13:17] >= 0.0).all()
+
+
+def test_batches_fly_like_single_vehicles():
+    dynamics = StabilizedQuadrotor(wind=Wind((1.0, 0.0, 0.0)))
+    rng = np.random.default_rng(8)
+    positions = rng.uniform(0.0, 1.0, (4, 3))
+    positions[0, 2] = 0.0
+    controls = HOVER + rng.normal(size=(4, 4)) * [0.1, 0.1, 0.5, 1.0]
+    controls[1, 3] = 0.0
+
+    def fly(x, u):
+        for count in range(100):
+            x = dynamics.step(count, x, u)
+        return join(x)
+
+    singly = [
+        fly(dynamics.initial_state(split(position)), split(control))
+        for position, control in zip(positions, controls, strict=True)
+    ]
+    batch = fly(dynamics.initial_state(split(positions)), split(controls))
+    np.testing.assert_allclose(batch, singly, rtol=1e-9, atol=1e-9)
+
+
+def test_derivative_is_that_of_the_airframe_between_samples():
+    dynamics = StabilizedQuadrotor(wind=Wind((1.0, 2.0, 0.0)))
+    x = dynamics.initial_state((0.0, 0.0, 1.0))
+    x_dot = dynamics.derivative(0.0, x, HOVER)
+    assert x_dot.shape == (dynamics.x_dim,)
+    damping = 4.0 * 9.1785e-7 * dynamics.airframe.parameters.hover_speed / 0.027
+    np.testing.assert_allclose(x_dot[3:6], [damping, 2.0 * damping, 0.0], atol=1e-12)
+    np.testing.assert_array_equal(x_dot[17:], 0.0)

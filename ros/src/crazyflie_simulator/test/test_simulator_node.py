@@ -1,45 +1,24 @@
-"""The simulator node on a fake process."""
+"""The simulator nodes on a fake process."""
 
 import math
 
+import numpy as np
 import pytest
+from simulators import NODES, PARAMETERS, command, heights, launch, refusal, transforms
 
 from crazyflie_msgs.msg import Control, ControlStamped
-from crazyflie_simulator.simulator_node import NearHoverSimulatorNode
+from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
+from crazyflie_simulator.simulator_node import (
+    NearHoverSimulatorCoupled7DNode,
+    NearHoverSimulatorNode,
+)
 from crazyflie_utils.fake import FakeProcess
 
-PARAMETERS = {
-    "time_step": 0.01,
-    "init/x": 1,
-    "init/y": 2.0,
-    "init/z": 0.0,
-    "frames/fixed": "world",
-    "frames/robot": "crazyflie",
-    "topics/control": "/control/final",
-}
 
-
-def launch(**changes):
-    """Return a process with a simulator in it."""
-    process = FakeProcess()
-    assert process.launch(NearHoverSimulatorNode(), "/simulator", {**PARAMETERS, **changes})
-    return process
-
-
-def command(process, thrust):
-    process.publish("/control/final", ControlStamped(control=Control(thrust=thrust)))
-
-
-def heights(process):
-    return [message.transforms[0].transform.translation.z for message in process.published("/tf")]
-
-
+@NODES
 @pytest.mark.parametrize("name", PARAMETERS)
-def test_every_parameter_is_required(name):
-    process = FakeProcess()
-    parameters = {key: value for key, value in PARAMETERS.items() if key != name}
-    assert not process.launch(NearHoverSimulatorNode(), "/simulator", parameters)
-    assert f"/simulator/{name} is not set" in process.logged("error")[0]
+def test_every_parameter_is_required(node_class, name):
+    assert f"/simulator/{name} is not set; expected" in refusal(node_class, **{name: None})
 
 
 @pytest.mark.parametrize(
@@ -53,50 +32,163 @@ def test_every_parameter_is_required(name):
         ("init/z", math.inf),
         ("frames/robot", 3),
         ("topics/control", ""),
+        ("clock/publish", 1),
         ("clock/real_time_factor", -1.0),
+        ("mocap/position_noise", -0.001),
+        ("mocap/attitude_noise", math.nan),
+        ("mocap/latency", "late"),
+        ("mocap/dropout", 1.1),
+        ("seed", -1),
+        ("seed", 0.5),
     ],
 )
 def test_bad_parameters_are_named(name, value):
-    process = FakeProcess()
-    assert not process.launch(NearHoverSimulatorNode(), "/simulator", {**PARAMETERS, name: value})
-    assert f"/simulator/{name} is" in process.logged("error")[0]
-    assert "expected" in process.logged("error")[0]
+    text = refusal(**{name: value})
+    assert f"/simulator/{name} is {value!r}; expected" in text
 
 
-def test_broadcasts_every_time_step_with_the_vehicles_stamp():
-    process = launch()
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("mass_error", -0.6),
+        ("thrust_error", math.nan),
+        ("wind/x", "north"),
+        ("wind/gust", -1.0),
+        ("wind/gust_time", 0.0),
+    ],
+)
+def test_bad_parameters_of_the_quadrotor_are_named(name, value):
+    text = refusal(QuadrotorSimulatorNode, **{name: value})
+    assert f"/simulator/{name} is {value!r}; expected" in text
+
+
+@NODES
+def test_broadcasts_every_time_step_with_the_vehicles_stamp(node_class):
+    process = launch(node_class)
     process.advance(1.0)
-    stamps = [message.transforms[0].header.stamp.to_sec() for message in process.published("/tf")]
+    stamps = [transform.header.stamp.to_sec() for transform in transforms(process)]
     assert stamps == pytest.approx([100.0 + 0.01 * k for k in range(1, 101)])
-    transform = process.published("/tf")[-1].transforms[0]
+    transform = transforms(process)[-1]
     assert (transform.header.frame_id, transform.child_frame_id) == ("world", "crazyflie")
     assert transform.transform.translation.x == 1.0
     assert transform.transform.translation.y == 2.0
+    assert transform.transform.rotation.w == 1.0
 
 
-def test_climbs_on_command():
-    process = launch()
+def test_a_time_step_below_that_of_the_model_repeats_no_stamp():
+    process = launch(time_step=0.0004)
+    process.advance(0.1)
+    stamps = [transform.header.stamp for transform in transforms(process)]
+    assert len(stamps) == len(set(stamps)) == 101
+
+
+@pytest.mark.parametrize("node_class", [NearHoverSimulatorNode, NearHoverSimulatorCoupled7DNode])
+def test_climbs_on_command(node_class):
+    process = launch(node_class)
     for _ in range(10):
         command(process, 11.81)
         process.advance(0.1)
     assert heights(process)[-1] == pytest.approx(1.0)
 
 
-def test_ignores_controls_that_are_not_finite():
-    process = launch()
+def test_the_quadrotor_climbs_when_its_motors_have_run_up():
+    process = launch(QuadrotorSimulatorNode)
+    for _ in range(10):
+        command(process, 11.81)
+        process.advance(0.1)
+    assert 0.4 < heights(process)[-1] < 1.0
+
+
+@NODES
+def test_tilts_and_turns_the_right_way(node_class):
+    process = launch(node_class, **{"init/z": 5.0})
+    for _ in range(10):
+        command(process, 9.81, roll=-0.1, pitch=0.1, yaw_dot=0.2)
+        process.advance(0.1)
+    last = transforms(process)[-1].transform
+    assert last.translation.x > 1.1
+    assert last.translation.y > 2.1
+    assert last.rotation.x < 0.0 < min(last.rotation.y, last.rotation.z)
+
+
+def test_a_control_between_ticks_takes_effect_at_once():
+    process = launch(time_step=0.5)
+    process.advance(0.25)
     command(process, 11.81)
-    for _ in range(4):
+    process.advance(0.25)
+    assert heights(process) == [pytest.approx(0.5 * 2.0 * 0.25**2)]
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+@NODES
+def test_the_last_good_control_does_not_outlive_bad_ones(node_class, bad):
+    process = launch(node_class, **{"init/z": 50.0})
+    command(process, 9.81, pitch=0.1)
+    for _ in range(40):
         process.advance(0.1)
-        command(process, math.nan)
-    assert heights(process)[-1] == pytest.approx(0.5 * 2.0 * 0.4**2)
-    assert len(process.logged("warn")) == 1
-    for _ in range(60):
-        process.advance(0.1)
-        command(process, math.inf)
+        command(process, bad)
     assert all(map(math.isfinite, heights(process)))
-    assert heights(process)[-1] < max(heights(process))
+    speeds = np.diff([transform.transform.translation.x for transform in transforms(process)])
+    falls = np.diff(heights(process))
+    # Pitched for half a second, then level, and from two seconds on without thrust.
+    assert speeds[48] > speeds[20] > 0.0
+    assert transforms(process)[150].transform.rotation.y == pytest.approx(0.0, abs=0.02)
+    np.testing.assert_allclose(falls[100:198], falls[100], atol=1e-3)
+    assert falls[-1] < -0.1
+    assert len(process.logged("warn")) == 1
+    assert "/control/final" in process.logged("warn")[0]
 
 
-def test_clock_needs_simulated_time_to_be_on():
-    process = launch(**{"clock/publish": True})
-    assert process.published("/clock") == []
+@pytest.mark.parametrize("field", ["roll", "pitch", "yaw_dot", "thrust"])
+def test_every_field_of_a_control_is_looked_at(field):
+    process = launch()
+    process.publish(
+        "/control/final", ControlStamped(control=Control(**{"thrust": 20.0, field: math.nan}))
+    )
+    process.advance(0.3)
+    assert heights(process)[-1] == 0.0
+
+
+def test_a_good_control_is_taken_again_after_bad_ones():
+    process = launch()
+    for _ in range(30):
+        command(process, math.nan)
+        process.advance(0.1)
+    command(process, 10.81)
+    process.advance(0.2)
+    assert heights(process)[-1] == pytest.approx(0.5 * 0.2**2)
+
+
+def test_motion_capture_errors_are_reproducible_and_each_vehicle_s_own():
+    def broadcast(name, seed):
+        process = FakeProcess()
+        errors = {"mocap/position_noise": 0.001, "mocap/attitude_noise": 0.01, "seed": seed}
+        errors |= {"mocap/latency": 0.03, "mocap/dropout": 0.1}
+        assert process.launch(NearHoverSimulatorNode(), name, PARAMETERS | errors)
+        process.advance(1.0)
+        return transforms(process)
+
+    assert broadcast("/simulator", 0) == broadcast("/simulator", 0)
+    assert broadcast("/simulator", 0) != broadcast("/simulator", 1)
+    assert broadcast("/cf1/simulator", 0) != broadcast("/cf2/simulator", 0)
+    stamps = [transform.header.stamp.to_sec() for transform in broadcast("/simulator", 0)]
+    assert 70 < len(stamps) <= 97
+    assert stamps[-1] <= 100.97 + 1e-6
+
+
+def test_wind_blows_the_quadrotor_along():
+    process = launch(QuadrotorSimulatorNode, **{"init/z": 5.0, "wind/y": -3.0})
+    for _ in range(10):
+        command(process, 9.81)
+        process.advance(0.1)
+    assert transforms(process)[-1].transform.translation.y < 1.9
+
+
+def test_mass_and_thrust_errors_of_the_quadrotor():
+    process = launch(QuadrotorSimulatorNode, mass_error=0.1, thrust_error=-0.1)
+    command(process, 9.81 * 1.1 / 0.9 - 0.1)
+    process.advance(0.4)
+    assert heights(process)[-1] == 0.0
+    command(process, 9.81 * 1.1 / 0.9 + 0.5)
+    process.advance(0.4)
+    assert heights(process)[-1] > 0.0

@@ -1,36 +1,45 @@
-"""ROS interface of a simulated vehicle."""
+"""ROS interface of a simulated vehicle, whatever its model."""
+
+import zlib
 
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 
 from crazyflie_msgs.msg import ControlStamped
-from crazyflie_simulator.dynamics import Dynamics, NearHover
+from crazyflie_simulator.dynamics import Coupled7D, Dynamics, NearHover
+from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import Vehicle
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameters import (
     BOOLEAN,
+    DURATION,
     FRAME,
     METRES,
     TIME_STEP,
     TOPIC,
+    Integer,
     Number,
     ParameterError,
 )
 from crazyflie_utils.vectors import is_finite, to_vector
 
+_LENGTH = Number(unit="m", minimum=0.0)
+_ANGLE = Number(unit="rad", minimum=0.0)
+_PROBABILITY = Number(minimum=0.0, maximum=1.0)
+SEED = Integer(0, 2**32 - 1)
+"""Kind of the parameter ``seed``."""
+
 
 class SimulatorNode(Node):
     """Fly a vehicle on the controls of a topic and tell tf where it is.
 
-    Parameters
-    ----------
-    dynamics : Dynamics
-        Model of the vehicle.
+    A subclass says in `load_dynamics` what kind of vehicle.
     """
 
-    def __init__(self, dynamics: Dynamics):
+    def __init__(self):
         super().__init__()
-        self._dynamics = dynamics
+        self._dynamics = None
         self._vehicle = None
+        self._motion_capture = None
         self._time_step = None
         self._position = None
         self._fixed_frame = None
@@ -40,8 +49,18 @@ class SimulatorNode(Node):
         self._real_time_factor = None
         self._broadcast = None
         self._set_clock = None
+        self._start = None
         self._ticks = 0
-        self._broadcast_time = None
+        self._measured_at = None
+
+    def load_dynamics(self, handle) -> Dynamics:
+        """Return the model of the vehicle, of the node's parameters if it has any.
+
+        Raises
+        ------
+        ParameterError
+        """
+        raise NotImplementedError
 
     def load_parameters(self, handle) -> None:
         """See `Node.load_parameters`."""
@@ -57,10 +76,20 @@ class SimulatorNode(Node):
                 f"parameter {handle.resolve('~clock/publish')} is true, but /use_sim_time is "
                 "not; expected both, so that somebody listens to /clock"
             )
+        self._motion_capture = MotionCapture(
+            position_noise=handle.param("mocap/position_noise", _LENGTH, 0.0),
+            attitude_noise=handle.param("mocap/attitude_noise", _ANGLE, 0.0),
+            latency=handle.param("mocap/latency", DURATION, 0.0),
+            dropout=handle.param("mocap/dropout", _PROBABILITY, 0.0),
+            # Vehicles with the same seed do not make the same errors.
+            seed=(handle.param("seed", SEED, 0), zlib.crc32(handle.name.encode())),
+        )
+        self._dynamics = self.load_dynamics(handle)
 
     def register_callbacks(self, handle) -> None:
         """See `Node.register_callbacks`."""
-        self._vehicle = Vehicle(self._dynamics, self._position, handle.time())
+        self._start = handle.time()
+        self._vehicle = Vehicle(self._dynamics, self._position, self._start)
         self._broadcast = handle.broadcast_transforms()
         if self._publishes_clock:
             self._set_clock = handle.clock_publisher()
@@ -90,27 +119,42 @@ class SimulatorNode(Node):
 
     def _on_clock_timer(self):
         self._ticks += 1
-        now = self._ticks * self._time_step
+        now = self._start + self._ticks * self._time_step
         self._vehicle.advance_to(now)
         self._broadcast_pose()
         self._set_clock(now)
 
     def _broadcast_pose(self):
-        if self._vehicle.time == self._broadcast_time:
+        now = self._vehicle.time
+        if now == self._measured_at:
             return
-        self._broadcast_time = self._vehicle.time
-        position, quaternion = self._vehicle.pose
+        self._measured_at = now
+        self._motion_capture.measure(now, *self._vehicle.pose)
+        transforms = [self._transform(*pose) for pose in self._motion_capture.arrivals(now)]
+        if transforms:
+            self._broadcast(transforms)
+
+    def _transform(self, time, position, quaternion):
         transform = TransformStamped()
-        transform.header.stamp = self._handle.stamp(self._vehicle.time)
+        transform.header.stamp = self._handle.stamp(time)
         transform.header.frame_id = self._fixed_frame
         transform.child_frame_id = self._robot_frame
-        transform.transform.translation = Vector3(*map(float, position))
+        transform.transform.translation = Vector3(*position)
         transform.transform.rotation = Quaternion(*quaternion)
-        self._broadcast([transform])
+        return transform
 
 
 class NearHoverSimulatorNode(SimulatorNode):
     """A vehicle with near-hover dynamics."""
 
-    def __init__(self):
-        super().__init__(NearHover())
+    def load_dynamics(self, handle) -> Dynamics:
+        """See `SimulatorNode.load_dynamics`."""
+        return NearHover()
+
+
+class NearHoverSimulatorCoupled7DNode(SimulatorNode):
+    """A vehicle whose thrust, tilt and yaw are coupled."""
+
+    def load_dynamics(self, handle) -> Dynamics:
+        """See `SimulatorNode.load_dynamics`."""
+        return Coupled7D()

@@ -1,6 +1,7 @@
-"""The simulator in a process of its own, on a real master."""
+"""A simulator in a process of its own, on a real master."""
 
 import queue
+import subprocess
 
 import pytest
 import rospy
@@ -39,3 +40,18 @@ def test_tf2_knows_the_vehicle():
     transform = buffer.lookup_transform("world", "crazyflie", rospy.Time(), rospy.Duration(LIMIT))
     assert transform.header.stamp.to_sec() == pytest.approx(rospy.get_time(), abs=LIMIT)
     listener.unregister()
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "reason"),
+    [
+        ("missing", [], "/missing/time_step is not set"),
+        ("negative", ["_time_step:=-0.01"], "/negative/time_step is -0.01"),
+    ],
+)
+def test_a_bad_parameter_ends_the_process(name, arguments, reason):
+    executable = rospy.get_param("/simulator_type")
+    command = ["rosrun", "crazyflie_simulator", executable, f"__name:={name}", *arguments]
+    process = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+    assert process.returncode == 1
+    assert reason in process.stdout + process.stderr

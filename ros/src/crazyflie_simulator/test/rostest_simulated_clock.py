@@ -1,0 +1,34 @@
+"""A simulator as the source of simulated time, as fast as it can, on a real master."""
+
+import queue
+
+import numpy as np
+import pytest
+import rospy
+from rosgraph_msgs.msg import Clock
+
+LIMIT = 20.0
+
+
+@pytest.fixture
+def clocks():
+    """Return a queue of what comes on /clock."""
+    received = queue.Queue()
+    subscriber = rospy.Subscriber("/clock", Clock, received.put)
+    yield received
+    subscriber.unregister()
+
+
+def test_time_passes_in_time_steps(clocks):
+    times = [clocks.get(timeout=LIMIT).clock.to_sec() for _ in range(500)]
+    # Messages may be lost on the way, the steps between the others may not.
+    steps = np.diff(times) / 0.01
+    assert steps.min() > 0.99
+    np.testing.assert_allclose(steps, np.round(steps), atol=1e-6)
+    assert rospy.get_time() >= times[-1]
+
+
+def test_a_minute_passes_in_seconds(clocks):
+    end = clocks.get(timeout=LIMIT).clock.to_sec() + 60.0
+    while clocks.get(timeout=LIMIT).clock.to_sec() < end:
+        pass

@@ -1,0 +1,275 @@
+"""Linear-quadratic gains: weights in, gains out, with the sign of u = u_ref + K e.
+
+The cost is the integral (of a sampled design the sum) of
+x^T Q x + u^T R u + 2 x^T N u over the deviations from hover.
+"""
+
+import math
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from scipy.linalg import expm
+
+from crazyflie_lqr.models import LinearModel
+
+_ROUNDOFF = 1e-9
+"""What is this much smaller than its surroundings counts as zero."""
+
+_MAX_DELAY_STEPS = 50
+"""Longest delay, in sample times; each adds u_dim states."""
+
+
+class DesignError(ValueError):
+    """No gains can be designed; the text says why."""
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What deviations and control cost.
+
+    Attributes
+    ----------
+    Q : ndarray, shape (x_dim, x_dim)
+        Of the state: symmetric, positive semidefinite.
+    R : ndarray, shape (u_dim, u_dim)
+        Of the control: symmetric, positive definite.
+    N : ndarray, shape (x_dim, u_dim)
+        Of their products: ``[[Q, N], [N^T, R]]`` is positive semidefinite.
+    """
+
+    Q: np.ndarray
+    R: np.ndarray
+    N: np.ndarray
+
+    def check(self) -> None:
+        """Raise `DesignError` unless the weights make a cost that has a minimum."""
+        for name, matrix in (("Q", self.Q), ("R", self.R), ("N", self.N)):
+            if not np.isfinite(matrix).all():
+                raise DesignError(f"{name} has entries that are not finite")
+        for name, matrix in (("Q", self.Q), ("R", self.R)):
+            if not np.allclose(matrix, matrix.T, rtol=_ROUNDOFF, atol=0.0):
+                i, j = np.argwhere(~np.isclose(matrix, matrix.T, rtol=_ROUNDOFF, atol=0.0))[0]
+                raise DesignError(
+                    f"{name} is not symmetric: entry ({i + 1}, {j + 1}) is {matrix[i, j]:g}, "
+                    f"({j + 1}, {i + 1}) is {matrix[j, i]:g}"
+                )
+        least = np.linalg.eigvalsh(self.R)[0]
+        if least <= _ROUNDOFF * np.abs(self.R).max():
+            raise DesignError(
+                f"R is not positive definite (least eigenvalue {least:.3g}); every control "
+                "must cost something"
+            )
+        least = np.linalg.eigvalsh(self.Q)[0]
+        if least < -_ROUNDOFF * np.abs(self.Q).max():
+            raise DesignError(
+                f"Q is not positive semidefinite (least eigenvalue {least:.3g}); no deviation "
+                "may be rewarded"
+            )
+        joint = np.block([[self.Q, self.N], [self.N.T, self.R]])
+        least = np.linalg.eigvalsh(joint)[0]
+        if least < -_ROUNDOFF * np.abs(joint).max():
+            raise DesignError(
+                f"N is too large: [[Q, N], [N^T, R]] has the eigenvalue {least:.3g}, and the "
+                "cost has no minimum"
+            )
+
+
+@dataclass(frozen=True)
+class Design:
+    """Gains and the plant they were designed for.
+
+    Attributes
+    ----------
+    K : ndarray, shape (u_dim, x_dim)
+        Gains, u = u_ref + K (x - x_ref).
+    A : ndarray, shape (n, n)
+        Dynamics of the plant: the model's; of a sampled design, one step of the
+        model and, behind the x_dim states of the model, the controls that are
+        still on their way.
+    B : ndarray, shape (n, u_dim)
+    sample_time : float
+        s; 0 is continuous.
+    """
+
+    K: np.ndarray
+    A: np.ndarray
+    B: np.ndarray
+    sample_time: float
+
+    @property
+    def feedback(self) -> np.ndarray:
+        """Gains on all states of the plant, shape (u_dim, n): none on controls on their way."""
+        missing = self.A.shape[0] - self.K.shape[1]
+        return np.pad(self.K, ((0, 0), (0, missing)))
+
+    @property
+    def poles(self) -> np.ndarray:
+        """Poles of the closed loop, shape (n,), rad/s; of a sampled one log(z) / sample_time.
+
+        A pole near z = 0, gone after some samples, is at minus infinity.
+        """
+        poles = np.linalg.eigvals(self.A + self.B @ self.feedback).astype(complex)
+        if self.sample_time == 0.0:
+            return poles
+        gone = np.abs(poles) < 1e-3
+        return np.where(gone, -math.inf, np.log(np.where(gone, 1.0, poles)) / self.sample_time)
+
+
+def design_gains(
+    model: LinearModel, weights: Weights, sample_time: float = 0.0, delay: float = 0.0
+) -> Design:
+    """Return the gains of least cost.
+
+    Parameters
+    ----------
+    model : LinearModel
+    weights : Weights
+    sample_time : float
+        Time between two controls, s, each held until the next; 0 designs in
+        continuous time.
+    delay : float
+        Time from the measurement of a state until its control acts, s.
+
+    Raises
+    ------
+    DesignError
+        The weights or times are unusable, or no gain stabilises the plant at
+        finite cost.
+
+    Notes
+    -----
+    With a delay the optimal control also feeds back the controls that are on
+    their way, ``u = K_x x + K_u (u[-1] + ... )``, which a gain file cannot say.
+    The gains returned are those for controls that change little within the
+    delay, ``u = (1 - sum K_u)^-1 K_x x``. They are within some percent of the
+    cost of the best gains on the state alone.
+    """
+    weights.check()
+    if not math.isfinite(sample_time) or sample_time < 0.0:
+        raise DesignError(f"the sample time is {sample_time:g} s; expected a number >= 0")
+    if not math.isfinite(delay) or delay < 0.0:
+        raise DesignError(f"the delay is {delay:g} s; expected a number >= 0")
+    if delay > 0.0 and sample_time == 0.0:
+        raise DesignError("a delay needs a sample time")
+    if delay > _MAX_DELAY_STEPS * sample_time:
+        raise DesignError(
+            f"the delay of {delay:g} s is longer than {_MAX_DELAY_STEPS} sample times"
+        )
+    _check_solvable(model, weights)
+    if sample_time == 0.0:
+        K = -_solve(control.lqr, model.A, model.B, weights)
+        design = Design(_clean(K), model.A, model.B, 0.0)
+    else:
+        A, B = sampled(model, sample_time, delay)
+        K = -_solve(control.dlqr, A, B, _padded(weights, A.shape[0]))
+        x_dim, u_dim = model.x_dim, model.u_dim
+        on_their_way = K[:, x_dim:].reshape(u_dim, -1, u_dim).sum(axis=1)
+        K = np.linalg.solve(np.eye(u_dim) - on_their_way, K[:, :x_dim])
+        design = Design(_clean(K), A, B, sample_time)
+    if design.poles.real.max() >= 0.0:
+        raise DesignError(
+            f"the closed loop has a pole at {design.poles.real.max():.3g} rad/s: these weights "
+            f"ask for more than the delay of {delay:g} s allows; raise R or lower Q"
+        )
+    return design
+
+
+def sampled(model: LinearModel, sample_time: float, delay: float) -> tuple:
+    """Return one step of a model whose control is held and comes late.
+
+    Parameters
+    ----------
+    model : LinearModel
+    sample_time, delay : float
+        s; the delay may be any multiple or fraction of the sample time.
+
+    Returns
+    -------
+    A : ndarray, shape (n, n)
+        n = x_dim + d u_dim with d = ceil(delay / sample_time): the state and the
+        last d controls, latest first.
+    B : ndarray, shape (n, u_dim)
+
+    Notes
+    -----
+    Exact; see Astrom and Wittenmark, Computer-Controlled Systems, section 2.3.
+    """
+    x_dim, u_dim = model.x_dim, model.u_dim
+    steps = math.ceil(delay / sample_time - _ROUNDOFF)
+    A_step, B_step = _held(model, sample_time)
+    if steps == 0:
+        return A_step, B_step
+    old = delay - (steps - 1) * sample_time
+    A_new, B_new = _held(model, sample_time - old)
+    _, B_old = _held(model, old)
+    inputs = [np.zeros_like(B_step) for _ in range(steps + 1)]
+    inputs[steps] = A_new @ B_old
+    inputs[steps - 1] = B_new
+    A = np.zeros((x_dim + steps * u_dim,) * 2)
+    A[:x_dim] = np.hstack([A_step, *inputs[1:]])
+    A[x_dim + u_dim :, x_dim:-u_dim] = np.eye((steps - 1) * u_dim)
+    B = np.vstack([inputs[0], np.eye(u_dim), np.zeros(((steps - 1) * u_dim, u_dim))])
+    return A, B
+
+
+def _held(model, duration):
+    # The exponential of [[A, B], [0, 0]] holds both blocks (Van Loan, 1978).
+    x_dim, u_dim = model.x_dim, model.u_dim
+    block = np.zeros((x_dim + u_dim,) * 2)
+    block[:x_dim] = np.hstack([model.A, model.B])
+    step = expm(block * duration)
+    return step[:x_dim, :x_dim], step[:x_dim, x_dim:]
+
+
+def _padded(weights, n):
+    more = n - weights.Q.shape[0]
+    return Weights(np.pad(weights.Q, (0, more)), weights.R, np.pad(weights.N, ((0, more), (0, 0))))
+
+
+def _check_solvable(model, weights):
+    """Raise `DesignError` for modes that no control reaches, or no weight sees.
+
+    The test is Hautus's, for every mode that does not decay by itself.
+    """
+    unweighted = weights.Q - weights.N @ np.linalg.solve(weights.R, weights.N.T)
+    A_cost = model.A - model.B @ np.linalg.solve(weights.R, weights.N.T)
+    for pole in np.linalg.eigvals(model.A):
+        if pole.real >= -_ROUNDOFF:
+            mode = _unreached(model.A.T, model.B.T, pole)
+            if mode is not None:
+                raise DesignError(
+                    f"{model.name} is not stabilisable: no control reaches "
+                    f"{_name(model, mode)} (mode at {pole:.3g} rad/s)"
+                )
+    for pole in np.linalg.eigvals(A_cost):
+        if abs(pole.real) <= _ROUNDOFF:
+            mode = _unreached(A_cost, unweighted, pole)
+            if mode is not None:
+                raise DesignError(
+                    f"the weights do not see {_name(model, mode)}, which does not decay by "
+                    f"itself (mode at {pole:.3g} rad/s): raise its entry in Q"
+                )
+
+
+def _unreached(A, C, pole):
+    """Return v with A v = pole v and C v = 0, or None."""
+    pencil = np.vstack([A - pole * np.eye(A.shape[0]), C])
+    _, values, modes = np.linalg.svd(pencil)
+    return modes[-1].conj() if values[-1] <= _ROUNDOFF * max(1.0, values[0]) else None
+
+
+def _name(model, mode):
+    size = np.abs(mode)
+    return ", ".join(s for s, v in zip(model.states, size, strict=True) if v > 0.1 * size.max())
+
+
+def _solve(solver, A, B, weights):
+    try:
+        return np.asarray(solver(A, B, weights.Q, weights.R, weights.N)[0])
+    except (np.linalg.LinAlgError, control.ControlException, ValueError) as error:
+        raise DesignError(f"the Riccati equation has no stabilising solution: {error}") from None
+
+
+def _clean(K):
+    return np.where(np.abs(K) < _ROUNDOFF * np.abs(K).max(), 0.0, K)

@@ -1,0 +1,189 @@
+"""The command design_gains: weights in, gain file out."""
+
+import argparse
+import math
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from crazyflie_lqr.design import Design, DesignError, Weights, design_gains
+from crazyflie_lqr.gain_file import save_matrix
+from crazyflie_lqr.margins import loop_margins
+from crazyflie_lqr.models import CONTROLS, MODELS, LinearModel
+
+_DESCRIPTION = """
+Design the gains K of u = u_ref + K (x - x_ref) that cost least, where the cost is the
+integral of x'Qx + u'Ru + 2x'Nu; print closed-loop poles and margins.
+"""
+
+_MATRIX_HELP = """
+numbers, separated by blanks or commas: the diagonal, or the matrix row by row; or the path
+of a text file with them
+"""
+
+
+def main(arguments: list | None = None) -> int:
+    """Run the command; return its exit status: 0, 1 for a design that cannot be, 2 for usage.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Of the command line, by default the process's.
+    """
+    arguments = sys.argv[1:] if arguments is None else arguments
+    options = _parser().parse_args(arguments)
+    model = MODELS[options.model]()
+    try:
+        weights = _weights(options, model)
+        design = design_gains(model, weights, options.sample_time, options.delay)
+        print(report(model, design))
+        if options.out:
+            save_matrix(options.out, design.K, _header(model, weights, options))
+            print(f"wrote {options.out}")
+        if options.plot:
+            from crazyflie_lqr.design_plot import save_plot
+
+            save_plot(options.plot, model, design)
+            print(f"wrote {options.plot}")
+    except (OSError, ValueError) as error:
+        print(f"design_gains: {error}", file=sys.stderr)
+        return 1
+    return 0
+
+
+def report(model: LinearModel, design: Design) -> str:
+    """Return gains, poles and margins of a design as text."""
+    lines = [f"{model.name}, {_time(design)}"]
+    lines += [" " * 8 + "".join(f"{state:>10}" for state in model.states)]
+    lines += [
+        f"{control:8}" + "".join(f"{value:10.4g}" for value in row)
+        for control, row in zip(CONTROLS, design.K + 0.0, strict=True)
+    ]
+    lines += ["poles (rad/s): " + _poles(design)]
+    lines += ["loop      gain may grow, shrink (dB)   phase margin (deg)   at (rad/s)   delay (ms)"]
+    for loop, control in enumerate(CONTROLS):
+        margins = loop_margins(design, loop)
+        lines.append(
+            f"{control:8}{_decibels(margins.gain_up):>15}{_decibels(margins.gain_down):>14}"
+            f"{_number(math.degrees(margins.phase)):>21}{_number(margins.crossover):>13}"
+            f"{_number(1e3 * margins.delay):>13}"
+        )
+    return "\n".join(lines)
+
+
+def _parser():
+    parser = argparse.ArgumentParser(prog="design_gains", description=_DESCRIPTION)
+    parser.add_argument("--model", choices=sorted(MODELS), required=True)
+    parser.add_argument("--Q", nargs="+", required=True, help=f"state weights: {_MATRIX_HELP}")
+    parser.add_argument("--R", nargs="+", required=True, help=f"control weights: {_MATRIX_HELP}")
+    parser.add_argument("--N", nargs="+", help="cross weights, row by row (default: none)")
+    parser.add_argument(
+        "--sample_time",
+        type=float,
+        default=0.0,
+        help="s; design for a control that is held so long (default 0: in continuous time)",
+    )
+    parser.add_argument(
+        "--delay",
+        type=float,
+        default=0.0,
+        help="s, from the measurement of a state until its control acts; needs --sample_time",
+    )
+    parser.add_argument("--out", metavar="FILE", help="write the gains to a file")
+    parser.add_argument("--plot", metavar="FILE", help="draw step responses and Bode diagrams")
+    # What looks like an option but is a list of numbers is one.
+    parser._negative_number_matcher = _NumberList()
+    return parser
+
+
+class _NumberList:
+    """Stands in for argparse's pattern of negative numbers, which knows no lists."""
+
+    def match(self, text):
+        try:
+            _numbers(text)
+        except ValueError:
+            return False
+        return True
+
+
+def _weights(options, model):
+    x_dim, u_dim = model.x_dim, model.u_dim
+    return Weights(
+        _matrix("Q", options.Q, x_dim, x_dim),
+        _matrix("R", options.R, u_dim, u_dim),
+        np.zeros((x_dim, u_dim)) if options.N is None else _matrix("N", options.N, x_dim, u_dim),
+    )
+
+
+def _matrix(name, words, rows, columns):
+    text = " ".join(words)
+    if len(words) == 1 and Path(text).is_file():
+        lines = Path(text).read_text(encoding="utf-8", errors="replace").splitlines()
+        text = " ".join(line.partition("#")[0] for line in lines)
+    try:
+        values = _numbers(text)
+    except ValueError as error:
+        raise DesignError(f"{name}: {error}, nor is there such a file") from None
+    if len(values) == rows * columns:
+        return np.reshape(values, (rows, columns))
+    if rows == columns == len(values):
+        return np.diag(values)
+    diagonal = f"{rows} (the diagonal) or " if rows == columns else ""
+    raise DesignError(
+        f"{name} has {len(values)} numbers; expected {diagonal}{rows * columns} "
+        f"({rows} rows of {columns})"
+    )
+
+
+def _numbers(text):
+    return [float(word) for word in text.replace(",", " ").split()]
+
+
+def _header(model, weights, options):
+    command = f"design_gains --model {model.name} --Q {_words(weights.Q)} --R {_words(weights.R)}"
+    if weights.N.any():
+        command += f" --N {_words(weights.N)}"
+    for name in ("sample_time", "delay"):
+        if getattr(options, name):
+            command += f" --{name} {getattr(options, name):g}"
+    return (
+        "Gains K of u = u_ref + K (x - x_ref), SI units and rad.\n"
+        f"Rows: {', '.join(CONTROLS)}. Columns: {', '.join(model.states)}.\n"
+        f"{command}"
+    )
+
+
+def _words(matrix):
+    rows, columns = matrix.shape
+    if rows == columns and not np.any(matrix - np.diag(np.diag(matrix))):
+        matrix = np.diag(matrix)
+    return " ".join(f"{value:.15g}" for value in np.ravel(matrix))
+
+
+def _time(design):
+    if design.sample_time == 0.0:
+        return "continuous time"
+    steps = (design.A.shape[0] - design.K.shape[1]) // design.K.shape[0]
+    text = f"sampled every {1e3 * design.sample_time:g} ms"
+    return text + (f", {steps} controls on their way" if steps else "")
+
+
+def _poles(design):
+    texts = {}
+    for pole in sorted(design.poles, key=lambda p: (-p.real, abs(p.imag))):
+        if pole.imag >= -1e-6 * abs(pole):
+            text = f"{pole.real:.4g}"
+            if pole.imag > 1e-6 * abs(pole):
+                text += f" +- {pole.imag:.4g}j"
+            texts[text] = texts.get(text, 0) + 1
+    return ", ".join(text + (f" (x{n})" if n > 1 else "") for text, n in texts.items())
+
+
+def _decibels(factor):
+    return _number(20.0 * math.log10(factor)) if factor > 0.0 else "-inf"
+
+
+def _number(value):
+    return "-" if math.isnan(value) else f"{value:.3g}"

@@ -1,0 +1,128 @@
+"""The command design_gains, and the gain files that are its output."""
+
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crazyflie_lqr.design_command import main
+from crazyflie_lqr.gain_file import load_matrix
+
+CONFIG = Path(__file__).parents[1] / "config"
+USUAL = {
+    "--model": "near_hover",
+    "--Q": "1 1 4 1 1 4 100",
+    "--R": "0.01 0.01 0.01 0.01",
+}
+
+
+def arguments(**changes):
+    """Return a command line; an option that is None is left out."""
+    options = {**USUAL, **{f"--{name}": value for name, value in changes.items()}}
+    return shlex.split(" ".join(f"{k} {v}" for k, v in options.items() if v is not None))
+
+
+@pytest.mark.parametrize("path", sorted(CONFIG.glob("K_*.txt")), ids=lambda path: path.name)
+def test_shipped_gains_are_what_the_command_in_their_header_makes(path, tmp_path):
+    shipped = path.read_text().splitlines()
+    [command] = [line for line in shipped if line.startswith("# design_gains ")]
+    out = tmp_path / "K.txt"
+    assert main([*shlex.split(command)[2:], "--out", str(out)]) == 0
+    made = out.read_text().splitlines()
+    comments = [line for line in shipped if line.startswith("#")]
+    assert [line for line in made if line.startswith("#")] == comments
+    x_dim = 12 if "full_state" in command else 7
+    np.testing.assert_allclose(
+        load_matrix(str(out), 4, x_dim), load_matrix(str(path), 4, x_dim), rtol=1e-8, atol=1e-12
+    )
+
+
+def test_there_are_gains_to_ship():
+    names = {path.name for path in CONFIG.glob("K_*.txt")}
+    assert names == {"K_hover.txt", "K_soft.txt", "K_full_state.txt"}
+
+
+def test_prints_gains_poles_and_margins(capsys):
+    assert main(arguments(R="1 1 1 1", Q="1 1 1 1 1 1 4")) == 0
+    output = capsys.readouterr().out
+    assert "near_hover, continuous time" in output
+    [poles] = re.findall(r"poles \(rad/s\): (.*)", output)
+    assert "-2" in poles.split(", ")
+    [yaw] = [line for line in output.splitlines() if line.startswith("yaw_dot ")][1:]
+    assert yaw.split() == ["yaw_dot", "inf", "-inf", "90", "2", "785"]
+    assert len(output.splitlines()) < 20
+
+
+def test_sampled_design_says_so_and_keeps_it_in_the_header(tmp_path, capsys):
+    out = tmp_path / "K.txt"
+    assert main(arguments(sample_time=0.01, delay=0.025, out=out)) == 0
+    assert "sampled every 10 ms, 3 controls on their way" in capsys.readouterr().out
+    assert "--sample_time 0.01 --delay 0.025\n" in out.read_text()
+    K = load_matrix(str(out), 4, 7)
+    assert -10.0 < K[1, 0] < -1.0
+
+
+@pytest.mark.parametrize(
+    "form", ["1 1 4 1 1 4 100", "1,1,4,1,1,4,100", "'1 1 4 1 1 4 100'", "{diagonal}", "{matrix}"]
+)
+def test_weights_may_be_numbers_or_a_file(form, tmp_path):
+    diagonal = [1, 1, 4, 1, 1, 4, 100]
+    files = {"diagonal": tmp_path / "diagonal.txt", "matrix": tmp_path / "matrix.txt"}
+    np.savetxt(files["diagonal"], diagonal, header="diagonal of Q")
+    np.savetxt(files["matrix"], np.diag(diagonal), header="Q")
+    out = tmp_path / "K.txt"
+    assert main(arguments(Q=form.format(**files), out=out)) == 0
+    assert out.read_text() == (CONFIG / "K_hover.txt").read_text()
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"Q": "1 1 4"}, "Q has 3 numbers; expected 7 (the diagonal) or 49 (7 rows of 7)"),
+        ({"R": "1 1 1 1 1"}, "R has 5 numbers; expected 4 (the diagonal) or 16"),
+        ({"N": "1 1 1 1 1 1 1"}, "N has 7 numbers; expected 28 (7 rows of 4)"),
+        ({"Q": "-1 1 4 1 1 4 100"}, "Q is not positive semidefinite"),
+        ({"Q": "-1,1,4,1,1,4,100"}, "Q is not positive semidefinite"),
+        ({"R": "0 1 1 1"}, "R is not positive definite"),
+        ({"R": "1 1 0 0  0 1 0 0  0 0 1 0  0 0 0 1"}, "R is not symmetric"),
+        ({"R": "1 1 one 1"}, "'one'"),
+        ({"Q": "nan 1 4 1 1 4 100"}, "Q has entries that are not finite"),
+        ({"Q": "Q.txt"}, "nor is there such a file"),
+        ({"Q": "1 0 4 1 1 4 0"}, "do not see"),
+        ({"delay": "0.1"}, "a delay needs a sample time"),
+        ({"sample_time": "-0.1"}, "sample time"),
+    ],
+)
+def test_bad_input_is_refused_and_nothing_is_written(changes, message, tmp_path, capsys):
+    out = tmp_path / "K.txt"
+    assert main(arguments(out=out, **changes)) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("design_gains: ")
+    assert message in error
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("changes", [{"model": "fixed_wing"}, {"Q": None}, {"sample_time": "fast"}])
+def test_wrong_usage_is_refused(changes, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        main(arguments(**changes))
+    assert "usage:" in capsys.readouterr().err
+
+
+def test_a_file_that_cannot_be_written_is_named(tmp_path, capsys):
+    assert main(arguments(out=tmp_path / "missing" / "K.txt")) == 1
+    assert "missing/K.txt" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("times", [{}, {"sample_time": 0.01, "delay": 0.02}])
+def test_plot_is_a_picture(times, tmp_path):
+    plot = tmp_path / "design.png"
+    assert main(arguments(plot=plot, **times)) == 0
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_plot_of_no_format_is_refused(tmp_path, capsys):
+    assert main(arguments(plot=tmp_path / "design.sheet")) == 1
+    assert "sheet" in capsys.readouterr().err

@@ -1,0 +1,97 @@
+"""Margins against closed forms, and against what happens beyond them."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crazyflie_lqr.design import Weights, design_gains, sampled
+from crazyflie_lqr.margins import loop_margins, loop_response
+from crazyflie_lqr.models import CONTROLS, full_state, near_hover
+
+MODEL = near_hover()
+WEIGHTS = Weights(np.diag([1.0, 1, 4, 1, 1, 4, 100]), 0.01 * np.eye(4), np.zeros((7, 4)))
+ALL = range(4)
+
+
+def test_an_integrator_keeps_ninety_degrees():
+    margins = loop_margins(design_gains(MODEL, WEIGHTS), CONTROLS.index("yaw_dot"))
+    assert margins.phase == pytest.approx(math.pi / 2.0)
+    assert margins.crossover == pytest.approx(100.0, rel=1e-4)
+    assert margins.delay == pytest.approx(math.pi / 2.0 / 100.0, rel=1e-4)
+    assert (margins.gain_up, margins.gain_down) == (math.inf, 0.0)
+
+
+def test_a_double_integrator_has_its_closed_form():
+    # L = (20.976 s + 20) / s^2 crosses 1 where w^4 = 20.976^2 w^2 + 20^2.
+    margins = loop_margins(design_gains(MODEL, WEIGHTS), CONTROLS.index("thrust"))
+    position, velocity = 20.0, math.sqrt(400.0 + 40.0)
+    crossover = math.sqrt((velocity**2 + math.sqrt(velocity**4 + 4.0 * position**2)) / 2.0)
+    assert margins.crossover == pytest.approx(crossover, rel=1e-4)
+    assert margins.phase == pytest.approx(math.atan(velocity * crossover / position), rel=1e-4)
+
+
+def test_a_sampled_integrator_has_its_closed_form():
+    # z (z - 1) + k = 0, one sample late, is stable up to k = 1.
+    design = design_gains(MODEL, WEIGHTS, 0.01, 0.01)
+    loop = CONTROLS.index("yaw_dot")
+    k = -design.K[loop, 6] * 0.01
+    assert loop_margins(design, loop).gain_up == pytest.approx(1.0 / k, rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", ALL)
+@pytest.mark.parametrize("model", [near_hover(), full_state()])
+def test_optimal_loops_keep_sixty_degrees_and_half_their_gain(model, seed):
+    # Safonov and Athans, 1977, for a diagonal R.
+    rng = np.random.default_rng(seed)
+    factor = rng.normal(size=(model.x_dim, model.x_dim))
+    weights = Weights(factor @ factor.T, np.diag(rng.uniform(0.1, 10.0, 4)), np.zeros_like(model.B))
+    design = design_gains(model, weights)
+    for loop in ALL:
+        margins = loop_margins(design, loop)
+        assert margins.phase >= math.pi / 3.0 - 1e-6
+        assert margins.gain_up == math.inf
+        assert margins.gain_down <= 0.5
+
+
+def is_stable(design, factors):
+    K = np.diag(factors) @ design.feedback
+    return np.abs(np.linalg.eigvals(design.A + design.B @ K)).max() < 1.0
+
+
+@pytest.mark.parametrize("loop", ALL)
+@pytest.mark.parametrize("delay", [0.0, 0.013, 0.04])
+def test_more_gain_than_the_margin_is_unstable(loop, delay):
+    design = design_gains(MODEL, WEIGHTS, 0.01, delay)
+    margins = loop_margins(design, loop)
+    for excess, stable in ((0.995, True), (1.005, False)):
+        factors = np.ones(4)
+        factors[loop] = excess * margins.gain_up
+        assert is_stable(design, factors) == stable
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.013, 0.04])
+def test_more_delay_than_the_margin_is_unstable(delay):
+    design = design_gains(MODEL, WEIGHTS, 0.01, delay)
+    # Late by a fraction of a sample is not the same to a sampled loop as a lag
+    # of its phase, but nearly so while the crossover is slow.
+    margin = min(loop_margins(design, loop).delay for loop in ALL)
+    for excess, stable in ((0.9, True), (1.1, False)):
+        A, B = sampled(MODEL, 0.01, delay + excess * margin)
+        assert is_stable(replace(design, A=A, B=B), np.ones(4)) == stable
+
+
+def test_a_loop_without_gain_has_no_margins_to_lose():
+    design = design_gains(MODEL, WEIGHTS)
+    K = design.K.copy()
+    K[2] = 0.0
+    margins = loop_margins(replace(design, K=K, A=design.A - np.diag([0, 0, 0, 0, 0, 0, 1])), 2)
+    assert (margins.gain_up, margins.phase, margins.delay) == (math.inf, math.inf, math.inf)
+
+
+def test_response_of_a_loop_is_that_of_its_transfer_function():
+    frequency, response = loop_response(design_gains(MODEL, WEIGHTS), CONTROLS.index("pitch"))
+    s = 1j * frequency
+    velocity = math.sqrt(100.0 + 20.0 / 9.81)
+    np.testing.assert_allclose(response, 9.81 * (velocity * s + 10.0) / s**2, rtol=1e-6)

@@ -1,0 +1,95 @@
+"""The gain files that come with the package: their numbers, and what they can take."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from crazyflie_lqr.gain_file import load_matrix, load_vector
+
+CONFIG = Path(__file__).parents[1] / "config"
+G = 9.81
+FULL = load_matrix(str(CONFIG / "K_full_state.txt"), 4, 12)
+
+
+def gains(tilt, tilt_rate, yaw, lift, lift_rate):
+    """Return gains with the signs of u = +K e."""
+    K = np.zeros((4, 7))
+    K[0, [1, 4]] = tilt, tilt_rate
+    K[1, [0, 3]] = -tilt, -tilt_rate
+    K[2, 6] = -yaw
+    K[3, [2, 5]] = -lift, -lift_rate
+    return K
+
+
+def test_hover_gains_have_the_closed_form_of_their_weights():
+    K = load_matrix(str(CONFIG / "K_hover.txt"), 4, 7)
+    tilt, lift = 1.0 / 0.1, 2.0 / 0.1
+    expected = gains(
+        tilt,
+        math.sqrt((1.0 / 0.1) ** 2 + 2.0 * tilt / G),
+        10.0 / 0.1,
+        lift,
+        math.sqrt((2.0 / 0.1) ** 2 + 2.0 * lift),
+    )
+    np.testing.assert_allclose(K, expected, rtol=1e-9)
+
+
+def test_soft_gains_are_the_hardware_ones():
+    K = load_matrix(str(CONFIG / "K_soft.txt"), 4, 7)
+    np.testing.assert_allclose(K, gains(0.25, 1.0, 3.5, 1.5, 1.0), rtol=1e-9)
+
+
+def test_reference_control_is_hover():
+    np.testing.assert_array_equal(load_vector(str(CONFIG / "u_ref_hover.txt"), 4), [0, 0, 0, G])
+
+
+def attitude_loop(rate_bandwidth):
+    """Return A, B of a vehicle with the states of the full one and a second-order attitude."""
+    A, B = np.zeros((12, 12)), np.zeros((12, 4))
+    A[[0, 1, 2, 6, 7, 8], [3, 4, 5, 9, 10, 11]] = 1.0
+    A[3, 7], A[4, 6], B[5, 3] = G, -G, 1.0
+    for angle, rate, control in ((6, 9, 0), (7, 10, 1)):
+        A[rate, angle], A[rate, rate] = -6.0 * rate_bandwidth, -rate_bandwidth
+        B[rate, control] = 6.0 * rate_bandwidth
+    A[11, 11], B[11, 2] = -10.0, 10.0
+    return A, B
+
+
+@pytest.mark.parametrize("yaw_deg", range(0, 360, 15))
+@pytest.mark.parametrize("rate_bandwidth", [15.0, 30.0, 100.0])
+def test_full_state_gains_fly_at_any_yaw(yaw_deg, rate_bandwidth):
+    # Attitude is measured about fixed axes, commanded about the heading's.
+    c, s = math.cos(math.radians(yaw_deg)), math.sin(math.radians(yaw_deg))
+    measured = np.eye(12)
+    for angle in (6, 9):
+        measured[angle : angle + 2, angle : angle + 2] = [[c, s], [-s, c]]
+    A, B = attitude_loop(rate_bandwidth)
+    assert np.linalg.eigvals(A + B @ FULL @ measured).real.max() < -0.3
+
+
+@pytest.mark.parametrize("late", [0, 1, 3])
+def test_full_state_gains_fly_where_attitude_follows_at_once(late):
+    # A sampled loop of 10 ms in which the measured tilt is the control that acts,
+    # and all rates are differences of two measurements.
+    dt = 0.01
+    A, B = np.zeros((7, 7)), np.zeros((7, 4))
+    A[[0, 1, 2], [3, 4, 5]] = 1.0
+    B[3, 1], B[4, 0], B[5, 3], B[6, 2] = G, -G, 1.0, 1.0
+    step = expm(np.block([[A, B], [np.zeros((4, 11))]]) * dt)
+
+    def advance(everything):
+        x, previous, controls = np.split(everything, [7, 13])
+        acting = controls[-4:]
+        pose = np.concatenate([x[:3], acting[:2], x[6:]])
+        rates = (pose - previous) / dt
+        u = FULL @ np.concatenate([pose[:3], rates[:3], pose[3:], rates[3:]])
+        controls = np.concatenate([u, controls])
+        acting = controls[4 * late : 4 * late + 4]
+        x = (step @ np.concatenate([x, acting]))[:7]
+        return np.concatenate([x, pose, controls[: 4 * (late + 1)]])
+
+    loop = np.array([advance(unit) for unit in np.eye(13 + 4 * (late + 1))]).T
+    assert np.abs(np.linalg.eigvals(loop)).max() < 1.0

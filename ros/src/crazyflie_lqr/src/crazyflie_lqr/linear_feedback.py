@@ -104,14 +104,16 @@ class LiftController(LinearFeedback):
     ----------
     K, u_ref, yaw_index
         See `LinearFeedback`.
-    integrator_k : array_like, shape (3,)
-        Gains of x, y, z in rad/(m s), rad/(m s), 1/s^2, with the signs of the
+    integrator_k : array_like, shape (3,), optional
+        Gains of x, y, z in rad/(m s), rad/(m s), 1/s^3, with the signs of the
         position gains in K.
-    integrator_limit : array_like, shape (3,)
+    integrator_limit : array_like, shape (3,), optional
         The integral of each axis stays within +- this, m s.
     """
 
-    def __init__(self, K, u_ref, yaw_index: int, integrator_k, integrator_limit):
+    def __init__(
+        self, K, u_ref, yaw_index: int, integrator_k=(0.0,) * 3, integrator_limit=(0.0,) * 3
+    ):
         super().__init__(K, u_ref, yaw_index)
         self._integrator_k = np.asarray(integrator_k, dtype=float)
         self._integrator_limit = np.asarray(integrator_limit, dtype=float)

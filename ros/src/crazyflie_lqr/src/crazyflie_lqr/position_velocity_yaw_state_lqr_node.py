@@ -1,0 +1,13 @@
+"""Position, velocity and yaw state; a reference of the same kind."""
+
+from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+
+
+class PositionVelocityYawStateLqrNode(LinearFeedbackNode):
+    """Linear feedback to a position, velocity and yaw."""
+
+    state_type = PositionVelocityYawStateStamped
+    reference_type = PositionVelocityYawStateStamped
+    x_dim = 7
+    yaw_index = 6

@@ -1,0 +1,1 @@
+"""Controls of several controllers, merged; and the form in which they are sent."""

@@ -1,0 +1,31 @@
+"""The form of a control that the radio driver expects on cmd_vel."""
+
+import math
+
+from crazyflie_utils.units import pwm_from_thrust
+
+
+def cmd_vel_from_control(roll: float, pitch: float, yaw_dot: float, thrust: float) -> tuple:
+    """Return the two vectors of the twist that carries a control.
+
+    Parameters
+    ----------
+    roll, pitch : float
+        rad.
+    yaw_dot : float
+        rad/s, counter-clockwise.
+    thrust : float
+        m/s^2, mass-normalised.
+
+    Returns
+    -------
+    linear : tuple of float
+        (pitch in degrees, roll in degrees, thrust in PWM). Not limited: the
+        driver limits it.
+    angular : tuple of float
+        (0, 0, yaw rate in deg/s, clockwise).
+    """
+    return (
+        (math.degrees(pitch), math.degrees(roll), pwm_from_thrust(thrust)),
+        (0.0, 0.0, -math.degrees(yaw_dot)),
+    )

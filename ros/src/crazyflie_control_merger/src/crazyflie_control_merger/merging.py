@@ -1,0 +1,77 @@
+"""Least-restrictive control: a second controller takes over as far as it must.
+
+Controls are u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2.
+"""
+
+import numpy as np
+
+from crazyflie_utils.held import HOLD_LIMIT
+
+MERGE = "MERGE"
+LQR = "LQR"
+PRIORITIZED = "PRIORITIZED"
+MODES = (MERGE, LQR, PRIORITIZED)
+"""How much of the prioritised control: its priority, none, all."""
+
+ALL_ENTRIES = (0, 1, 2, 3)
+NO_YAW_ENTRIES = (0, 1, 3)
+"""Entries of the control that the prioritised controller decides on."""
+
+
+class Merger:
+    """Mix the latest prioritised control into regular ones.
+
+    A prioritised control counts for `crazyflie_utils.held.HOLD_LIMIT`. Without
+    one the regular control is left as it is, in every mode.
+
+    Parameters
+    ----------
+    mode : str
+        One of `MODES`.
+    entries : tuple of int
+        Entries of the control that are mixed; the others stay regular.
+    """
+
+    def __init__(self, mode: str, entries: tuple = ALL_ENTRIES):
+        self._mode = mode
+        self._entries = list(entries)
+        self._prioritized = None
+        self._priority = 0.0
+        self._time = None
+
+    def prioritize(self, control, priority: float, time: float) -> None:
+        """Take a prioritised control.
+
+        Parameters
+        ----------
+        control : array_like, shape (len(entries),)
+        priority : float
+            0 leaves the regular control alone, 1 replaces it; clipped to [0, 1].
+        time : float
+            Now, s.
+        """
+        self._prioritized = np.asarray(control, dtype=float)
+        self._priority = min(max(priority, 0.0), 1.0)
+        self._time = time
+
+    def merged(self, regular: np.ndarray, time: float) -> np.ndarray:
+        """Return (1 - p) regular + p prioritised, shape (4,).
+
+        Parameters
+        ----------
+        regular : ndarray, shape (4,)
+        time : float
+            Now, s.
+        """
+        p = self._weight(time)
+        if p == 0.0:
+            return regular
+        merged = regular.copy()
+        merged[self._entries] = (1.0 - p) * regular[self._entries] + p * self._prioritized
+        return merged
+
+    def _weight(self, time):
+        # Time that has stepped back is that of another run.
+        if self._time is None or not 0.0 <= time - self._time < HOLD_LIMIT:
+            return 0.0
+        return {MERGE: self._priority, LQR: 0.0, PRIORITIZED: 1.0}[self._mode]

@@ -1,0 +1,53 @@
+"""The converter on a fake process."""
+
+import math
+
+import pytest
+
+from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
+from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_utils.fake import FakeProcess
+
+PARAMETERS = {"topics/control": "/control/final", "topics/cmd_vel": "/crazyflie/cmd_vel"}
+
+
+@pytest.fixture
+def process():
+    """Return a process with a converter in it."""
+    process = FakeProcess()
+    assert process.launch(CmdVelConverterNode(), "/cmd_vel_converter", PARAMETERS)
+    return process
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+@pytest.mark.parametrize("value", [None, "", 3, "no topic"])
+def test_bad_parameters_are_named(name, value):
+    process = FakeProcess()
+    parameters = {**PARAMETERS, name: value}
+    if value is None:
+        del parameters[name]
+    assert not process.launch(CmdVelConverterNode(), "/cmd_vel_converter", parameters)
+    assert f"/cmd_vel_converter/{name} is" in process.logged("error")[0]
+
+
+def test_converts_every_control(process):
+    for k in range(1, 4):
+        control = Control(roll=0.1 * k, pitch=0.2, yaw_dot=-0.3, thrust=9.81)
+        process.publish("/control/final", ControlStamped(control=control))
+        assert len(process.published("/crazyflie/cmd_vel")) == k
+    twist = process.published("/crazyflie/cmd_vel")[-1]
+    assert twist.linear.y == pytest.approx(math.degrees(0.3))
+    assert twist.linear.x == pytest.approx(math.degrees(0.2))
+    assert twist.angular.z == pytest.approx(math.degrees(0.3))
+    assert twist.linear.z == pytest.approx(42000.0)
+    assert (twist.angular.x, twist.angular.y) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_what_is_not_finite_is_ignored(process, bad):
+    for field in Control.__slots__:
+        control = ControlStamped(control=Control(**{field: bad}))
+        process.publish("/control/final", control)
+    assert process.published("/crazyflie/cmd_vel") == []
+    [warning] = process.logged("warn")
+    assert "/control/final" in warning

@@ -125,6 +125,14 @@ def test_integrator_skips_time_that_cannot_be(step):
     assert u[3] == pytest.approx(9.81 + 0.2)
 
 
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+def test_integrator_forgets_what_overflows():
+    controller = lift(k=(0.0, 0.0, 1.0), limit=(1.0, 1.0, 1.0), K=np.zeros((4, 7)))
+    for time, x in enumerate([1.7e308, 1.7e308, 0.0]):
+        u = controller.control(state(x=x), state(x=-1.7e308 if x else 0.0), 0.1 * time)
+    np.testing.assert_allclose(u, U_REF)
+
+
 def test_integrator_is_off_by_default():
     controller = lift(k=(1.0, 1.0, 1.0))
     for time in (0.0, 0.1, 0.2):

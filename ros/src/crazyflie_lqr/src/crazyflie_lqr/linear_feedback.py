@@ -19,6 +19,9 @@ MIN_THRUST = 4.0
 MAX_THRUST = 16.0
 """Least and most thrust that `LiftController` asks for, m/s^2."""
 
+_LEAST = np.array([-MAX_TILT, -MAX_TILT, -np.inf, MIN_THRUST])
+_MOST = np.array([MAX_TILT, MAX_TILT, np.inf, MAX_THRUST])
+
 MAX_GAP = 0.5
 """Longest time between two states over which `LiftController` integrates, s."""
 
@@ -115,7 +118,8 @@ class LiftController(LinearFeedback):
         self, K, u_ref, yaw_index: int, integrator_k=(0.0,) * 3, integrator_limit=(0.0,) * 3
     ):
         super().__init__(K, u_ref, yaw_index)
-        self._integrator_k = np.asarray(integrator_k, dtype=float)
+        self._integrator_K = np.zeros((len(u_ref), 3))
+        self._integrator_K[[PITCH, ROLL, THRUST], [0, 1, 2]] = integrator_k
         self._integrator_limit = np.asarray(integrator_limit, dtype=float)
         self._integral = np.zeros(3)
         self._time = None
@@ -128,15 +132,14 @@ class LiftController(LinearFeedback):
         """
         e = heading_error(x, x_ref, self.yaw_index)
         self._integrate(e[:3], time)
-        u = self.u_ref + self.K @ e
-        u[[PITCH, ROLL, THRUST]] += self._integrator_k * self._integral
-        u[[ROLL, PITCH]] = np.clip(u[[ROLL, PITCH]], -MAX_TILT, MAX_TILT)
-        u[THRUST] = np.clip(u[THRUST], MIN_THRUST, MAX_THRUST)
-        return u
+        u = self.u_ref + self.K @ e + self._integrator_K @ self._integral
+        return np.minimum(np.maximum(u, _LEAST), _MOST)
 
     def _integrate(self, error, time):
         dt = 0.0 if self._time is None else time - self._time
         self._time = time
-        if 0.0 < dt <= MAX_GAP:
+        # An error that overflowed must not stay in the integral.
+        if 0.0 < dt <= MAX_GAP and np.isfinite(error).all():
             limit = self._integrator_limit
-            self._integral = np.clip(self._integral + error * dt, -limit, limit)
+            integral = self._integral + error * dt
+            self._integral = np.minimum(np.maximum(integral, -limit), limit)

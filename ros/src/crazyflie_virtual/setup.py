@@ -1,0 +1,13 @@
+"""Tells catkin where the Python modules are."""
+
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
+
+PACKAGES = [
+    "crazyflie_virtual",
+    "crazyflie_virtual.firmware",
+    "crazyflie_virtual.mocap",
+    "crazyflie_virtual.services",
+]
+
+setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

@@ -1,0 +1,61 @@
+"""Packets of the Crazy RealTime Protocol, one in a UDP datagram."""
+
+from enum import IntEnum
+from typing import NamedTuple
+
+MAX_DATA = 30
+"""Bytes that a packet holds beside its header."""
+
+_RESERVED = 3 << 2
+"""Bits of the header that are always set."""
+
+
+class Port(IntEnum):
+    """Who a packet is for."""
+
+    CONSOLE = 0x0
+    PARAMETERS = 0x2
+    SETPOINT = 0x3
+    MEMORY = 0x4
+    LOG = 0x5
+    LOCALIZATION = 0x6
+    GENERIC_SETPOINT = 0x7
+    HIGH_LEVEL = 0x8
+    SUPERVISOR = 0x9
+    PLATFORM = 0xD
+    LINK = 0xF
+
+
+class Packet(NamedTuple):
+    """One packet.
+
+    Attributes
+    ----------
+    port, channel : int
+        0 to 15 and 0 to 3.
+    data : bytes
+        At most `MAX_DATA`.
+    """
+
+    port: int
+    channel: int
+    data: bytes
+
+    def encode(self) -> bytes:
+        """Return the packet as a datagram.
+
+        Raises
+        ------
+        ValueError
+            There is too much data for one packet.
+        """
+        if len(self.data) > MAX_DATA:
+            raise ValueError(f"a packet holds {MAX_DATA} bytes, got {len(self.data)}")
+        return bytes([self.port << 4 | _RESERVED | self.channel]) + self.data
+
+
+def decode(datagram: bytes) -> Packet | None:
+    """Return the packet in a datagram; None when it holds none."""
+    if not 1 <= len(datagram) <= MAX_DATA + 1:
+        return None
+    return Packet(datagram[0] >> 4, datagram[0] & 3, datagram[1:])

@@ -1,0 +1,62 @@
+"""Who is listened to: streamed setpoints come before the high-level commander."""
+
+from crazyflie_virtual.firmware.states import Setpoint
+
+NOBODY, HIGH_LEVEL, STREAMED = 0, 1, 2
+"""Priorities."""
+
+
+class Commander:
+    """The setpoint that holds.
+
+    A streamed setpoint keeps the high-level commander out until
+    `release`; age does not end that.
+
+    Parameters
+    ----------
+    planner : Planner
+
+    Attributes
+    ----------
+    setpoint : Setpoint
+    priority : int
+        Of the setpoint: `NOBODY`, `HIGH_LEVEL` or `STREAMED`.
+    high_level_enabled : int
+        Whether the high-level commander is asked.
+    """
+
+    def __init__(self, planner):
+        self._planner = planner
+        self.setpoint = Setpoint()
+        self.priority = NOBODY
+        self.high_level_enabled = 1
+
+    def stream(self, setpoint: Setpoint) -> None:
+        """Take a setpoint from the client."""
+        self.setpoint = setpoint
+        self.priority = STREAMED
+        self._planner.disable()
+
+    def release(self, estimate) -> None:
+        """Let the high-level commander take over, from the vehicle's state."""
+        self.priority = min(self.priority, HIGH_LEVEL)
+        self._planner.tell_state(estimate)
+
+    def forget(self) -> None:
+        """Begin as after a start: no setpoint, the high-level commander stopped."""
+        self.priority = NOBODY
+        self.setpoint = Setpoint()
+        self._planner.stop()
+
+    def ask_planner(self, time: float, estimate) -> None:
+        """Let the high-level commander give its setpoint for ``time`` (s)."""
+        if not self.high_level_enabled:
+            return
+        setpoint = self._planner.setpoint(time, estimate)
+        if setpoint is not None and self.priority <= HIGH_LEVEL:
+            self.setpoint = setpoint
+            self.priority = HIGH_LEVEL
+
+    def age(self, time: float) -> float:
+        """Return how old the setpoint is at ``time``, s."""
+        return time - self.setpoint.time

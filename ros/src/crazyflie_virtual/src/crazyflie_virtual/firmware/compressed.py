@@ -1,0 +1,39 @@
+"""Quaternions in 32 bits, as they are on the wire."""
+
+import math
+
+_BITS = 9
+_MASK = (1 << _BITS) - 1
+_ROOT_HALF = math.sqrt(0.5)
+
+
+def compress_quaternion(quaternion) -> int:
+    """Return a unit quaternion (x, y, z, w) in 32 bits.
+
+    The two highest bits tell which component is largest; it is left out. The
+    others follow in order, each as a sign and 9 bits of magnitude in units of
+    ``sqrt(1/2) / 511``, in the sign that makes the largest positive.
+    """
+    largest = max(range(4), key=lambda i: abs(quaternion[i]))
+    flip = quaternion[largest] < 0.0
+    word = largest
+    for i, component in enumerate(quaternion):
+        if i == largest:
+            continue
+        magnitude = min(_MASK, int(_MASK * abs(component) / _ROOT_HALF + 0.5))
+        sign = (component < 0.0) != flip
+        word = word << (_BITS + 1) | sign << _BITS | magnitude
+    return word
+
+
+def decompress_quaternion(word: int) -> tuple:
+    """Return the unit quaternion (x, y, z, w) of 32 bits; inverse of `compress_quaternion`."""
+    largest = word >> 30
+    parts = []
+    for i in range(3):
+        field = word >> (2 - i) * (_BITS + 1)
+        magnitude = (field & _MASK) / _MASK * _ROOT_HALF
+        parts.append(-magnitude if field >> _BITS & 1 else magnitude)
+    rest = math.sqrt(max(0.0, 1.0 - sum(part * part for part in parts)))
+    parts.insert(largest, rest)
+    return tuple(parts)

@@ -1,0 +1,27 @@
+"""What the firmware prints."""
+
+from collections import deque
+
+from crazyflie_virtual.crtp import MAX_DATA
+
+_KEPT = 100
+"""Pieces kept until a client reads them."""
+
+
+class Console:
+    """Text on its way to the client.
+
+    What is said before there is a client is kept, the latest of it.
+    """
+
+    def __init__(self):
+        self._pieces = deque(maxlen=_KEPT)
+
+    def say(self, line: str) -> None:
+        """Print a line."""
+        data = (line + "\n").encode("ascii", "replace")
+        self._pieces.extend(data[i : i + MAX_DATA] for i in range(0, len(data), MAX_DATA))
+
+    def pop(self) -> bytes | None:
+        """Return the next piece, at most a packet long; None when there is none."""
+        return self._pieces.popleft() if self._pieces else None

@@ -1,0 +1,184 @@
+"""The vehicle's estimate of its state.
+
+Position and velocity: a Kalman filter per axis, predicted with the
+accelerometer and corrected with measured positions; the axes have one
+covariance. Attitude: the gyroscope's integral, corrected with measured
+attitudes in proportion to its variance, and, while the motors are off, with the
+direction of gravity.
+"""
+
+import math
+
+from crazyflie_utils.units import GRAVITY
+from crazyflie_virtual.rotations import rotate
+
+_ACCELERATION_NOISE = 0.5
+"""Process noise, m/s^2, held for one step of the position's filter."""
+
+_RATE_NOISE = 0.1
+"""Process noise, rad/s, held for one step of the attitude's filter."""
+
+_FIRST_VARIANCES = (100.0, 0.0, 1.0)
+"""Of the position, with the velocity, of the velocity; m^2, m^2/s, m^2/s^2."""
+
+_FIRST_ATTITUDE_VARIANCE = 10.0
+"""rad^2: the first measurement counts in full."""
+
+_LEVELLING_TIME = 0.5
+"""Time constant with which gravity corrects the attitude at rest, s."""
+
+
+class Estimator:
+    """Estimate of position, velocity and attitude.
+
+    Parameters
+    ----------
+    estimate : Estimate
+        What is kept up to date.
+
+    Attributes
+    ----------
+    initial_x, initial_y, initial_z, initial_yaw : float
+        Where `reset` begins, m and rad.
+    variance_position, variance_velocity, variance_attitude : float
+        m^2, m^2/s^2, rad^2.
+    """
+
+    def __init__(self, estimate):
+        self._estimate = estimate
+        self.initial_x = self.initial_y = self.initial_z = self.initial_yaw = 0.0
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin anew at the initial pose, at rest, and unsure of it."""
+        e = self._estimate
+        e.x, e.y, e.z = self.initial_x, self.initial_y, self.initial_z
+        e.vx = e.vy = e.vz = e.ax = e.ay = e.az = 0.0
+        e.qx = e.qy = 0.0
+        e.qz, e.qw = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
+        self._covariance = _FIRST_VARIANCES
+        self.variance_attitude = _FIRST_ATTITUDE_VARIANCE
+        self._update_angles()
+
+    @property
+    def variance_position(self) -> float:
+        """Variance of the position along each axis, m^2."""
+        return self._covariance[0]
+
+    @property
+    def variance_velocity(self) -> float:
+        """Variance of the velocity along each axis, m^2/s^2."""
+        return self._covariance[2]
+
+    def predict(self, sensors, dt: float) -> None:
+        """Move on by ``dt`` (s) with what the inertial sensors measure."""
+        e = self._estimate
+        x, y, z, w = e.qx, e.qy, e.qz, e.qw
+        half = 0.5 * dt * math.pi / 180.0
+        a, b, c = half * sensors.gyro_x, half * sensors.gyro_y, half * sensors.gyro_z
+        x, y, z, w = (
+            x + w * a + y * c - z * b,
+            y + w * b + z * a - x * c,
+            z + w * c + x * b - y * a,
+            w - x * a - y * b - z * c,
+        )
+        scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+        e.qx, e.qy, e.qz, e.qw = x, y, z, w = x * scale, y * scale, z * scale, w * scale
+
+        force = (sensors.acc_x, sensors.acc_y, sensors.acc_z)
+        e.ax, e.ay, up = rotate((x, y, z, w), force)
+        e.az = up - 1.0
+        dvx, dvy, dvz = GRAVITY * dt * e.ax, GRAVITY * dt * e.ay, GRAVITY * dt * e.az
+        e.x += dt * (e.vx + 0.5 * dvx)
+        e.y += dt * (e.vy + 0.5 * dvy)
+        e.z += dt * (e.vz + 0.5 * dvz)
+        e.vx += dvx
+        e.vy += dvy
+        e.vz += dvz
+        self._update_angles()
+
+    def grow_variances(self, dt: float) -> None:
+        """Let the variances grow by what ``dt`` (s) adds to them."""
+        p, m, v = self._covariance
+        q = _ACCELERATION_NOISE**2
+        p += 2.0 * dt * m + dt * dt * v + 0.25 * q * dt**4
+        m += dt * v + 0.5 * q * dt**3
+        v += q * dt * dt
+        if p > _FIRST_VARIANCES[0]:
+            p, m, v = _FIRST_VARIANCES
+        self._covariance = (p, m, v)
+        self.variance_attitude = min(
+            self.variance_attitude + _RATE_NOISE**2 * dt * dt, _FIRST_ATTITUDE_VARIANCE
+        )
+
+    def correct_position(self, x: float, y: float, z: float, deviation: float) -> None:
+        """Take in a measured position (m) with its standard deviation (m)."""
+        e = self._estimate
+        p, m, v = self._covariance
+        total = p + deviation * deviation
+        gain_p, gain_v = p / total, m / total
+        dx, dy, dz = x - e.x, y - e.y, z - e.z
+        e.x += gain_p * dx
+        e.y += gain_p * dy
+        e.z += gain_p * dz
+        e.vx += gain_v * dx
+        e.vy += gain_v * dy
+        e.vz += gain_v * dz
+        self._covariance = ((1.0 - gain_p) * p, (1.0 - gain_p) * m, v - gain_v * m)
+
+    def correct_attitude(self, x: float, y: float, z: float, w: float, deviation: float) -> None:
+        """Take in a measured attitude, a unit quaternion, with its deviation (rad)."""
+        e = self._estimate
+        gain = self.variance_attitude / (self.variance_attitude + deviation * deviation)
+        if e.qx * x + e.qy * y + e.qz * z + e.qw * w < 0.0:
+            x, y, z, w = -x, -y, -z, -w
+        self._blend(x, y, z, w, gain)
+        self.variance_attitude *= 1.0 - gain
+
+    def rest(self, sensors, dt: float) -> None:
+        """Take it that the vehicle stands still: no velocity, and gravity shows what is up."""
+        e = self._estimate
+        e.vx = e.vy = e.vz = 0.0
+        norm = math.sqrt(sensors.acc_x**2 + sensors.acc_y**2 + sensors.acc_z**2)
+        if not 0.9 < norm < 1.1:
+            return
+        roll = math.atan2(sensors.acc_y, sensors.acc_z)
+        pitch = math.asin(max(-1.0, min(1.0, -sensors.acc_x / norm)))
+        level = _quaternion_zyx(roll, pitch, math.radians(e.yaw))
+        if sum(a * b for a, b in zip(level, (e.qx, e.qy, e.qz, e.qw), strict=True)) < 0.0:
+            level = tuple(-part for part in level)
+        self._blend(*level, dt / _LEVELLING_TIME)
+
+    def _blend(self, x, y, z, w, gain):
+        # Towards another quaternion of the same sign; for small angles the
+        # straight line is the great circle.
+        e = self._estimate
+        x, y, z, w = (
+            e.qx + gain * (x - e.qx),
+            e.qy + gain * (y - e.qy),
+            e.qz + gain * (z - e.qz),
+            e.qw + gain * (w - e.qw),
+        )
+        scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+        e.qx, e.qy, e.qz, e.qw = x * scale, y * scale, z * scale, w * scale
+        self._update_angles()
+
+    def _update_angles(self):
+        e = self._estimate
+        x, y, z, w = e.qx, e.qy, e.qz, e.qw
+        degree = 180.0 / math.pi
+        e.roll = degree * math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        e.pitch = -degree * math.asin(max(-1.0, min(1.0, 2.0 * (w * y - x * z))))
+        e.yaw = degree * math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+def _quaternion_zyx(roll, pitch, yaw):
+    sr, cr = math.sin(roll / 2.0), math.cos(roll / 2.0)
+    sp, cp = math.sin(pitch / 2.0), math.cos(pitch / 2.0)
+    sy, cy = math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )

@@ -1,0 +1,142 @@
+"""The firmware as a whole: all its parts, and the order in which they have their turn."""
+
+from crazyflie_virtual.firmware.commander import Commander
+from crazyflie_virtual.firmware.console import Console
+from crazyflie_virtual.firmware.estimator import Estimator
+from crazyflie_virtual.firmware.localization import DECK, Localization
+from crazyflie_virtual.firmware.planner import Phase, Planner
+from crazyflie_virtual.firmware.power import PowerMonitor
+from crazyflie_virtual.firmware.sensors import Sensors
+from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
+from crazyflie_virtual.firmware.stabilizer import Stabilizer
+from crazyflie_virtual.firmware.states import Estimate, Setpoint
+from crazyflie_virtual.firmware.supervisor import Supervisor
+from crazyflie_virtual.link_statistics import LinkStatistics
+from crazyflie_virtual.memories import MemoryTester
+from crazyflie_virtual.physics import STEP
+
+POSITION_STEPS = 5
+"""Steps from one turn of position controller and high-level commander to the next: 100 Hz."""
+
+_SUPERVISOR_STEPS = 20
+_POWER_STEPS = 50
+_POSITION_PERIOD = POSITION_STEPS * STEP
+
+
+class Firmware:
+    """Everything between packets and motor commands, with its state.
+
+    Parameters
+    ----------
+    physics : Physics
+        What the sensors measure.
+    faults : Faults
+        Switches, which are parameters of the virtual vehicle too.
+    settings : Settings
+
+    Attributes
+    ----------
+    time : float
+        Since the start, s.
+    setpoint : Setpoint
+        What is flown.
+    """
+
+    def __init__(self, physics, faults, settings):
+        self._physics = physics
+        self.faults = faults
+        self._steps = 0
+        self.time = 0.0
+        self.console = Console()
+        self.estimate = Estimate()
+        self.sensors = Sensors(settings.sensor_noise, settings.seed)
+        self.estimator = Estimator(self.estimate)
+        self.localization = Localization(self.estimator, physics, settings.positioning == DECK)
+        self.planner = Planner()
+        self.commander = Commander(self.planner)
+        self.attitude_decoder = AttitudeDecoder()
+        self.supervisor = Supervisor(self.console.say, settings.auto_arm)
+        self.stabilizer = Stabilizer()
+        self.power = PowerMonitor()
+        self.link_statistics = LinkStatistics()
+        self.memory_tester = MemoryTester()
+        self.setpoint = Setpoint()
+        self.reset_estimation = 0
+        self.console.say("SYS: ----------------------------")
+        self.console.say("SYS: Virtual Crazyflie 2.1 is up and running!")
+        self.console.say("STAB: Ready to fly.")
+
+    @property
+    def milliseconds(self) -> int:
+        """Time since the start, ms."""
+        return round(1000.0 * self.time)
+
+    @property
+    def info(self) -> int:
+        """The supervisor's bits, and: high-level commander flies, has finished, is disabled."""
+        phase = self.planner.phase
+        return (
+            self.supervisor.bits
+            | (phase in (Phase.FLYING, Phase.LANDING)) << 8
+            | self.planner.is_finished(self.time) << 9
+            | (phase is Phase.DISABLED) << 10
+        )
+
+    def step(self, voltage: float) -> tuple:
+        """Take `STEP` and return the motor commands, PWM.
+
+        Parameters
+        ----------
+        voltage : float
+            Of the battery, V.
+        """
+        physics, sensors, estimate = self._physics, self.sensors, self.estimate
+        self._steps += 1
+        self.time = self._steps * STEP
+        with_position = self._steps % POSITION_STEPS == 0
+        sensors.sample_inertial(physics.rates, physics.specific_force)
+        self.estimator.predict(sensors, STEP)
+        if with_position:
+            self._estimate_slowly()
+            self.commander.ask_planner(self.time, estimate)
+        if self._steps % _SUPERVISOR_STEPS == 0:
+            self._supervise()
+        if self._steps % _POWER_STEPS == 0:
+            self.link_statistics.update(self.time)
+            self._watch_power(voltage)
+            sensors.sample_slow(physics.position[2], physics.quaternion)
+        setpoint = self.setpoint = self.supervisor.override(self.commander.setpoint)
+        return self.stabilizer.update(
+            setpoint, estimate, sensors, with_position, self.supervisor.can_fly
+        )
+
+    def new_client(self) -> None:
+        """Take note that a client begins to talk.
+
+        On the ground it finds the commander as after a start. In flight nothing
+        changes.
+        """
+        if not self.supervisor.is_flying:
+            self.commander.forget()
+
+    def _estimate_slowly(self):
+        if self.reset_estimation:
+            self.reset_estimation = 0
+            self.estimator.reset()
+        self.estimator.grow_variances(_POSITION_PERIOD)
+        self.localization.update(self.time)
+        if not any(self.stabilizer.commands) and not self.supervisor.is_flying:
+            self.estimator.rest(self.sensors, _POSITION_PERIOD)
+
+    def _supervise(self):
+        idle = self.stabilizer.idle_thrust
+        motors_run = max(self.stabilizer.commands) > idle
+        age = self.commander.age(self.time)
+        self.supervisor.update(self.time, self.sensors, age, motors_run)
+        self.planner.block(not self.supervisor.can_fly)
+
+    def _watch_power(self, voltage):
+        was_low = self.power.state
+        self.power.update(self.time, voltage)
+        if self.power.state and not was_low:
+            self.console.say(f"PM: battery low, {voltage:.2f} V")

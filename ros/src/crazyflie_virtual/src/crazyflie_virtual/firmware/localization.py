@@ -1,0 +1,75 @@
+"""Where positions and attitudes from outside the inertial sensors come from.
+
+The client sends external positions or poses, as real vehicles get them from a
+motion capture system. In their absence a positioning deck measures the true
+pose; without a deck the estimate is dead reckoning.
+"""
+
+DECK, NONE = "deck", "none"
+"""What a vehicle can carry."""
+
+EXTERNAL_AGE = 0.5
+"""How long after the last external measurement the deck keeps quiet, s."""
+
+_DECK_POSITION_DEVIATION = 0.003
+"""m."""
+
+_DECK_ATTITUDE_DEVIATION = 0.003
+"""rad."""
+
+
+class Localization:
+    """Feeds the estimator.
+
+    Parameters
+    ----------
+    estimator : Estimator
+    physics : Physics
+        What the deck measures.
+    has_deck : bool
+        Whether the vehicle carries a positioning deck.
+
+    Attributes
+    ----------
+    x, y, z, qx, qy, qz, qw : float
+        Last external measurement, m; for the log.
+    time : float or None
+        When it came, s.
+    position_deviation, attitude_deviation : float
+        Standard deviations that external measurements are taken to have, m and rad.
+    """
+
+    def __init__(self, estimator, physics, has_deck: bool):
+        self._estimator = estimator
+        self._physics = physics
+        self.has_deck = has_deck
+        self.x = self.y = self.z = 0.0
+        self.qx = self.qy = self.qz = 0.0
+        self.qw = 1.0
+        self.time = None
+        self.position_deviation = 0.01
+        self.attitude_deviation = 0.0045
+
+    @property
+    def milliseconds(self) -> float:
+        """When the last external measurement came, ms, in the 16 bits of the log."""
+        return 0.0 if self.time is None else 1000.0 * self.time % 65536.0
+
+    def take_position(self, time: float, position) -> None:
+        """Take in an external position (m)."""
+        self.time = time
+        self.x, self.y, self.z = position
+        self._estimator.correct_position(*position, self.position_deviation)
+
+    def take_pose(self, time: float, position, quaternion) -> None:
+        """Take in an external position (m) and attitude, a unit quaternion (x, y, z, w)."""
+        self.take_position(time, position)
+        self.qx, self.qy, self.qz, self.qw = quaternion
+        self._estimator.correct_attitude(*quaternion, self.attitude_deviation)
+
+    def update(self, time: float) -> None:
+        """Let the deck measure, if there is one and nothing better."""
+        is_external = self.time is not None and time - self.time < EXTERNAL_AGE
+        if self.has_deck and not is_external:
+            self._estimator.correct_position(*self._physics.position, _DECK_POSITION_DEVIATION)
+            self._estimator.correct_attitude(*self._physics.quaternion, _DECK_ATTITUDE_DEVIATION)

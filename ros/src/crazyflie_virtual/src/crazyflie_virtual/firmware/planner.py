@@ -1,0 +1,216 @@
+"""The high-level commander: takeoff, landing, go to, trajectories."""
+
+import errno
+import math
+from enum import Enum
+
+from crazyflie_virtual.firmware.polynomials import (
+    PIECE_SIZE,
+    Goal,
+    Piece,
+    Trajectory,
+    smooth_piece,
+    straight_piece,
+)
+from crazyflie_virtual.firmware.states import ABSOLUTE, Setpoint
+
+MEMORY_SIZE = 4096
+"""Bytes of the trajectory memory."""
+
+DEFINITIONS = 10
+"""Trajectories that can be defined at one time."""
+
+REFUSED = 1
+"""What a command returns that does not fit what the planner is doing."""
+
+_SHORTEST = 0.01
+"""Least duration of a plan, s."""
+
+
+class Phase(Enum):
+    """What the planner is doing."""
+
+    STOPPED = 0
+    """It holds the motors off."""
+    FLYING = 1
+    LANDING = 2
+    DISABLED = 3
+    """It gives no setpoints: streamed ones have taken over."""
+
+
+class Planner:
+    """Plans trajectories and tells where they are.
+
+    Commands return 0 or an error number.
+
+    Attributes
+    ----------
+    memory : bytearray
+        Pieces of trajectories, uploaded by the client.
+    phase : Phase
+    blocked : bool
+        Set while the vehicle cannot fly: plans are refused.
+    takeoff_speed, landing_speed : float
+        Where a command gives none, m/s.
+    """
+
+    def __init__(self):
+        self.memory = bytearray(MEMORY_SIZE)
+        self.phase = Phase.STOPPED
+        self.blocked = False
+        self.takeoff_speed = self.landing_speed = 0.5
+        self._definitions = {}
+        self._trajectory = None
+        self._begin = 0.0
+        self._last = Goal((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
+
+    def is_finished(self, time: float) -> bool:
+        """Tell whether what was planned last has come to its end."""
+        return self._trajectory is None or time >= self._begin + self._trajectory.duration
+
+    def setpoint(self, time: float, estimate) -> Setpoint | None:
+        """Return what the vehicle is to do at ``time`` (s); None when disabled."""
+        if self.phase is Phase.LANDING and self.is_finished(time):
+            self.phase = Phase.STOPPED
+        if self.phase in (Phase.STOPPED, Phase.DISABLED):
+            self.tell_state(estimate)
+            return Setpoint(time=time) if self.phase is Phase.STOPPED else None
+        goal = self._last = self._trajectory.evaluate(time - self._begin)
+        x, y, z = goal.position
+        vx, vy, vz = goal.velocity
+        ax, ay, az = goal.acceleration
+        return Setpoint(
+            mode_x=ABSOLUTE,
+            mode_y=ABSOLUTE,
+            mode_z=ABSOLUTE,
+            mode_yaw=ABSOLUTE,
+            x=x,
+            y=y,
+            z=z,
+            vx=vx,
+            vy=vy,
+            vz=vz,
+            ax=ax,
+            ay=ay,
+            az=az,
+            yaw=math.degrees(goal.yaw),
+            yaw_rate=math.degrees(goal.yaw_rate),
+            time=time,
+        )
+
+    def tell_state(self, estimate) -> None:
+        """Begin the next plan at the vehicle's state and not at the last setpoint."""
+        self._last = Goal(
+            (estimate.x, estimate.y, estimate.z),
+            (estimate.vx, estimate.vy, estimate.vz),
+            (0.0,) * 3,
+            math.radians(estimate.yaw),
+            0.0,
+        )
+
+    def stop(self) -> int:
+        """Hold the motors off."""
+        self.phase = Phase.STOPPED
+        return 0
+
+    def disable(self) -> None:
+        """Give no more setpoints."""
+        self.phase = Phase.DISABLED
+
+    def block(self, is_blocked: bool) -> None:
+        """Refuse plans from now on, and stop what is flying; or allow them again."""
+        if is_blocked and self.phase in (Phase.FLYING, Phase.LANDING):
+            self.phase = Phase.STOPPED
+        self.blocked = is_blocked
+
+    def take_off(self, time: float, height: float, yaw: float | None, duration: float) -> int:
+        """Climb to ``height`` (m) in ``duration`` (s), turning to ``yaw`` (rad) unless None."""
+        if self.phase in (Phase.FLYING, Phase.LANDING):
+            return REFUSED
+        return self._move_vertically(time, height, yaw, duration, Phase.FLYING)
+
+    def land(self, time: float, height: float, yaw: float | None, duration: float) -> int:
+        """Descend to ``height`` (m) in ``duration`` (s), then stop the motors."""
+        if self.phase is Phase.LANDING:
+            return REFUSED
+        return self._move_vertically(time, height, yaw, duration, Phase.LANDING)
+
+    def climb_time(self, height: float, is_relative: bool, speed: float) -> tuple:
+        """Return height (m) and duration (s) of a climb at a mean speed (m/s)."""
+        now = self._last.position[2]
+        height = now + height if is_relative else height
+        return height, abs(height - now) / speed
+
+    def go_to(
+        self,
+        time: float,
+        position: tuple,
+        yaw: float,
+        duration: float,
+        relative: bool,
+        linear: bool,
+    ) -> int:
+        """Fly to a position (m) and heading (rad), or by them, in ``duration`` (s)."""
+        start = self._last
+        if relative:
+            position = tuple(a + b for a, b in zip(position, start.position, strict=True))
+            yaw += start.yaw
+        plan = straight_piece if linear else smooth_piece
+        return self._fly(time, plan, start, position, yaw, duration, Phase.FLYING)
+
+    def define(self, trajectory_id: int, offset: int, pieces: int) -> int:
+        """Say where in the memory a trajectory is: offset in bytes, number of pieces."""
+        fits = pieces > 0 and offset + pieces * PIECE_SIZE <= len(self.memory)
+        if trajectory_id >= DEFINITIONS or not fits:
+            return errno.ENOMEM
+        self._definitions[trajectory_id] = (offset, pieces)
+        return 0
+
+    def start(
+        self,
+        time: float,
+        trajectory_id: int,
+        time_scale: float,
+        backwards: bool,
+        relative: bool,
+        relative_yaw: bool,
+    ) -> int:
+        """Fly a trajectory that was defined; ``relative`` to the present position (and yaw)."""
+        if self.blocked:
+            return REFUSED
+        if trajectory_id not in self._definitions:
+            return errno.ENOENT
+        if not (math.isfinite(time_scale) and time_scale > 0.0):
+            return errno.EINVAL
+        offset, count = self._definitions[trajectory_id]
+        chunks = (self.memory[offset + i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
+        try:
+            pieces = tuple(Piece.unpack(chunk) for chunk in chunks)
+        except ValueError:
+            return errno.EINVAL
+        trajectory = Trajectory(pieces, time_scale, backwards)
+        if relative:
+            yaw = self._last.yaw if relative_yaw else None
+            trajectory = trajectory.moved_to(self._last.position, yaw)
+        self._begin_at(time, trajectory, Phase.FLYING)
+        return 0
+
+    def _move_vertically(self, time, height, yaw, duration, phase):
+        x, y, z = self._last.position
+        start = Goal((x, y, z), (0.0,) * 3, (0.0,) * 3, self._last.yaw, 0.0)
+        yaw = start.yaw if yaw is None else yaw
+        return self._fly(time, smooth_piece, start, (x, y, height), yaw, duration, phase)
+
+    def _fly(self, time, plan, start, position, yaw, duration, phase):
+        if self.blocked:
+            return REFUSED
+        if not all(map(math.isfinite, (*position, yaw, duration))) or duration < 0.0:
+            return errno.EINVAL
+        piece = plan(start, position, yaw, max(duration, _SHORTEST))
+        self._begin_at(time, Trajectory((piece,)), phase)
+        return 0
+
+    def _begin_at(self, time, trajectory, phase):
+        self._trajectory = trajectory
+        self._begin = time
+        self.phase = phase

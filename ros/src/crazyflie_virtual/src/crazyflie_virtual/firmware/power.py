@@ -1,0 +1,52 @@
+"""Power management: what the firmware makes of the battery's voltage. 10 Hz."""
+
+ON_BATTERY, LOW = 0, 3
+"""States; 1 and 2, charging and charged, do not occur."""
+
+_LOW_AFTER = 5.0
+"""How long the voltage is low until it counts, s."""
+
+_LEVELS = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10)
+"""Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C]."""
+
+
+class PowerMonitor:
+    """Watches the voltage.
+
+    Attributes
+    ----------
+    voltage : float
+        V.
+    level : int
+        Charge as the firmware guesses it from the voltage, %.
+    state : int
+        `ON_BATTERY` or `LOW`.
+    low_voltage, critical_voltage : float
+        V.
+    is_exhausted : bool
+        The voltage has been critical for too long: the vehicle turns off.
+    """
+
+    def __init__(self):
+        self.voltage = 4.1
+        self.level = 90
+        self.state = ON_BATTERY
+        self.low_voltage, self.critical_voltage = 3.2, 3.0
+        self.is_exhausted = False
+        self._good_time = self._fair_time = None
+
+    @property
+    def millivolts(self) -> float:
+        """Voltage, mV."""
+        return 1000.0 * self.voltage
+
+    def update(self, time: float, voltage: float) -> None:
+        """Take in the voltage (V) at a time (s)."""
+        self.voltage = voltage
+        self.level = 10 * max(0, sum(voltage >= level for level in _LEVELS) - 1)
+        if voltage > self.low_voltage or self._good_time is None:
+            self._good_time = time
+        if voltage > self.critical_voltage or self._fair_time is None:
+            self._fair_time = time
+        self.state = LOW if time - self._good_time > _LOW_AFTER else ON_BATTERY
+        self.is_exhausted = time - self._fair_time > _LOW_AFTER

@@ -1,0 +1,152 @@
+"""From setpoint and estimate to motor commands: the cascade of controllers and the mixer."""
+
+import math
+
+from crazyflie_virtual.firmware import attitude, mixer
+from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
+from crazyflie_virtual.firmware.position import PositionController
+from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Setpoint
+
+_OFF = (0.0,) * 4
+
+
+class MotorOverride:
+    """Motor commands set by parameter, for tests on the bench.
+
+    Attributes
+    ----------
+    enable : int
+        0 for none, 1 for each motor its own command, 2 for that of motor 1 on all.
+    m1, m2, m3, m4 : int
+        PWM.
+    """
+
+    def __init__(self):
+        self.enable = 0
+        self.m1 = self.m2 = self.m3 = self.m4 = 0
+
+    def commands(self) -> tuple | None:
+        """Return the commands that hold, or None."""
+        if self.enable == 1:
+            return tuple(map(float, (self.m1, self.m2, self.m3, self.m4)))
+        return (float(self.m1),) * 4 if self.enable else None
+
+
+class Stabilizer:
+    """The controllers of one vehicle.
+
+    Attributes
+    ----------
+    attitude : AttitudeController
+    position : PositionController
+    override : MotorOverride
+    roll, pitch, yaw : float
+        Desired attitude, deg.
+    roll_rate, pitch_rate, yaw_rate : float
+        Desired body rates, deg/s.
+    thrust, command_roll, command_pitch, command_yaw : float
+        What goes to the mixer, PWM.
+    requested, commands : tuple, 4 components
+        Motor commands before and after their limits, PWM.
+    idle_thrust : int
+        Least command of an armed motor, PWM.
+    """
+
+    def __init__(self):
+        self.attitude = AttitudeController()
+        self.position = PositionController()
+        self.override = MotorOverride()
+        self.idle_thrust = 0
+        self.roll = self.pitch = self.yaw = 0.0
+        self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0
+        self.thrust = self.command_roll = self.command_pitch = self.command_yaw = 0.0
+        self.requested = self.commands = _OFF
+        self._automatic = (0.0, 0.0, 0.0)
+        self._modes = Setpoint().modes
+
+    def update(
+        self, setpoint: Setpoint, estimate, sensors, with_position: bool, may_run: bool
+    ) -> tuple:
+        """Return the motor commands, PWM.
+
+        Parameters
+        ----------
+        setpoint : Setpoint
+        estimate : Estimate
+        sensors : Sensors
+        with_position : bool
+            Whether the position controller has its turn.
+        may_run : bool
+            Whether the supervisor lets motors run.
+        """
+        if setpoint.modes != self._modes:
+            self._modes = setpoint.modes
+            self._reset(estimate)
+        if with_position:
+            self._control_position(setpoint, estimate)
+        self._desire_yaw(setpoint, estimate)
+        self._desire_tilt(setpoint)
+        if self.thrust <= 0.0:
+            self._rest(estimate)
+        else:
+            self._control_attitude(setpoint, estimate, sensors)
+            self.requested = mixer.mix(
+                self.thrust, self.command_roll, self.command_pitch, self.command_yaw
+            )
+        override = self.override.commands()
+        if override is not None:
+            self.requested = override
+        idle = float(self.idle_thrust)
+        self.commands = mixer.limit(self.requested, idle) if may_run else _OFF
+        return self.commands
+
+    def _reset(self, estimate):
+        self.attitude.reset()
+        self.position.reset()
+        self._automatic = (estimate.roll, estimate.pitch, 0.0)
+
+    def _control_position(self, setpoint, estimate):
+        if (setpoint.mode_x, setpoint.mode_y, setpoint.mode_z) != (DISABLED,) * 3:
+            self._automatic = self.position.update(setpoint, estimate)
+
+    def _desire_yaw(self, setpoint, estimate):
+        if setpoint.mode_yaw == VELOCITY:
+            # A commanded yaw rate moves the heading that is held.
+            yaw = self.yaw + setpoint.yaw_rate * attitude.DT
+            limit = self.attitude.yaw_max_delta
+            if limit > 0.0:
+                ahead = wrap_degrees(yaw - estimate.yaw)
+                yaw = estimate.yaw + max(-limit, min(limit, ahead))
+            self.yaw = wrap_degrees(yaw)
+        elif setpoint.mode_yaw == ABSOLUTE:
+            self.yaw = wrap_degrees(setpoint.yaw)
+        elif setpoint.mode_quaternion == ABSOLUTE:
+            x, y, z, w = setpoint.quaternion
+            self.yaw = math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+
+    def _desire_tilt(self, setpoint):
+        roll, pitch, thrust = self._automatic
+        self.thrust = setpoint.thrust if setpoint.mode_z == DISABLED else thrust
+        if DISABLED in (setpoint.mode_x, setpoint.mode_y):
+            roll, pitch = setpoint.roll, setpoint.pitch
+        self.roll, self.pitch = roll, pitch
+
+    def _control_attitude(self, setpoint, estimate, sensors):
+        rates = self.attitude.desired_rates(estimate, self.roll, self.pitch, self.yaw)
+        roll_rate, pitch_rate, yaw_rate = rates
+        if setpoint.mode_roll == VELOCITY:
+            roll_rate = setpoint.roll_rate
+        if setpoint.mode_pitch == VELOCITY:
+            pitch_rate = setpoint.pitch_rate
+        self.roll_rate, self.pitch_rate, self.yaw_rate = roll_rate, pitch_rate, yaw_rate
+        gyro = (sensors.gyro_x, -sensors.gyro_y, sensors.gyro_z)
+        outputs = self.attitude.outputs((roll_rate, pitch_rate, yaw_rate), gyro)
+        self.command_roll, self.command_pitch, self.command_yaw = outputs
+
+    def _rest(self, estimate):
+        # Without thrust the controllers begin anew, and the heading that is
+        # held is the vehicle's.
+        self._reset(estimate)
+        self.yaw = estimate.yaw
+        self.command_roll = self.command_pitch = self.command_yaw = 0.0
+        self.requested = _OFF

@@ -1,0 +1,222 @@
+"""The supervisor: may the motors run, and what overrides the setpoint. 25 Hz.
+
+States and times are those of the firmware (2025). Unlike there, a vehicle whose
+motors have been off for a while counts as landed also while its setpoint is
+old: it stands on the ground then, and need not be locked.
+"""
+
+from enum import Enum
+
+from crazyflie_virtual.firmware.states import Setpoint
+
+LEVEL_AGE, OFF_AGE = 0.5, 2.0
+"""Age of the setpoint from which a flying vehicle levels out, and from which it falls, s."""
+
+EMERGENCY_WATCHDOG = 1.0
+"""How long one message holds off the emergency stop, s, once there has been one."""
+
+_LANDED_AFTER = 2.0
+"""How long the motors are off until the vehicle is not flying, s."""
+
+_TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
+"""Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s."""
+
+_FREE_FALL = 0.1
+"""Accelerometer, g, below which in all axes the vehicle is falling: not tumbled."""
+
+
+class State(Enum):
+    """Where the supervisor is."""
+
+    NOT_READY = "Pre-flight checks not passed"
+    CHECKED = "Pre-flight checks passed"
+    READY = "Ready to fly"
+    FLYING = "Flying"
+    LANDED = "Landed"
+    LEVELLING = "Warning, level out"
+    CRASHED = "Crashed"
+    LOCKED = "Locked"
+
+
+_RUNNING = (State.READY, State.FLYING, State.LANDED, State.LEVELLING)
+_IN_AIR = (State.FLYING, State.LEVELLING)
+
+
+class Supervisor:
+    """Decides whether the motors may run.
+
+    Parameters
+    ----------
+    say : callable
+        ``say(text)`` prints a line on the console.
+    auto_arm : bool
+        Arm as soon as the checks have passed, as a Crazyflie 2.1 does; otherwise
+        wait for the client, as vehicles with brushless motors do.
+
+    Attributes
+    ----------
+    state : State
+    is_armed, is_tumbled, is_crashed : bool
+    emergency_stop : int
+        Parameter stabilizer.stop: not 0 stops the motors.
+    tumble_check : int
+        0 for none.
+    preflight_timeout, landed_timeout : int
+        ms after which a vehicle that was armed by the client is disarmed when
+        it does not take off, and after landing.
+    """
+
+    def __init__(self, say, auto_arm: bool = True):
+        self._say = say
+        self.auto_arm = auto_arm
+        self.state = State.NOT_READY
+        self.is_armed = self.is_tumbled = self.is_crashed = False
+        self.emergency_stop = 0
+        self.tumble_check = 1
+        self.preflight_timeout, self.landed_timeout = 30000, 3000
+        self._emergency = False
+        self._watchdog_time = None
+        self._thrust_time = None
+        self._tumble_time = None
+        self._state_time = 0.0
+
+    @property
+    def can_fly(self) -> bool:
+        """Whether the motors may run."""
+        return self.state in _RUNNING
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether the vehicle is in the air, as far as the supervisor knows."""
+        return self.state in _IN_AIR
+
+    @property
+    def bits(self) -> int:
+        """The state in bits.
+
+        From bit 0: can be armed, is armed, arms itself, can fly, is flying, has
+        tumbled, is locked, has crashed.
+        """
+        flags = (
+            self.state is State.CHECKED,
+            self.is_armed,
+            self.auto_arm,
+            self.can_fly,
+            self.is_flying,
+            self.is_tumbled,
+            self.state is State.LOCKED,
+            self.is_crashed,
+        )
+        return sum(1 << i for i, flag in enumerate(flags) if flag)
+
+    def arm(self, do_arm: bool) -> bool:
+        """Arm or disarm; return whether that was possible."""
+        if do_arm and not self.is_armed and self.state is not State.CHECKED:
+            return False
+        self.is_armed = do_arm
+        return True
+
+    def recover(self) -> bool:
+        """End the crashed state, if the vehicle is upright; return whether it has ended."""
+        if self.is_crashed and self.is_tumbled:
+            return False
+        self.is_crashed = False
+        return True
+
+    def stop(self) -> None:
+        """Stop the motors; only a restart ends that."""
+        self._emergency = True
+
+    def feed_watchdog(self, time: float) -> None:
+        """Hold off the emergency stop; from the first time on this must go on."""
+        self._watchdog_time = time
+
+    def update(self, time: float, sensors, setpoint_age: float, motors_run: bool) -> None:
+        """Take the state at ``time`` (s) on by one step.
+
+        Parameters
+        ----------
+        time : float
+        sensors : Sensors
+        setpoint_age : float
+            s.
+        motors_run : bool
+            Whether any motor is commanded more than idle.
+        """
+        if motors_run:
+            self._thrust_time = time
+        runs = self._thrust_time is not None and time - self._thrust_time < _LANDED_AFTER
+        self.is_tumbled = bool(self.tumble_check) and self._has_tumbled(time, sensors)
+        state = self._next(time, setpoint_age, runs)
+        if state is self.state:
+            return
+        self.state = state
+        self._state_time = time
+        if state is State.CRASHED:
+            self.is_crashed = True
+        if state not in _RUNNING:
+            self.is_armed = False
+        if state is State.CHECKED and self.auto_arm:
+            self.is_armed = True
+        if state in (State.LOCKED, State.CRASHED):
+            remedy = "reboot" if state is State.LOCKED else "recovery"
+            self._say(f"SUP: {state.value}, {remedy} required")
+
+    def override(self, setpoint: Setpoint) -> Setpoint:
+        """Return the setpoint that is flown in the place of the commander's."""
+        if not self.can_fly:
+            return Setpoint(time=setpoint.time)
+        return setpoint.leveled() if self.state is State.LEVELLING else setpoint
+
+    def _next(self, time, setpoint_age, runs):
+        state = self.state
+        if state is State.LOCKED or self._is_emergency(time):
+            return State.LOCKED
+        if state is State.CRASHED:
+            return State.CRASHED if self.is_crashed else State.NOT_READY
+        if state is State.NOT_READY:
+            return State.NOT_READY if self.is_tumbled else State.CHECKED
+        if state is State.CHECKED:
+            if self.is_tumbled:
+                return State.NOT_READY
+            return State.READY if self.is_armed else State.CHECKED
+        if state is State.READY:
+            waited = self._waited(time, self.preflight_timeout)
+            if self.is_tumbled or not self.is_armed or waited:
+                return State.NOT_READY
+            return State.FLYING if runs else State.READY
+        if state is State.LANDED:
+            if not self.is_armed or self._waited(time, self.landed_timeout):
+                return State.NOT_READY
+            return State.FLYING if runs else State.LANDED
+        return self._next_in_air(setpoint_age, runs)
+
+    def _next_in_air(self, setpoint_age, runs):
+        if self.is_tumbled:
+            return State.CRASHED
+        if not self.is_armed:
+            return State.LOCKED
+        if not runs:
+            return State.READY if self.auto_arm else State.LANDED
+        if setpoint_age > OFF_AGE:
+            return State.LOCKED
+        return State.LEVELLING if setpoint_age > LEVEL_AGE else State.FLYING
+
+    def _waited(self, time, timeout):
+        return not self.auto_arm and time - self._state_time > timeout / 1000.0
+
+    def _is_emergency(self, time):
+        fed = self._watchdog_time
+        starved = fed is not None and time - fed > EMERGENCY_WATCHDOG
+        return self._emergency or starved or bool(self.emergency_stop)
+
+    def _has_tumbled(self, time, sensors):
+        forces = (sensors.acc_x, sensors.acc_y, sensors.acc_z)
+        is_falling = all(abs(force) < _FREE_FALL for force in forces)
+        if is_falling or sensors.acc_z >= _TILTED[0]:
+            self._tumble_time = None
+            return False
+        if self._tumble_time is None:
+            self._tumble_time = time
+        lasted = time - self._tumble_time
+        return lasted > _TILTED[1] or (sensors.acc_z < _UPSIDE_DOWN[0] and lasted > _UPSIDE_DOWN[1])

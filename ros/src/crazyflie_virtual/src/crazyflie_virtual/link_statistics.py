@@ -1,0 +1,46 @@
+"""Packets counted."""
+
+_ACTIVE = 2.0
+"""How long after the last packet the client counts as connected, s."""
+
+
+class LinkStatistics:
+    """Traffic of the link, for the log.
+
+    Attributes
+    ----------
+    is_connected : bool
+        Whether a packet came lately.
+    received : int
+        Packets since the start, modulo 2^16.
+    received_rate, sent_rate : float
+        Packets per second, over the last second.
+    """
+
+    def __init__(self):
+        self.is_connected = False
+        self.received = 0
+        self.received_rate = self.sent_rate = 0.0
+        self._last = None
+        self._window = 0.0
+        self._in = self._out = 0
+
+    def count_received(self, time: float) -> None:
+        """Count a packet that came at ``time`` (s)."""
+        self.received = (self.received + 1) & 0xFFFF
+        self._in += 1
+        self._last = time
+        self.is_connected = True
+
+    def count_sent(self, packets: int) -> None:
+        """Count packets to the client."""
+        self._out += packets
+
+    def update(self, time: float) -> None:
+        """Let time pass, to ``time`` (s)."""
+        self.is_connected = self._last is not None and time - self._last < _ACTIVE
+        elapsed = time - self._window
+        if elapsed >= 1.0:
+            self.received_rate, self.sent_rate = self._in / elapsed, self._out / elapsed
+            self._in = self._out = 0
+            self._window = time

@@ -1,0 +1,65 @@
+"""Main programs: with ROS when roslaunch starts them, without otherwise."""
+
+import signal
+import sys
+
+from crazyflie_virtual.options import parse_arguments
+
+_DESCRIPTION = (
+    "A Crazyflie in software that speaks CRTP over UDP: connect with any cflib program to "
+    "udp://HOST:PORT."
+)
+
+_MOCAP_DESCRIPTION = (
+    "A motion capture system in software: streams the true poses of the virtual vehicles on this "
+    "machine as a NatNet server."
+)
+
+
+def virtual_crazyflie() -> None:
+    """Run a virtual vehicle until interrupted."""
+    if _is_ros_node():
+        from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
+
+        _run_node(VirtualCrazyflieNode, "virtual_crazyflie")
+    from crazyflie_virtual.server import Server
+    from crazyflie_virtual.settings import Settings
+
+    _run("virtual_crazyflie", _DESCRIPTION, Settings, Server)
+
+
+def virtual_mocap() -> None:
+    """Run a virtual motion capture system until interrupted."""
+    if _is_ros_node():
+        from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
+
+        _run_node(VirtualMocapNode, "virtual_mocap")
+    from crazyflie_virtual.mocap.server import MocapServer
+    from crazyflie_virtual.mocap.settings import MocapSettings
+
+    _run("virtual_mocap", _MOCAP_DESCRIPTION, MocapSettings, MocapServer)
+
+
+def _is_ros_node():
+    # roslaunch gives every node its name this way; parameters for rosrun look alike.
+    return any(":=" in argument for argument in sys.argv[1:])
+
+
+def _run_node(node_class, name):
+    from crazyflie_utils import run
+
+    run(node_class, name)
+
+
+def _run(program, description, options_class, server_class):
+    options = parse_arguments(options_class, sys.argv[1:], program, description)
+    try:
+        server = server_class(options, lambda text: print(text, file=sys.stderr, flush=True))
+    except OSError as error:
+        sys.exit(f"{program}: cannot listen: {error}")
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    print(server.description, flush=True)
+    try:
+        server.run()
+    except KeyboardInterrupt:
+        pass

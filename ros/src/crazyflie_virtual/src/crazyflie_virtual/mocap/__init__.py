@@ -1,0 +1,1 @@
+"""A NatNet server that shows the virtual vehicles."""

@@ -1,0 +1,12 @@
+"""ROS interface of the virtual motion capture system."""
+
+from crazyflie_virtual.mocap.server import MocapServer
+from crazyflie_virtual.mocap.settings import MocapSettings
+from crazyflie_virtual.server_node import ServerNode
+
+
+class VirtualMocapNode(ServerNode):
+    """A NatNet server whose options are parameters."""
+
+    def __init__(self):
+        super().__init__(MocapSettings, MocapServer)

@@ -1,0 +1,163 @@
+"""Messages of a NatNet server, as bytes.
+
+Versions 2.9, 3.1 and 4.1 of the bit stream. Numbers are little-endian; a message
+begins with its number and the length of what follows, 16 bits each.
+"""
+
+import struct
+from typing import NamedTuple
+
+CONNECT, SERVER_INFO = 0, 1
+REQUEST_MODEL, MODEL = 4, 5
+FRAME = 7
+KEEP_ALIVE = 10
+ECHO_REQUEST, ECHO_RESPONSE = 12, 13
+UNRECOGNIZED = 100
+
+VERSIONS = ("2.9", "3.1", "4.1")
+
+CLOCK_FREQUENCY = 1_000_000_000
+"""Ticks per second of the server's clock."""
+
+_RIGID_BODY = 1
+_TRACKED = 1
+_NO_PARENT = -1
+_HEADER = struct.Struct("<HH")
+
+
+class BodyPose(NamedTuple):
+    """A rigid body in a frame.
+
+    Attributes
+    ----------
+    body_id, name : int, str
+    position : tuple, 3 components
+        m.
+    quaternion : tuple, 4 components
+        (x, y, z, w).
+    is_tracked : bool
+        Otherwise the pose is an old one.
+    """
+
+    body_id: int
+    name: str
+    position: tuple
+    quaternion: tuple
+    is_tracked: bool
+
+
+class Stamps(NamedTuple):
+    """When a frame came to be, s of the server's clock.
+
+    Attributes
+    ----------
+    exposure, received, sent : float
+        Middle of the cameras' exposure, arrival of their data, dispatch of the frame.
+    """
+
+    exposure: float
+    received: float
+    sent: float
+
+
+def parse(datagram: bytes) -> tuple | None:
+    """Return number and payload of a message; None when it is none."""
+    if len(datagram) < _HEADER.size:
+        return None
+    number, _ = _HEADER.unpack_from(datagram)
+    return number, datagram[_HEADER.size :]
+
+
+class Encoder:
+    """Writes the messages of one version.
+
+    Parameters
+    ----------
+    version : str
+        One of `VERSIONS`.
+    """
+
+    def __init__(self, version: str):
+        self._parts = tuple(int(part) for part in version.split("."))
+
+    def server_info(self, name: str, data_port: int, multicast_address: str | None) -> bytes:
+        """Return the answer to `CONNECT`; without a multicast address for unicast."""
+        group = multicast_address or "0.0.0.0"
+        payload = struct.pack(
+            "<256s4B4BQHB4B",
+            name.encode()[:255],
+            *(1, 0, 0, 0),
+            *(*self._parts, 0, 0),
+            CLOCK_FREQUENCY,
+            data_port,
+            multicast_address is not None,
+            *(int(part) for part in group.split(".")),
+        )
+        return _message(SERVER_INFO, payload)
+
+    def model(self, bodies) -> bytes:
+        """Return the answer to `REQUEST_MODEL`: names and numbers of the bodies."""
+        payload = struct.pack("<i", len(bodies))
+        for body in bodies:
+            description = (
+                body.name.encode()
+                + b"\0"
+                + struct.pack("<ii3f", body.body_id, _NO_PARENT, 0.0, 0.0, 0.0)
+            )
+            if self._parts >= (3, 0):
+                # No markers.
+                description += struct.pack("<i", 0)
+            payload += struct.pack("<i", _RIGID_BODY)
+            if self._parts >= (4, 1):
+                payload += struct.pack("<i", len(description))
+            payload += description
+        return _message(MODEL, payload)
+
+    def frame(self, number: int, bodies, stamps: Stamps) -> bytes:
+        """Return a frame.
+
+        Parameters
+        ----------
+        number : int
+            Of the frame.
+        bodies : sequence of BodyPose
+        stamps : Stamps
+        """
+        rigid_bodies = b"".join(self._rigid_body(body) for body in bodies)
+        sections = [(0, b""), (0, b""), (len(bodies), rigid_bodies), (0, b"")]
+        if self._parts >= (4, 1):
+            # Assets.
+            sections.append((0, b""))
+        # Labelled markers, force plates, devices.
+        sections += [(0, b"")] * (3 if self._parts >= (2, 11) else 2)
+        payload = struct.pack("<i", number)
+        for count, content in sections:
+            payload += struct.pack("<i", count)
+            if self._parts >= (4, 1):
+                payload += struct.pack("<i", len(content))
+            payload += content
+        payload += struct.pack("<IId", 0, 0, stamps.exposure)
+        if self._parts >= (3, 0):
+            payload += struct.pack("<3Q", *(round(s * CLOCK_FREQUENCY) for s in stamps))
+        return _message(FRAME, payload + struct.pack("<hI", 0, 0))
+
+    def _rigid_body(self, body):
+        data = struct.pack("<i7f", body.body_id, *body.position, *body.quaternion)
+        if self._parts < (3, 0):
+            # No markers.
+            data += struct.pack("<i", 0)
+        return data + struct.pack("<fh", 0.0, _TRACKED if body.is_tracked else 0)
+
+
+def echo(payload: bytes, time: float) -> bytes:
+    """Return the answer to `ECHO_REQUEST`: the client's clock and the server's (s)."""
+    return _message(ECHO_RESPONSE, payload[:8] + struct.pack("<Q", round(time * CLOCK_FREQUENCY)))
+
+
+def unrecognized() -> bytes:
+    """Return the answer to a request that the server does not know."""
+    return _message(UNRECOGNIZED, b"")
+
+
+def _message(number, payload):
+    return _HEADER.pack(number, len(payload)) + payload

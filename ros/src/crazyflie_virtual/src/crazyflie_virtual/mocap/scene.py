@@ -1,0 +1,113 @@
+"""What the cameras see of the virtual vehicles."""
+
+import math
+import random
+
+from crazyflie_simulator.motion_capture import MotionCapture
+from crazyflie_virtual.mocap.natnet import BodyPose
+
+_STALE = 0.5
+"""How long after the last observation a body counts as gone, s."""
+
+
+class Switches:
+    """What can be made to go wrong, at any time.
+
+    Parameters
+    ----------
+    dropout : float
+        Probability with which a body is not tracked in a frame.
+    invalid : str
+        Numbers of bodies that are not tracked, separated by commas; or "all".
+    silent : bool
+        Whether frames are held back.
+    """
+
+    def __init__(self, dropout: float = 0.0, invalid: str = "", silent: bool = False):
+        self.dropout = dropout
+        self.invalid = invalid
+        self.silent = silent
+
+    def hides(self, body_id: int) -> bool:
+        """Tell whether a body is one of those that are not tracked."""
+        names = [part.strip() for part in self.invalid.split(",")]
+        return "all" in names or str(body_id) in names
+
+
+class Scene:
+    """Rigid bodies, as observed last.
+
+    Parameters
+    ----------
+    switches : Switches
+    position_noise, attitude_noise : float
+        Standard deviations along and about each axis, m and rad.
+    seed : int
+    """
+
+    def __init__(
+        self,
+        switches: Switches,
+        position_noise: float = 0.0,
+        attitude_noise: float = 0.0,
+        seed: int = 0,
+    ):
+        self._switches = switches
+        self._noise = (position_noise, attitude_noise)
+        self._seed = seed
+        self._random = random.Random(seed)
+        self._observations = {}
+        self._cameras = {}
+        self._seen = {}
+
+    def observe(self, observation) -> None:
+        """Take in an `Observation`."""
+        body_id = observation.body_id
+        if body_id not in self._cameras:
+            self._cameras[body_id] = MotionCapture(*self._noise, seed=(self._seed, body_id))
+        self._observations[body_id] = observation
+
+    def bodies(self, time: float) -> list:
+        """Return every body as it is seen at ``time`` (s), in the order of their numbers.
+
+        Returns
+        -------
+        list of BodyPose
+            A body that is not tracked has the pose it was seen at last.
+        """
+        return [self._look(self._observations[i], time) for i in sorted(self._observations)]
+
+    def _look(self, observation, time):
+        body_id, name = observation.body_id, observation.name
+        lost = (
+            time - observation.time > _STALE
+            or self._switches.hides(body_id)
+            or self._random.random() < self._switches.dropout
+        )
+        if not lost:
+            camera = self._cameras[body_id]
+            camera.measure(time, *_extrapolate(observation, time))
+            _, position, quaternion = camera.arrivals(time)[-1]
+            self._seen[body_id] = (tuple(position), tuple(quaternion))
+        never = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+        position, quaternion = self._seen.get(body_id, never)
+        return BodyPose(body_id, name, position, quaternion, not lost)
+
+
+def _extrapolate(observation, time):
+    # Observations come with a few milliseconds between them and not in step
+    # with the frames; over these the vehicle goes straight on.
+    dt = time - observation.time
+    position = tuple(
+        p + v * dt for p, v in zip(observation.position, observation.velocity, strict=True)
+    )
+    x, y, z, w = observation.quaternion
+    a, b, c = (0.5 * dt * rate for rate in observation.rates)
+    turned = (
+        x + w * a + y * c - z * b,
+        y + w * b + z * a - x * c,
+        z + w * c + x * b - y * a,
+        w - x * a - y * b - z * c,
+    )
+    norm = math.hypot(*turned)
+    return position, tuple(part / norm for part in turned)

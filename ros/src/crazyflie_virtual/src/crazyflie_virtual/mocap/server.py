@@ -1,0 +1,160 @@
+"""The NatNet server."""
+
+import select
+import socket
+import threading
+import time
+from collections import deque
+
+from crazyflie_virtual.mocap import natnet
+from crazyflie_virtual.mocap.natnet import Encoder, Stamps
+from crazyflie_virtual.mocap.scene import Scene
+from crazyflie_virtual.observer import decode
+from crazyflie_virtual.sockets import open_socket, received, send
+
+_CLIENT_LIMIT = 5.0
+"""How long after its last word a client is sent frames, s."""
+
+_LONGEST_WAIT = 0.1
+"""s."""
+
+
+class MocapServer:
+    """Streams what a `Scene` shows.
+
+    Parameters
+    ----------
+    settings : MocapSettings
+    warn : callable, optional
+        Not used: the server does not fall behind.
+
+    Attributes
+    ----------
+    address : tuple
+        Host and port for commands.
+    observer_port : int
+        Where the vehicles tell their poses.
+    switches : Switches
+
+    Raises
+    ------
+    OSError
+        A port is taken.
+    """
+
+    def __init__(self, settings, warn=None):
+        self._settings = settings
+        self.switches = settings.switches()
+        self._scene = Scene(
+            self.switches, settings.position_noise, settings.attitude_noise, settings.seed
+        )
+        self._encoder = Encoder(settings.version)
+        self._commands = open_socket(settings.host, settings.command_port)
+        try:
+            self._observations = open_socket("127.0.0.1", settings.observer_port)
+        except OSError:
+            self._commands.close()
+            raise
+        self.address = self._commands.getsockname()
+        self.observer_port = self._observations.getsockname()[1]
+        if settings.multicast:
+            interface = socket.inet_aton(settings.host)
+            self._commands.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
+        self._clients = {}
+        self._period = 1.0 / settings.rate
+        self._begin = time.monotonic()
+        self._frames = 0
+        self._pending = deque()
+        self._is_stopping = False
+        self._thread = None
+
+    @property
+    def description(self) -> str:
+        """Where clients find the server."""
+        s = self._settings
+        host, port = self.address
+        way = f"multicast to {s.multicast_address}:{s.data_port}" if s.multicast else "unicast"
+        return f"virtual motion capture: NatNet {s.version} at {host}:{port}, {way}"
+
+    def start(self) -> None:
+        """Run in a thread of its own until `stop`."""
+        self._thread = threading.Thread(target=self.run, name="virtual_mocap", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End, and close the ports."""
+        self._is_stopping = True
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(timeout=2.0)
+        self._commands.close()
+        self._observations.close()
+
+    def run(self) -> None:
+        """Serve until `stop`."""
+        while not self._is_stopping:
+            wake = self._begin + (self._frames + 1) * self._period
+            if self._pending:
+                wake = min(wake, self._pending[0][0])
+            wait = min(max(0.0, wake - time.monotonic()), _LONGEST_WAIT)
+            ready, _, _ = select.select([self._commands, self._observations], [], [], wait)
+            if self._observations in ready:
+                self._hear_vehicles()
+            if self._commands in ready:
+                self._hear_clients(time.monotonic())
+            self._expose(time.monotonic())
+            self._dispatch(time.monotonic())
+
+    def _hear_vehicles(self):
+        for datagram, _ in received(self._observations):
+            observation = decode(datagram)
+            if observation is not None:
+                self._scene.observe(observation)
+
+    def _hear_clients(self, now):
+        for datagram, client in received(self._commands):
+            message = natnet.parse(datagram)
+            if message is None:
+                continue
+            self._clients[client] = now
+            answer = self._answer(*message, now)
+            if answer is not None:
+                send(self._commands, answer, client)
+
+    def _answer(self, number, payload, now):
+        settings = self._settings
+        if number == natnet.KEEP_ALIVE:
+            return None
+        if number == natnet.CONNECT:
+            group = settings.multicast_address if settings.multicast else None
+            return self._encoder.server_info("virtual_mocap", settings.data_port, group)
+        if number == natnet.REQUEST_MODEL:
+            return self._encoder.model(self._scene.bodies(now))
+        if number == natnet.ECHO_REQUEST:
+            return natnet.echo(payload, now)
+        return natnet.unrecognized()
+
+    def _expose(self, now):
+        frame = int((now - self._begin) / self._period)
+        if frame <= self._frames:
+            return
+        # Frames that were missed are missing, as those of a busy system.
+        self._frames = frame
+        exposure = self._begin + frame * self._period
+        if self.switches.silent:
+            return
+        bodies = self._scene.bodies(exposure)
+        self._pending.append((exposure + self._settings.latency, exposure, frame, bodies))
+
+    def _dispatch(self, now):
+        while self._pending and self._pending[0][0] <= now:
+            _, exposure, frame, bodies = self._pending.popleft()
+            message = self._encoder.frame(frame, bodies, Stamps(exposure, exposure, now))
+            for receiver in self._receivers(now):
+                send(self._commands, message, receiver)
+
+    def _receivers(self, now):
+        settings = self._settings
+        if settings.multicast:
+            return [(settings.multicast_address, settings.data_port)]
+        self._clients = {c: t for c, t in self._clients.items() if now - t < _CLIENT_LIMIT}
+        return list(self._clients)

@@ -1,0 +1,68 @@
+"""The true pose, told to local observers: a datagram now and then.
+
+Motion capture sees the vehicle this way, and tests do. The time is that of the
+machine's monotonic clock, which all its processes share.
+"""
+
+import struct
+from typing import NamedTuple
+
+DEFAULT_PORT = 19800
+
+_MAGIC = b"vcf1"
+_FORM = struct.Struct("<4sH32s14d")
+
+
+class Observation(NamedTuple):
+    """The truth about a vehicle at some moment.
+
+    Attributes
+    ----------
+    body_id, name : int, str
+        Of the vehicle; the name has at most 31 bytes.
+    time : float
+        Of the machine's monotonic clock, s.
+    position, velocity : tuple, 3 components
+        m and m/s, fixed frame.
+    quaternion : tuple, 4 components
+        (x, y, z, w), body to fixed frame.
+    rates : tuple, 3 components
+        Body rates, rad/s.
+    """
+
+    body_id: int
+    name: str
+    time: float
+    position: tuple
+    velocity: tuple
+    quaternion: tuple
+    rates: tuple
+
+    def encode(self) -> bytes:
+        """Return the observation as a datagram."""
+        return _FORM.pack(
+            _MAGIC,
+            self.body_id,
+            self.name.encode()[:31],
+            self.time,
+            *self.position,
+            *self.velocity,
+            *self.quaternion,
+            *self.rates,
+        )
+
+
+def decode(datagram: bytes) -> Observation | None:
+    """Return the observation in a datagram; None when it holds none."""
+    if len(datagram) != _FORM.size or not datagram.startswith(_MAGIC):
+        return None
+    _, body_id, name, time, *numbers = _FORM.unpack(datagram)
+    return Observation(
+        body_id,
+        name.rstrip(b"\0").decode("utf-8", "replace"),
+        time,
+        tuple(numbers[0:3]),
+        tuple(numbers[3:6]),
+        tuple(numbers[6:10]),
+        tuple(numbers[10:13]),
+    )

@@ -1,0 +1,129 @@
+"""The body of the vehicle: the adapter to the simulator's airframe."""
+
+import math
+from dataclasses import replace
+
+from crazyflie_simulator.quadrotor import Airframe, QuadrotorParameters
+from crazyflie_utils.units import GRAVITY, HOVER_PWM
+from crazyflie_virtual.battery import FULL_VOLTAGE
+from crazyflie_virtual.rotations import rotate_back
+
+STEP = 0.002
+"""Step of the integration, s: that of the firmware's attitude controller."""
+
+_OVERTURNING = 0.5
+"""Cosine of the tilt beyond which a vehicle that comes down lies on its back."""
+
+_STILL_AIR = (0.0, 0.0, 0.0)
+
+
+class Physics:
+    """Rigid body, four motors, ground.
+
+    Parameters
+    ----------
+    position : sequence, 3 components
+        m.
+    yaw : float
+        rad.
+    mass_error, thrust_error : float
+        How much more mass and thrust the vehicle has than it should, as a
+        fraction.
+
+    Attributes
+    ----------
+    specific_force : tuple, 3 components
+        What an accelerometer feels, m/s^2, body frame.
+    impact_speed : float
+        Downward speed of the last contact with the ground, m/s.
+    is_overturned : bool
+        Came down on its back: lies there until `put_upright`.
+    """
+
+    def __init__(
+        self,
+        position=(0.0, 0.0, 0.0),
+        yaw: float = 0.0,
+        mass_error: float = 0.0,
+        thrust_error: float = 0.0,
+    ):
+        nominal = QuadrotorParameters()
+        self._airframe = Airframe(
+            replace(
+                nominal,
+                mass=nominal.mass * (1.0 + mass_error),
+                thrust_constant=nominal.thrust_constant * (1.0 + thrust_error),
+            )
+        )
+        self._speed_squared_per_pwm = nominal.hover_speed**2 / HOVER_PWM
+        self._max_speed = nominal.max_rotor_speed
+        self._hover_speed = nominal.hover_speed
+        x = self._airframe.initial_state([float(part) for part in position])
+        x[6:10] = [0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]
+        x[13:17] = [0.0] * 4
+        self._x = x
+        self.specific_force = (0.0, 0.0, GRAVITY)
+        self.impact_speed = 0.0
+        self.is_overturned = False
+
+    @property
+    def position(self) -> tuple:
+        """m, fixed frame."""
+        return tuple(self._x[0:3])
+
+    @property
+    def velocity(self) -> tuple:
+        """m/s, fixed frame."""
+        return tuple(self._x[3:6])
+
+    @property
+    def quaternion(self) -> tuple:
+        """(x, y, z, w), body to fixed frame."""
+        return tuple(self._x[6:10])
+
+    @property
+    def rates(self) -> tuple:
+        """Body rates, rad/s."""
+        return tuple(self._x[10:13])
+
+    @property
+    def load(self) -> float:
+        """Mean of the third powers of the rotor speeds over the hover speed's."""
+        return sum((speed / self._hover_speed) ** 3 for speed in self._x[13:17]) / 4.0
+
+    def put_upright(self) -> None:
+        """Pick the vehicle up and put it on its feet."""
+        self.is_overturned = False
+        self.specific_force = (0.0, 0.0, GRAVITY)
+
+    def step(self, commands, voltage: float) -> None:
+        """Take the body on by `STEP`.
+
+        Parameters
+        ----------
+        commands : sequence, 4 components
+            Motor commands, PWM.
+        voltage : float
+            Of the battery, V: it limits the speed of the motors.
+        """
+        top = self._max_speed * voltage / FULL_VOLTAGE
+        per_pwm = self._speed_squared_per_pwm
+        before = self._x
+        if self.is_overturned:
+            commands = (0.0,) * 4
+        # Thrust, the square of the speed, is linear in the command.
+        speeds = [min(top, math.sqrt(per_pwm * command)) for command in commands]
+        after = self._x = self._airframe.step(0.0, before, speeds, _STILL_AIR, STEP)
+        if before[2] > 0.0 and after[2] <= 0.0:
+            self.impact_speed = max(0.0, -before[5])
+            up = 1.0 - 2.0 * (before[6] ** 2 + before[7] ** 2)
+            self.is_overturned = up < _OVERTURNING
+        if self.is_overturned:
+            self.specific_force = (0.0, 0.0, -GRAVITY)
+            return
+        force = (
+            (after[3] - before[3]) / STEP,
+            (after[4] - before[4]) / STEP,
+            (after[5] - before[5]) / STEP + GRAVITY,
+        )
+        self.specific_force = rotate_back(after[6:10], force)

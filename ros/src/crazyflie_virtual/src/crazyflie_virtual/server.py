@@ -1,0 +1,132 @@
+"""The virtual vehicle on a UDP port, in real time."""
+
+import random
+import select
+import threading
+import time
+
+from crazyflie_virtual.channel import Channel
+from crazyflie_virtual.observer import Observation
+from crazyflie_virtual.settings import FIRST_PORT
+from crazyflie_virtual.sockets import open_socket, received, send
+from crazyflie_virtual.vehicle import Vehicle
+
+_TICK = 0.005
+"""How long the vehicle may be behind the clock when nothing happens, s."""
+
+_GREATEST_LAG = 0.25
+"""What is simulated at once, s; beyond that the vehicle loses time instead of its link."""
+
+_NULL = b"\xff"
+"""What a scanner sends: it is no client."""
+
+
+class Server:
+    """A vehicle behind a socket.
+
+    Parameters
+    ----------
+    settings : Settings
+    warn : callable
+        ``warn(text)`` is called when the vehicle cannot keep up with the clock.
+
+    Attributes
+    ----------
+    vehicle : Vehicle
+    address : tuple
+        Host and port.
+
+    Raises
+    ------
+    OSError
+        The port is taken.
+    """
+
+    def __init__(self, settings, warn=lambda text: None):
+        self._socket = open_socket(settings.host, settings.port)
+        self.address = self._socket.getsockname()
+        self._warn = warn
+        self.vehicle = Vehicle(settings)
+        source = random.Random(settings.seed)
+        self._up = Channel(self.vehicle.faults, source)
+        self._down = Channel(self.vehicle.faults, source)
+        self._client = None
+        self._begin = self._last_turn = time.monotonic()
+        self._observer = (settings.observer_host, settings.observer_port)
+        self._observation_period = 1.0 / settings.observer_rate
+        self._next_observation = self._begin
+        number = max(1, self.address[1] - FIRST_PORT + 1)
+        self._body_id = settings.body_id or number & 0x7FFF
+        self._body_name = settings.body_name or f"cf{number}"
+        self._is_stopping = False
+        self._thread = None
+
+    @property
+    def description(self) -> str:
+        """Where clients find the vehicle."""
+        host, port = self.address
+        return f"virtual Crazyflie at udp://{host}:{port}"
+
+    @property
+    def switches(self):
+        """The vehicle's fault switches."""
+        return self.vehicle.faults
+
+    def start(self) -> None:
+        """Run in a thread of its own until `stop`."""
+        self._thread = threading.Thread(target=self.run, name="virtual_crazyflie", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End, and close the port."""
+        self._is_stopping = True
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(timeout=2.0)
+        self._socket.close()
+
+    def run(self) -> None:
+        """Serve until `stop`."""
+        while not self._is_stopping:
+            now = time.monotonic()
+            self._turn(now)
+            arrival = min(self._up.next_arrival(), self._down.next_arrival())
+            wake = min(now - (now - self._begin) % _TICK + _TICK, arrival)
+            wait = max(0.0, wake - time.monotonic())
+            select.select([self._socket], [], [], wait)
+
+    def observe(self) -> Observation:
+        """Return the truth about the vehicle, as of now."""
+        physics = self.vehicle.physics
+        return Observation(
+            self._body_id,
+            self._body_name,
+            self._begin + self.vehicle.time,
+            physics.position,
+            physics.velocity,
+            physics.quaternion,
+            physics.rates,
+        )
+
+    def _turn(self, now):
+        self.vehicle.faults.pass_time(now - self._last_turn)
+        self._last_turn = now
+        for item in received(self._socket):
+            self._up.push(now, item)
+        lag = now - self._begin - self.vehicle.time
+        if lag > _GREATEST_LAG:
+            self._begin += lag
+            self._warn(f"the machine is too slow: the vehicle has lost {lag:.2f} s")
+        for datagram in self.vehicle.advance_to(now - self._begin):
+            if self._client is not None:
+                self._down.push(now, (datagram, self._client))
+        for datagram, sender in self._up.pop(now):
+            if datagram[:1] != _NULL:
+                self._client = sender
+            for answer in self.vehicle.receive(datagram):
+                self._down.push(now, (answer, sender))
+        for datagram, receiver in self._down.pop(now):
+            send(self._socket, datagram, receiver)
+        if self._observer[1] and now >= self._next_observation:
+            missed = (now - self._next_observation) // self._observation_period
+            self._next_observation += (1 + missed) * self._observation_period
+            send(self._socket, self.observe().encode(), self._observer)

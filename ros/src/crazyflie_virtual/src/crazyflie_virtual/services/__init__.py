@@ -1,0 +1,1 @@
+"""The ports of CRTP: packets in, packets out."""

@@ -1,0 +1,133 @@
+"""Port 8: the high-level commander."""
+
+import errno
+import struct
+
+from crazyflie_virtual.crtp import Packet, Port
+
+_ALL_GROUPS = 0
+_LOCATION_MEMORY, _TYPE_POLYNOMIALS = 1, 0
+
+
+class HighLevelService:
+    """Commands to the planner.
+
+    Parameters
+    ----------
+    firmware : Firmware
+    """
+
+    port = Port.HIGH_LEVEL
+
+    def __init__(self, firmware):
+        self._firmware = firmware
+        self._planner = firmware.planner
+        self._groups = 0
+
+    def handle(self, packet: Packet) -> list:
+        """Return the answer to a command: four bytes, the last an error number."""
+        if not packet.data:
+            return []
+        error = self._command(packet.data[0], packet.data[1:])
+        answer = packet.data[:3].ljust(3, b"\0") + bytes([error])
+        return [Packet(Port.HIGH_LEVEL, packet.channel, answer)]
+
+    def _command(self, command, data):
+        if command not in _COMMANDS:
+            return errno.ENOEXEC
+        form, handler = _COMMANDS[command]
+        if len(data) < struct.calcsize("<" + form):
+            return errno.EINVAL
+        values = struct.unpack_from("<" + form, data)
+        return handler(self, *values)
+
+    def _is_meant(self, group):
+        return group == _ALL_GROUPS or group & self._groups
+
+    @property
+    def _time(self):
+        return self._firmware.time
+
+    def _set_groups(self, groups):
+        self._groups = groups
+        return 0
+
+    def _stop(self, group):
+        return self._planner.stop() if self._is_meant(group) else 0
+
+    def _take_off(self, group, height, yaw, keep_yaw, duration):
+        if not self._is_meant(group):
+            return 0
+        yaw = None if keep_yaw else yaw
+        return self._planner.take_off(self._time, height, yaw, duration)
+
+    def _land(self, group, height, yaw, keep_yaw, duration):
+        if not self._is_meant(group):
+            return 0
+        yaw = None if keep_yaw else yaw
+        return self._planner.land(self._time, height, yaw, duration)
+
+    def _take_off_1(self, group, height, duration):
+        return self._take_off(group, height, 0.0, False, duration)
+
+    def _land_1(self, group, height, duration):
+        return self._land(group, height, 0.0, False, duration)
+
+    def _take_off_at_speed(self, group, height, relative, yaw, keep_yaw, speed):
+        speed = speed if speed > 0.0 else self._planner.takeoff_speed
+        height, duration = self._planner.climb_time(height, relative, speed)
+        return self._take_off(group, height, yaw, keep_yaw, duration)
+
+    def _land_at_speed(self, group, height, relative, yaw, keep_yaw, speed):
+        speed = speed if speed > 0.0 else self._planner.landing_speed
+        height = -height if relative else height
+        height, duration = self._planner.climb_time(height, relative, speed)
+        return self._land(group, height, yaw, keep_yaw, duration)
+
+    def _go_to(self, group, relative, linear, x, y, z, yaw, duration):
+        if not self._is_meant(group):
+            return 0
+        return self._planner.go_to(
+            self._time, (x, y, z), yaw, duration, bool(relative), bool(linear)
+        )
+
+    def _go_to_1(self, group, relative, x, y, z, yaw, duration):
+        return self._go_to(group, relative, False, x, y, z, yaw, duration)
+
+    def _start(self, group, relative, relative_yaw, backwards, trajectory_id, time_scale):
+        if not self._is_meant(group):
+            return 0
+        return self._planner.start(
+            self._time,
+            trajectory_id,
+            time_scale,
+            bool(backwards),
+            bool(relative),
+            bool(relative_yaw),
+        )
+
+    def _start_1(self, group, relative, backwards, trajectory_id, time_scale):
+        return self._start(group, relative, False, backwards, trajectory_id, time_scale)
+
+    def _define(self, trajectory_id, location, kind, offset, pieces):
+        if (location, kind) != (_LOCATION_MEMORY, _TYPE_POLYNOMIALS):
+            return errno.ENOEXEC
+        return self._planner.define(trajectory_id, offset, pieces)
+
+
+_COMMANDS = {
+    0: ("B", HighLevelService._set_groups),
+    1: ("Bff", HighLevelService._take_off_1),
+    2: ("Bff", HighLevelService._land_1),
+    3: ("B", HighLevelService._stop),
+    4: ("2B5f", HighLevelService._go_to_1),
+    5: ("4Bf", HighLevelService._start_1),
+    6: ("3BIB", HighLevelService._define),
+    7: ("Bff?f", HighLevelService._take_off),
+    8: ("Bff?f", HighLevelService._land),
+    9: ("Bf?f?f", HighLevelService._take_off_at_speed),
+    10: ("Bf?f?f", HighLevelService._land_at_speed),
+    12: ("3B5f", HighLevelService._go_to),
+    13: ("5Bf", HighLevelService._start),
+}
+"""Command -> (fields, handler). 1, 2, 4 and 5 are those of older clients."""

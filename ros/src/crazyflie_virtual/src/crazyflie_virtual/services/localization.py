@@ -1,0 +1,79 @@
+"""Port 6: positions and poses from outside."""
+
+import math
+import struct
+
+from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.firmware.compressed import decompress_quaternion
+
+_POSITION, _GENERIC, _PACKED_POSITIONS = 0, 1, 2
+_EMERGENCY_STOP, _EMERGENCY_WATCHDOG, _POSE, _PACKED_POSES = 3, 4, 8, 9
+
+_PACKED_POSITION = struct.Struct("<B3h")
+_PACKED_POSE = struct.Struct("<B3hI")
+
+
+class LocalizationService:
+    """Hands external measurements to the estimator.
+
+    Parameters
+    ----------
+    firmware : Firmware
+    address : int
+        Last byte of the radio's address: packed positions and poses of several
+        vehicles are marked with it.
+    """
+
+    port = Port.LOCALIZATION
+
+    def __init__(self, firmware, address: int):
+        self._firmware = firmware
+        self._address = address
+
+    def handle(self, packet: Packet) -> list:
+        """Take a measurement; there is no answer."""
+        data = packet.data
+        if packet.channel == _POSITION:
+            self._position(data)
+        elif packet.channel == _PACKED_POSITIONS:
+            for values in _each(_PACKED_POSITION, data):
+                if values[0] == self._address:
+                    self._take_position([part / 1000.0 for part in values[1:]])
+        elif packet.channel == _GENERIC and data:
+            self._generic(data[0], data[1:])
+        return []
+
+    def _generic(self, kind, data):
+        supervisor = self._firmware.supervisor
+        if kind == _POSE and len(data) == 28:
+            values = struct.unpack("<7f", data)
+            self._take_pose(values[:3], values[3:])
+        elif kind == _PACKED_POSES:
+            for values in _each(_PACKED_POSE, data):
+                if values[0] == self._address:
+                    position = [part / 1000.0 for part in values[1:4]]
+                    self._take_pose(position, decompress_quaternion(values[4]))
+        elif kind == _EMERGENCY_STOP:
+            supervisor.stop()
+        elif kind == _EMERGENCY_WATCHDOG:
+            supervisor.feed_watchdog(self._firmware.time)
+
+    def _position(self, data):
+        if len(data) == 12:
+            self._take_position(struct.unpack("<fff", data))
+
+    def _take_position(self, position):
+        if all(map(math.isfinite, position)):
+            self._firmware.localization.take_position(self._firmware.time, position)
+
+    def _take_pose(self, position, quaternion):
+        norm = math.hypot(*quaternion)
+        # No rotation, or not a number.
+        if not (all(map(math.isfinite, position)) and 0.5 < norm < 2.0):
+            return
+        unit = tuple(part / norm for part in quaternion)
+        self._firmware.localization.take_pose(self._firmware.time, position, unit)
+
+
+def _each(form, data):
+    return form.iter_unpack(data[: len(data) // form.size * form.size])

@@ -1,0 +1,137 @@
+"""Port 5: log blocks."""
+
+import errno
+import struct
+
+from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.kinds import LOG_KINDS
+from crazyflie_virtual.log_table import log_variables
+from crazyflie_virtual.toc import Entry, Table
+
+MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
+"""Blocks at one time, variables in all of them, bytes of values in one."""
+
+_TABLE, _CONTROL, _DATA = 0, 1, 2
+_DELETE, _START, _STOP, _RESET, _CREATE, _APPEND = 2, 3, 4, 5, 6, 7
+
+_PERIOD_UNIT = 10
+"""Of the period on the wire, ms."""
+
+
+class _Block:
+    def __init__(self):
+        self.variables = []
+        self.size = 0
+        self.period = 0
+        self.due = None
+
+    def add(self, variable, kind):
+        self.variables.append((variable.read, kind))
+        self.size += kind.size
+
+
+class LogService:
+    """Sends the values of variables that the client asks for, periodically.
+
+    Parameters
+    ----------
+    firmware : Firmware
+        Where the values are.
+    """
+
+    port = Port.LOG
+
+    def __init__(self, firmware):
+        self._firmware = firmware
+        self._variables = log_variables()
+        entries = [Entry(v.group, v.name, v.kind.log_code) for v in self._variables]
+        self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
+        self._blocks = {}
+        self._due = None
+
+    def handle(self, packet: Packet) -> list:
+        """Return the answers to a packet."""
+        if packet.channel == _TABLE:
+            answer = self.table.answer(packet.data)
+            return [] if answer is None else [Packet(Port.LOG, _TABLE, answer)]
+        if packet.channel == _CONTROL and packet.data:
+            command, rest = packet.data[0], packet.data[1:]
+            block_id = rest[0] if rest else 0
+            error = self._control(command, block_id, rest[1:])
+            return [Packet(Port.LOG, _CONTROL, bytes([command, block_id, error]))]
+        return []
+
+    def collect(self) -> list:
+        """Return the packets with values that are due."""
+        now = self._firmware.milliseconds
+        if self._due is None or now < self._due:
+            return []
+        packets = []
+        for block_id, block in self._blocks.items():
+            if block.due is not None and now >= block.due:
+                # The phase is kept; what was missed is skipped.
+                block.due += (1 + (now - block.due) // block.period) * block.period
+                packets.append(self._data_packet(block_id, block, now))
+        self._schedule()
+        return packets
+
+    def _control(self, command, block_id, data):
+        if command == _RESET:
+            self._blocks.clear()
+            self._schedule()
+            return 0
+        if command == _CREATE:
+            if block_id in self._blocks:
+                return errno.EEXIST
+            if len(self._blocks) >= MAX_BLOCKS:
+                return errno.ENOMEM
+            self._blocks[block_id] = _Block()
+            error = self._append(self._blocks[block_id], data)
+            if error:
+                del self._blocks[block_id]
+            return error
+        if command not in (_APPEND, _DELETE, _START, _STOP):
+            return errno.ENOEXEC
+        block = self._blocks.get(block_id)
+        if block is None:
+            return errno.ENOENT
+        if command == _APPEND:
+            return self._append(block, data)
+        if command == _DELETE:
+            del self._blocks[block_id]
+        elif command == _START:
+            period = _PERIOD_UNIT * (data[0] if data else 0)
+            if period == 0:
+                return errno.EINVAL
+            block.period = period
+            block.due = self._firmware.milliseconds + period
+        else:
+            block.due = None
+        self._schedule()
+        return 0
+
+    def _append(self, block, data):
+        for code, index in struct.iter_unpack("<BH", data[: len(data) // 3 * 3]):
+            if index >= len(self._variables):
+                return errno.ENOENT
+            variable = self._variables[index]
+            # The low half of the code is the type to send; 0 is the variable's own.
+            kind = LOG_KINDS.get(code & 0xF, variable.kind if code & 0xF == 0 else None)
+            if kind is None:
+                return errno.ENOENT
+            if block.size + kind.size > MAX_BYTES:
+                return errno.E2BIG
+            if sum(len(b.variables) for b in self._blocks.values()) >= MAX_VARIABLES:
+                return errno.ENOMEM
+            block.add(variable, kind)
+        return 0
+
+    def _schedule(self):
+        dues = [block.due for block in self._blocks.values() if block.due is not None]
+        self._due = min(dues, default=None)
+
+    def _data_packet(self, block_id, block, now):
+        firmware = self._firmware
+        values = b"".join(kind.pack(read(firmware)) for read, kind in block.variables)
+        stamp = (now & 0xFFFFFF).to_bytes(3, "little")
+        return Packet(Port.LOG, _DATA, bytes([block_id]) + stamp + values)

@@ -1,0 +1,196 @@
+"""Port 2: parameters."""
+
+import errno
+import math
+import struct
+from operator import attrgetter
+
+from crazyflie_virtual.crtp import MAX_DATA, Packet, Port
+from crazyflie_virtual.kinds import PARAMETER_KINDS
+from crazyflie_virtual.parameter_table import parameter_specs
+from crazyflie_virtual.toc import Entry, Table
+
+_TABLE, _READ, _WRITE, _MISC = 0, 1, 2, 3
+
+_SET_BY_NAME, _EXTENDED_TYPE, _STORE, _STATE, _CLEAR = 0, 2, 3, 4, 5
+_DEFAULT, _EXTENDED_TYPE_2, _DEFAULT_2 = 6, 7, 8
+
+_EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40
+"""Flags beside the type's code."""
+
+
+class Parameter:
+    """A parameter of a firmware that runs.
+
+    Parameters
+    ----------
+    spec : ParameterSpec
+    firmware : Firmware
+    """
+
+    def __init__(self, spec, firmware):
+        self.spec = spec
+        self.full_name = f"{spec.group}.{spec.name}"
+        self._owner = None
+        if isinstance(spec.source, str):
+            path, _, self._attribute = spec.source.rpartition(".")
+            self._owner = attrgetter(path)(firmware) if path else firmware
+        else:
+            self._value = spec.source
+        self.default = self.value
+
+    @property
+    def value(self):
+        """The present value."""
+        return self._value if self._owner is None else getattr(self._owner, self._attribute)
+
+    def set(self, value) -> None:
+        """Change the value, unless it is read-only or the new one is no number."""
+        if self.spec.read_only or not math.isfinite(value):
+            return
+        if self._owner is None:
+            self._value = value
+        else:
+            setattr(self._owner, self._attribute, value)
+
+    @property
+    def code(self) -> int:
+        """Type and flags in the table."""
+        spec = self.spec
+        extended = _EXTENDED if spec.persistent else 0
+        return spec.kind.parameter_code | extended | (_READ_ONLY if spec.read_only else _CORE)
+
+
+class ParameterService:
+    """Reads and writes parameters, and stores the persistent ones.
+
+    Parameters
+    ----------
+    firmware : Firmware
+    stored : dict
+        Full name -> value; outlives a restart of the vehicle. Applied at once.
+    """
+
+    port = Port.PARAMETERS
+
+    def __init__(self, firmware, stored: dict):
+        self._parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
+        self._stored = stored
+        for parameter in self._parameters:
+            if parameter.full_name in stored:
+                parameter.set(stored[parameter.full_name])
+        self.table = Table([Entry(p.spec.group, p.spec.name, p.code) for p in self._parameters])
+
+    def handle(self, packet: Packet) -> list:
+        """Return the answers to a packet."""
+        data = packet.data
+        if packet.channel == _TABLE:
+            answer = self.table.answer(data)
+        elif packet.channel == _MISC:
+            answer = self._misc(data)
+        elif len(data) < 2:
+            answer = None
+        elif packet.channel == _READ:
+            answer = self._read(data)
+        else:
+            answer = self._write(data)
+        return [] if answer is None else [Packet(Port.PARAMETERS, packet.channel, answer)]
+
+    def _find(self, data, at=0):
+        (index,) = struct.unpack_from("<H", data, at)
+        return self._parameters[index] if index < len(self._parameters) else None
+
+    def _read(self, data):
+        parameter = self._find(data)
+        if parameter is None:
+            return data[:2] + bytes([errno.ENOENT])
+        return data[:2] + b"\0" + parameter.spec.kind.pack(parameter.value)
+
+    def _write(self, data):
+        parameter = self._find(data)
+        if parameter is None:
+            return data[:2] + bytes([errno.ENOENT])
+        kind = parameter.spec.kind
+        if len(data) >= 2 + kind.size:
+            parameter.set(kind.unpack(data[2 : 2 + kind.size]))
+        return data[:2] + kind.pack(parameter.value)
+
+    def _misc(self, data):
+        if not data:
+            return None
+        if data[0] == _SET_BY_NAME:
+            return self._set_by_name(data)
+        handler = _MISC_HANDLERS.get(data[0])
+        if handler is None or len(data) < 3:
+            return None
+        parameter = self._find(data, 1)
+        return data[:3] + handler(self, parameter)
+
+    def _set_by_name(self, data):
+        parts = data[1:].split(b"\0", 2)
+        if len(parts) < 3 or not parts[2]:
+            return None
+        group, name = parts[0].decode("latin1"), parts[1].decode("latin1")
+        index = self.table.index(group, name)
+        kind, value = PARAMETER_KINDS.get(parts[2][0]), parts[2][1:]
+        error = 0
+        if index is None:
+            error = errno.ENOENT
+        elif kind is not self._parameters[index].spec.kind or len(value) != kind.size:
+            error = errno.EINVAL
+        elif self._parameters[index].spec.read_only:
+            error = errno.EACCES
+        else:
+            self._parameters[index].set(kind.unpack(value))
+        names = data[: 1 + len(parts[0]) + 1 + len(parts[1]) + 1]
+        return (names + bytes([error]))[:MAX_DATA]
+
+    def _extended_type(self, parameter):
+        return bytes([1 if parameter is not None and parameter.spec.persistent else 0])
+
+    def _extended_type_2(self, parameter):
+        if parameter is None:
+            return bytes([errno.ENOENT])
+        return b"\0" + self._extended_type(parameter)
+
+    def _default(self, parameter):
+        if parameter is None or parameter.spec.read_only:
+            return bytes([errno.ENOENT])
+        return parameter.spec.kind.pack(parameter.default)
+
+    def _default_2(self, parameter):
+        value = self._default(parameter)
+        known = parameter is not None and not parameter.spec.read_only
+        return (b"\0" if known else b"") + value
+
+    def _store(self, parameter):
+        if parameter is None or not parameter.spec.persistent:
+            return bytes([errno.ENOENT])
+        self._stored[parameter.full_name] = parameter.value
+        return b"\0"
+
+    def _clear(self, parameter):
+        if parameter is None or not parameter.spec.persistent:
+            return bytes([errno.ENOENT])
+        self._stored.pop(parameter.full_name, None)
+        return b"\0"
+
+    def _state(self, parameter):
+        if parameter is None or not parameter.spec.persistent:
+            return bytes([errno.ENOENT])
+        kind = parameter.spec.kind
+        default = kind.pack(parameter.default)
+        if parameter.full_name not in self._stored:
+            return b"\0" + default
+        return b"\1" + default + kind.pack(self._stored[parameter.full_name])
+
+
+_MISC_HANDLERS = {
+    _EXTENDED_TYPE: ParameterService._extended_type,
+    _STORE: ParameterService._store,
+    _STATE: ParameterService._state,
+    _CLEAR: ParameterService._clear,
+    _DEFAULT: ParameterService._default,
+    _EXTENDED_TYPE_2: ParameterService._extended_type_2,
+    _DEFAULT_2: ParameterService._default_2,
+}

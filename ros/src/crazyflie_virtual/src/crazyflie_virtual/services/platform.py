@@ -1,0 +1,52 @@
+"""Port 13: what the vehicle is; and commands of older clients."""
+
+import struct
+
+from crazyflie_virtual.crtp import Packet, Port
+
+_COMMAND, _VERSION = 0, 1
+_CONTINUOUS_WAVE, _ARM, _RECOVER, _NOTIFY = 0, 1, 2, 3
+_PROTOCOL, _FIRMWARE, _DEVICE = 0, 1, 2
+
+DEVICE = "CF21"
+FIRMWARE = "virtual"
+
+
+class PlatformService:
+    """Versions and platform commands.
+
+    Parameters
+    ----------
+    protocol : int
+        Version of the protocol to report.
+    supervisor : SupervisorService
+        Which arms and recovers.
+    """
+
+    port = Port.PLATFORM
+
+    def __init__(self, protocol: int, supervisor):
+        self._protocol = protocol
+        self._supervisor = supervisor
+
+    def handle(self, packet: Packet) -> list:
+        """Return the answers to a packet."""
+        if not packet.data:
+            return []
+        command, data = packet.data[0], packet.data[1:]
+        answer = None
+        if packet.channel == _VERSION:
+            answer = self._version(command)
+        elif packet.channel == _COMMAND and command in (_ARM, _RECOVER):
+            answer = self._supervisor.command(command, data)
+        elif packet.channel == _COMMAND and command in (_CONTINUOUS_WAVE, _NOTIFY):
+            answer = data
+        if answer is None:
+            return []
+        return [Packet(Port.PLATFORM, packet.channel, bytes([command]) + answer)]
+
+    def _version(self, command):
+        if command == _PROTOCOL:
+            return struct.pack("<i", self._protocol)
+        texts = {_FIRMWARE: FIRMWARE, _DEVICE: DEVICE}
+        return texts[command].encode() + b"\0" if command in texts else None

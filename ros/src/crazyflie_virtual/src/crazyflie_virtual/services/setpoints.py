@@ -1,0 +1,55 @@
+"""Ports 3 and 7: streamed setpoints."""
+
+from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.firmware.setpoints import decode_generic
+
+_SETPOINT, _META = 0, 1
+_SETPOINTS_STOP = 0
+
+
+class AttitudeSetpointService:
+    """Attitude setpoints.
+
+    Parameters
+    ----------
+    firmware : Firmware
+    """
+
+    port = Port.SETPOINT
+
+    def __init__(self, firmware):
+        self._firmware = firmware
+
+    def handle(self, packet: Packet) -> list:
+        """Take a setpoint; there is no answer."""
+        f = self._firmware
+        if packet.channel == _SETPOINT:
+            setpoint = f.attitude_decoder.decode(packet.data, f.commander.priority, f.time)
+            if setpoint is not None:
+                f.commander.stream(setpoint)
+        return []
+
+
+class GenericSetpointService:
+    """Setpoints of all other types, and the end of streaming.
+
+    Parameters
+    ----------
+    firmware : Firmware
+    """
+
+    port = Port.GENERIC_SETPOINT
+
+    def __init__(self, firmware):
+        self._firmware = firmware
+
+    def handle(self, packet: Packet) -> list:
+        """Take a setpoint or a command; there is no answer."""
+        f = self._firmware
+        if packet.channel == _SETPOINT:
+            setpoint = decode_generic(packet.data, f.time)
+            if setpoint is not None:
+                f.commander.stream(setpoint)
+        elif packet.channel == _META and packet.data[:1] == bytes([_SETPOINTS_STOP]):
+            f.commander.release(f.estimate)
+        return []

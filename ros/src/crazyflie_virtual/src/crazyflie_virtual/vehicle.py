@@ -1,0 +1,129 @@
+"""A whole virtual Crazyflie, without sockets and with the time given to it."""
+
+import math
+
+from crazyflie_virtual import crtp
+from crazyflie_virtual.battery import LOW_CHARGE, Battery
+from crazyflie_virtual.board import Board, Storage
+from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.physics import STEP, Physics
+
+_RADIO_CHANNEL = 3
+"""Of the link port: packets that the radio chip answers itself, also while the
+microcontroller is off."""
+
+_RADIO_COMMAND = 0xFE
+_ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
+
+_BATTERY_STEPS = 10
+
+_STOPPED = (0.0,) * 4
+
+
+class Vehicle:
+    """Body, battery, radio chip and microcontroller.
+
+    Parameters
+    ----------
+    settings : Settings
+    faults : Faults, optional
+        Switches; by default those of the settings.
+
+    Attributes
+    ----------
+    physics : Physics
+        The truth.
+    battery : Battery
+    faults : Faults
+    board : Board or None
+        None while the microcontroller is off.
+    """
+
+    def __init__(self, settings, faults=None):
+        self._settings = settings
+        self.faults = settings.faults() if faults is None else faults
+        self.physics = Physics(
+            (settings.init_x, settings.init_y, 0.0),
+            settings.init_yaw,
+            settings.mass_error,
+            settings.thrust_error,
+        )
+        self.battery = Battery(settings.battery)
+        self._storage = Storage(settings.address)
+        self._steps = 0
+        self._is_dead = False
+        self.board = None
+        self._turn_on()
+
+    @property
+    def time(self) -> float:
+        """How far the vehicle has come, s."""
+        return self._steps * STEP
+
+    def receive(self, datagram: bytes) -> list:
+        """Return the datagrams that answer one."""
+        packet = crtp.decode(datagram)
+        if packet is None or self._is_dead:
+            return []
+        if packet.port == Port.LINK and packet.channel == _RADIO_CHANNEL:
+            self._command_radio(packet.data)
+            # Whoever scans, or switches the power, waits for any packet.
+            return [Packet(Port.LINK, _RADIO_CHANNEL, b"").encode()]
+        if self.board is None:
+            return []
+        return [answer.encode() for answer in self.board.receive(packet)]
+
+    def advance_to(self, time: float) -> list:
+        """Go on to the last whole step before ``time`` (s).
+
+        Returns
+        -------
+        list of bytes
+            Datagrams for the client that it has not asked for.
+        """
+        datagrams = []
+        for _ in range(math.floor(time / STEP + 1e-6) - self._steps):
+            self._step()
+            if self.board is not None:
+                datagrams += [packet.encode() for packet in self.board.unsolicited()]
+        return datagrams
+
+    def _step(self):
+        self._steps += 1
+        commands = _STOPPED
+        if self.board is not None:
+            commands = self.board.step(self.battery.voltage)
+        failed = self.faults.motor_failure
+        if failed:
+            commands = tuple(0.0 if i + 1 == failed else c for i, c in enumerate(commands))
+        self.physics.step(commands, self.battery.voltage)
+        if self._steps % _BATTERY_STEPS == 0:
+            self._drain()
+
+    def _drain(self):
+        if self.faults.low_battery:
+            self.battery.charge = min(self.battery.charge, LOW_CHARGE)
+        self.battery.step(_BATTERY_STEPS * STEP, self.physics.load)
+        if self.board is not None and self.board.firmware.power.is_exhausted:
+            self._is_dead = True
+            self.board = None
+
+    def _command_radio(self, data):
+        if data[:1] != bytes([_RADIO_COMMAND]) or len(data) < 2:
+            return
+        command = data[1]
+        if command == _ALL_OFF:
+            self._is_dead = True
+        if command in (_ALL_OFF, _OFF):
+            self.board = None
+        elif command == _ON and self.board is None:
+            self._turn_on()
+        elif command == _RESET:
+            self.board = None
+            # To the firmware; there is no boot loader to reset to.
+            if data[2:3] == b"\x01":
+                self._turn_on()
+
+    def _turn_on(self):
+        self.physics.put_upright()
+        self.board = Board(self.physics, self.faults, self._settings, self._storage)

@@ -8,7 +8,7 @@ import rospkg
 import yaml
 from roslaunch.config import load_config_default
 
-from crazyflie_examples.visualizer_node import VisualizerNode
+from crazyflie_description.visualizer_node import VisualizerNode
 from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.runner import NodeClasses
 

@@ -14,12 +14,12 @@ import rospkg
 import yaml
 from matplotlib import image
 
+from crazyflie_description.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
 from crazyflie_examples.demo import HOVER
 from crazyflie_examples.flight_report import HOVER_TOLERANCE
 from crazyflie_examples.launching import launched
 from crazyflie_examples.pilot import FlightError, Pilot
 from crazyflie_examples.virtual_display import DisplayError, virtual_display
-from crazyflie_examples.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
 from crazyflie_utils import runner
 
 SCREEN = (1400, 900)

@@ -5,7 +5,7 @@ from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
-from crazyflie_examples.flown_path import FlownPath, circle
+from crazyflie_description.flown_path import FlownPath, circle
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.held import Held
 from crazyflie_utils.node import Node

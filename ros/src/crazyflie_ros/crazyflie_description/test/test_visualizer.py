@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
-from crazyflie_examples import visualizer_node
-from crazyflie_examples.flown_path import FlownPath, circle
-from crazyflie_examples.visualizer_node import PERIOD, SPACING, VisualizerNode
+from crazyflie_description import visualizer_node
+from crazyflie_description.flown_path import FlownPath, circle
+from crazyflie_description.visualizer_node import PERIOD, SPACING, VisualizerNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils.fake import FakeProcess
 

@@ -1,0 +1,1 @@
+"""How a Crazyflie and its flight are drawn."""

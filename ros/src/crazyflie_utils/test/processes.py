@@ -22,13 +22,15 @@ class NodeProcess:
 
     def __init__(self, arguments):
         paths = [str(_TEST), os.environ.get("PYTHONPATH", "")]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
+        environment.pop("ROS_NAMESPACE", None)
         self._begin = time.monotonic()
         self._process = subprocess.Popen(
             arguments,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))},
+            env=environment,
         )
         self.output = ""
         self.duration = None
@@ -75,8 +77,8 @@ def composed(name, *arguments, **nodes):
     """Run a composed_node; ``nodes`` is node name = class in small_nodes.py."""
     if nodes:
         rospy.set_param(f"/{name}/nodes", {key: f"small_nodes:{nodes[key]}" for key in nodes})
-    command = ["rosrun", "crazyflie_utils", "composed_node", f"__name:={name}", *arguments]
-    return _ended(NodeProcess(command))
+    script = str(_TEST.parent / "exec" / "composed_node")
+    return _ended(NodeProcess([sys.executable, script, f"__name:={name}", *arguments]))
 
 
 @contextlib.contextmanager

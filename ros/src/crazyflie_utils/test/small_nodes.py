@@ -94,7 +94,7 @@ class Stuck(Ticker):
     """A ticker whose first tick never returns."""
 
     def _on_timer(self):
-        super()._on_timer()
+        self._handle.info("stuck from now on")
         threading.Event().wait()
 
 

@@ -29,7 +29,8 @@ def pytest_arguments(arguments: list) -> list:
             told.append("--junit-xml=" + argument.removeprefix(_OUTPUT))
         elif argument != _TEXT:
             told.append(argument)
-    return [*told, "-p", "no:cacheprovider", "-v"]
+    # rospy warns of itself at every message of simulated time.
+    return [*told, "-p", "no:cacheprovider", "-v", "-W", "ignore:notifyAll:DeprecationWarning"]
 
 
 def main() -> int:

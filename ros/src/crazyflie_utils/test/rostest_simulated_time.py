@@ -1,0 +1,65 @@
+"""Timers by simulated time, whoever publishes /clock."""
+
+import pytest
+import rospy
+from processes import LIMIT, composed, listening, small_node, wait_until
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Float64
+
+PERIOD = 0.5
+
+
+def test_clock_from_outside_drives_timers():
+    clock = rospy.Publisher("/clock", Clock, queue_size=100)
+    with (
+        listening("/ticker/time", Float64) as ticks,
+        small_node("Ticker", "ticker", f"_time_step:={PERIOD}"),
+    ):
+
+        def set_clock(moment):
+            clock.publish(Clock(rospy.Time.from_sec(moment)))
+
+        def set_until(condition, what, moments):
+            def step():
+                set_clock(next(moments))
+                return condition()
+
+            wait_until(step, what)
+
+        # Time begins when the node hears it.
+        moments = iter(10.0 + PERIOD * count for count in range(10**6))
+        set_until(lambda: not ticks.empty(), "a first tick", moments)
+        begin = next(moments) + 1000.0
+        set_clock(begin)
+        while ticks.get(timeout=LIMIT).data != begin:
+            pass
+        for count in range(1, 21):
+            set_clock(begin + count * PERIOD / 2)
+            if count % 2 == 0:
+                assert ticks.get(timeout=LIMIT).data == begin + count * PERIOD / 2
+        assert ticks.empty()
+        # A reset: ticks go on one period after the new beginning.
+        for count in range(1, 11):
+            set_clock(1.0 + count * PERIOD)
+            if count > 1:
+                assert ticks.get(timeout=LIMIT).data == 1.0 + count * PERIOD
+        assert ticks.empty()
+    clock.unregister()
+
+
+def test_clock_of_a_node_in_the_process_drives_timers():
+    for name in ("fast", "slow"):
+        rospy.set_param(f"/{name}/time_step", {"fast": 0.1, "slow": PERIOD}[name])
+    with (
+        listening("/fast/time", Float64) as fast,
+        listening("/slow/time", Float64) as slow,
+        listening("/clock", Clock) as clock,
+        composed("simulation", clockwork="Clockwork", fast="Ticker", slow="Ticker"),
+    ):
+        for heard, period in ((fast, 0.1), (slow, PERIOD)):
+            moments = [heard.get(timeout=LIMIT).data for _ in range(20)]
+            # The first are lost to those who connect later, and no other.
+            first = round(moments[0] / period)
+            assert moments == pytest.approx([(first + count) * period for count in range(20)])
+        assert clock.get(timeout=LIMIT).clock.to_sec() > 0.0
+        wait_until(lambda: rospy.get_time() > 1.0, "rospy's own clock to move")

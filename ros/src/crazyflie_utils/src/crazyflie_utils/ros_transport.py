@@ -9,9 +9,10 @@ import rospy
 from crazyflie_utils import rospy_internals
 from crazyflie_utils.transport import Outlet, ServiceError, Transport
 
-_QUEUE_SIZE = 10
+_QUEUE_SIZE = 100
 """Messages kept for each slow listener. With a queue rospy sends from a thread of
-its own, so that a listener that is frozen cannot stop a vehicle."""
+its own, so that a listener that is frozen cannot stop a vehicle; a simulation that
+runs as fast as it can fills a short one faster than that thread gets its turn."""
 
 
 class _RosOutlet(Outlet):

@@ -1,10 +1,13 @@
 """tf within a process: tf2's semantics, and no nonsense let in."""
 
 import math
+import threading
 
 import genpy
 import pytest
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from hypothesis import given
+from hypothesis import strategies as st
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_utils.angles import quaternion_from_rpy
@@ -46,12 +49,34 @@ def test_latest_transform_with_its_own_stamp(process, lookup):
     assert (found.header.frame_id, found.child_frame_id) == ("world", "crazyflie")
 
 
-def test_stamps_come_back_to_the_nanosecond(process, lookup):
-    exact = genpy.Time(1_700_000_000, 123_456_789)
+@given(st.integers(1, 2_000_000_000), st.integers(0, 999_999_999))
+def test_stamps_come_back_to_the_nanosecond(seconds, nanoseconds):
+    process = FakeProcess()
+    lookup = process.handle("/node").listen_to_transforms()
     message = transform("world", "crazyflie", 0.0)
-    message.header.stamp = exact
+    message.header.stamp = genpy.Time(seconds, nanoseconds)
     hear(process, message)
-    assert lookup("world", "crazyflie").header.stamp == exact
+    assert lookup("world", "crazyflie").header.stamp == genpy.Time(seconds, nanoseconds)
+
+
+def test_transforms_of_many_threads(process, lookup, monkeypatch):
+    monkeypatch.setattr("crazyflie_utils.transforms._MOST_STAMPS", 3)
+    failures = []
+
+    def broadcast(child):
+        try:
+            for count in range(300):
+                hear(process, transform("world", child, 100.0 + count * 0.01))
+        except Exception as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=broadcast, args=(f"cf{n}",)) for n in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(20.0)
+    assert failures == []
+    assert lookup("world", "cf0").header.stamp.to_sec() == pytest.approx(102.99)
 
 
 def test_looks_in_both_directions(process, lookup):

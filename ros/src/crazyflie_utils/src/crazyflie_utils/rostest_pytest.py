@@ -7,7 +7,6 @@ In a .test file::
 """
 
 import sys
-import warnings
 
 import pytest
 import rosgraph
@@ -29,7 +28,7 @@ def pytest_arguments(arguments: list) -> list:
             told.append("--junit-xml=" + argument.removeprefix(_OUTPUT))
         elif argument != _TEXT:
             told.append(argument)
-    # rospy warns of itself at every message of simulated time.
+    # rospy calls notifyAll, which Python 3.10 has deprecated, with every /clock.
     return [*told, "-p", "no:cacheprovider", "-v", "-W", "ignore:notifyAll:DeprecationWarning"]
 
 
@@ -39,8 +38,6 @@ def main() -> int:
         print("pytest_node needs a ROS master: run it with rostest", file=sys.stderr)
         return 1
     rospy.init_node("pytest_node", anonymous=True, disable_signals=True)
-    # rospy calls notifyAll, which Python 3.10 has deprecated, with every /clock.
-    warnings.filterwarnings("ignore", message="notifyAll", category=DeprecationWarning)
     try:
         return pytest.main(pytest_arguments(rospy.myargv(sys.argv)[1:]))
     finally:

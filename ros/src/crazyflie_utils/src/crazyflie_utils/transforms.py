@@ -1,5 +1,7 @@
 """tf for a process: one tf2 buffer and one broadcaster, however many nodes."""
 
+import threading
+
 import genpy
 import tf2_ros
 from tf2_msgs.msg import TFMessage
@@ -44,6 +46,7 @@ class Transforms:
         # tf2's Python buffer keeps stamps as floats, to 0.1 us; this gives them back
         # as they came.
         self._stamps = {}
+        self._lock = threading.Lock()
 
     def broadcast(self, transforms: list) -> None:
         """Publish a list of geometry_msgs/TransformStamped on /tf."""
@@ -108,9 +111,11 @@ class Transforms:
                 )
 
     def _remember(self, stamp):
-        self._stamps[stamp.to_sec()] = stamp
-        if len(self._stamps) > _MOST_STAMPS:
-            del self._stamps[next(iter(self._stamps))]
+        # Each broadcaster outside has its own thread here.
+        with self._lock:
+            self._stamps[stamp.to_sec()] = stamp
+            if len(self._stamps) > _MOST_STAMPS:
+                del self._stamps[next(iter(self._stamps))]
 
 
 def _complaint(transform):

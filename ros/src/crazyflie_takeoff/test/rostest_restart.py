@@ -37,11 +37,17 @@ def heard():
     timer.shutdown()
 
 
-def kill(node):
-    """Let a node die in the middle of whatever it is doing; roslaunch starts another one."""
+def kill(node, heard):
+    """Let a node die in the middle of whatever it is doing; roslaunch starts another one.
+
+    What has been heard until then is forgotten.
+    """
     uri = rosgraph.Master("/rostest_restart").lookupNode(node)
     _, _, pid = ServerProxy(uri).getPid("/rostest_restart")
     os.kill(pid, signal.SIGKILL)
+    for messages in heard.values():
+        while not messages.empty():
+            messages.get()
 
 
 def service(name):
@@ -66,10 +72,10 @@ def wait_for(heard, topic, word):
         pass
 
 
-def forget(heard):
-    for messages in heard.values():
-        while not messages.empty():
-            messages.get()
+def wait_for_both(heard, word):
+    """Wait until the server has said a word and the filter remembers it."""
+    wait_for(heard, "/in_flight_state", word)
+    wait_for(heard, "/in_flight_filter", word)
 
 
 def thrusts(heard, topic, count):
@@ -79,13 +85,11 @@ def thrusts(heard, topic, count):
 
 
 def test_on_the_ground_first(heard):
-    wait_for(heard, "/in_flight_filter", "on_ground")
-    forget(heard)
-    kill(SERVER)
+    wait_for_both(heard, "on_ground")
+    kill(SERVER, heard)
     wait_for(heard, "/in_flight_state", "on_ground")
     assert set(thrusts(heard, "/control/final", 50)) == {0.0}
-    forget(heard)
-    kill(FILTER)
+    kill(FILTER, heard)
     wait_for(heard, "/in_flight_filter", "on_ground")
     assert set(thrusts(heard, "/control/final", 50)) == {0.0}
     with pytest.raises(rospy.ServiceException, match="on the ground"):
@@ -94,29 +98,26 @@ def test_on_the_ground_first(heard):
 
 def test_then_in_flight(heard):
     call_when_there("/takeoff")
-    wait_for(heard, "/in_flight_filter", "flying")
-    forget(heard)
-    kill(SERVER)
+    wait_for_both(heard, "flying")
+    kill(SERVER, heard)
     wait_for(heard, "/in_flight_state", "flying")
     assert set(thrusts(heard, "/control/final", 50)) == {COMMANDED}
-    kill(FILTER)
-    forget(heard)
+    assert heard["/control/takeoff"].empty()
+    kill(FILTER, heard)
     wait_for(heard, "/in_flight_filter", "flying")
     assert set(thrusts(heard, "/control/final", 50)) == {COMMANDED}
+    assert heard["/control/takeoff"].empty()
     with pytest.raises(rospy.ServiceException, match="in flight"):
         call_when_there("/takeoff")
-    assert heard["/control/takeoff"].empty()
 
 
 def test_and_on_the_ground_again(heard):
     call_when_there("/land")
-    wait_for(heard, "/in_flight_filter", "on_ground")
+    wait_for_both(heard, "on_ground")
     thrusts(heard, "/control/final", 20)
-    kill(FILTER)
-    forget(heard)
+    kill(FILTER, heard)
     wait_for(heard, "/in_flight_filter", "on_ground")
     assert set(thrusts(heard, "/control/final", 50)) == {0.0}
-    forget(heard)
-    kill(SERVER)
+    kill(SERVER, heard)
     wait_for(heard, "/in_flight_state", "on_ground")
     assert set(thrusts(heard, "/control/final", 50)) == {0.0}

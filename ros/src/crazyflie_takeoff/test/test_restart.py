@@ -7,7 +7,7 @@ import pytest
 from std_msgs.msg import Empty, String
 from takeoff_helpers import BARE, FILTER, SERVER, HoverNetwork, Network, control, state
 
-from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.transport import ServiceError
 
@@ -248,15 +248,15 @@ def test_server_with_a_foreign_filter_in_flight():
 
 
 def test_filter_with_a_foreign_server():
-    """Toggles alone decide, and a restart in flight costs a fifth of a second."""
+    """Toggles alone decide, and a restart in flight costs the time of listening."""
     network = Network()
     network.start("filter", TakeoffControlFilterNode(), FILTER)
     process = network.process("filter")
-    for _ in range(30):
+    for _ in range(50):
         process.publish("/control/lqr", control(9.0))
         network.advance(0.01)
     first = network.on("/control/final")[0][0]
-    assert first == pytest.approx(100.2, abs=0.02)
+    assert first == pytest.approx(100.0 + LISTENING_TIME, abs=0.02)
     process.publish("/in_flight", Empty())
     network.advance(0.01)
     assert network.last("/in_flight_filter") == "flying"

@@ -6,7 +6,7 @@ import pytest
 from std_msgs.msg import Empty, String
 from takeoff_helpers import FILTER, control
 
-from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
 from crazyflie_utils.fake import FakeProcess
 
 
@@ -21,7 +21,7 @@ def launch():
 def process():
     """Return a process with a filter that has listened."""
     process = launch()
-    process.advance(0.2)
+    process.advance(LISTENING_TIME)
     return process
 
 
@@ -99,7 +99,7 @@ def test_listens_at_first():
     process.publish("/control/lqr", control(1.0))
     process.publish("/control/lqr", control(2.0))
     assert thrusts(process) == []
-    process.advance(0.2)
+    process.advance(LISTENING_TIME)
     assert thrusts(process) == [2.0]
     process.publish("/control/lqr", control(3.0))
     process.advance(1.0)

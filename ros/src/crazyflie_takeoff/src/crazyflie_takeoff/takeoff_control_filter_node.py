@@ -9,8 +9,8 @@ from crazyflie_utils.node import Node
 from crazyflie_utils.parameters import TOPIC
 from crazyflie_utils.vectors import is_finite
 
-LISTENING_TIME = 0.2
-"""How long a filter that has started listens before it passes a controller, s: two
+LISTENING_TIME = 0.4
+"""How long a filter that has started listens before it passes a controller, s: some
 periods of the zero thrust on the ground, and less than a vehicle flies on without
 controls."""
 

@@ -1,0 +1,31 @@
+"""Link to a Crazyflie: connections with limits, log blocks, parameters, commands.
+
+The names below are loaded when they are first used, so that the modules
+without cflib (`crazyflie_py.errors`, `crazyflie_py.address`, ...) can be had alone.
+"""
+
+import importlib
+
+_HOME = {
+    "Crazyflie": "crazyflie_py.crazyflie",
+    "CrazyflieError": "crazyflie_py.errors",
+    "LinkState": "crazyflie_py.crazyflie",
+    "LogBlock": "crazyflie_py.log",
+    "PolynomialPiece": "crazyflie_py.trajectory",
+    "scan": "crazyflie_py.scanning",
+}
+
+__all__ = [
+    "Crazyflie",
+    "CrazyflieError",
+    "LinkState",
+    "LogBlock",
+    "PolynomialPiece",
+    "scan",
+]
+
+
+def __getattr__(name):
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOME[name]), name)

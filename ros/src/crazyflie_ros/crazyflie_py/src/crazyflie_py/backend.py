@@ -1,0 +1,137 @@
+"""cflib's Crazyflie, with the edges taken off that a process with many vehicles cuts itself on.
+
+cflib is licensed under the GPL, version 3; nothing of it is copied here.
+"""
+
+import contextlib
+import logging
+import os
+import threading
+from pathlib import Path
+
+import cflib.crtp
+from cflib.crazyflie import Crazyflie as CflibCrazyflie
+from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
+
+_init_lock = threading.Lock()
+
+_LINK_SOURCE_CHANNEL = 1
+_UDP_RECEIVE_LIMIT = 0.1
+
+# cflib logs what it also reports, with tracebacks; we report it in other words.
+if logging.getLogger("cflib").level == logging.NOTSET:
+    logging.getLogger("cflib").setLevel(logging.CRITICAL)
+
+
+def init_drivers() -> None:
+    """Let cflib know its drivers, once in a process."""
+    with _init_lock:
+        if not cflib.crtp.CLASSES:
+            cflib.crtp.init_drivers()
+
+
+def table_cache() -> str | None:
+    """Return the user's folder for log and parameter tables; None when it cannot be written.
+
+    It is ``$XDG_CACHE_HOME/crazyflie_py`` or ``~/.cache/crazyflie_py``. cflib names the
+    files by the tables' checksums, so that other firmware has other files.
+    """
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    folder = Path(base) / "crazyflie_py"
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return str(folder) if os.access(folder, os.W_OK) else None
+
+
+def packet(port: int, channel: int, data: bytes) -> CRTPPacket:
+    """Return a CRTP packet with at most 30 bytes of data."""
+    result = CRTPPacket()
+    result.set_header(port, channel)
+    result.data = bytes(data)
+    return result
+
+
+class Backend(CflibCrazyflie):
+    """cflib's Crazyflie for a single connection; a new one is made for the next.
+
+    Parameters
+    ----------
+    cache : str or None
+        Folder of the tables.
+    on_error : callable
+        ``on_error(text)``, from one of cflib's threads and maybe several times, when a
+        driver gives up.
+    """
+
+    def __init__(self, cache: str | None, on_error):
+        super().__init__(rw_cache=cache)
+        self._on_error = on_error
+        self._setup_begun = False
+        self._dropping = threading.Lock()
+        # Unlike cflib's own, it knows who holds it; see `send_packet`.
+        self._send_lock = threading.RLock()
+        self.link_established.add_callback(self._tune_udp)
+
+    def ask_for_source(self) -> None:
+        """Send the first question of the set-up again: nobody else does."""
+        self.send_packet(packet(CRTPPort.LINKCTRL, _LINK_SOURCE_CHANNEL, b"\0"))
+
+    def send_packet(self, pk, expected_reply=(), resend=False, timeout=0.2):
+        """Send a packet; never raises.
+
+        An error in a driver, or a link that is closed meanwhile, would leave cflib's
+        lock taken, and everybody who sends later would wait for ever.
+        """
+        try:
+            super().send_packet(pk, expected_reply, resend, timeout)
+        except Exception as error:
+            with contextlib.suppress(RuntimeError):
+                self._send_lock.release()
+            if self.link is not None:
+                self._on_error(f"cannot send: {error}")
+
+    def drop(self) -> None:
+        """End the connection without another packet.
+
+        cflib's own ``close_link`` sends a setpoint of zero thrust first, which would
+        take a vehicle out of the air that flies by itself.
+        """
+        with self._dropping:
+            self.incoming.stop()
+            link = self.link
+            if link is not None:
+                _wake_receiver(link)
+            if self.incoming.is_alive() and not self.is_called_by_incoming_handler_thread():
+                self.incoming.join(timeout=1.0)
+            self.link = None
+            if link is not None:
+                link.close()
+            self.disconnected.call(self.link_uri)
+
+    def _link_error_cb(self, errmsg):
+        # cflib's own version closes the link and joins its threads right here:
+        # in whichever thread met the error, the one that holds the send lock
+        # included, and then they wait for each other for ever.
+        self._on_error(errmsg)
+
+    def _platform_info_fetched(self):
+        # Where the first question is sent twice, its answer may come twice.
+        if not self._setup_begun:
+            self._setup_begun = True
+            super()._platform_info_fetched()
+
+    def _tune_udp(self, _):
+        link = self.link
+        if link is not None and link.get_name() == "udp":
+            # cflib resends nothing over UDP: one lost packet would end the set-up.
+            link.needs_resending = True
+            # Its receiver looks up once in this time, and `drop` waits for it.
+            link.socket.settimeout(_UDP_RECEIVE_LIMIT)
+
+
+def _wake_receiver(link):
+    # The thread that hands packets out looks up only once a second.
+    with contextlib.suppress(AttributeError):
+        link.in_queue.put(None)

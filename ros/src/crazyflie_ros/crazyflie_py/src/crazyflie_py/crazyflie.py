@@ -1,0 +1,298 @@
+"""A vehicle, whose link may come and go."""
+
+import enum
+import threading
+import time
+
+from cflib.crtp.crtpstack import CRTPPort
+
+from crazyflie_py.address import Address
+from crazyflie_py.backend import table_cache
+from crazyflie_py.console import Console
+from crazyflie_py.errors import CrazyflieError, LinkLostError
+from crazyflie_py.high_level import HighLevel
+from crazyflie_py.link import Limits, Link
+from crazyflie_py.localization import Localization
+from crazyflie_py.log import Log, LogBlock
+from crazyflie_py.parameters import Parameters
+from crazyflie_py.reboot import reboot
+from crazyflie_py.setpoints import Setpoints
+from crazyflie_py.supervisor import Supervisor
+from crazyflie_py.trajectory import Trajectories
+
+CHECK_PERIOD = 0.1
+"""How often the link is looked at, s."""
+
+FIRST_PAUSE, LONGEST_PAUSE = 0.5, 10.0
+"""Pause before the first attempt to connect again, and the longest one, s; each is
+twice the one before."""
+
+
+class LinkState(enum.Enum):
+    """State of the link to a vehicle."""
+
+    DISCONNECTED = "disconnected"
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+    LOST = "lost"
+
+
+class Crazyflie:
+    """A vehicle: connect, use, close; or use it in a ``with`` statement.
+
+    The first `connect` succeeds or raises. After that the link is watched: when
+    the vehicle has not been heard for 0.5 s it is lost, and, if so wished, tried
+    again with growing pauses until `close`; its log blocks are started anew.
+
+    All callbacks come from threads of this object or of cflib, and must be quick.
+
+    Parameters
+    ----------
+    uri : str
+        Such as "radio://0/25/2M/E7E7E7E701" or "udp://127.0.0.1:19850".
+    reconnect : bool
+        Whether to connect again after the link was lost.
+    on_state : callable, optional
+        ``on_state(state, text)`` with a `LinkState` whenever it changes, and when an
+        attempt to reconnect fails for another reason than the last; the text says why.
+    on_console : callable, optional
+        ``on_console(line)`` for every line that the firmware prints.
+    on_packet : callable, optional
+        ``on_packet(port, channel, data)`` for every packet that arrives.
+    cache : str, optional
+        Folder for log and parameter tables; by default in the user's cache.
+    limits : Limits, optional
+        Time limits.
+
+    Attributes
+    ----------
+    setpoints, high_level, trajectories, localization, parameters, log, supervisor
+        What can be done with the vehicle; see their classes.
+
+    Raises
+    ------
+    AddressError
+        The address is malformed.
+    """
+
+    def __init__(
+        self,
+        uri: str,
+        reconnect: bool = False,
+        on_state=None,
+        on_console=None,
+        on_packet=None,
+        cache: str | None = None,
+        limits: Limits | None = None,
+    ):
+        self.address = Address.parse(uri)
+        self.setpoints = Setpoints(self.link)
+        self.high_level = HighLevel(self.link)
+        self.trajectories = Trajectories(self.link, self.high_level)
+        self.localization = Localization(self.link)
+        self.parameters = Parameters(self.link)
+        self.log = Log(self.link)
+        self.supervisor = Supervisor(self.link)
+        self._reconnect = reconnect
+        self._on_state = on_state
+        self._on_packet = on_packet
+        self._cache = cache
+        self._limits = limits
+        self._link = None
+        self._state = LinkState.DISCONNECTED
+        self._reason = "not connected yet"
+        self._blocks = {}
+        self._blocks_lock = threading.Lock()
+        self._closed = threading.Event()
+        self._watcher = None
+        self._console = Console(on_console) if on_console is not None else None
+        self._rssi = None
+        self._announced = None
+        self._opening = None
+
+    def __enter__(self) -> "Crazyflie":
+        """Connect."""
+        self.connect()
+        return self
+
+    def __exit__(self, *_) -> None:
+        """Close."""
+        self.close()
+
+    @property
+    def state(self) -> LinkState:
+        """State of the link."""
+        return self._state
+
+    def connect(self) -> None:
+        """Connect for the first time; blocks.
+
+        Raises
+        ------
+        CrazyflieError
+            With the reason and what to do.
+        """
+        if self._watcher is not None or self._closed.is_set():
+            raise CrazyflieError(f"{self.address.uri}: connect can be called once only")
+        self._set_state(LinkState.CONNECTING, f"connecting to {self.address.uri}")
+        try:
+            self._open_link()
+        except CrazyflieError as error:
+            self._set_state(LinkState.DISCONNECTED, str(error))
+            raise
+        self._set_state(LinkState.CONNECTED, f"connected to {self.address.uri}")
+        self._watcher = threading.Thread(target=self._watch, name="crazyflie-watch", daemon=True)
+        self._watcher.start()
+
+    def link(self) -> Link:
+        """Return the living link.
+
+        Raises
+        ------
+        LinkLostError
+            There is none.
+        """
+        link = self._link
+        if link is None:
+            raise LinkLostError(f"no link to the vehicle: {self._reason}")
+        return link
+
+    def add_log_block(self, block: LogBlock) -> None:
+        """Have the vehicle send a block, now and after every reconnection; blocks.
+
+        Raises
+        ------
+        CrazyflieError
+            The block is not possible.
+        """
+        config = self.log.start(block)
+        with self._blocks_lock:
+            self._blocks[block] = config
+
+    def remove_log_block(self, block: LogBlock) -> None:
+        """Have the vehicle no longer send a block."""
+        with self._blocks_lock:
+            config = self._blocks.pop(block, None)
+        if config is not None:
+            self.log.stop(config)
+
+    def send_packet(self, port: int, channel: int, data: bytes) -> None:
+        """Send a CRTP packet of one's own, with at most 30 bytes of data."""
+        self.link().send(port, channel, data)
+
+    def latency(self) -> float:
+        """Return the time that 95 % of the latest pings took at most, s."""
+        return float(self.link().cflib.link_statistics.latency.latency) / 1000.0
+
+    def quality(self) -> float:
+        """Return the share of the latest pings that were answered, 0 to 1."""
+        return self.link().liveness.quality()
+
+    @property
+    def rssi(self) -> float | None:
+        """Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere."""
+        return self._rssi
+
+    def age(self) -> float:
+        """Return how long ago the vehicle was heard, s."""
+        return self.link().liveness.age(time.monotonic())
+
+    def reboot(self) -> None:
+        """Restart the vehicle's firmware; only by radio. Blocks.
+
+        The link is lost by that: it is taken up again if `reconnect` is set.
+
+        Raises
+        ------
+        CrazyflieError
+            Not a radio link, or the vehicle has not acknowledged it.
+        """
+        reboot(self.address, before=lambda: self._drop("the vehicle is restarted"))
+
+    def close(self) -> None:
+        """End the connection; safe to call twice and while connecting."""
+        self._closed.set()
+        opening = self._opening
+        if opening is not None:
+            opening.close()
+        self._drop("the link was closed")
+        watcher = self._watcher
+        if watcher is not None and watcher is not threading.current_thread():
+            watcher.join(timeout=2.0)
+        self._set_state(LinkState.DISCONNECTED, "the link was closed")
+
+    # The link and its end.
+
+    def _open_link(self):
+        cache = table_cache() if self._cache is None else self._cache
+        link = Link(self.address, self._limits, cache, self._hear)
+        link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._note_rssi)
+        self._opening = link
+        try:
+            link.open()
+        finally:
+            self._opening = None
+        self._link = link
+        if self._closed.is_set():
+            self._drop("the link was closed")
+            raise LinkLostError("the link was closed while connecting")
+
+    def _drop(self, reason):
+        link, self._link = self._link, None
+        self._reason = reason
+        if link is not None:
+            link.close(reason)
+
+    def _watch(self):
+        while not self._closed.wait(CHECK_PERIOD):
+            link = self._link
+            error = link.error if link is not None else LinkLostError(self._reason)
+            if error is None:
+                continue
+            # First say it: to close the link takes a moment.
+            self._link = None
+            if self._closed.is_set():
+                return
+            self._set_state(LinkState.LOST, str(error))
+            if link is not None:
+                link.close(str(error))
+            if not self._reconnect or not self._try_again():
+                return
+
+    def _try_again(self):
+        pause = FIRST_PAUSE
+        while not self._closed.wait(pause):
+            pause = min(2.0 * pause, LONGEST_PAUSE)
+            try:
+                self._open_link()
+                with self._blocks_lock:
+                    for block in self._blocks:
+                        self._blocks[block] = self.log.start(block)
+            except CrazyflieError as error:
+                self._drop(str(error))
+                if not self._closed.is_set():
+                    self._set_state(LinkState.LOST, str(error))
+            else:
+                self._set_state(LinkState.CONNECTED, f"connected to {self.address.uri} again")
+                return True
+        return False
+
+    def _set_state(self, state, text):
+        self._state = state
+        self._reason = text
+        if (state, text) == self._announced:
+            return
+        self._announced = (state, text)
+        if self._on_state is not None:
+            self._on_state(state, text)
+
+    # What arrives, in cflib's thread.
+
+    def _hear(self, port, channel, data):
+        if port == CRTPPort.CONSOLE and channel == 0 and self._console is not None:
+            self._console.hear(data)
+        if self._on_packet is not None:
+            self._on_packet(port, channel, data)
+
+    def _note_rssi(self, rssi):
+        self._rssi = rssi

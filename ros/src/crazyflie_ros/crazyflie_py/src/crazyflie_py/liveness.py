@@ -1,0 +1,80 @@
+"""Is the vehicle still there? Its own words are the only witness.
+
+cflib never notices a vehicle that is frozen: a UDP socket stays open, and a
+radio's acknowledgements come from a second processor. So a link counts as lost
+when neither a log packet nor the answer to a ping has come for a while.
+"""
+
+import threading
+from collections import deque
+
+LOST_AFTER = 0.5
+"""Age of the last sign of life, in s, at which a link is lost: the firmware, too,
+gives up on a setpoint after 500 ms."""
+
+_WINDOW = 20
+"""Pings that the link quality is computed from; cflib sends 10 a second."""
+
+
+class Liveness:
+    """The age of the last sign of life, and how many pings were answered.
+
+    All times are in s, of one steady clock.
+
+    Parameters
+    ----------
+    now : float
+        The link is alive at this moment.
+    limit : float
+        Age of the last sign of life at which the link is lost, s.
+    """
+
+    def __init__(self, now: float, limit: float = LOST_AFTER):
+        self._limit = limit
+        self._heard = now
+        self._checked = now
+        self._lock = threading.Lock()
+        self._pings = deque(maxlen=_WINDOW)
+
+    def heard(self, now: float) -> None:
+        """Take note of a sign of life."""
+        self._heard = now
+
+    def ping_sent(self) -> None:
+        """Take note of a ping that was sent."""
+        with self._lock:
+            self._pings.append(False)
+
+    def ping_answered(self, now: float) -> None:
+        """Take note of an answer: it counts for the latest ping without one."""
+        self.heard(now)
+        with self._lock:
+            for index in range(len(self._pings) - 1, -1, -1):
+                if not self._pings[index]:
+                    self._pings[index] = True
+                    return
+
+    def age(self, now: float) -> float:
+        """Return the age of the last sign of life, s."""
+        return max(0.0, now - self._heard)
+
+    def quality(self) -> float:
+        """Return the share of the latest pings that were answered, 0 to 1.
+
+        The very latest is left out: its answer may be under way.
+        """
+        with self._lock:
+            pings = list(self._pings)[:-1]
+        return sum(pings) / len(pings) if pings else 1.0
+
+    def is_lost(self, now: float) -> bool:
+        """Tell whether the link is lost; to be asked several times within the limit.
+
+        When this question itself comes late, it is the machine that was busy,
+        and what the vehicle said may wait to be read: it gets a new period.
+        """
+        late = now - self._checked > 0.5 * self._limit
+        self._checked = now
+        if late:
+            self._heard = max(self._heard, now - 0.5 * self._limit)
+        return self.age(now) > self._limit

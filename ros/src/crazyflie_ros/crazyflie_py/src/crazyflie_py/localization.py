@@ -1,0 +1,40 @@
+"""What an external system, such as motion capture, knows about the vehicle's pose."""
+
+import math
+
+from crazyflie_py.checks import check_finite
+from crazyflie_py.errors import ValueRangeError
+
+_STREAM = "localization"
+
+
+class Localization:
+    """Tell the vehicle where it is; nothing here blocks.
+
+    Parameters
+    ----------
+    current_link : callable
+        Returns the `Link`, or raises `LinkLostError`.
+    """
+
+    def __init__(self, current_link):
+        self._current_link = current_link
+
+    def position(self, x: float, y: float, z: float) -> None:
+        """Send a position in the world, m."""
+        check_finite("external position", x, y, z)
+        link = self._current_link()
+        link.stream(_STREAM, lambda: link.cflib.loc.send_extpos((x, y, z)))
+
+    def pose(self, position, quaternion) -> None:
+        """Send a position (m) and an attitude (x, y, z, w) in the world.
+
+        The quaternion is normalised.
+        """
+        check_finite("external pose", *position, *quaternion)
+        norm = math.hypot(*quaternion)
+        if norm < 1e-6:
+            raise ValueRangeError("external pose: the quaternion (0, 0, 0, 0) is no attitude")
+        unit = [component / norm for component in quaternion]
+        link = self._current_link()
+        link.stream(_STREAM, lambda: link.cflib.loc.send_extpose(position, unit))

@@ -1,0 +1,132 @@
+"""Setpoints that are streamed: the vehicle follows the latest for a short while.
+
+Units and signs are those of this module's methods; what goes over the link is in
+their descriptions, since that is what counts.
+"""
+
+import math
+import threading
+import time
+
+from crazyflie_py.checks import check_finite
+from crazyflie_py.errors import ValueRangeError
+
+MOST_THRUST = 65535
+"""Largest thrust command (PWM)."""
+
+ZEROS = 100
+"""Setpoints of zero thrust after connecting and before leaving."""
+
+_SENT_LIMIT = 1.0
+_STREAM = "setpoint"
+_MOST_MILLI = 32.767
+
+
+class Setpoints:
+    """Stream setpoints to a vehicle; nothing here blocks.
+
+    All methods raise `LinkLostError` without a link, and `ValueRangeError` for
+    numbers that cannot be sent.
+
+    Parameters
+    ----------
+    current_link : callable
+        Returns the `Link`, or raises `LinkLostError`.
+    """
+
+    def __init__(self, current_link):
+        self._current_link = current_link
+
+    def attitude(self, roll: float, pitch: float, yaw_rate: float, thrust: int) -> None:
+        """Roll, pitch (degrees), yaw rate (degrees/s) and thrust (PWM, 0 to 65535).
+
+        Positive pitch accelerates forward; over the link it is negated (by cflib).
+        Positive yaw rate is clockwise seen from above, as the link has it: the
+        firmware negates it. The firmware ignores thrust until one setpoint
+        of zero thrust has come.
+        """
+        check_finite("attitude setpoint", roll, pitch, yaw_rate, thrust)
+        if not 0 <= thrust <= MOST_THRUST:
+            raise ValueRangeError(f"thrust is {thrust}; expected 0 to {MOST_THRUST} PWM")
+        self._stream(lambda c: c.send_setpoint(roll, pitch, yaw_rate, int(thrust)))
+
+    def full_state(self, position, velocity, acceleration, quaternion, rates) -> None:
+        """Position (m), velocity (m/s), acceleration (m/s^2), attitude and body rates (rad/s).
+
+        Positions, velocities and accelerations are of the world; the quaternion is
+        (x, y, z, w). Over the link all are in thousandths, in 16 bits: at most
+        +-32.767. Rates are in milliradians/s there.
+        """
+        thousandths = (*position, *velocity, *acceleration, *rates)
+        check_finite("full-state setpoint", *thousandths, *quaternion)
+        for value in thousandths:
+            if abs(value) > _MOST_MILLI:
+                raise ValueRangeError(
+                    f"full-state setpoint: {value:g} is outside +-{_MOST_MILLI} (m, m/s, m/s^2, "
+                    "rad/s)"
+                )
+        if math.hypot(*quaternion) < 1e-6:
+            raise ValueRangeError("full-state setpoint: the quaternion (0, 0, 0, 0) is no attitude")
+        self._stream(
+            lambda c: c.send_full_state_setpoint(
+                position, velocity, acceleration, quaternion, *rates
+            )
+        )
+
+    def velocity_world(self, vx: float, vy: float, vz: float, yaw_rate: float) -> None:
+        """Velocity in the world (m/s) and yaw rate (degrees/s, counter-clockwise)."""
+        check_finite("velocity setpoint", vx, vy, vz, yaw_rate)
+        self._stream(lambda c: c.send_velocity_world_setpoint(vx, vy, vz, yaw_rate))
+
+    def hover(self, vx: float, vy: float, yaw_rate: float, height: float) -> None:
+        """Velocity in the body's heading (m/s), yaw rate (degrees/s, ccw) and height (m)."""
+        check_finite("hover setpoint", vx, vy, yaw_rate, height)
+        self._stream(lambda c: c.send_hover_setpoint(vx, vy, yaw_rate, height))
+
+    def height(self, roll: float, pitch: float, yaw_rate: float, height: float) -> None:
+        """Roll, pitch (degrees, as the link has them), yaw rate (degrees/s, ccw) and height (m)."""
+        check_finite("height setpoint", roll, pitch, yaw_rate, height)
+        self._stream(lambda c: c.send_zdistance_setpoint(roll, pitch, yaw_rate, height))
+
+    def position(self, x: float, y: float, z: float, yaw: float) -> None:
+        """Position in the world (m) and yaw (degrees)."""
+        check_finite("position setpoint", x, y, z, yaw)
+        self._stream(lambda c: c.send_position_setpoint(x, y, z, yaw))
+
+    def stop(self) -> None:
+        """Stop the motors."""
+        self._stream(lambda c: c.send_stop_setpoint())
+
+    def zeros(self, count: int = ZEROS, period: float = 0.002) -> None:
+        """Send zero thrust ``count`` times, every ``period`` seconds; blocks until they are sent.
+
+        It opens the firmware's thrust lock, and stops a vehicle that flies on setpoints.
+        """
+        link = self._current_link()
+        link.forget(_STREAM)
+        sent = threading.Event()
+        for _ in range(count):
+            link.command(lambda: link.cflib.commander.send_setpoint(0, 0, 0, 0))
+            time.sleep(period)
+        link.command(sent.set)
+        sent.wait(_SENT_LIMIT)
+
+    def hand_over(self, remain_valid_ms: int = 0) -> None:
+        """Say that no more setpoints follow: high-level commands are heard again.
+
+        Without it the firmware ignores them after a streamed setpoint.
+
+        Parameters
+        ----------
+        remain_valid_ms : int
+            How long the last setpoint still counts, ms.
+        """
+        if not 0 <= remain_valid_ms < 2**32:
+            raise ValueRangeError(f"{remain_valid_ms} ms is not in 0 to 2^32 - 1")
+        link = self._current_link()
+        link.forget(_STREAM)
+        link.command(lambda: link.cflib.commander.send_notify_setpoint_stop(remain_valid_ms))
+
+    def _stream(self, send):
+        link = self._current_link()
+        link.stream(_STREAM, lambda: send(link.cflib.commander))

@@ -1,0 +1,134 @@
+"""The vehicle's supervisor: arming, its state, emergency stop."""
+
+import enum
+
+from cflib.crtp.crtpstack import CRTPPort
+
+from crazyflie_py.errors import RefusedError
+
+SUPERVISOR_PROTOCOL = 12
+"""The first protocol version in which the supervisor has a port of its own."""
+
+_EMERGENCY_REPEATS = 5
+_INFO_CHANNEL, _COMMAND_CHANNEL = 0, 1
+_GET_STATE, _ARM, _RECOVER = 0x0C, 0x01, 0x02
+_ANSWER = 0x80
+
+
+class SupervisorState(enum.IntFlag):
+    """What the supervisor says of the vehicle; also the log variable supervisor.info."""
+
+    CAN_BE_ARMED = 1 << 0
+    ARMED = 1 << 1
+    AUTO_ARMED = 1 << 2
+    CAN_FLY = 1 << 3
+    FLYING = 1 << 4
+    TUMBLED = 1 << 5
+    LOCKED = 1 << 6
+    CRASHED = 1 << 7
+    HIGH_LEVEL_ACTIVE = 1 << 8
+    TRAJECTORY_FINISHED = 1 << 9
+    HIGH_LEVEL_DISABLED = 1 << 10
+
+    def words(self) -> str:
+        """Return the state in words, such as "armed, flying"."""
+        names = [flag.name.lower().replace("_", " ") for flag in SupervisorState if flag in self]
+        return ", ".join(names) or "nothing"
+
+
+class Supervisor:
+    """Talk to the vehicle's supervisor.
+
+    Parameters
+    ----------
+    current_link : callable
+        Returns the `Link`, or raises `LinkLostError`.
+    """
+
+    def __init__(self, current_link):
+        self._current_link = current_link
+
+    def read(self) -> SupervisorState | None:
+        """Ask for the state; blocks. None when the firmware is too old to say.
+
+        Raises
+        ------
+        CrazyflieError
+            No link or no reply.
+        """
+        link = self._current_link()
+        if link.protocol < SUPERVISOR_PROTOCOL:
+            return None
+        answer = link.ask(
+            bytes([_GET_STATE]),
+            CRTPPort.SUPERVISOR,
+            _INFO_CHANNEL,
+            bytes([_ANSWER | _GET_STATE]),
+            "the supervisor's state",
+        )
+        return SupervisorState(int.from_bytes(answer[1:3], "little"))
+
+    def arm(self, do_arm: bool = True) -> None:
+        """Arm or disarm the motors; blocks until the vehicle has confirmed it.
+
+        Firmware before protocol 12 confirms nothing.
+
+        Raises
+        ------
+        RefusedError
+            The vehicle cannot be armed now; the text says why.
+        CrazyflieError
+            No link or no reply.
+        """
+        link = self._current_link()
+        if link.protocol < SUPERVISOR_PROTOCOL:
+            link.command(lambda: link.cflib.supervisor.send_arming_request(do_arm))
+            return
+        verb = "arming" if do_arm else "disarming"
+        self._confirm(link, bytes([_ARM, do_arm]), verb)
+
+    def recover(self) -> None:
+        """Let a vehicle that has crashed be armed again; blocks until it has confirmed it.
+
+        Raises
+        ------
+        CrazyflieError
+            As `arm`.
+        """
+        link = self._current_link()
+        if link.protocol < SUPERVISOR_PROTOCOL:
+            link.command(link.cflib.supervisor.send_crash_recovery_request)
+            return
+        self._confirm(link, bytes([_RECOVER]), "recovering from a crash")
+
+    def emergency_stop(self) -> None:
+        """Stop the motors at once, before anything else that waits to be sent; does not block.
+
+        Sent several times, since a packet may be lost. The vehicle has to be
+        restarted before it can fly again.
+
+        Raises
+        ------
+        LinkLostError
+            Nothing can be sent.
+        """
+        link = self._current_link()
+
+        def send():
+            link.cflib.supervisor.send_emergency_stop()
+            link.cflib.commander.send_stop_setpoint()
+
+        for _ in range(_EMERGENCY_REPEATS):
+            link.command(send, urgent=True)
+
+    def _confirm(self, link, request, what):
+        answer = link.ask(
+            request,
+            CRTPPort.SUPERVISOR,
+            _COMMAND_CHANNEL,
+            bytes([_ANSWER | request[0]]),
+            what,
+        )
+        if len(answer) > 1 and not answer[1]:
+            state = self.read()
+            raise RefusedError(f"{what}: the vehicle refuses it; its state is: {state.words()}")

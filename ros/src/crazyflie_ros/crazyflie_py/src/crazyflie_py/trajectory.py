@@ -1,0 +1,125 @@
+"""Trajectories of polynomials, kept in the vehicle's memory and flown by its planner."""
+
+import struct
+from dataclasses import dataclass
+
+from cflib.crazyflie.mem.memory_element import MemoryElement
+from cflib.crazyflie.mem.trajectory_memory import Poly4D
+from cflib.crtp.crtpstack import CRTPPort
+
+from crazyflie_py.checks import check_finite, check_positive
+from crazyflie_py.errors import RefusedError, ValueRangeError
+
+COEFFICIENTS = 8
+"""Coefficients of a polynomial of degree 7, the constant first."""
+
+PIECE_SIZE = 132
+"""Bytes of a piece in the vehicle's memory: 4 polynomials and a duration, as floats."""
+
+_WRITE_CHANNEL = 2
+_CHUNK = 24
+
+
+@dataclass(frozen=True)
+class PolynomialPiece:
+    """A piece of a trajectory: four polynomials of time.
+
+    Attributes
+    ----------
+    duration : float
+        s.
+    x, y, z, yaw : tuple of float
+        Up to 8 coefficients, the constant first: m and rad, in powers of s.
+    """
+
+    duration: float
+    x: tuple
+    y: tuple
+    z: tuple
+    yaw: tuple
+
+    def pack(self) -> bytes:
+        """Return the piece as the vehicle's memory holds it.
+
+        Raises
+        ------
+        ValueRangeError
+            Too many coefficients, a number that is not finite, or no duration.
+        """
+        check_positive("duration of a piece", self.duration)
+        polynomials = []
+        for axis in ("x", "y", "z", "yaw"):
+            coefficients = list(getattr(self, axis))
+            if len(coefficients) > COEFFICIENTS:
+                raise ValueRangeError(
+                    f"polynomial of {axis} has {len(coefficients)} coefficients; expected at "
+                    f"most {COEFFICIENTS}"
+                )
+            check_finite(f"polynomial of {axis}", *coefficients)
+            coefficients += [0.0] * (COEFFICIENTS - len(coefficients))
+            polynomials.append(Poly4D.Poly(coefficients))
+        return bytes(Poly4D(self.duration, *polynomials).pack())
+
+
+class Trajectories:
+    """The vehicle's memory of trajectories.
+
+    Parameters
+    ----------
+    current_link : callable
+        Returns the `Link`, or raises `LinkLostError`.
+    high_level : HighLevel
+    """
+
+    def __init__(self, current_link, high_level):
+        self._current_link = current_link
+        self._high_level = high_level
+
+    def upload(self, trajectory_id: int, piece_offset: int, pieces: list) -> None:
+        """Write pieces to the vehicle's memory and define a trajectory of them; blocks.
+
+        Parameters
+        ----------
+        trajectory_id : int
+            0 to 255.
+        piece_offset : int
+            Where in the memory it begins, counted in pieces.
+        pieces : list of PolynomialPiece
+
+        Raises
+        ------
+        CrazyflieError
+            The pieces do not fit, the vehicle refuses them or does not reply.
+        """
+        if not pieces:
+            raise ValueRangeError(f"trajectory {trajectory_id} has no pieces")
+        link = self._current_link()
+        memory = _memory(link)
+        begin = piece_offset * PIECE_SIZE
+        end = begin + len(pieces) * PIECE_SIZE
+        if end > memory.size:
+            raise ValueRangeError(
+                f"trajectory {trajectory_id}: {len(pieces)} pieces from piece {piece_offset} on "
+                f"do not fit: the vehicle has room for {memory.size // PIECE_SIZE}"
+            )
+        data = b"".join(piece.pack() for piece in pieces)
+        for start in range(0, len(data), _CHUNK):
+            _write(link, memory.id, begin + start, data[start : start + _CHUNK])
+        self._high_level.define_trajectory(trajectory_id, begin, len(pieces))
+
+
+def _memory(link):
+    memories = link.cflib.mem.get_mems(MemoryElement.TYPE_TRAJ)
+    if not memories:
+        raise RefusedError("the vehicle has no memory for trajectories: update its firmware")
+    return memories[0]
+
+
+def _write(link, memory_id, address, data):
+    # cflib's own writer is left for dead when a reply comes twice.
+    where = struct.pack("<BI", memory_id, address)
+    what = f"writing the trajectory, byte {address}"
+    answer = link.ask(where + data, CRTPPort.MEM, _WRITE_CHANNEL, where, what)
+    status = answer[5] if len(answer) > 5 else 0
+    if status:
+        raise RefusedError(f"{what}: the vehicle refuses it (error {status})")

@@ -1,0 +1,84 @@
+"""Fixtures of the tests: a vehicle that answers as it is told to."""
+
+import pytest
+
+from crazyflie_py.crazyflie import Crazyflie
+from crazyflie_py.fake import EXTENDED, READ_ONLY, FakeVehicle
+
+LOG = {
+    "stateEstimate.x": ("f", 1.5),
+    "stateEstimate.y": ("f", -2.5),
+    "pm.vbat": ("f", 3.75),
+    "radio.rssi": ("B", 47),
+    "pm.state": ("b", -1),
+    "stateEstimateZ.quat": ("I", 0xC0000000),
+    "gyro.xRaw": ("h", -1234),
+    "kalman.q0": ("e", 0.5),
+}
+
+PARAMETERS = {
+    "ring.effect": ("B", 6, 0),
+    "pid_rate.roll_kp": ("f", 0.25, EXTENDED),
+    "cpu.id0": ("I", 2**32 - 1, READ_ONLY),
+    "sound.freq": ("H", 4000, 0),
+    "motor.trim": ("b", -3, 0),
+}
+
+
+@pytest.fixture(autouse=True)
+def _own_cache(monkeypatch, tmp_path_factory):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+
+
+@pytest.fixture
+def make_vehicle():
+    """Return a function that makes vehicles, which end with the test."""
+    vehicles = []
+
+    def make(**options):
+        options.setdefault("log", dict(LOG))
+        options.setdefault("parameters", dict(PARAMETERS))
+        vehicles.append(FakeVehicle(**options))
+        return vehicles[-1]
+
+    yield make
+    for vehicle in vehicles:
+        vehicle.close()
+
+
+@pytest.fixture
+def make_link():
+    """Return a function that makes (unconnected) links, which end with the test."""
+    links = []
+
+    def make(uri, **options):
+        links.append(Crazyflie(uri, **options))
+        return links[-1]
+
+    yield make
+    for link in links:
+        link.close()
+
+
+@pytest.fixture
+def vehicle(make_vehicle):
+    return make_vehicle()
+
+
+@pytest.fixture
+def link(vehicle, make_link):
+    """Return a link that is connected to ``vehicle``."""
+    link = make_link(vehicle.uri)
+    link.connect()
+    return link
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    """Return a vehicle, a connected link and the vehicle's first parameters, for a module."""
+    cache = str(tmp_path_factory.mktemp("cache"))
+    with (
+        FakeVehicle(log=dict(LOG), parameters=dict(PARAMETERS)) as vehicle,
+        Crazyflie(vehicle.uri, cache=cache) as link,
+    ):
+        yield vehicle, link, dict(PARAMETERS)

@@ -1,0 +1,111 @@
+"""A virtual vehicle, flown through the library in real time."""
+
+import queue
+import threading
+
+import pytest
+
+from crazyflie_py.crazyflie import Crazyflie, LinkState
+from crazyflie_py.errors import RefusedError
+from crazyflie_py.log import LogBlock
+from crazyflie_py.supervisor import SupervisorState
+from crazyflie_py.trajectory import PolynomialPiece
+from crazyflie_virtual.server import Server
+from crazyflie_virtual.settings import Settings
+
+LIMIT = 20.0
+
+
+@pytest.fixture(scope="module")
+def server():
+    server = Server(Settings(port=0, observer_port=0))
+    server.start()
+    yield server
+    server.stop()
+
+
+class Pilot:
+    """A link to the virtual vehicle, and what it logs."""
+
+    def __init__(self, server):
+        self.states = queue.Queue()
+        self.lines = queue.Queue()
+        self._logged = {}
+        self._changed = threading.Condition()
+        self.link = Crazyflie(
+            f"udp://127.0.0.1:{server.address[1]}",
+            reconnect=True,
+            on_state=lambda state, text: self.states.put(state),
+            on_console=self.lines.put,
+        )
+        self.link.connect()
+        variables = ("stateEstimate.x", "stateEstimate.z", "supervisor.info", "pm.vbat")
+        self.link.add_log_block(LogBlock("pilot", 20, variables, self._note))
+
+    def wait_until(self, condition):
+        """Wait until ``condition(x, z, state, voltage)`` holds."""
+        with self._changed:
+            assert self._changed.wait_for(
+                lambda: self._logged and condition(*self._logged), LIMIT
+            ), f"in the end: {self._logged}"
+
+    def wait_for_state(self, state):
+        while self.states.get(timeout=LIMIT) is not state:
+            pass
+
+    def _note(self, time_ms, values):
+        x, z, info, voltage = values
+        with self._changed:
+            self._logged = (x, z, SupervisorState(info), voltage)
+            self._changed.notify_all()
+
+
+@pytest.fixture(scope="module")
+def pilot(server):
+    pilot = Pilot(server)
+    yield pilot
+    pilot.link.close()
+
+
+def test_the_real_tables(pilot):
+    assert pilot.link.log.variables()["stateEstimateZ.quat"] == "uint32_t"
+    assert pilot.link.parameters.types()["ring.effect"] == ("uint8_t", True)
+    assert len(pilot.link.parameters.values()) == len(pilot.link.parameters.types()) > 100
+    assert pilot.link.parameters.write("ring.effect", 5) == 5
+    assert pilot.link.parameters.read("ring.effect") == 5
+    assert pilot.lines.get(timeout=LIMIT)
+    pilot.wait_until(lambda x, z, state, voltage: 3.0 < voltage < 4.3)
+
+
+def test_a_flight_by_commands_after_setpoints(pilot):
+    link = pilot.link
+    link.setpoints.zeros()
+    link.setpoints.hand_over()
+    link.high_level.take_off(0.4, 1.0)
+    pilot.wait_until(lambda x, z, state, _: z > 0.35 and SupervisorState.FLYING in state)
+    link.trajectories.upload(1, 3, [PolynomialPiece(1.0, (0.0, 0.3), (), (), ())])
+    link.high_level.start_trajectory(1, relative=True)
+    pilot.wait_until(lambda x, z, *_: x > 0.2 and z > 0.3)
+    link.high_level.land(0.0, 1.0)
+    pilot.wait_until(lambda x, z, *_: z < 0.05)
+
+
+def test_a_trajectory_that_was_never_defined_is_refused(pilot):
+    with pytest.raises(RefusedError, match="start of the trajectory"):
+        pilot.link.high_level.start_trajectory(77)
+
+
+def test_silence_is_noticed_and_overcome(server, pilot):
+    server.switches.silence = 1.0
+    pilot.wait_for_state(LinkState.LOST)
+    pilot.wait_for_state(LinkState.CONNECTED)
+    with pilot._changed:
+        pilot._logged = {}
+    pilot.wait_until(lambda *_: True)
+
+
+def test_after_an_emergency_stop_nothing_flies(pilot):
+    pilot.link.supervisor.emergency_stop()
+    pilot.wait_until(lambda x, z, state, _: SupervisorState.LOCKED in state)
+    with pytest.raises(RefusedError, match="arming.*locked"):
+        pilot.link.supervisor.arm()

@@ -376,3 +376,81 @@ def test_callbacks_of_many_threads_never_meet(process, handle):
         thread.join(LIMIT)
     assert len(met) == 2 * 6 * 200
     assert not any(met)
+
+
+# Parts of a node, other threads, the end.
+
+
+def test_a_part_of_a_node_takes_down_what_it_has_made(process, handle):
+    received = []
+    part = handle.part()
+    part.subscribe("a", String, received.append)
+    part.advertise_service("go", Trigger, lambda request: TriggerResponse())
+    part.timer(1.0, lambda: received.append("tick"))
+    publisher = part.publisher("b", String)
+    handle.subscribe("a", String, lambda message: received.append("node"))
+    process.publish("/ns/a", String("x"))
+    process.advance(1.0)
+    assert received == [String("x"), "node", "tick"]
+    part.close()
+    process.publish("/ns/a", String("y"))
+    process.advance(5.0)
+    assert received[3:] == ["node"]
+    with pytest.raises(KeyError):
+        process.call("/ns/go", None)
+    publisher.publish(String("too late, but no error"))
+
+
+def test_a_callback_of_a_part_that_waits_does_not_begin_after_its_end(process, handle):
+    part = handle.part()
+    ran = []
+    part.subscribe("a", String, lambda message: ran.append(message))
+
+    def end_it(_):
+        handle.publisher("a", String).publish(String("x"))
+        part.run_soon(ran.append, "soon")
+        part.close()
+
+    handle.subscribe("end", String, end_it)
+    process.publish("/ns/end", String())
+    assert ran == []
+
+
+def test_what_a_part_took_down_can_be_made_again(process, handle):
+    for _ in range(2):
+        part = handle.part()
+        part.publisher("a", String)
+        part.advertise_service("go", Trigger, lambda request: TriggerResponse())
+        assert process.call("/ns/go", None) == TriggerResponse()
+        part.close()
+
+
+def test_faults_of_a_part_are_the_nodes(process, handle):
+    safe = []
+    handle.on_fault(lambda: safe.append(True))
+    handle.part().run_soon(lambda: 1 / 0)
+    assert safe == [True]
+    assert "ZeroDivisionError" in process.logged("error")[0]
+
+
+def test_another_thread_hands_over(process, handle):
+    ran = []
+    thread = threading.Thread(target=handle.run_soon, args=(ran.append, 1))
+    thread.start()
+    thread.join(LIMIT)
+    assert ran == [1]
+
+
+def test_parameters_of_others(process, handle):
+    handle.set_param("/cf/ring", {"effect": 7, "more": {"deep": 1.5}})
+    handle.set_param("own", True)
+    assert process.transport.parameters["/ns/own"] is True
+    assert handle.param("/cf/ring/effect", int) == 7
+    assert handle.param("/cf/ring/more/deep", float) == 1.5
+    assert handle.param("/cf/ring/none", int, 3) == 3
+
+
+def test_the_end_of_the_process(process, handle):
+    assert process.exit_status is None
+    handle.end(3)
+    assert process.exit_status == 3

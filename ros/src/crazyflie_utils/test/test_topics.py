@@ -13,6 +13,7 @@ class Wire(Outlet):
     def __init__(self, latch):
         self.latch = latch
         self.heard = False
+        self.is_closed = False
         self.sent = []
 
     def is_heard(self):
@@ -20,6 +21,9 @@ class Wire(Outlet):
 
     def publish(self, message):
         self.sent.append(message)
+
+    def close(self):
+        self.is_closed = True
 
 
 class World:
@@ -35,6 +39,7 @@ class World:
 
     def subscribe(self, topic, message_type, deliver):
         self.subscribed.append((topic, message_type, deliver))
+        return lambda: self.subscribed.remove((topic, message_type, deliver))
 
 
 @pytest.fixture
@@ -138,3 +143,35 @@ def test_message_of_another_type_is_refused(topics):
 
 def test_publisher_knows_its_topic(topics):
     assert topics.publisher("/a", String, latch=False).topic == "/a"
+
+
+def test_who_has_unsubscribed_is_told_no_more(topics, world):
+    received = []
+    end_first = topics.subscribe("/a", String, lambda message: received.append("first"))
+    topics.subscribe("/a", String, lambda message: received.append("second"))
+    publisher = topics.publisher("/a", String, latch=False)
+    end_first()
+    publisher.publish(String("x"))
+    assert received == ["second"]
+    assert len(world.subscribed) == 1
+
+
+def test_unsubscribing_while_a_message_is_delivered_skips_nobody(topics):
+    received = []
+    ends = []
+
+    def receive_once(message):
+        received.append("first")
+        ends[0]()
+
+    ends.append(topics.subscribe("/a", String, receive_once))
+    topics.subscribe("/a", String, lambda message: received.append("second"))
+    publisher = topics.publisher("/a", String, latch=False)
+    publisher.publish(String("x"))
+    publisher.publish(String("y"))
+    assert received == ["first", "second", "second"]
+
+
+def test_a_publisher_that_is_closed_tells_those_outside(topics, world):
+    topics.publisher("/a", String, latch=False).close()
+    assert world.wires[0].is_closed

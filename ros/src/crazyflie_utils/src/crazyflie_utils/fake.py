@@ -20,6 +20,9 @@ class _Record(Outlet):
         message.serialize(io.BytesIO())
         self.messages.append(message)
 
+    def close(self):
+        pass
+
 
 class FakeTransport(Transport):
     """An outside world that remembers everything and does nothing by itself."""
@@ -39,17 +42,28 @@ class FakeTransport(Transport):
         """Return an entry of ``parameters``."""
         return self.parameters[name]
 
+    def set_param(self, name, value):
+        """Set an entry of ``parameters``; a dictionary is a namespace, as with ROS."""
+        if not isinstance(value, dict):
+            self.parameters[name] = value
+            return
+        for key, item in value.items():
+            self.set_param(f"{name}/{key}", item)
+
     def advertise(self, topic, message_type, latch):
         """Return an outlet that keeps the messages."""
         return self.outlets.setdefault(topic, _Record())
 
     def subscribe(self, topic, message_type, deliver):
         """Keep ``deliver`` for `FakeProcess.publish`."""
-        self.inlets.setdefault(topic, []).append(deliver)
+        inlets = self.inlets.setdefault(topic, [])
+        inlets.append(deliver)
+        return lambda: inlets.remove(deliver)
 
     def advertise_service(self, name, service_type, begin, settle):
         """Keep ``begin`` for `FakeProcess.call`."""
         self.services[name] = begin
+        return lambda: self.services.pop(name)
 
     def call_service(self, name, service_type, request, limit):
         """Call a service of this process; fail when there is none."""

@@ -44,6 +44,31 @@ class NodeHandle:
         self._make_safe = None
         self._faults = {}
         self._throttled = {}
+        self._undo = []
+        self._is_closed = False
+
+    def part(self) -> "NodeHandle":
+        """Return a handle for a part of the node that may end before the node does.
+
+        `close` takes down what was made through it. It may be used from any thread.
+        """
+        part = NodeHandle(self._process, self._name)
+        part._make_safe = self._make_safe
+        part._faults = self._faults
+        return part
+
+    def close(self) -> None:
+        """Take down all publishers, subscribers, services and timers of this handle.
+
+        No callback that was registered through it begins any more.
+        """
+        self._is_closed = True
+        while self._undo:
+            self._undo.pop()()
+
+    def end(self, status: int = 0) -> None:
+        """End the process, and with it all its nodes, with an exit status."""
+        self._process.end(status)
 
     # Names and parameters.
 
@@ -66,7 +91,8 @@ class NodeHandle:
         Parameters
         ----------
         name : str
-            Such as "frames/fixed", without the ``~``.
+            Such as "frames/fixed", without the ``~``. One that begins with a slash is
+            not the node's own: it is taken as it is.
         kind : callable
             From `crazyflie_utils.parameters`: checks the value and says what
             is expected.
@@ -78,7 +104,7 @@ class NodeHandle:
         ParameterError
             Required but not set, or not what is expected.
         """
-        full_name = self.resolve("~" + name)
+        full_name = self.resolve(name if name.startswith("/") else "~" + name)
         try:
             value = self._process.transport.get_param(full_name)
         except KeyError:
@@ -93,6 +119,18 @@ class NodeHandle:
                 f"parameter {full_name} is {value!r}; expected {kind}{reason}"
             ) from None
 
+    def set_param(self, name: str, value) -> None:
+        """Set a parameter that others may read; blocks for a few milliseconds.
+
+        Parameters
+        ----------
+        name : str
+            A relative name is in the node's namespace.
+        value : bool, int, float, str, list or dict
+            A dictionary takes the place of the whole namespace ``name``.
+        """
+        self._process.transport.set_param(self.resolve(name), value)
+
     # Topics and services.
 
     def publisher(self, topic: str, message_type: type, latch: bool = False) -> Publisher:
@@ -100,7 +138,9 @@ class NodeHandle:
 
         With ``latch``, whoever subscribes later is sent the last message.
         """
-        return self._process.topics.publisher(self.resolve(topic), message_type, latch)
+        publisher = self._process.topics.publisher(self.resolve(topic), message_type, latch)
+        self._undo.append(publisher.close)
+        return publisher
 
     def subscribe(self, topic: str, message_type: type, callback) -> None:
         """Have ``callback(message)`` called for every message on a topic.
@@ -109,9 +149,10 @@ class NodeHandle:
         """
         guarded = self.guard(callback)
         submit = self._process.executor.submit
-        self._process.topics.subscribe(
+        unsubscribe = self._process.topics.subscribe(
             self.resolve(topic), message_type, lambda message: submit(partial(guarded, message))
         )
+        self._undo.append(unsubscribe)
 
     def advertise_service(self, name: str, service_type: type, callback) -> None:
         """Answer calls of a service.
@@ -120,9 +161,10 @@ class NodeHandle:
         `concurrent.futures.Future` of it, so that the node goes on living
         meanwhile; or raises `ServiceError` with a text for the caller.
         """
-        self._process.transport.advertise_service(
+        end = self._process.transport.advertise_service(
             self.resolve(name), service_type, partial(self._begin, callback), self._settle
         )
+        self._undo.append(end)
 
     def call_service(self, name: str, service_type: type, request, limit: float) -> Future:
         """Call a service of any process, without waiting for it.
@@ -211,7 +253,16 @@ class NodeHandle:
         With ``steady`` the period is of the machine's clock also when time is
         simulated. Ticks that are missed are skipped.
         """
-        return self._process.add_timer(period, self.guard(callback), steady)
+        timer = self._process.add_timer(period, self.guard(callback), steady)
+        self._undo.append(timer.stop)
+        return timer
+
+    def run_soon(self, callback, *arguments) -> None:
+        """Have ``callback(*arguments)`` called in its turn with all other callbacks.
+
+        This is how threads of a node's own hand over to it.
+        """
+        self._process.executor.submit(partial(self.guard(callback), *arguments))
 
     def clock_publisher(self):
         """Return a function that moves simulated time to a moment (s) for everybody.
@@ -275,6 +326,8 @@ class NodeHandle:
         """Return ``callback`` such that what it raises is reported and goes no further."""
 
         def guarded(*args):
+            if self._is_closed:
+                return
             try:
                 callback(*args)
             except Exception as error:

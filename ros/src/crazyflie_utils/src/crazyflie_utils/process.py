@@ -33,9 +33,14 @@ class Process:
         self._steady_clock = SteadyClock()
         self._steady = SteadyTimers(TimerQueue(self.executor), self._steady_clock)
         self._simulated = TimerQueue(self.executor)
+        self.exit_status = None
         if use_sim_time:
             self.clock.on_change(self._run_simulated)
             self.topics.subscribe("/clock", Clock, self._hear_clock)
+
+    def end(self, status: int) -> None:
+        """Have the process shut down and exit with ``status``."""
+        self.exit_status = status
 
     @property
     def uses_sim_time(self) -> bool:

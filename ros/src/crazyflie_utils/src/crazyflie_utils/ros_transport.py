@@ -3,6 +3,7 @@
 import contextlib
 import threading
 from concurrent.futures import Future, InvalidStateError
+from functools import partial
 
 import rospy
 
@@ -25,6 +26,9 @@ class _RosOutlet(Outlet):
     def publish(self, message):
         self._publisher.publish(message)
 
+    def close(self):
+        self._publisher.unregister()
+
 
 class RosTransport(Transport):
     """rospy, for a process that has called ``rospy.init_node``."""
@@ -41,13 +45,17 @@ class RosTransport(Transport):
         """Return a parameter from the parameter server."""
         return rospy.get_param(name)
 
+    def set_param(self, name, value):
+        """Set a parameter on the parameter server."""
+        rospy.set_param(name, value)
+
     def advertise(self, topic, message_type, latch):
         """Register a publisher with the master."""
         return _RosOutlet(rospy.Publisher(topic, message_type, latch=latch, queue_size=_QUEUE_SIZE))
 
     def subscribe(self, topic, message_type, deliver):
         """Register a subscriber with the master."""
-        rospy.Subscriber(topic, message_type, deliver, tcp_nodelay=True)
+        return rospy.Subscriber(topic, message_type, deliver, tcp_nodelay=True).unregister
 
     def advertise_service(self, name, service_type, begin, settle):
         """Register a service with the master."""
@@ -58,7 +66,7 @@ class RosTransport(Transport):
             except ServiceError as error:
                 raise rospy.ServiceException(str(error)) from None
 
-        rospy.Service(name, service_type, serve)
+        return partial(rospy.Service(name, service_type, serve).shutdown, "no longer offered")
 
     def call_service(self, name, service_type, request, limit):
         """Call in a thread of its own, and give up on it after ``limit``."""

@@ -151,12 +151,12 @@ def _run(process, make_nodes):
     signals = _catch_signals()
     # Not in this thread, which must stay free to end a callback that does not.
     threading.Thread(target=process.start, name="start", daemon=True).start()
-    while not signals and not rospy.is_shutdown():
+    while not signals and process.exit_status is None and not rospy.is_shutdown():
         time.sleep(0.1)
-    rospy.signal_shutdown(f"signal {signals}")
+    rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
     if ending.is_stuck:
         _exit_at_once(1)
-    sys.exit(0)
+    sys.exit(process.exit_status or 0)
 
 
 class _Ending:

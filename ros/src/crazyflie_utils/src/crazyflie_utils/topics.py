@@ -53,6 +53,10 @@ class Publisher:
             self._outlet.publish(message)
         self._topic.deliver(message)
 
+    def close(self) -> None:
+        """Publish no more."""
+        self._outlet.close()
+
 
 class Topics:
     """All topics of a process.
@@ -77,8 +81,13 @@ class Topics:
         topic = self._topic(name, message_type)
         return Publisher(topic, self._transport.advertise(name, message_type, latch), latch)
 
-    def subscribe(self, name: str, message_type: type, receiver) -> None:
+    def subscribe(self, name: str, message_type: type, receiver):
         """Have ``receiver(message)`` called for every message on a topic.
+
+        Returns
+        -------
+        callable
+            Ends it.
 
         Raises
         ------
@@ -91,7 +100,14 @@ class Topics:
             receiver(topic.latched)
         # Each receiver for itself, so that one that comes late is sent what an
         # outside publisher has latched; the connection is shared all the same.
-        self._transport.subscribe(name, message_type, receiver)
+        unsubscribe_outside = self._transport.subscribe(name, message_type, receiver)
+
+        def unsubscribe():
+            # Not in place: a message may be on its way to the others.
+            topic.receivers = [each for each in topic.receivers if each is not receiver]
+            unsubscribe_outside()
+
+        return unsubscribe
 
     def _topic(self, name, message_type):
         topic = self._topics.setdefault(name, Topic(name, message_type))

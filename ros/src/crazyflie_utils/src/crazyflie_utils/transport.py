@@ -23,6 +23,10 @@ class Outlet(ABC):
     def publish(self, message) -> None:
         """Send a message to those outside."""
 
+    @abstractmethod
+    def close(self) -> None:
+        """Tell those outside that no more messages come."""
+
 
 class Transport(ABC):
     """Parameters, topics, services, logging and life time, by absolute names."""
@@ -36,22 +40,27 @@ class Transport(ABC):
         """Return the raw value of a parameter; KeyError when it is not set."""
 
     @abstractmethod
+    def set_param(self, name: str, value) -> None:
+        """Set a parameter."""
+
+    @abstractmethod
     def advertise(self, topic: str, message_type: type, latch: bool) -> Outlet:
         """Announce a topic to those outside."""
 
     @abstractmethod
-    def subscribe(self, topic: str, message_type: type, deliver) -> None:
+    def subscribe(self, topic: str, message_type: type, deliver):
         """Have ``deliver(message)`` called with what those outside publish.
 
         Also with what they have latched; a topic may be subscribed more than once.
+        Returns a function that ends it.
         """
 
     @abstractmethod
-    def advertise_service(self, name: str, service_type: type, begin, settle) -> None:
+    def advertise_service(self, name: str, service_type: type, begin, settle):
         """Answer calls of a service with ``settle(begin(request))``.
 
         ``begin`` returns a Future of the response at once; ``settle`` waits for it
-        and may raise `ServiceError`.
+        and may raise `ServiceError`. Returns a function that ends the service.
         """
 
     @abstractmethod

@@ -17,7 +17,7 @@ ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
         (None, 0.16, FLYING),
         (ON_GROUND, None, ON_GROUND),
         (ON_GROUND, 0.1, ON_GROUND),
-        (ON_GROUND, 1.0, FLYING),
+        (ON_GROUND, 1.0, ON_GROUND),
         (FLYING, None, FLYING),
         (FLYING, 0.0, FLYING),
         (FLYING, 1.0, FLYING),
@@ -43,9 +43,14 @@ def test_knows_what_has_been_announced(remembered, height):
     assert find_state(remembered, height).announced == remembered.in_flight
 
 
-@pytest.mark.parametrize("remembered", [None, *FlightState])
-def test_never_on_the_ground_when_it_is_seen_in_flight(remembered):
+@pytest.mark.parametrize("remembered", [None, TAKING_OFF, FLYING, DESCENDING, LANDING])
+def test_never_on_the_ground_when_it_may_be_in_flight(remembered):
     assert find_state(remembered, 0.16).state is not ON_GROUND
+
+
+def test_stands_on_a_table_when_no_controller_speaks():
+    assert find_state(None, 0.7, is_commanded=False).state is ON_GROUND
+    assert find_state(FLYING, 0.7, is_commanded=False).state is FLYING
 
 
 def test_says_why():

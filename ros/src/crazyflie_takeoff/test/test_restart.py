@@ -262,7 +262,7 @@ def test_filter_with_a_foreign_server():
     assert network.last("/in_flight_filter") == "flying"
     process.publish("/in_flight", Empty())
     network.advance(0.01)
-    assert network.last("/in_flight_filter") == "unknown"
+    assert network.last("/in_flight_filter") == "commanded"
 
 
 def test_server_takes_the_place_of_a_foreign_one_in_flight():

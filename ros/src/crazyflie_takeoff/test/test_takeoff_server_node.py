@@ -194,10 +194,24 @@ def test_waits_for_the_height_if_there_is_one():
     process.publish("/in_flight_filter", String("unknown"))
     process.advance(0.5)
     assert states(process) == []
-    process.publish("/state", state(1.2))
+    process.publish("/state", state(0.1))
     process.advance(0.02)
-    assert states(process) == ["flying"]
-    assert "1.20 m" in process.logged("info")[0]
+    assert states(process) == ["on_ground"]
+    assert "0.10 m" in process.logged("info")[0]
+
+
+@pytest.mark.parametrize(("said", "begins"), [("unknown", "on_ground"), ("commanded", "flying")])
+def test_a_high_vehicle_is_flying_only_if_a_controller_speaks(said, begins):
+    process = launch(SERVER)
+    process.publish("/in_flight_filter", String("unknown"))
+    process.publish("/state", state(0.7))
+    process.advance(0.5)
+    assert states(process) == []
+    process.publish("/in_flight_filter", String(said))
+    for _ in range(6):
+        process.publish("/state", state(0.7))
+        process.advance(0.1)
+    assert states(process) == [begins]
 
 
 def test_flies_if_only_the_height_says_so():

@@ -33,6 +33,7 @@ class ControlFilter:
         self._toggled = False
         self._listening = True
         self._waiting = None
+        self._is_commanded = False
         self._takeoff_control = None
         self._takeoff_thrust = 0.0
         self._takeoff_time = math.inf
@@ -41,6 +42,11 @@ class ControlFilter:
     def in_flight(self) -> bool:
         """Whether the vehicle is in flight, as far as is known."""
         return self._toggled if self._state is None else self._state.in_flight
+
+    @property
+    def is_commanded(self) -> bool:
+        """Whether a commanded control has ever come."""
+        return self._is_commanded
 
     @property
     def remembered(self) -> FlightState | None:
@@ -83,6 +89,7 @@ class ControlFilter:
         """Return what to pass on when a commanded control has come at ``time`` (s), or None."""
         # After a reset of the clock the age counts from there.
         self._takeoff_time = min(self._takeoff_time, time)
+        self._is_commanded = True
         self._waiting = None
         if self.in_flight:
             return control

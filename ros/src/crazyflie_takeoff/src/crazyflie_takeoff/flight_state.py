@@ -30,3 +30,6 @@ class FlightState(enum.Enum):
 
 UNKNOWN = "unknown"
 """What a filter publishes that has not been told a flight state."""
+
+COMMANDED = "commanded"
+"""The same, when a controller sends commands: there may be a flight under way."""

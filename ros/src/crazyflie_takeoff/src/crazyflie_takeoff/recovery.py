@@ -2,7 +2,8 @@
 
 It may be the first on the ground, or take the place of one that died at any moment.
 There are two witnesses: the control filter, which remembers the flight state
-that the former server published; and the measured height.
+that the former server published, or else says whether a controller speaks; and
+the measured height.
 """
 
 from dataclasses import dataclass
@@ -34,13 +35,17 @@ class Finding:
 
 
 def find_state(
-    remembered: FlightState | None, height: float | None, can_descend: bool = True
+    remembered: FlightState | None,
+    height: float | None,
+    can_descend: bool = True,
+    is_commanded: bool = True,
 ) -> Finding:
     """Conclude from what the witnesses say where the flight stands.
 
     In doubt it is FLYING: the controller keeps the vehicle, and the operator can
-    land. An interrupted takeoff or landing is landed if the height is known: on the
-    ground its caller, who got an error, expects the vehicle to be safe.
+    land. A vehicle that is high up although nothing is remembered and no controller
+    speaks stands on something. An interrupted takeoff or landing is landed if the
+    height is known: its caller, who got an error, expects the vehicle to be safe.
 
     Parameters
     ----------
@@ -50,6 +55,8 @@ def find_state(
         Measured z, m; None when it is not known.
     can_descend : bool
         Whether landings begin with a descent.
+    is_commanded : bool
+        Whether a controller speaks, or may do so.
 
     Returns
     -------
@@ -57,18 +64,19 @@ def find_state(
     """
     seen = "the height is not known" if height is None else f"the height is {height:.2f} m"
     said = "nothing is remembered" if remembered is None else f"{remembered.value} is remembered"
-    state = _conclude(remembered, height, can_descend)
+    state = _conclude(remembered, height, can_descend, is_commanded)
     announced = state.in_flight if remembered is None else remembered.in_flight
     return Finding(state, announced, f"{said}, {seen}")
 
 
-def _conclude(remembered, height, can_descend):
-    if remembered is not None and not remembered.is_settled:
+def _conclude(remembered, height, can_descend, is_commanded):
+    if remembered is None:
+        is_high = height is not None and height > FLYING_HEIGHT
+        return FlightState.FLYING if is_high and is_commanded else FlightState.ON_GROUND
+    if not remembered.is_settled:
         if height is not None and height < TOUCHDOWN_HEIGHT:
             return FlightState.LANDING
         if height is not None and can_descend:
             return FlightState.DESCENDING
         return FlightState.FLYING
-    if height is not None and height > FLYING_HEIGHT:
-        return FlightState.FLYING
-    return FlightState.ON_GROUND if remembered is None else remembered
+    return remembered

@@ -4,7 +4,7 @@ from std_msgs.msg import Empty, String
 
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_takeoff.control_filter import ControlFilter
-from crazyflie_takeoff.flight_state import UNKNOWN, FlightState
+from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameters import TOPIC
 from crazyflie_utils.vectors import is_finite
@@ -74,6 +74,7 @@ class TakeoffControlFilterNode(Node):
     def _on_commanded_control(self, message):
         if self._is_good(message, "commanded_control"):
             self._pass_on(self._filter.commanded(self._handle.time(), message))
+            self._publish_state()
 
     def _stop_listening(self):
         self._listening_timer.stop()
@@ -93,7 +94,10 @@ class TakeoffControlFilterNode(Node):
 
     def _publish_state(self):
         remembered = self._filter.remembered
-        state = UNKNOWN if remembered is None else remembered.value
+        if remembered is not None:
+            state = remembered.value
+        else:
+            state = COMMANDED if self._filter.is_commanded else UNKNOWN
         if state != self._published_state:
             self._published_state = state
             self._filter_state.publish(String(state))

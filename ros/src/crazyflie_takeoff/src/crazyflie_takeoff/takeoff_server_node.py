@@ -14,8 +14,8 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_takeoff.flight import Flight, Plan, RefusalError
-from crazyflie_takeoff.flight_state import UNKNOWN, FlightState
-from crazyflie_takeoff.recovery import find_state
+from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
+from crazyflie_takeoff.recovery import FLYING_HEIGHT, find_state
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameters import DURATION, METRES, SERVICE, TOPIC, Number
 from crazyflie_utils.transport import ServiceError
@@ -48,6 +48,7 @@ class TakeoffServerNode(Node):
         self._flight = None
         self._heard_filter = False
         self._remembered = None
+        self._is_commanded = True
         self._position = None
         self._position_time = None
         self._published_state = None
@@ -140,7 +141,8 @@ class TakeoffServerNode(Node):
 
     def _on_filter_state(self, message):
         try:
-            self._remembered = None if message.data == UNKNOWN else FlightState(message.data)
+            knows_nothing = message.data in (UNKNOWN, COMMANDED)
+            self._remembered = None if knows_nothing else FlightState(message.data)
         except ValueError:
             self._handle.warn(
                 f"ignoring {message.data!r} on {self._topics['filter_state']}, which is no "
@@ -149,6 +151,7 @@ class TakeoffServerNode(Node):
             )
         else:
             self._heard_filter = True
+            self._is_commanded = message.data != UNKNOWN
 
     def _on_state(self, message):
         if not is_finite(message.state):
@@ -168,8 +171,13 @@ class TakeoffServerNode(Node):
         return self._position if now - self._position_time < STATE_LIMIT else None
 
     def _has_all_evidence(self):
-        sees_enough = self._topics["state"] is None or self._known_position() is not None
-        return self._heard_filter and sees_enough
+        position = self._known_position()
+        sees_enough = self._topics["state"] is None or position is not None
+        if not (self._heard_filter and sees_enough):
+            return False
+        # A filter that has only just started may hear a controller yet.
+        is_high = position is not None and position[2] > FLYING_HEIGHT
+        return self._is_commanded or not is_high
 
     def _find_state(self):
         self._finding_timer.stop()
@@ -177,7 +185,8 @@ class TakeoffServerNode(Node):
             return
         position = self._known_position()
         height = None if position is None else position[2]
-        finding = find_state(self._remembered, height, self._plan.descent_speed > 0.0)
+        can_descend = self._plan.descent_speed > 0.0
+        finding = find_state(self._remembered, height, can_descend, self._is_commanded)
         self._handle.info(f"begins {finding.state.value}: {finding.reason}")
         self._flight = Flight(self._plan, finding.state, finding.announced)
         waiting, self._waiting = self._waiting, []

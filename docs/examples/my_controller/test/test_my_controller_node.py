@@ -1,0 +1,63 @@
+"""The controller on a fake process: parameters in a dictionary, no ROS."""
+
+from pathlib import Path
+
+import pytest
+
+from crazyflie_msgs.msg import (
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
+from crazyflie_utils.fake import FakeProcess
+from my_controller.my_controller_node import MyControllerNode
+
+U_REF = "0 0 0 9.81"
+K_FILE = Path(__file__).parents[1] / "config" / "K.txt"
+
+
+@pytest.fixture
+def parameters(tmp_path):
+    """Return the parameters that every controller needs."""
+    u_ref_file = tmp_path / "u_ref.txt"
+    u_ref_file.write_text(U_REF)
+    return {
+        "x_dim": 7,
+        "u_dim": 4,
+        "K_file": str(K_FILE),
+        "u_ref_file": str(u_ref_file),
+        "topics/reference": "/ref",
+        "topics/state": "/state",
+        "topics/control": "/control/lqr",
+    }
+
+
+def control_at(parameters, x):
+    """Return the control for a vehicle that is at x (m) and should be at 0."""
+    process = FakeProcess()
+    assert process.launch(MyControllerNode(), "/lqr_controller", parameters)
+    reference = PositionVelocityStateStamped(state=PositionVelocityState(z=1.0))
+    process.publish("/ref", reference)
+    state = PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=x, z=1.0))
+    process.publish("/state", state)
+    [message] = process.published("/control/lqr")
+    return message.control
+
+
+def test_turns_towards_the_heading(parameters):
+    assert control_at({**parameters, "heading": 0.5}, 0.0).yaw_dot == pytest.approx(2.0 * 0.5)
+    assert control_at(parameters, 0.0).yaw_dot == 0.0
+
+
+def test_tilts_no_more_than_it_may(parameters):
+    assert control_at(parameters, -100.0).pitch == 0.2
+    assert control_at({**parameters, "max_tilt": 0.05}, 100.0).pitch == -0.05
+
+
+def test_a_bad_parameter_is_named(parameters):
+    process = FakeProcess()
+    bad = {**parameters, "max_tilt": 0}
+    assert not process.launch(MyControllerNode(), "/lqr_controller", bad)
+    expected = "parameter /lqr_controller/max_tilt is 0; expected a finite number > 0 (rad)"
+    assert process.logged("error") == [expected]

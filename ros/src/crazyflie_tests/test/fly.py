@@ -1,0 +1,44 @@
+"""Fly a launch file on a master of its own, and judge the flight.
+
+Usage: fly.py PACKAGE FILE [ARGUMENT:=VALUE ...]
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+from crazyflie_examples.flight_report import FlightReport
+from crazyflie_examples.launching import launched
+from crazyflie_examples.pilot import FlightError, Pilot
+from crazyflie_utils import runner
+
+HOVER = (0.0, 0.0, 1.0)
+HOVER_DURATION = 6.0
+
+
+def main(arguments: list) -> int:
+    """Take off, hover, land; return the exit status, 0 for a good flight."""
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "launch.log"
+        with launched(arguments, log):
+            try:
+                pilot = Pilot(runner.begin("pilot"))
+                pilot.wait_until_ready()
+                pilot.takeoff()
+                pilot.hover(HOVER_DURATION)
+                pilot.land()
+            except FlightError as error:
+                print(f"the flight failed: {error}\n{log.read_text()}")
+                return 1
+    record = pilot.finish()
+    report = FlightReport.of(record, HOVER)
+    print(report.table())
+    state = dict(zip(record.state.fields, record.state.last, strict=True))
+    print(f"yaw at the end: {state['yaw']:.3f}")
+    for complaint in report.complaints():
+        print(f"bad flight: {complaint}")
+    return 1 if report.complaints() else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

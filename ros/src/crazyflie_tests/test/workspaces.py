@@ -1,0 +1,67 @@
+"""Copies of the workspace and shells to use them with."""
+
+import os
+import shutil
+from pathlib import Path
+
+from terminal import Terminal
+
+from crazyflie_examples.launching import free_port
+
+TOP = Path(__file__).resolve().parents[4]
+"""Top of the repository."""
+
+FLY = Path(__file__).with_name("fly.py")
+
+FAST = "rviz:=false sim_time:=true real_time_factor:=0 simulator_dt:=0.01 composed:=true"
+"""Arguments of sw_hover.launch that fly it in seconds."""
+
+BUILD_LIMIT = 300.0
+"""The longest that a build may take, s; it takes about 20."""
+
+_NOT_COPIED = (".git", ".venv", "build", "devel", "install", "out", "__pycache__", ".hypothesis")
+
+
+def copy(folder: Path) -> Path:
+    """Copy the sources of the workspace to a folder and return it; Python packages are shared."""
+    shutil.copytree(TOP, folder, symlinks=True, ignore=shutil.ignore_patterns(*_NOT_COPIED))
+    (folder / "ros" / ".venv").symlink_to(TOP / "ros" / ".venv")
+    return folder
+
+
+def clean_environment(home: Path) -> dict:
+    """Return the environment of somebody who has sourced nothing and prefers another Python.
+
+    The first python3 on the PATH is one that does not work; behind it is the PATH of
+    this process without what this workspace has put there.
+    """
+    home.mkdir(exist_ok=True)
+    other = home / "other_python"
+    other.mkdir(exist_ok=True)
+    for name in ("python", "python3"):
+        (other / name).write_text("#!/bin/sh\necho this is the wrong python3 >&2\nexit 1\n")
+        (other / name).chmod(0o755)
+    inherited = os.environ["PATH"].split(os.pathsep)
+    path = [str(other), *(entry for entry in inherited if not entry.startswith(str(TOP)))]
+    return {
+        "HOME": str(home),
+        "LANG": "C.UTF-8",
+        "PATH": os.pathsep.join(path),
+        "ROS_IP": "127.0.0.1",
+        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
+    }
+
+
+def overlay(folder: Path, *packages: str) -> Path:
+    """Make a workspace with packages of docs/examples, not built; return its folder."""
+    for package in packages:
+        source = TOP / "docs" / "examples" / package
+        shutil.copytree(
+            source, folder / "src" / package, ignore=shutil.ignore_patterns(*_NOT_COPIED)
+        )
+    return folder
+
+
+def shell(folder: Path, home: Path) -> Terminal:
+    """Return a shell in a folder, with a `clean_environment`."""
+    return Terminal(folder, clean_environment(home))

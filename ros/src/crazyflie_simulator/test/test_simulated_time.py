@@ -11,6 +11,7 @@ from crazyflie_simulator.simulator_node import NearHoverSimulatorNode
 from crazyflie_utils.fake import FakeProcess, FakeTransport
 from crazyflie_utils.node import Node
 from crazyflie_utils.process import Process
+from crazyflie_utils.timers import Timer
 
 
 class ClockedProcess(FakeProcess):
@@ -24,8 +25,9 @@ class ClockedProcess(FakeProcess):
         """Keep timers by the machine's clock, to be fired by `tick`."""
         if not steady:
             return super().add_timer(period, work)
-        self.steady_timers.append((period, work))
-        return None
+        timer = Timer(period, work, now=0.0)
+        self.steady_timers.append((period, timer.fire))
+        return timer
 
     def tick(self):
         """Fire the timers by the machine's clock."""

@@ -69,7 +69,7 @@ def test_passes_the_right_control(say, final):
 
     memory = queue.Queue()
     rospy.Subscriber("/in_flight_filter", String, memory.put)
-    assert memory.get(timeout=LIMIT).data == "unknown"
+    assert memory.get(timeout=LIMIT).data == "commanded"
     say("/in_flight", Empty())
     assert memory.get(timeout=LIMIT).data == "flying"
     # In flight every control is passed on, whatever the age of the other kind.

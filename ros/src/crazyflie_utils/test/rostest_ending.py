@@ -59,6 +59,11 @@ def test_every_node_of_a_process_says_a_last_word():
         assert last_word(one) == last_word(two) == SAFE
 
 
+def test_node_may_end_its_process_with_a_status():
+    with small_node("Quitter", "quitter", "_time_step:=0.01") as process:
+        assert process.wait() == 3
+
+
 def test_callback_that_never_returns_does_not_keep_the_process():
     with small_node("Stuck", "stuck", "_time_step:=0.01") as process:
         wait_until(lambda: "stuck from now on" in process.output, "the first tick")

@@ -6,6 +6,7 @@ import subprocess
 from concurrent.futures import Future
 
 import pytest
+import rosgraph
 import rospy
 from processes import LIMIT, composed, wait_until
 from std_msgs.msg import Float64, Int64, String
@@ -169,6 +170,26 @@ def test_call_of_a_service_that_does_not_answer(handle):
     assert str(error) == f"{handle.name}/silent has not answered within 0.5 s"
 
 
+# Parts.
+
+
+def test_part_of_a_node_takes_down_what_it_has_made(handle):
+    part = handle.part()
+    publisher = part.publisher("~part_out", String)
+    part.subscribe("~part_in", String, lambda message: None)
+    part.advertise_service("~part_service", Trigger, lambda request: TriggerResponse())
+    names = {handle.resolve(f"~part_{what}") for what in ("out", "in", "service")}
+
+    def known():
+        lists = rosgraph.Master("/test").getSystemState()
+        return names & {name for entries in lists for name, _ in entries}
+
+    assert known() == names
+    part.close()
+    wait_until(lambda: not known(), "the master to forget")
+    publisher.publish(String("too late, but no error"))
+
+
 # Parameters.
 
 
@@ -186,6 +207,12 @@ def test_call_of_a_service_that_does_not_answer(handle):
 def test_parameters_of_every_type(handle, value, kind):
     rospy.set_param(f"{handle.name}/some/value", value)
     assert handle.param("some/value", kind) == value
+
+
+def test_parameters_for_others(handle):
+    handle.set_param("/cf/ring", {"effect": 7})
+    assert rospy.get_param("/cf/ring/effect") == 7
+    assert handle.param("/cf/ring/effect", Integer(0, 13)) == 7
 
 
 def test_parameters_that_are_bad_or_missing(handle):

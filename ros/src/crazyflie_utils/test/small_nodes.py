@@ -90,6 +90,13 @@ class Clockwork(Node):
         self._set_clock(self._steps * 0.01)
 
 
+class Quitter(Ticker):
+    """A ticker that ends its process with status 3."""
+
+    def _on_timer(self):
+        self._handle.end(3)
+
+
 class Stuck(Ticker):
     """A ticker whose first tick never returns."""
 

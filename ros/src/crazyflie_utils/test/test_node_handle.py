@@ -9,6 +9,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerResponse
 
 from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.services import Service
 from crazyflie_utils.transport import ServiceError
 
 LIMIT = 20.0
@@ -154,7 +155,7 @@ def test_service_that_takes_time_and_fails_is_logged(process, handle, error):
     answer = process.call("/ns/go", None)
     work.set_exception(error)
     with pytest.raises(ServiceError, match=type(error).__name__):
-        handle._settle(answer)
+        answer.result(LIMIT)
     assert type(error).__name__ in process.logged("error")[0]
 
 
@@ -166,18 +167,22 @@ def test_service_that_is_cancelled_says_so(process, handle):
         answer.result(LIMIT)
 
 
+def settle(process, handle):
+    """Wait for a service that does not answer, as a real transport does."""
+    service = Service(process, handle, lambda request: Future(), faults=None)
+    return service.settle(service.begin(None))
+
+
 def test_caller_is_not_left_waiting_at_shutdown(process, handle, monkeypatch):
-    slow_service(handle)
     monkeypatch.setattr(process.transport, "is_shutdown", lambda: True)
     with pytest.raises(ServiceError, match="/ns/node is shutting down"):
-        handle._settle(process.call("/ns/go", None))
+        settle(process, handle)
 
 
 def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(process, handle, monkeypatch):
-    slow_service(handle)
-    monkeypatch.setattr("crazyflie_utils.node_handle._STALL_LIMIT", 0.05)
+    monkeypatch.setattr("crazyflie_utils.services._STALL_LIMIT", 0.05)
     with pytest.raises(ServiceError, match="/clock stands still"):
-        handle._settle(process.call("/ns/go", None))
+        settle(process, handle)
 
 
 def test_nodes_call_services_without_waiting(process, handle):
@@ -414,6 +419,27 @@ def test_a_callback_of_a_part_that_waits_does_not_begin_after_its_end(process, h
     handle.subscribe("end", String, end_it)
     process.publish("/ns/end", String())
     assert ran == []
+
+
+def test_a_service_of_a_part_that_waits_refuses_after_its_end(process, handle):
+    part = handle.part()
+    part.advertise_service("go", Trigger, lambda request: TriggerResponse())
+    answers = []
+
+    def call_and_end(_):
+        answers.append(handle.call_service("go", Trigger, None, 1.0))
+        part.close()
+
+    handle.subscribe("end", String, call_and_end)
+    process.publish("/ns/end", String())
+    assert "has ended this service" in str(answers[0].exception(LIMIT))
+
+
+def test_a_part_that_was_made_early_is_made_safe_too(process, handle):
+    part, safe = handle.part(), []
+    handle.on_fault(lambda: safe.append(True))
+    part.run_soon(lambda: 1 / 0)
+    assert safe == [True]
 
 
 def test_what_a_part_took_down_can_be_made_again(process, handle):

@@ -175,3 +175,14 @@ def test_unsubscribing_while_a_message_is_delivered_skips_nobody(topics):
 def test_a_publisher_that_is_closed_tells_those_outside(topics, world):
     topics.publisher("/a", String, latch=False).close()
     assert world.wires[0].is_closed
+
+
+def test_what_a_closed_publisher_says_or_has_latched_is_lost(topics, world):
+    received = []
+    publisher = topics.publisher("/a", String, latch=True)
+    publisher.publish(String("latched"))
+    publisher.close()
+    topics.subscribe("/a", String, received.append)
+    publisher.publish(String("too late"))
+    assert received == []
+    assert [message.data for message in world.wires[0].sent] == ["latched"]

@@ -2,24 +2,21 @@
 
 import math
 import time
-import traceback
-from concurrent.futures import Future, wait
+from concurrent.futures import Future
 from functools import partial
 
 import genpy
 import rosgraph.names
 from rosgraph_msgs.msg import Clock
 
+from crazyflie_utils.faults import Faults
 from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.services import Service, pass_on
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import Publisher
-from crazyflie_utils.transport import ServiceError
 
 REQUIRED = object()
 """Default of a parameter that has none."""
-
-_STALL_LIMIT = 5.0
-"""How long, in s of the machine's clock, a service waits while time stands still."""
 
 
 class NodeHandle:
@@ -41,8 +38,7 @@ class NodeHandle:
     def __init__(self, process, name: str):
         self._process = process
         self._name = name
-        self._make_safe = None
-        self._faults = {}
+        self._faults = Faults(self)
         self._throttled = {}
         self._undo = []
         self._is_closed = False
@@ -53,7 +49,6 @@ class NodeHandle:
         `close` takes down what was made through it. It may be used from any thread.
         """
         part = NodeHandle(self._process, self._name)
-        part._make_safe = self._make_safe
         part._faults = self._faults
         return part
 
@@ -65,6 +60,11 @@ class NodeHandle:
         self._is_closed = True
         while self._undo:
             self._undo.pop()()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether `close` has been called."""
+        return self._is_closed
 
     def end(self, status: int = 0) -> None:
         """End the process, and with it all its nodes, with an exit status."""
@@ -161,8 +161,9 @@ class NodeHandle:
         `concurrent.futures.Future` of it, so that the node goes on living
         meanwhile; or raises `ServiceError` with a text for the caller.
         """
+        service = Service(self._process, self, callback, self._faults)
         end = self._process.transport.advertise_service(
-            self.resolve(name), service_type, partial(self._begin, callback), self._settle
+            self.resolve(name), service_type, service.begin, service.settle
         )
         self._undo.append(end)
 
@@ -182,55 +183,8 @@ class NodeHandle:
             self.resolve(name), service_type, request, limit
         )
         submit = self._process.executor.submit
-        reply.add_done_callback(lambda reply: submit(partial(self._pass_on, reply, outcome)))
+        reply.add_done_callback(lambda reply: submit(partial(pass_on, reply, outcome, self)))
         return outcome
-
-    def _begin(self, callback, request):
-        answer = Future()
-
-        def work():
-            try:
-                response = callback(request)
-            except ServiceError as error:
-                answer.set_exception(error)
-            except Exception as error:
-                self._report_fault(callback, error)
-                answer.set_exception(ServiceError(f"{self._name}: {error!r}"))
-            else:
-                if isinstance(response, Future):
-                    response.add_done_callback(lambda done: self._pass_on(done, answer))
-                else:
-                    answer.set_result(response)
-
-        self._process.executor.submit(work)
-        return answer
-
-    def _pass_on(self, done, to):
-        if not to.set_running_or_notify_cancel():
-            return
-        if done.cancelled():
-            to.set_exception(ServiceError(f"{self._name}: cancelled"))
-            return
-        error = done.exception()
-        if error is None:
-            to.set_result(done.result())
-        elif isinstance(error, ServiceError):
-            to.set_exception(error)
-        else:
-            self.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
-            to.set_exception(ServiceError(f"{self._name}: {error!r}"))
-
-    def _settle(self, answer):
-        clock = self._process.clock
-        seen, seen_at = clock.time(), time.monotonic()
-        while not wait([answer], timeout=0.1).done:
-            if self._process.transport.is_shutdown():
-                raise ServiceError(f"{self._name} is shutting down")
-            if clock.time() != seen:
-                seen, seen_at = clock.time(), time.monotonic()
-            elif time.monotonic() - seen_at > _STALL_LIMIT:
-                raise ServiceError(f"{self._name}: /clock stands still")
-        return answer.result()
 
     # Time.
 
@@ -320,7 +274,7 @@ class NodeHandle:
 
     def on_fault(self, make_safe) -> None:
         """Have ``make_safe()`` called after a callback of this node has raised."""
-        self._make_safe = make_safe
+        self._faults.make_safe = make_safe
 
     def guard(self, callback):
         """Return ``callback`` such that what it raises is reported and goes no further."""
@@ -331,22 +285,6 @@ class NodeHandle:
             try:
                 callback(*args)
             except Exception as error:
-                self._report_fault(callback, error)
+                self._faults.report(callback, error)
 
         return guarded
-
-    def _report_fault(self, callback, error):
-        where = traceback.extract_tb(error.__traceback__)[-1]
-        fault = (type(error), where.filename, where.lineno)
-        count = self._faults[fault] = self._faults.get(fault, 0) + 1
-        name = getattr(callback, "__qualname__", repr(callback))
-        if count == 1:
-            self.error(f"{name} failed\n{''.join(traceback.format_exception(error))}")
-        else:
-            self.warn(f"{name} failed again: {error!r} ({count} times)", throttle=5.0, key=fault)
-        if self._make_safe is None:
-            return
-        try:
-            self._make_safe()
-        except Exception as second:
-            self.error(f"make_safe failed too: {second!r}")

@@ -28,6 +28,7 @@ class Publisher:
         self._topic = topic
         self._outlet = outlet
         self._latch = latch
+        self._is_closed = False
 
     @property
     def topic(self) -> str:
@@ -47,6 +48,8 @@ class Publisher:
                 f"topic {self.topic} carries {self._topic.message_type._type}, "
                 f"not {type(message).__name__}"
             )
+        if self._is_closed:
+            return
         if self._latch:
             self._topic.latched = message
         if self._latch or self._outlet.is_heard():
@@ -54,7 +57,10 @@ class Publisher:
         self._topic.deliver(message)
 
     def close(self) -> None:
-        """Publish no more."""
+        """Publish no more; what is published later, and what was latched, is lost."""
+        self._is_closed = True
+        if self._latch:
+            self._topic.latched = None
         self._outlet.close()
 
 

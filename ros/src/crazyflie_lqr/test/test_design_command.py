@@ -41,7 +41,7 @@ def test_shipped_gains_are_what_the_command_in_their_header_makes(path, tmp_path
 
 def test_there_are_gains_to_ship():
     names = {path.name for path in CONFIG.glob("K_*.txt")}
-    assert names == {"K_hover.txt", "K_soft.txt", "K_full_state.txt"}
+    assert names == {"K_hover.txt", "K_soft.txt", "K_quadrotor.txt", "K_full_state.txt"}
 
 
 def test_prints_gains_poles_and_margins(capsys):

@@ -42,6 +42,19 @@ def test_soft_gains_are_the_hardware_ones():
     np.testing.assert_allclose(K, gains(0.25, 1.0, 3.5, 1.5, 1.0), rtol=1e-9)
 
 
+def test_quadrotor_gains_have_the_closed_form_of_their_weights():
+    K = load_matrix(str(CONFIG / "K_quadrotor.txt"), 4, 7)
+    tilt, lift = 1.0 / 2.0, 2.0 * 3.0
+    expected = gains(
+        tilt,
+        math.sqrt((1.0 / 2.0) ** 2 + 2.0 * tilt / G),
+        10.0 / 3.0,
+        lift,
+        math.sqrt((2.0 * 3.0) ** 2 + 2.0 * lift),
+    )
+    np.testing.assert_allclose(K, expected, rtol=1e-9)
+
+
 def test_reference_control_is_hover():
     np.testing.assert_array_equal(load_vector(str(CONFIG / "u_ref_hover.txt"), 4), [0, 0, 0, G])
 

@@ -3,10 +3,10 @@
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
+import launch_files
 import pytest
 import rospkg
 import yaml
-from roslaunch.config import load_config_default
 
 from crazyflie_description.visualizer_node import VisualizerNode
 from crazyflie_utils.fake import FakeProcess
@@ -17,13 +17,8 @@ FRAGMENT = Path(PACKAGES.get_path("launch_shared")) / "launch" / "rviz.launch"
 
 
 def expand(**arguments):
-    """Return nodes by name and parameters by full name."""
-    given = [f"{name}:={value}" for name, value in arguments.items()]
-    config = load_config_default(
-        [(str(FRAGMENT), given)], None, verbose=False, assign_machines=False
-    )
-    nodes = {node.name: node for node in config.nodes}
-    return nodes, {name: parameter.value for name, parameter in config.params.items()}
+    """Return nodes and parameters by name."""
+    return launch_files.expand(FRAGMENT, **arguments)
 
 
 def root_link(description):
@@ -32,16 +27,16 @@ def root_link(description):
 
 def test_starts_rviz_and_the_visualizer():
     nodes, parameters = expand(fixed_frame="map")
-    assert set(nodes) == {"rviz", "visualizer"}
-    assert nodes["rviz"].args.endswith("-f map")
-    assert not nodes["rviz"].required
+    assert set(nodes) == {"/rviz", "/visualizer"}
+    assert nodes["/rviz"].args.endswith("-f map")
+    assert not nodes["/rviz"].required
     assert root_link(parameters["/robot_description"]) == "base_link"
 
 
 def test_the_model_follows_the_robots_frame():
     nodes, parameters = expand(robot_frame="vicon/cf7/cf7")
     assert root_link(parameters["/rviz/robot_description"]) == "vicon/cf7/cf7/base_link"
-    assert nodes["rviz"].remap_args == [["robot_description", "rviz/robot_description"]]
+    assert nodes["/rviz"].remap_args == [["robot_description", "rviz/robot_description"]]
 
 
 @pytest.mark.parametrize("composed", ["false", "true"])
@@ -49,7 +44,7 @@ def test_the_visualizer_finds_its_parameters(composed):
     nodes, parameters = expand(
         fixed_frame="map", robot_frame="cf7", reference_topic="/cf7/ref", composed=composed
     )
-    assert ("visualizer" in nodes) == (composed == "false")
+    assert ("/visualizer" in nodes) == (composed == "false")
     process = FakeProcess(parameters)
     assert process.launch(VisualizerNode(), "/visualizer"), process.logged("error")
     assert "/cf7/ref" in process.transport.inlets
@@ -75,4 +70,4 @@ def test_without_rviz_there_is_only_the_description():
 
 def test_visualizer_can_run_without_rviz():
     nodes, _ = expand(rviz="false", visualizer="true")
-    assert set(nodes) == {"visualizer"}
+    assert set(nodes) == {"/visualizer"}

@@ -16,7 +16,7 @@ from crazyflie_utils.vectors import to_vector
 
 
 class FlightRecorderNode(Node):
-    """Record the topics of a flight; by default those of the examples.
+    """Record the topics of a flight; by default those of the examples in its namespace.
 
     Attributes
     ----------
@@ -36,11 +36,11 @@ class FlightRecorderNode(Node):
     def load_parameters(self, handle) -> None:
         """See `Node.load_parameters`."""
         defaults = {
-            "state": "/state",
-            "reference": "/ref",
-            "takeoff_control": "/control/takeoff",
-            "final_control": "/control/final",
-            "in_flight": "/in_flight",
+            "state": "state",
+            "reference": "ref",
+            "takeoff_control": "control/takeoff",
+            "final_control": "control/final",
+            "in_flight": "in_flight",
         }
         for name, default in defaults.items():
             self._topics[name] = handle.param(f"topics/{name}", TOPIC, default)

@@ -19,24 +19,23 @@ class Pilot:
     Parameters
     ----------
     process : crazyflie_utils.process.Process
-        Not started yet; the pilot starts it.
-    takeoff, land : str
-        Names of the services.
+        Not started yet.
+    namespace : str
+        Of the vehicle's topics and services: of takeoff, land, state and so on.
     limit : float
         The longest that anything may take, s of the machine's clock.
+    start : bool
+        Start the process; of several pilots in it, the last one does.
     """
 
-    def __init__(
-        self, process, takeoff: str = "/takeoff", land: str = "/land", limit: float = 60.0
-    ):
-        self._handle = process.handle("/flight_recorder")
-        self._takeoff = takeoff
-        self._land = land
+    def __init__(self, process, namespace: str = "/", limit: float = 60.0, start: bool = True):
+        self._handle = process.handle(f"{namespace.rstrip('/')}/flight_recorder")
         self._limit = limit
         self._recorder = FlightRecorderNode()
         if not self._recorder.initialize(self._handle):
             raise FlightError("the flight recorder could not be started; see the log")
-        process.start()
+        if start:
+            process.start()
 
     @property
     def position(self):
@@ -55,8 +54,8 @@ class Pilot:
         self._wait_for(lambda: len(record.final_control), "no control was published")
 
     def takeoff(self) -> None:
-        """Call /takeoff and wait for its answer."""
-        self._call(self._takeoff, "takeoff", "flying")
+        """Call takeoff and wait for its answer."""
+        self._call("takeoff", "flying")
 
     def hover(self, duration: float) -> None:
         """Let ``duration`` seconds of flight pass."""
@@ -65,11 +64,11 @@ class Pilot:
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")
 
     def land(self) -> None:
-        """Call /land and wait for its answer, and for what the vehicle does then."""
-        self._call(self._land, "land", "landed")
+        """Call land and wait for its answer, and for what the vehicle does then."""
+        self._call("land", "landed")
         self.hover(0.5)
 
-    def _call(self, service, called, answered):
+    def _call(self, service, answered):
         record = self._recorder.record
         called_at = record.state.last_time
         future = self._handle.call_service(service, Empty, EmptyRequest(), self._limit)
@@ -77,7 +76,7 @@ class Pilot:
             future.result()
         except ServiceError as error:
             raise FlightError(str(error)) from None
-        record.events[called] = called_at
+        record.events[service] = called_at
         record.events[answered] = record.state.last_time
 
     def _wait_for(self, condition, complaint):

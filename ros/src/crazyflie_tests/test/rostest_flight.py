@@ -1,0 +1,50 @@
+"""A flight from takeoff to landing, whoever made the nodes that fly it."""
+
+import numpy as np
+import pytest
+
+from crazyflie_examples.flight_report import HOVER_TOLERANCE, FlightReport
+from crazyflie_examples.pilot import Pilot
+from crazyflie_utils.runner import ros_process
+from crazyflie_utils.units import GRAVITY
+
+HOVER = (0.0, 0.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def record():
+    """Fly once, and return what was recorded."""
+    process = ros_process()
+    pilot = Pilot(process)
+    pilot.wait_until_ready()
+    pilot.takeoff()
+    pilot.hover(6.0)
+    pilot.land()
+    yield pilot.finish()
+    process.stop()
+
+
+def test_stays_on_the_ground_until_it_is_told_to_take_off(record):
+    heights = record.state.between(0.0, record.events["takeoff"])[:, 2]
+    assert np.all(heights == 0.0)
+
+
+def test_hovers(record):
+    assert FlightReport.of(record, HOVER).hover_error_max < HOVER_TOLERANCE
+
+
+def test_is_on_the_ground_with_zero_thrust_at_the_end(record):
+    report = FlightReport.of(record, HOVER)
+    assert report.final_height == 0.0
+    assert report.final_thrust == 0.0
+
+
+def test_takeoff_is_a_push_and_landing_a_ramp(record):
+    events = record.events
+    push = record.takeoff_control.between(events["takeoff"] + 0.2, events["flying"])[:, 3]
+    np.testing.assert_allclose(push, GRAVITY + 0.2)
+    ramp = record.takeoff_control.between(events["land"], record.state.last_time)[:, 3]
+    falling = ramp[ramp > 0.0]
+    assert falling.size > 50
+    assert np.all(np.diff(falling) < 0.0)
+    assert ramp[-1] == 0.0

@@ -62,6 +62,10 @@ class Firmware:
         self.memory_tester = MemoryTester()
         self.setpoint = Setpoint()
         self.reset_estimation = 0
+        # The checks before the first flight take three turns; a client that
+        # connects at once is not to find them unfinished.
+        for _ in range(3):
+            self._supervise()
         self.console.say("SYS: ----------------------------")
         self.console.say("SYS: Virtual Crazyflie 2.1 is up and running!")
         self.console.say("STAB: Ready to fly.")

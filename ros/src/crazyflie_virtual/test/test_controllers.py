@@ -1,0 +1,139 @@
+"""PID, mixer and the signs of the cascade."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crazyflie_virtual.firmware import mixer
+from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
+from crazyflie_virtual.firmware.pid import Pid
+from crazyflie_virtual.firmware.position import PositionController
+from crazyflie_virtual.firmware.sensors import Sensors
+from crazyflie_virtual.firmware.stabilizer import Stabilizer
+from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Setpoint
+
+
+def test_pid_parts():
+    pid = Pid(2.0, 3.0, 0.5, 0.1, kff=0.25)
+    assert pid.update(1.0, 0.0) == pytest.approx(2.0 + 3.0 * 0.1 + 0.25)
+    # The derivative is of the measurement: a jump of what is desired does not kick.
+    output = pid.update(4.0, 0.2)
+    assert (pid.out_p, pid.out_d, pid.out_ff) == pytest.approx((7.6, -0.5 * 0.2 / 0.1, 1.0))
+    assert pid.out_i == pytest.approx(3.0 * (0.1 + 0.38))
+    assert output == pytest.approx(pid.out_p + pid.out_i + pid.out_d + pid.out_ff)
+
+
+def test_pid_limits_and_reset():
+    pid = Pid(0.0, 1.0, 0.0, 1.0, integral_limit=2.0, output_limit=1.5)
+    assert [pid.update(1.0, 0.0) for _ in range(4)] == [1.0, 1.5, 1.5, 1.5]
+    assert pid.out_i == 2.0
+    pid.reset()
+    assert pid.update(-0.5, 0.0) == -0.5
+
+
+@given(st.floats(-1e4, 1e4))
+def test_wrapped_angles_point_the_same_way(angle):
+    wrapped = wrap_degrees(angle)
+    assert -180.0 <= wrapped < 180.0
+    turns = (angle - wrapped) / 360.0
+    assert turns == pytest.approx(round(turns), abs=1e-6)
+
+
+def test_mixer_directions():
+    front_right, back_right, back_left, front_left = range(4)
+    rolled = mixer.mix(100.0, 10.0, 0.0, 0.0)
+    assert rolled[front_left] == rolled[back_left] > rolled[front_right] == rolled[back_right]
+    pitched = mixer.mix(100.0, 0.0, 10.0, 0.0)
+    assert pitched[front_left] == pitched[front_right] > pitched[back_left] == pitched[back_right]
+    # Less of the motors that turn counter-clockwise, 1 and 3, turns to the left.
+    yawed = mixer.mix(100.0, 0.0, 0.0, 10.0)
+    assert yawed[back_right] == yawed[front_left] > yawed[front_right] == yawed[back_left]
+
+
+@given(st.tuples(*[st.floats(-1e5, 2e5)] * 4))
+def test_limited_commands_keep_their_differences_upwards(requested):
+    commands = mixer.limit(requested)
+    assert all(0.0 <= command <= mixer.FULL_PWM for command in commands)
+    if min(requested) > 0.0 and max(requested) - min(requested) < mixer.FULL_PWM:
+        spread = [command - max(commands) for command in commands]
+        expected = [request - max(requested) for request in requested]
+        if all(max(commands) + s > 0.0 for s in expected):
+            assert spread == pytest.approx(expected, abs=1e-6)
+
+
+def test_idle_thrust():
+    assert mixer.limit((0.0, 10.0, 5000.0, 0.0), idle=3000.0) == (3000.0, 3000.0, 5000.0, 3000.0)
+
+
+def setpoint_at(**position):
+    return Setpoint(mode_x=ABSOLUTE, mode_y=ABSOLUTE, mode_z=ABSOLUTE, **position)
+
+
+def test_position_errors_tilt_the_vehicle_there():
+    # Forward is nose down, negative in the firmware; left is roll to the left, negative.
+    roll, pitch, _ = PositionController().update(setpoint_at(x=0.1), Estimate())
+    assert pitch < 0.0 == pytest.approx(roll)
+    roll, pitch, _ = PositionController().update(setpoint_at(y=0.1), Estimate())
+    assert roll < 0.0 == pytest.approx(pitch)
+    # The same with the nose to the left: +y is ahead.
+    roll, pitch, _ = PositionController().update(setpoint_at(y=0.1), Estimate(yaw=90.0))
+    assert pitch < 0.0 == pytest.approx(roll, abs=1e-9)
+
+
+def test_position_controller_limits():
+    controller = PositionController()
+    roll, pitch, thrust = controller.update(setpoint_at(x=100.0, y=-100.0, z=100.0), Estimate())
+    assert (roll, pitch) == (20.0, -20.0)
+    assert controller.vx.desired == pytest.approx(1.1)
+    assert thrust == pytest.approx(36000.0 + 1000.0 * (25.0 * 1.1 + 15.0 * 0.011))
+    assert controller.update(setpoint_at(z=-100.0), Estimate(vz=10.0))[2] == 20000.0
+
+
+def test_velocity_setpoints_in_both_frames():
+    east = Estimate(yaw=90.0)
+    ahead = Setpoint(mode_x=VELOCITY, mode_y=VELOCITY, vx=0.5, velocity_body=True)
+    _, pitch, _ = PositionController().update(ahead, east)
+    assert pitch < -5.0
+    world = Setpoint(mode_x=VELOCITY, mode_y=VELOCITY, vy=0.5)
+    assert PositionController().update(world, east)[1] == pytest.approx(pitch)
+
+
+def test_yaw_error_takes_the_shorter_way_round():
+    rates = AttitudeController().desired_rates(Estimate(yaw=170.0), 0.0, 0.0, -170.0)
+    assert rates[2] > 0.0
+    rates = AttitudeController().desired_rates(Estimate(yaw=-170.0), 0.0, 0.0, 170.0)
+    assert rates[2] < 0.0
+
+
+def test_yaw_rate_moves_the_heading_that_is_held():
+    stabilizer = Stabilizer()
+    setpoint = Setpoint(mode_yaw=VELOCITY, yaw_rate=50.0, thrust=30000.0)
+    for _ in range(100):
+        stabilizer.update(setpoint, Estimate(), Sensors(noise=False), False, True)
+    assert stabilizer.yaw == pytest.approx(10.0)
+    stabilizer.attitude.yaw_max_delta = 5.0
+    stabilizer.update(setpoint, Estimate(), Sensors(noise=False), False, True)
+    assert stabilizer.yaw == pytest.approx(5.0)
+
+
+def test_without_thrust_motors_are_off_and_heading_is_the_vehicles():
+    stabilizer = Stabilizer()
+    commands = stabilizer.update(
+        Setpoint(roll=20.0), Estimate(yaw=33.0), Sensors(noise=False), True, True
+    )
+    assert commands == (0.0,) * 4
+    assert stabilizer.yaw == 33.0
+
+
+def test_motors_set_by_parameter():
+    stabilizer = Stabilizer()
+    override = stabilizer.override
+    override.enable, override.m1, override.m2, override.m3, override.m4 = 1, 10, 20, 30, 40
+
+    def commands(may_run=True):
+        return stabilizer.update(Setpoint(), Estimate(), Sensors(noise=False), True, may_run)
+
+    assert commands() == (10.0, 20.0, 30.0, 40.0)
+    assert commands(may_run=False) == (0.0,) * 4
+    override.enable = 2
+    assert commands() == (10.0,) * 4

@@ -1,0 +1,177 @@
+"""What cflib sees when something goes wrong, and the faults of the link in figures."""
+
+import contextlib
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import pytest
+from virtual_client import LIMIT, Client, wait_until
+
+from crazyflie_virtual.firmware.supervisor import State
+
+
+@pytest.fixture
+def client():
+    """Return ``client(uri)``; all are closed at the end."""
+    clients = []
+
+    def client(uri):
+        clients.append(Client(uri))
+        return clients[-1]
+
+    yield client
+    for each in clients:
+        each.close()
+
+
+@pytest.fixture
+def process():
+    """Return a virtual vehicle in a process of its own, without ROS, and its URI."""
+    command = [sys.executable, "-m", "crazyflie_virtual", "--port", "0", "--observer-port", "0"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    yield process, process.stdout.readline().split()[-1]
+    process.kill()
+    process.wait(LIMIT)
+    process.stdout.close()
+
+
+def closed_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def test_port_closed_is_a_failed_connection(client):
+    someone = client(f"udp://127.0.0.1:{closed_port()}").open()
+    someone.wait_for("connection_failed")
+    assert "connected" not in someone.events
+
+
+def test_silence_from_the_start_connects_nobody(serve, client):
+    _, uri = serve(silence=1e6)
+    someone = client(uri).open()
+    rows = client(serve()[1]).open()
+    # As long as another takes to connect, this one hears nothing, not even a failure.
+    rows.wait_for("fully_connected")
+    assert someone.events == {}
+    assert not someone.cf.is_connected()
+
+
+def test_peer_gone_is_a_lost_connection(process, client):
+    vehicle, uri = process
+    someone = client(uri).open()
+    someone.wait_for("fully_connected")
+    vehicle.kill()
+    someone.wait_for("connection_lost")
+    # Without a word.
+    someone.cf.commander.send_setpoint(0.0, 0.0, 0.0, 30000)
+
+
+def test_the_process_ends_when_it_is_asked_to(process):
+    vehicle, _ = process
+    vehicle.send_signal(signal.SIGTERM)
+    assert vehicle.wait(LIMIT) == 0
+
+
+def test_frozen_peer_still_looks_connected(serve, client):
+    server, uri = serve()
+    someone = client(uri).open()
+    someone.wait_for("fully_connected")
+    rows = someone.log("stateEstimate.z")
+    someone.cf.high_level_commander.takeoff(0.3, 0.5)
+    wait_until(lambda: server.vehicle.physics.position[2] > 0.2)
+    server.switches.silence = 1e6
+    age = server.vehicle.time
+    wait_until(lambda: server.vehicle.time > age + 0.1)
+    heard = len(rows)
+    wait_until(lambda: server.vehicle.time > age + 0.6)
+    assert len(rows) == heard
+    assert someone.cf.is_connected()
+    assert "connection_lost" not in someone.events
+    # The vehicle flies on, and is heard again after the silence.
+    assert server.vehicle.physics.position[2] > 0.2
+    server.switches.silence = 0.0
+    wait_until(lambda: len(rows) > heard)
+
+
+def test_silence_while_streaming_meets_the_watchdogs(serve, client):
+    server, uri = serve()
+    someone = client(uri).open()
+    someone.wait_for("fully_connected")
+    supervisor = server.vehicle.board.firmware.supervisor
+
+    def stream_until(condition):
+        def step():
+            someone.cf.commander.send_hover_setpoint(0.0, 0.0, 0.0, 0.3)
+            return condition()
+
+        wait_until(step)
+
+    stream_until(lambda: server.vehicle.physics.position[2] > 0.2)
+    # Its answer is silenced, too.
+    someone.cf.param.set_value("virtual.silence", 1000.0)
+    stream_until(lambda: supervisor.state is State.LEVELLING)
+    stream_until(lambda: supervisor.state is State.LOCKED)
+    stream_until(lambda: server.vehicle.physics.position[2] == 0.0)
+
+
+def test_motor_failure(serve, client):
+    server, uri = serve()
+    someone = client(uri).open()
+    someone.wait_for("fully_connected")
+    someone.cf.high_level_commander.takeoff(0.3, 0.5)
+    wait_until(lambda: server.vehicle.physics.position[2] > 0.2)
+    someone.set("virtual.motorFailure", 2)
+    wait_until(lambda: server.vehicle.physics.position[2] == 0.0)
+
+
+def test_low_battery(serve, client):
+    _, uri = serve()
+    someone = client(uri).open()
+    someone.wait_for("fully_connected")
+    rows = someone.log("pm.vbat")
+    wait_until(lambda: rows and rows[-1][1]["pm.vbat"] > 4.0)
+    someone.set("virtual.lowBattery", 1)
+    wait_until(lambda: rows[-1][1]["pm.vbat"] < 3.5)
+
+
+def echoes(server, count):
+    """Send pings; return how many come back."""
+    heard = 0
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pinger:
+        pinger.settimeout(0.3)
+        # No more at a time than fit into the buffers of the sockets.
+        for _ in range(count // 100):
+            for k in range(100):
+                pinger.sendto(b"\xfc" + bytes([k]), server.address)
+            received = 0
+            with contextlib.suppress(TimeoutError):
+                while received < 100:
+                    pinger.recv(64)
+                    received += 1
+            heard += received
+    return heard
+
+
+def test_packets_are_lost_both_ways(serve):
+    assert echoes(serve()[0], 400) == 400
+    # Half of them on the way there, half of the others on the way back.
+    assert echoes(serve(loss=0.5)[0], 400) == pytest.approx(100, abs=50)
+
+
+def test_packets_are_late_both_ways(serve):
+    server, _ = serve(delay=0.1)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pinger:
+        pinger.settimeout(LIMIT)
+        begin = time.monotonic()
+        pinger.sendto(b"\xfcping", server.address)
+        assert pinger.recv(64) == b"\xfcping"
+        assert time.monotonic() - begin >= 0.2
+
+
+def test_a_client_connects_in_spite_of_delay(serve, client):
+    _, uri = serve(delay=0.001)
+    client(uri).open().wait_for("fully_connected")

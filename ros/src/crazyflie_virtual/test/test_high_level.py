@@ -1,0 +1,169 @@
+"""High-level commands: what cflib sends, what is answered, what is flown."""
+
+import errno
+import math
+import struct
+
+import pytest
+from cflib.crazyflie.mem import Poly4D
+from virtual_bench import Bench, cflib_client
+
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.firmware.planner import REFUSED
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def command(bench, method, *arguments, protocol=12, **keywords):
+    """Send what cflib's high-level commander sends; return the error number."""
+    client, sent = cflib_client(protocol)
+    getattr(client.high_level_commander, method)(*arguments, **keywords)
+    (packet,) = sent
+    answer = bench.ask_one(packet.port, packet.channel, packet.data)
+    assert len(answer) == 4
+    assert answer[:2] == packet.data[:2]
+    return answer[3]
+
+
+def upload(bench, *pieces, address=0):
+    data = b"".join(bytes(piece.pack()) for piece in pieces)
+    for start in range(0, len(data), 24):
+        chunk = data[start : start + 24]
+        request = struct.pack("<BI", 1, address + start) + chunk
+        assert bench.ask_one(Port.MEMORY, 2, request)[-1] == 0
+
+
+def straight(x, duration):
+    """Return a piece that goes x metres along x at height 1."""
+    zero = [0.0] * 8
+    along = [0.0, x / duration] + [0.0] * 6
+    up = [1.0] + [0.0] * 7
+    return Poly4D(duration, *(Poly4D.Poly(c) for c in (along, zero, up, zero)))
+
+
+def test_takeoff_follows_the_polynomial(bench):
+    assert command(bench, "takeoff", 1.0, 2.0) == 0
+    for k in range(1, 21):
+        bench.run(0.1)
+        s = k / 20
+        expected = 35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7
+        assert bench.firmware.setpoint.z == pytest.approx(expected, abs=0.01)
+    bench.run(4.0)
+    assert bench.height == pytest.approx(1.0, abs=0.1)
+
+
+def test_takeoff_turns_to_its_yaw_or_keeps_it():
+    bench = Bench(init_yaw=0.5)
+    command(bench, "takeoff", 0.5, 1.0, yaw=None)
+    bench.run(3.0)
+    assert bench.firmware.estimate.yaw == pytest.approx(math.degrees(0.5), abs=2.0)
+    command(bench, "land", 0.0, 1.0, yaw=1.0)
+    bench.run(0.98)
+    assert bench.firmware.setpoint.yaw == pytest.approx(math.degrees(1.0), abs=1.0)
+
+
+def test_land_stops_the_motors_on_the_ground(bench):
+    bench.take_off()
+    assert command(bench, "land", 0.0, 2.0) == 0
+    assert command(bench, "land", 0.0, 2.0) == REFUSED
+    bench.run(2.5)
+    assert bench.height == 0.0
+    assert not bench.motors_run
+    bench.take_off()
+
+
+def test_go_to(bench):
+    bench.take_off()
+    assert command(bench, "takeoff", 2.0, 2.0) == REFUSED
+    assert command(bench, "go_to", 1.0, -0.5, 1.5, math.pi / 2, 3.0) == 0
+    bench.run(6.0)
+    x, y, z = bench.physics.position
+    assert (x, y, z) == pytest.approx((1.0, -0.5, 1.5), abs=0.06)
+    assert bench.firmware.estimate.yaw == pytest.approx(90.0, abs=2.0)
+    assert command(bench, "go_to", 0.0, 0.5, 0.0, 0.0, 2.0, relative=True, linear=True) == 0
+    bench.run(5.0)
+    assert bench.physics.position[1] == pytest.approx(0.0, abs=0.06)
+
+
+@pytest.mark.parametrize("protocol", [7, 12])
+def test_trajectory_from_memory(bench, protocol):
+    bench.take_off()
+    upload(bench, straight(1.0, 2.0), straight(0.0, 1.0), address=132)
+    client, sent = cflib_client()
+    client.high_level_commander.define_trajectory(3, 132, 1)
+    bench.ask(*sent[0])
+    assert command(bench, "start_trajectory", 3, 1.5, protocol=protocol) == 0
+    bench.run(1.5)
+    assert bench.firmware.setpoint.x == pytest.approx(0.5, abs=0.02)
+    bench.run(4.0)
+    assert bench.physics.position[0] == pytest.approx(1.0, abs=0.06)
+    # Backwards, from where the vehicle is.
+    keywords = {"relative_position": True, "reversed": True}
+    assert command(bench, "start_trajectory", 3, 1.0, protocol=protocol, **keywords) == 0
+    bench.run(4.5)
+    assert bench.physics.position[0] == pytest.approx(0.0, abs=0.06)
+
+
+def test_trajectories_that_are_none(bench):
+    bench.take_off()
+    assert command(bench, "start_trajectory", 5) == errno.ENOENT
+    define = struct.pack("<4BIB", 6, 1, 1, 0, 4000, 1)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, define)[3] == errno.ENOMEM
+    # Memory that was never written has pieces without duration.
+    define = struct.pack("<4BIB", 6, 1, 1, 0, 0, 1)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, define)[3] == 0
+    assert command(bench, "start_trajectory", 1) == errno.EINVAL
+    compressed = struct.pack("<4BIB", 6, 1, 1, 1, 0, 1)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, compressed)[3] == errno.ENOEXEC
+    bench.run(1.0)
+    assert bench.height == pytest.approx(1.0, abs=0.1)
+
+
+def test_stop_drops_the_vehicle(bench):
+    bench.take_off()
+    assert command(bench, "stop") == 0
+    bench.run(1.0)
+    assert bench.height == 0.0
+
+
+def test_groups(bench):
+    assert command(bench, "set_group_mask", 0b10) == 0
+    assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b01) == 0
+    bench.run(1.0)
+    assert bench.height == 0.0
+    assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b11) == 0
+    bench.run(1.0)
+    assert bench.height > 0.3
+
+
+@pytest.mark.parametrize("number", [1, 9])
+def test_other_takeoffs(bench, number):
+    forms = {1: ("<BBff", 0.5, 1.0), 9: ("<BBf?f?f", 0.5, True, 0.0, False, 0.5)}
+    form, *values = forms[number]
+    data = struct.pack(form, number, 0, *values)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, data)[3] == 0
+    bench.run(4.0)
+    assert bench.height == pytest.approx(0.5, abs=0.1)
+    forms = {1: ("<BBff", 2, 0, 0.0, 1.0), 9: ("<BBf?f?f", 10, 0, 0.5, True, 0.0, False, 0.5)}
+    form, *values = forms[number]
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, struct.pack(form, *values))[3] == 0
+    bench.run(2.0)
+    assert bench.height == 0.0
+
+
+@pytest.mark.parametrize(
+    ("data", "error"),
+    [
+        (b"\x63", errno.ENOEXEC),
+        (b"\x07\x00", errno.EINVAL),
+        (struct.pack("<BBff?f", 7, 0, math.nan, 0.0, False, 1.0), errno.EINVAL),
+        (struct.pack("<BBff?f", 7, 0, 1.0, 0.0, False, -1.0), errno.EINVAL),
+    ],
+)
+def test_what_is_no_command(bench, data, error):
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, data)[3] == error
+    bench.run(0.5)
+    assert bench.height == 0.0

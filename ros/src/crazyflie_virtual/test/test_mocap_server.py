@@ -1,0 +1,156 @@
+"""The NatNet server, with the client library as its client."""
+
+import contextlib
+import threading
+
+import pytest
+from natnet import NatNetClient
+
+from crazyflie_virtual.mocap.server import MocapServer
+from crazyflie_virtual.mocap.settings import MocapSettings
+from crazyflie_virtual.server import Server
+from crazyflie_virtual.settings import Settings
+
+LIMIT = 10.0
+
+
+class Watcher:
+    """A client, and the latest of what it hears."""
+
+    def __init__(self, client):
+        self.client = client
+        self.frames = []
+        self.model = None
+        self._heard = threading.Condition()
+        client.on_data_frame_received_event.handlers.append(self._on_frame)
+        client.on_data_description_received_event.handlers.append(self._on_model)
+
+    def _on_frame(self, frame):
+        with self._heard:
+            self.frames.append(frame)
+            self._heard.notify()
+
+    def _on_model(self, model):
+        with self._heard:
+            self.model = model
+            self._heard.notify()
+
+    def wait(self, condition):
+        """Wait until ``condition()`` holds."""
+        with self._heard:
+            assert self._heard.wait_for(condition, LIMIT)
+
+    def wait_for_body(self, condition):
+        """Return a body of a later frame for which ``condition(body)`` holds."""
+        seen = len(self.frames)
+
+        def found():
+            return [b for f in self.frames[seen:] for b in f.rigid_bodies if condition(b)]
+
+        self.wait(found)
+        return found()[0]
+
+
+@pytest.fixture
+def watch():
+    """Return ``watch(**options)``: a motion capture system, and a client that hears it."""
+    with contextlib.ExitStack() as stack:
+
+        def watch(**options):
+            settings = MocapSettings(command_port=0, observer_port=0, **options)
+            server = MocapServer(settings)
+            stack.callback(server.stop)
+            server.start()
+            client = NatNetClient(
+                command_port=server.address[1],
+                use_multicast=settings.multicast,
+                multicast_address=settings.multicast_address,
+                data_port=settings.data_port,
+            )
+            watcher = Watcher(client)
+            client.connect(timeout=LIMIT)
+            stack.callback(client.shutdown)
+            client.run_async()
+            return server, watcher
+
+        yield watch
+
+
+@pytest.fixture
+def vehicle():
+    """Return ``vehicle(server, **options)``, which starts a vehicle that a server sees."""
+    with contextlib.ExitStack() as stack:
+
+        def vehicle(server, **options):
+            settings = Settings(port=0, observer_port=server.observer_port, **options)
+            virtual = Server(settings)
+            stack.callback(virtual.stop)
+            virtual.start()
+            return virtual
+
+        yield vehicle
+
+
+@pytest.mark.parametrize("version", ["2.9", "3.1", "4.1"])
+def test_unicast_client_sees_the_vehicles(watch, vehicle, version):
+    server, watcher = watch(version=version)
+    vehicle(server, body_id=3, body_name="alice", init_x=1.5)
+    vehicle(server, body_id=8, init_y=-2.0)
+    watcher.wait(lambda: watcher.frames and len(watcher.frames[-1].rigid_bodies) == 2)
+    alice, bob = watcher.frames[-1].rigid_bodies
+    assert (alice.id_num, alice.pos, alice.tracking_valid) == (3, (1.5, 0.0, 0.0), True)
+    assert (bob.id_num, bob.pos) == (8, (0.0, -2.0, 0.0))
+    watcher.client.request_modeldef()
+    watcher.wait(lambda: watcher.model is not None)
+    assert [b.name for b in watcher.model.rigid_bodies][0] == "alice"
+    assert str(watcher.client.server_info.nat_net_protocol_version) == f"{version}.0.0"
+
+
+def test_multicast_client_sees_the_vehicles(watch, vehicle):
+    server, watcher = watch(multicast=True, data_port=15411)
+    vehicle(server, body_id=3, init_x=1.5)
+    assert watcher.wait_for_body(lambda b: b.id_num == 3).pos == (1.5, 0.0, 0.0)
+
+
+def test_frames_are_numbered_and_stamped_in_step(watch):
+    _, watcher = watch(rate=200.0)
+    watcher.wait(lambda: len(watcher.frames) >= 40)
+    frames = watcher.frames[:40]
+    numbers = [f.prefix.frame_number for f in frames]
+    assert numbers == sorted(set(numbers))
+    first, last = frames[0], frames[-1]
+    elapsed = last.suffix.timestamp - first.suffix.timestamp
+    # A busy machine may leave out frames; it does not move them.
+    assert elapsed == pytest.approx((numbers[-1] - numbers[0]) / 200.0, abs=1e-6)
+
+
+def test_latency_is_between_exposure_and_dispatch(watch):
+    _, watcher = watch(latency=0.05)
+    watcher.wait(lambda: len(watcher.frames) >= 5)
+    for frame in watcher.frames:
+        suffix = frame.suffix
+        assert suffix.stamp_transmit - suffix.stamp_camera_mid_exposure >= 49_999_000
+
+
+def test_switches(watch, vehicle):
+    server, watcher = watch()
+    vehicle(server, body_id=3)
+    watcher.wait_for_body(lambda b: b.tracking_valid)
+    server.switches.invalid = "3"
+    watcher.wait_for_body(lambda b: not b.tracking_valid)
+    server.switches.invalid = ""
+    watcher.wait_for_body(lambda b: b.tracking_valid)
+
+
+def test_a_vehicle_that_ends_is_no_longer_tracked(watch, vehicle):
+    server, watcher = watch()
+    virtual = vehicle(server, body_id=3)
+    watcher.wait_for_body(lambda b: b.tracking_valid)
+    virtual.stop()
+    watcher.wait_for_body(lambda b: not b.tracking_valid)
+
+
+def test_a_port_that_is_taken(watch):
+    server, _ = watch()
+    with pytest.raises(OSError, match="Address already in use"):
+        MocapServer(MocapSettings(command_port=server.address[1], observer_port=0))

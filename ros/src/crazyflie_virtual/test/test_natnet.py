@@ -1,0 +1,142 @@
+"""Messages of the NatNet server against the client library's parser."""
+
+import math
+import struct
+
+import numpy as np
+import pytest
+from natnet.data_descriptions import DataDescriptions
+from natnet.data_frame import DataFrame
+from natnet.packet_buffer import PacketBuffer
+from natnet.server_info import ServerInfo
+from natnet.version import Version
+from scipy.spatial.transform import Rotation
+
+from crazyflie_virtual.mocap import natnet
+from crazyflie_virtual.mocap.natnet import BodyPose, Encoder, Stamps
+from crazyflie_virtual.mocap.scene import Scene, Switches
+from crazyflie_virtual.observer import Observation
+
+BODIES = [
+    BodyPose(1, "cf1", (1.0, 2.0, 3.0), (0.0, 0.0, 0.6, 0.8), True),
+    BodyPose(9, "cf9", (4.0, 5.0, 6.0), (0.5, 0.5, 0.5, 0.5), False),
+]
+
+
+@pytest.fixture(params=natnet.VERSIONS)
+def version(request):
+    return request.param
+
+
+def read(parser, message, number, version):
+    """Return what the client library makes of a message, all of which it has to use."""
+    assert struct.unpack_from("<HH", message) == (number, len(message) - 4)
+    buffer = PacketBuffer(message[4:])
+    parsed = parser.read_from_buffer(buffer, Version.from_str(version))
+    return parsed, len(message) - 4 - buffer.pointer
+
+
+def test_server_info(version):
+    message = Encoder(version).server_info("somebody", 1511, "239.255.42.99")
+    info, rest = read(ServerInfo, message, natnet.SERVER_INFO, version)
+    assert info.application_name == "somebody"
+    assert str(info.nat_net_protocol_version) == f"{version}.0.0"
+    assert rest == 15
+    tail = struct.unpack("<QHB4B", message[-15:])
+    assert tail == (natnet.CLOCK_FREQUENCY, 1511, 1, 239, 255, 42, 99)
+    unicast = Encoder(version).server_info("somebody", 1511, None)
+    assert unicast[-5:] == bytes(5)
+
+
+def test_model(version):
+    message = Encoder(version).model(BODIES)
+    model, rest = read(DataDescriptions, message, natnet.MODEL, version)
+    assert rest == 0
+    assert [(b.name, b.id_num) for b in model.rigid_bodies] == [("cf1", 1), ("cf9", 9)]
+
+
+def test_frame(version):
+    message = Encoder(version).frame(77, BODIES, Stamps(1.5, 1.6, 1.7))
+    frame, rest = read(DataFrame, message, natnet.FRAME, version)
+    # The end mark, which the library leaves.
+    assert rest == 4
+    assert frame.prefix.frame_number == 77
+    first, second = frame.rigid_bodies
+    assert (first.id_num, first.pos, first.tracking_valid) == (1, (1.0, 2.0, 3.0), True)
+    assert first.rot == pytest.approx((0.0, 0.0, 0.6, 0.8))
+    assert (second.id_num, second.tracking_valid) == (9, False)
+    assert frame.suffix.timestamp == 1.5
+    if version != "2.9":
+        assert frame.suffix.stamp_camera_mid_exposure == 1_500_000_000
+        assert frame.suffix.stamp_transmit == 1_700_000_000
+
+
+def test_echo():
+    message = natnet.echo(struct.pack("<Q", 123), 2.0)
+    assert struct.unpack("<HHQQ", message) == (natnet.ECHO_RESPONSE, 16, 123, 2_000_000_000)
+
+
+# The scene.
+
+
+def observation(time, body_id=1, **changes):
+    fields = {
+        "position": (1.0, 2.0, 3.0),
+        "velocity": (0.0, 0.0, 0.0),
+        "quaternion": (0.0, 0.0, 0.0, 1.0),
+        "rates": (0.0, 0.0, 0.0),
+    }
+    return Observation(body_id, f"cf{body_id}", time, **{**fields, **changes})
+
+
+def test_bodies_go_on_between_observations():
+    scene = Scene(Switches())
+    scene.observe(observation(10.0, velocity=(1.0, -2.0, 0.5), rates=(0.0, 0.0, 2.0)))
+    (body,) = scene.bodies(10.01)
+    np.testing.assert_allclose(body.position, (1.01, 1.98, 3.005))
+    expected = Rotation.from_rotvec((0.0, 0.0, 0.02))
+    assert (expected.inv() * Rotation.from_quat(body.quaternion)).magnitude() < 1e-5
+    assert body.is_tracked
+
+
+def test_a_vehicle_that_is_gone_is_not_tracked():
+    scene = Scene(Switches())
+    scene.observe(observation(10.0))
+    assert scene.bodies(10.4)[0].is_tracked
+    (body,) = scene.bodies(10.6)
+    assert not body.is_tracked
+    assert body.position == (1.0, 2.0, 3.0)
+
+
+def test_invalid_bodies_keep_the_pose_they_were_seen_at():
+    switches = Switches(invalid="2, 5")
+    scene = Scene(switches)
+    scene.observe(observation(10.0, 1))
+    scene.observe(observation(10.0, 2))
+    assert [b.is_tracked for b in scene.bodies(10.0)] == [True, False]
+    switches.invalid = "all"
+    scene.observe(observation(10.1, 1, position=(9.0, 9.0, 9.0)))
+    assert [b.is_tracked for b in scene.bodies(10.1)] == [False, False]
+    assert scene.bodies(10.1)[0].position == (1.0, 2.0, 3.0)
+
+
+def test_dropout_takes_its_share():
+    scene = Scene(Switches(dropout=0.25))
+    tracked = 0
+    for k in range(4000):
+        scene.observe(observation(0.01 * k))
+        tracked += scene.bodies(0.01 * k)[0].is_tracked
+    assert tracked == pytest.approx(3000, abs=150)
+
+
+def test_noise_has_its_deviations():
+    scene = Scene(Switches(), position_noise=0.002, attitude_noise=0.01, seed=3)
+    positions, angles = [], []
+    for k in range(2000):
+        scene.observe(observation(0.01 * k))
+        (body,) = scene.bodies(0.01 * k)
+        positions.append(body.position)
+        angles.append(Rotation.from_quat(body.quaternion).as_rotvec())
+    np.testing.assert_allclose(np.std(positions, axis=0), 0.002, rtol=0.1)
+    np.testing.assert_allclose(np.std(angles, axis=0), 0.01, rtol=0.1)
+    assert all(math.isclose(math.hypot(*b.quaternion), 1.0) for b in scene.bodies(19.99))

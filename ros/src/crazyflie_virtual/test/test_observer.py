@@ -1,0 +1,37 @@
+"""The true pose as a datagram."""
+
+import socket
+import time
+
+from crazyflie_virtual.observer import Observation, decode
+from crazyflie_virtual.server import Server
+from crazyflie_virtual.settings import Settings
+
+LIMIT = 10.0
+
+
+def test_observations_come_back():
+    observation = Observation(
+        7, "ünder", 12.5, (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (0.0, 0.0, 0.6, 0.8), (7.0, 8.0, 9.0)
+    )
+    assert decode(observation.encode()) == observation
+
+
+def test_rubbish_is_no_observation():
+    assert decode(b"") is None
+    assert decode(bytes(200)) is None
+
+
+def test_a_vehicle_tells_its_observer():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as observer:
+        observer.bind(("127.0.0.1", 0))
+        observer.settimeout(LIMIT)
+        port = observer.getsockname()[1]
+        server = Server(Settings(port=0, observer_port=port, body_id=5, init_y=2.0))
+        server.start()
+        try:
+            first, second = (decode(observer.recv(1024)) for _ in range(2))
+        finally:
+            server.stop()
+    assert (first.body_id, first.position) == (5, (0.0, 2.0, 0.0))
+    assert first.time < second.time <= time.monotonic()

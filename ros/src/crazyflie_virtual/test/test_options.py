@@ -1,0 +1,54 @@
+"""Options from a command line."""
+
+import pytest
+
+from crazyflie_virtual.faults import Faults
+from crazyflie_virtual.mocap.settings import MocapSettings
+from crazyflie_virtual.options import parse_arguments
+from crazyflie_virtual.settings import Settings
+
+
+def parse(*arguments, options_class=Settings):
+    return parse_arguments(options_class, arguments, "program", "text")
+
+
+def test_defaults_are_those_of_the_class():
+    assert parse() == Settings()
+    assert parse(options_class=MocapSettings) == MocapSettings()
+    assert Settings().faults() == Faults()
+
+
+def test_all_types():
+    settings = parse(
+        "--port", "19855", "--init-x", "-1.5", "--positioning", "none", "--auto-arm", "false",
+        "--address", "0x2A", "--fault-motor-failure", "2", "--fault-low-battery", "true",
+    )  # fmt: skip
+    assert (settings.port, settings.init_x, settings.positioning) == (19855, -1.5, "none")
+    assert (settings.auto_arm, settings.address) == (False, 0x2A)
+    assert settings.faults() == Faults(low_battery=1, motor_failure=2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("--port", "70000"), "--port: 70000: expected 0 to 65535"),
+        (("--port", "many"), "--port: 'many': expected a number"),
+        (("--init-x", "nan"), "--init-x: nan: expected"),
+        (("--positioning", "gps"), "'gps': expected one of deck, none"),
+        (("--auto-arm", "1"), "'1': expected true or false"),
+        (("--wings", "2"), "unrecognized arguments: --wings 2"),
+    ],
+)
+def test_bad_options_are_named(arguments, text, capsys):
+    with pytest.raises(SystemExit) as exit_info:
+        parse(*arguments)
+    assert exit_info.value.code == 2
+    assert text in capsys.readouterr().err
+
+
+def test_help_tells_every_option(capsys):
+    with pytest.raises(SystemExit):
+        parse("--help")
+    text = capsys.readouterr().out
+    for name in ("--observer-rate", "--fault-silence", "--thrust-error"):
+        assert name in text

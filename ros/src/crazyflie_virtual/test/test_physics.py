@@ -1,0 +1,108 @@
+"""The body of the vehicle."""
+
+import numpy as np
+import pytest
+
+from crazyflie_utils.units import GRAVITY, HOVER_PWM
+from crazyflie_virtual.battery import FULL_VOLTAGE
+from crazyflie_virtual.firmware.sensors import Sensors
+from crazyflie_virtual.physics import STEP, Physics
+
+
+def fly(physics, commands, duration, voltage=FULL_VOLTAGE):
+    for _ in range(round(duration / STEP)):
+        physics.step(commands, voltage)
+
+
+def test_stands_still_and_feels_gravity():
+    physics = Physics((1.0, 2.0, 0.0), yaw=0.5)
+    fly(physics, (0.0,) * 4, 0.5)
+    assert physics.position == (1.0, 2.0, 0.0)
+    assert physics.quaternion == pytest.approx((0.0, 0.0, np.sin(0.25), np.cos(0.25)))
+    assert physics.specific_force == pytest.approx((0.0, 0.0, GRAVITY))
+
+
+@pytest.mark.parametrize(("mass_error", "thrust_error"), [(0.0, 0.0), (0.05, 0.0), (0.0, -0.05)])
+def test_hover_thrust_is_that_of_the_link(mass_error, thrust_error):
+    physics = Physics((0.0, 0.0, 0.0), 0.0, mass_error, thrust_error)
+    hover = HOVER_PWM * (1.0 + mass_error) / (1.0 + thrust_error)
+    fly(physics, (0.99 * hover,) * 4, 1.0)
+    assert physics.position[2] == 0.0
+    assert physics.specific_force[2] == pytest.approx(GRAVITY)
+    # The load goes with the third power of the speed, thrust with the second.
+    assert physics.load == pytest.approx((0.99 * hover / HOVER_PWM) ** 1.5, rel=1e-3)
+    fly(physics, (1.01 * hover,) * 4, 1.0)
+    assert physics.position[2] > 0.02
+    assert physics.specific_force[2] == pytest.approx(1.01 * GRAVITY, rel=3e-3)
+
+
+def test_a_low_battery_limits_the_thrust():
+    full, low = Physics(), Physics()
+    fly(full, (60000.0,) * 4, 0.5, voltage=4.0)
+    fly(low, (60000.0,) * 4, 0.5, voltage=3.0)
+    assert full.specific_force[2] > 1.3 * GRAVITY
+    assert low.specific_force[2] < 1.2 * GRAVITY
+
+
+def test_a_fall_feels_like_nothing_and_ends_on_the_ground():
+    physics = Physics((0.0, 0.0, 0.5))
+    fly(physics, (0.0,) * 4, 0.2)
+    assert physics.specific_force == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
+    fly(physics, (0.0,) * 4, 0.3)
+    assert physics.position[2] == 0.0
+    assert physics.impact_speed == pytest.approx(np.sqrt(2.0 * GRAVITY * 0.5), rel=0.02)
+    assert not physics.is_overturned
+
+
+def test_coming_down_on_the_back():
+    physics = Physics((0.0, 0.0, 3.0))
+    fly(physics, (60000.0, 60000.0, 0.0, 0.0), 0.2)
+    fly(physics, (0.0,) * 4, 0.4)
+    while physics.position[2] > 0.0:
+        physics.step((0.0,) * 4, FULL_VOLTAGE)
+    physics.is_overturned = True
+    fly(physics, (60000.0,) * 4, 0.5)
+    assert physics.position[2] == 0.0
+    assert physics.specific_force == (0.0, 0.0, -GRAVITY)
+    physics.put_upright()
+    fly(physics, (60000.0,) * 4, 0.5)
+    assert physics.position[2] > 0.0
+
+
+def test_sensors_see_what_there_is():
+    sensors = Sensors(noise=False)
+    sensors.sample_inertial((1.0, -2.0, 3.0), (0.0, GRAVITY, -2.0 * GRAVITY))
+    assert (sensors.gyro_x, sensors.gyro_y, sensors.gyro_z) == pytest.approx(
+        np.degrees([1.0, -2.0, 3.0])
+    )
+    assert (sensors.acc_x, sensors.acc_y, sensors.acc_z) == pytest.approx((0.0, 1.0, -2.0))
+    sensors.sample_inertial((100.0, 0.0, 0.0), (0.0, 0.0, 1000.0))
+    assert (sensors.gyro_x, sensors.acc_z) == (2000.0, 24.0)
+
+
+def test_noise_has_its_deviation_and_its_seed():
+    def samples(seed):
+        sensors = Sensors(seed=seed)
+        rows = []
+        for _ in range(3000):
+            sensors.sample_inertial((0.0, 0.0, 0.0), (0.0, 0.0, GRAVITY))
+            rows.append((sensors.gyro_x, sensors.gyro_z, sensors.acc_x, sensors.acc_z - 1.0))
+        return np.array(rows)
+
+    noise = samples(1)
+    np.testing.assert_allclose(noise.std(axis=0), [0.1, 0.1, 0.002, 0.002], rtol=0.1)
+    np.testing.assert_allclose(noise.mean(axis=0), 0.0, atol=0.01)
+    np.testing.assert_array_equal(noise, samples(1))
+    assert (noise != samples(2)).any()
+
+
+def test_barometer_and_magnetometer():
+    sensors = Sensors(noise=False)
+    sensors.sample_slow(100.0, (0.0, 0.0, 0.0, 1.0))
+    # Standard atmosphere at 100 m.
+    assert sensors.pressure == pytest.approx(1001.3, abs=0.3)
+    north = sensors.mag_x
+    half = np.sqrt(0.5)
+    sensors.sample_slow(0.0, (0.0, 0.0, half, half))
+    # The nose to the left of north: north is to the right.
+    assert (sensors.mag_x, sensors.mag_y) == pytest.approx((0.0, -north), abs=1e-12)

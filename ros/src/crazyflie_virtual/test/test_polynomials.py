@@ -1,0 +1,126 @@
+"""Polynomials against their conditions, numpy's derivatives and cflib's memory layout."""
+
+import math
+
+import numpy as np
+import pytest
+from cflib.crazyflie.mem import Poly4D
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.polynomial import Polynomial
+
+from crazyflie_virtual.firmware.polynomials import (
+    PIECE_SIZE,
+    Goal,
+    Piece,
+    Trajectory,
+    smooth_piece,
+    straight_piece,
+)
+
+ZERO = (0.0, 0.0, 0.0)
+NUMBER = st.floats(-3.0, 3.0)
+VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
+DURATION = st.floats(0.5, 5.0)
+
+
+@given(VECTOR, VECTOR, VECTOR, VECTOR, NUMBER, NUMBER, NUMBER, DURATION)
+def test_smooth_piece_meets_all_conditions(p, v, a, end, yaw, yaw_rate, end_yaw, duration):
+    start = Goal(p, v, a, yaw, yaw_rate)
+    piece = smooth_piece(start, end, end_yaw, duration)
+    starts = [*zip(p, v, a, strict=True), (yaw, yaw_rate, 0.0)]
+    ends = [*end, yaw + math.remainder(end_yaw - yaw, 2.0 * math.pi)]
+    for axis, at_start, at_end in zip(piece.axes, starts, ends, strict=True):
+        polynomial = Polynomial(axis)
+        orders = [polynomial.deriv(order) if order else polynomial for order in range(4)]
+        np.testing.assert_allclose([f(0.0) for f in orders], [*at_start, 0.0], atol=1e-9)
+        np.testing.assert_allclose([f(duration) for f in orders], [at_end, 0, 0, 0], atol=1e-6)
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.2, 3.0), DURATION)
+def test_takeoff_is_the_documented_polynomial(s, height, duration):
+    start = Goal(ZERO, ZERO, ZERO, 0.0, 0.0)
+    goal = smooth_piece(start, (0.0, 0.0, height), 0.0, duration).evaluate(s * duration)
+    expected = height * (35 * s**4 - 84 * s**5 + 70 * s**6 - 20 * s**7)
+    assert goal.position[2] == pytest.approx(expected, abs=1e-9)
+
+
+@given(VECTOR, VECTOR, DURATION, st.floats(0.0, 1.0))
+def test_straight_piece_has_constant_speed(p, end, duration, s):
+    start = Goal(p, (1.0, 1.0, 1.0), ZERO, 0.0, 0.0)
+    goal = straight_piece(start, end, 0.5, duration).evaluate(s * duration)
+    np.testing.assert_allclose(goal.position, (1 - s) * np.array(p) + s * np.array(end), atol=1e-9)
+    np.testing.assert_allclose(goal.velocity, (np.array(end) - p) / duration, atol=1e-9)
+    assert goal.yaw_rate == pytest.approx(0.5 / duration)
+
+
+def test_the_turn_is_the_shorter_one():
+    start = Goal(ZERO, ZERO, ZERO, 3.0, 0.0)
+    assert smooth_piece(start, ZERO, -3.0, 1.0).evaluate(1.0).yaw == pytest.approx(2 * math.pi - 3)
+
+
+def random_piece(seed, duration):
+    axes = np.random.default_rng(seed).uniform(-1.0, 1.0, (4, 8))
+    return Piece(tuple(map(tuple, axes.tolist())), duration)
+
+
+def test_evaluation_agrees_with_numpy():
+    piece = random_piece(1, 2.0)
+    goal = piece.evaluate(0.7)
+    for i in range(3):
+        polynomial = Polynomial(piece.axes[i])
+        assert goal.position[i] == pytest.approx(polynomial(0.7))
+        assert goal.velocity[i] == pytest.approx(polynomial.deriv()(0.7))
+        assert goal.acceleration[i] == pytest.approx(polynomial.deriv(2)(0.7))
+    assert goal.yaw_rate == pytest.approx(Polynomial(piece.axes[3]).deriv()(0.7))
+
+
+def test_memory_layout_is_the_clients():
+    piece = random_piece(2, 1.5)
+    uploaded = Poly4D(1.5, *(Poly4D.Poly(list(axis)) for axis in piece.axes)).pack()
+    assert len(uploaded) == PIECE_SIZE
+    assert piece.pack() == bytes(uploaded)
+    np.testing.assert_allclose(Piece.unpack(bytes(uploaded)).axes, piece.axes, rtol=1e-6)
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_pieces_that_are_not_finite_are_refused(bad):
+    data = bytearray(random_piece(3, 1.0).pack())
+    data[:4] = np.float32(bad).tobytes()
+    with pytest.raises(ValueError, match="finite"):
+        Piece.unpack(bytes(data))
+
+
+def line(start, end, duration):
+    """Return a piece from one x to another, with a yaw that does the same."""
+    goal = Goal((start, 0.0, 1.0), ZERO, ZERO, start, 0.0)
+    return straight_piece(goal, (end, 0.0, 1.0), end, duration)
+
+
+def test_trajectory_flies_its_pieces_in_order_and_stays_at_the_end():
+    trajectory = Trajectory((line(0.0, 1.0, 1.0), line(1.0, 3.0, 1.0)))
+    xs = [trajectory.evaluate(t).position[0] for t in (0.0, 0.5, 1.5, 2.0, 9.0)]
+    np.testing.assert_allclose(xs, [0.0, 0.5, 2.0, 3.0, 3.0], atol=1e-12)
+    assert trajectory.evaluate(1.5).velocity[0] == pytest.approx(2.0)
+    assert trajectory.evaluate(9.0).velocity == ZERO
+
+
+def test_trajectory_scaled_and_backwards():
+    trajectory = Trajectory((line(0.0, 1.0, 1.0), line(1.0, 3.0, 1.0)), 2.0, backwards=True)
+    assert trajectory.duration == 4.0
+    goal = trajectory.evaluate(1.0)
+    assert goal.position[0] == pytest.approx(2.0)
+    assert goal.velocity[0] == pytest.approx(-1.0)
+    assert goal.yaw_rate == pytest.approx(-1.0)
+
+
+def test_trajectory_moved_and_turned():
+    trajectory = Trajectory((line(1.0, 2.0, 1.0),))
+    moved = trajectory.moved_to((5.0, 6.0, 7.0), None).evaluate(1.0)
+    np.testing.assert_allclose(moved.position, (6.0, 6.0, 7.0), atol=1e-12)
+    assert moved.yaw == pytest.approx(2.0)
+    # It begins with yaw 1 along x; turned to yaw 1 + pi/2 it goes along y.
+    turned = trajectory.moved_to((5.0, 6.0, 7.0), 1.0 + math.pi / 2.0).evaluate(1.0)
+    np.testing.assert_allclose(turned.position, (5.0, 7.0, 7.0), atol=1e-12)
+    np.testing.assert_allclose(turned.velocity, (0.0, 0.0, 0.0), atol=1e-12)
+    assert turned.yaw == pytest.approx(2.0 + math.pi / 2.0)

@@ -1,0 +1,193 @@
+"""Link, platform, memories, supervisor, localization and console, byte by byte."""
+
+import errno
+import struct
+
+import numpy as np
+import pytest
+from virtual_bench import Bench
+
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.settings import Settings
+from crazyflie_virtual.vehicle import Vehicle
+
+
+@pytest.fixture
+def bench():
+    return Bench()
+
+
+def test_link_echoes_and_says_who_is_there(bench):
+    assert bench.ask_one(Port.LINK, 0, b"hello") == b"hello"
+    assert bench.ask_one(Port.LINK, 1, b"\0") == b"Bitcraze Crazyflie".ljust(30, b"\0")
+    assert bench.ask(Port.LINK, 2, b"gone") == []
+
+
+def test_scan_is_answered(bench):
+    assert [p[:2] for p in bench.ask(Port.LINK, 3, b"")] == [(15, 3)]
+
+
+def test_rubbish_is_not_answered(bench):
+    assert bench.vehicle.receive(b"") == []
+    assert bench.vehicle.receive(bytes(40)) == []
+    assert bench.ask(1, 0, b"\1\2\3") == []
+
+
+def test_versions(bench):
+    assert bench.ask_one(Port.PLATFORM, 1, b"\0") == b"\0" + struct.pack("<i", 12)
+    assert Bench(protocol=8).ask_one(Port.PLATFORM, 1, b"\0") == b"\0" + struct.pack("<i", 8)
+    assert bench.ask_one(Port.PLATFORM, 1, b"\2") == b"\2CF21\0"
+    assert bench.ask(Port.PLATFORM, 1, b"\x63") == []
+
+
+def test_console_waits_for_a_client(bench):
+    assert bench.unsolicited == []
+    bench.ask(Port.LINK, 0, b"")
+    bench.run(0.01)
+    texts = [p for p in bench.unsolicited if p.port == Port.CONSOLE]
+    assert all(len(p.data) <= 30 for p in texts)
+    text = b"".join(p.data for p in texts).decode()
+    assert "Virtual Crazyflie 2.1 is up and running!\n" in text
+
+
+# Memories.
+
+
+def test_list_of_memories(bench):
+    assert bench.ask_one(Port.MEMORY, 0, b"\1") == b"\1\3"
+    details = [bench.ask_one(Port.MEMORY, 0, bytes([2, i])) for i in range(3)]
+    assert [struct.unpack("<BBBI8s", d) for d in details] == [
+        (2, 0, 0x00, 112, bytes(8)),
+        (2, 1, 0x12, 4096, bytes(8)),
+        (2, 2, 0x15, 4096, bytes(8)),
+    ]
+    assert bench.ask_one(Port.MEMORY, 0, b"\2\3") == b"\2\3"
+
+
+def test_memory_keeps_what_is_written(bench):
+    content = bytes(range(24))
+    address = struct.pack("<BI", 1, 4072)
+    assert bench.ask_one(Port.MEMORY, 2, address + content) == address + b"\0"
+    answer = bench.ask_one(Port.MEMORY, 1, struct.pack("<BIB", 1, 4072, 24))
+    assert answer == address + b"\0" + content
+
+
+@pytest.mark.parametrize(
+    ("number", "address", "count", "error"),
+    [(1, 4073, 24, errno.EIO), (1, 0, 25, errno.EIO), (9, 0, 1, errno.ENOENT)],
+)
+def test_memory_errors(bench, number, address, count, error):
+    answer = bench.ask_one(Port.MEMORY, 1, struct.pack("<BIB", number, address, count))
+    assert answer == struct.pack("<BIB", number, address, error)
+    if count <= 24:
+        data = struct.pack("<BI", number, address) + bytes(count)
+        assert bench.ask_one(Port.MEMORY, 2, data)[-1] == error
+
+
+def test_eeprom_has_the_radio_address():
+    bench = Bench(address=0x2A)
+    content = bench.ask_one(Port.MEMORY, 1, struct.pack("<BIB", 0, 0, 21))[6:]
+    assert content[:5] == b"0xBC\x01"
+    high, low = struct.unpack_from("<BI", content, 15)
+    assert (high << 32 | low) == 0xE7E7E7E72A
+    assert content[20] == sum(content[:20]) % 256
+
+
+def test_memory_tester(bench):
+    assert bench.ask_one(Port.MEMORY, 1, struct.pack("<BIB", 2, 250, 10))[6:] == bytes(
+        (250 + i) % 256 for i in range(10)
+    )
+    bench.ask(Port.MEMORY, 2, struct.pack("<BI", 2, 10) + bytes([10, 11, 99, 13]))
+    assert bench.firmware.memory_tester.errors == 1
+    bench.firmware.memory_tester.reset_writes = 1
+    assert bench.firmware.memory_tester.errors == 0
+
+
+# Supervisor.
+
+
+def test_it_can_fly_from_the_first_moment():
+    assert Vehicle(Settings()).board.firmware.supervisor.can_fly
+
+
+def test_supervisor_bits(bench):
+    # Armed, arms itself, can fly; nothing planned is finished.
+    assert bench.ask_one(Port.SUPERVISOR, 0, b"\x0c") == b"\x8c" + struct.pack("<H", 0x20E)
+    assert bench.ask_one(Port.SUPERVISOR, 0, b"\x02") == b"\x82\x01"
+    bench.take_off()
+    (bits,) = struct.unpack("<H", bench.ask_one(Port.SUPERVISOR, 0, b"\x0c")[1:])
+    assert bits == 0x31E
+
+
+def test_arming_by_the_client():
+    bench = Bench(auto_arm=False)
+    assert bench.ask_one(Port.SUPERVISOR, 0, b"\x0c") == b"\x8c" + struct.pack("<H", 0x201)
+    assert bench.ask_one(Port.SUPERVISOR, 1, b"\x01\x01") == b"\x81\x01\x01"
+    bench.run(0.1)
+    # Twice is as good as once.
+    assert bench.ask_one(Port.SUPERVISOR, 1, b"\x01\x01") == b"\x81\x01\x01"
+    bench.take_off()
+    assert bench.ask_one(Port.SUPERVISOR, 1, b"\x01\x00") == b"\x81\x01\x00"
+    bench.run(1.0)
+    assert bench.height == 0.0
+
+
+def test_arming_as_older_clients_do_it():
+    bench = Bench(auto_arm=False)
+    assert bench.ask_one(Port.PLATFORM, 0, b"\x01\x01") == b"\x01\x01\x01"
+    assert bench.ask_one(Port.PLATFORM, 0, b"\x02") == b"\x02\x01\x01"
+
+
+def test_vehicle_that_is_not_armed_does_not_fly():
+    bench = Bench(auto_arm=False)
+    take_off = struct.pack("<BBff?f", 7, 0, 1.0, 0.0, False, 2.0)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, take_off)[3] != 0
+    bench.run(1.0)
+    assert not bench.motors_run
+
+
+# Localization.
+
+
+def test_external_position_and_pose(bench):
+    bench.run(1.0)
+    for _ in range(100):
+        bench.ask(Port.LOCALIZATION, 0, struct.pack("<fff", 1.0, 2.0, 3.0))
+        bench.run(0.01)
+    e = bench.firmware.estimate
+    np.testing.assert_allclose((e.x, e.y, e.z), (1.0, 2.0, 3.0), atol=0.05)
+    half = np.sqrt(0.5)
+    for _ in range(100):
+        bench.ask(Port.LOCALIZATION, 1, struct.pack("<B7f", 8, 3.0, 2.0, 1.0, 0, 0, half, half))
+        bench.run(0.01)
+    np.testing.assert_allclose((e.x, e.y, e.z, e.yaw), (3.0, 2.0, 1.0, 90.0), atol=0.1)
+
+
+def test_packed_positions_and_poses_are_for_those_with_the_address(bench):
+    def x():
+        return round(bench.firmware.localization.x, 3)
+
+    bench.ask(Port.LOCALIZATION, 2, struct.pack("<B3hB3h", 1, 100, 0, 0, 0xE7, 250, 0, 0))
+    assert x() == 0.25
+    pose = struct.pack("<BB3hI", 9, 0xE7, 500, 0, 0, 3 << 30)
+    bench.ask(Port.LOCALIZATION, 1, pose)
+    assert x() == 0.5
+    assert bench.firmware.localization.qw == 1.0
+    bench.ask(Port.LOCALIZATION, 1, struct.pack("<BB3hI", 9, 0x01, 900, 0, 0, 3 << 30))
+    assert x() == 0.5
+
+
+@pytest.mark.parametrize(
+    ("channel", "data"),
+    [
+        (0, struct.pack("<fff", np.nan, 0, 0)),
+        (0, b"\0\0"),
+        (1, struct.pack("<B7f", 8, 0, 0, 0, 0, 0, 0, 0)),
+        (1, struct.pack("<B7f", 8, 0, 0, np.inf, 0, 0, 0, 1)),
+        (1, b"\x08"),
+        (1, b""),
+    ],
+)
+def test_measurements_that_are_none_are_ignored(bench, channel, data):
+    assert bench.ask(Port.LOCALIZATION, channel, data) == []
+    assert bench.firmware.localization.time is None

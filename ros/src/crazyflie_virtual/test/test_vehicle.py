@@ -1,0 +1,285 @@
+"""Whole flights on the bench: watchdogs, emergency stop, faults, restarts."""
+
+import struct
+
+import numpy as np
+import pytest
+from virtual_bench import Bench, attitude, generic
+
+from crazyflie_utils.units import HOVER_PWM
+from crazyflie_virtual.crtp import Port
+from crazyflie_virtual.firmware.power import LOW
+from crazyflie_virtual.firmware.supervisor import State
+
+HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)
+EMERGENCY_STOPS = {
+    "supervisor": (Port.SUPERVISOR, 1, b"\x03"),
+    "localization": (Port.LOCALIZATION, 1, b"\x03"),
+}
+
+
+@pytest.fixture
+def flying():
+    bench = Bench()
+    bench.take_off()
+    return bench
+
+
+def tell_pose(bench, offset=(0.0, 0.0, 0.0)):
+    """Send the true pose, moved by an offset, as an external one."""
+    position = [a + b for a, b in zip(bench.physics.position, offset, strict=True)]
+    data = struct.pack("<B7f", 8, *position, *bench.physics.quaternion)
+    bench.ask(Port.LOCALIZATION, 1, data)
+
+
+def test_hovers_within_a_centimetre(flying):
+    flying.run(15.0)
+    heights = []
+    for _ in range(50):
+        flying.run(0.1)
+        heights.append(flying.physics.position)
+    np.testing.assert_allclose(heights, [(0.0, 0.0, 1.0)] * 50, atol=0.01)
+
+
+@pytest.mark.parametrize("options", [{"mass_error": 0.05}, {"thrust_error": -0.05}])
+def test_hovers_though_it_is_not_nominal(options):
+    bench = Bench(**options)
+    bench.take_off()
+    bench.run(15.0)
+    assert bench.height == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("yaw", [0.0, 1.0, -2.5])
+def test_flies_to_positions_with_any_heading(yaw):
+    bench = Bench(init_x=0.5, init_y=-0.5, init_yaw=yaw)
+    degrees = np.degrees(yaw)
+    bench.stream(generic(7, "ffff", 0.5, -0.5, 1.0, degrees), 4.0)
+    bench.stream(generic(7, "ffff", 1.0, 0.0, 1.0, degrees), 5.0)
+    assert bench.physics.position == pytest.approx((1.0, 0.0, 1.0), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("tilt", "axis", "sign"),
+    [
+        ({"roll": 5.0}, 1, -1.0),
+        # On the wire the pitch is nose up: cflib has turned it round.
+        ({"pitch": -5.0}, 0, 1.0),
+    ],
+)
+def test_attitude_setpoints_accelerate_to_the_right_side(flying, tilt, axis, sign):
+    flying.unlock()
+    flying.stream(attitude(thrust=int(HOVER_PWM), **tilt), 0.6)
+    assert sign * flying.physics.velocity[axis] > 0.2
+    assert abs(flying.physics.velocity[1 - axis]) < 0.05
+
+
+def test_positive_yaw_rate_on_the_attitude_port_is_clockwise(flying):
+    flying.unlock()
+    flying.stream(attitude(yaw_rate=30.0, thrust=int(HOVER_PWM)), 0.6)
+    assert flying.firmware.estimate.yaw < -10.0
+
+
+@pytest.mark.parametrize(("kind", "sign"), [(10, 1.0), (5, -1.0)])
+def test_yaw_rate_of_hover_setpoints(flying, kind, sign):
+    flying.stream(generic(kind, "ffff", 0.0, 0.0, 30.0, 1.0), 1.0)
+    assert sign * flying.firmware.estimate.yaw == pytest.approx(28.0, abs=5.0)
+    assert flying.physics.rates[2] * sign == pytest.approx(np.radians(30.0), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("packet", "velocity"),
+    [
+        (generic(8, "ffff", 0.3, -0.2, 0.1, 0.0), (0.3, -0.2, 0.1)),
+        (generic(10, "ffff", 0.3, -0.2, 0.0, 1.0), (0.3, -0.2, 0.0)),
+        (generic(1, "ffff", 0.3, -0.2, 0.1, 0.0), (0.3, -0.2, 0.1)),
+    ],
+)
+def test_velocity_setpoints(flying, packet, velocity):
+    flying.stream(packet, 4.0)
+    assert flying.physics.velocity == pytest.approx(velocity, abs=0.06)
+
+
+def test_z_distance_setpoint(flying):
+    flying.stream(generic(9, "ffff", 0.0, -3.0, 0.0, 0.6), 3.0)
+    assert flying.height == pytest.approx(0.6, abs=0.1)
+    assert flying.physics.velocity[0] > 0.5
+
+
+def test_without_setpoints_it_levels_out_and_then_falls(flying):
+    flying.unlock()
+    flying.stream(HOLD, 1.0)
+    flying.stream(attitude(roll=10.0, thrust=int(1.02 * HOVER_PWM)), 0.3)
+    flying.run(0.46)
+    assert flying.firmware.supervisor.state is State.FLYING
+    assert flying.firmware.estimate.roll == pytest.approx(10.0, abs=3.0)
+    flying.run(0.4)
+    assert flying.firmware.supervisor.state is State.LEVELLING
+    assert flying.firmware.estimate.roll == pytest.approx(0.0, abs=3.0)
+    assert flying.motors_run
+    flying.run(1.0)
+    assert flying.motors_run
+    flying.run(0.3)
+    assert flying.firmware.supervisor.state is State.LOCKED
+    assert not flying.motors_run
+    flying.run(3.0)
+    assert flying.height == 0.0
+    # Nothing moves it until it is restarted.
+    flying.stream(HOLD, 0.5)
+    assert not flying.motors_run
+
+
+def test_a_setpoint_in_time_ends_the_levelling(flying):
+    flying.stream(HOLD, 1.0)
+    flying.run(1.5)
+    assert flying.firmware.supervisor.state is State.LEVELLING
+    flying.stream(HOLD, 1.0)
+    assert flying.firmware.supervisor.state is State.FLYING
+    assert flying.height > 0.5
+
+
+def test_the_high_level_commander_has_no_watchdog(flying):
+    flying.run(20.0)
+    assert flying.firmware.supervisor.state is State.FLYING
+    assert flying.height == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("way", EMERGENCY_STOPS)
+def test_emergency_stop(flying, way):
+    flying.ask(*EMERGENCY_STOPS[way])
+    flying.run(0.05)
+    assert not flying.motors_run
+    flying.run(1.0)
+    assert flying.height == 0.0
+    take_off = struct.pack("<BBff?f", 7, 0, 1.0, 0.0, False, 2.0)
+    assert flying.ask_one(Port.HIGH_LEVEL, 0, take_off)[3] != 0
+    (bits,) = struct.unpack("<H", flying.ask_one(Port.SUPERVISOR, 0, b"\x0c")[1:])
+    assert bits & 0x40
+
+
+@pytest.mark.parametrize("packet", [(Port.SUPERVISOR, 1, b"\x04"), (Port.LOCALIZATION, 1, b"\x04")])
+def test_emergency_watchdog(flying, packet):
+    for _ in range(5):
+        flying.ask(*packet)
+        flying.run(0.8)
+    assert flying.motors_run
+    flying.run(0.3)
+    assert not flying.motors_run
+
+
+def test_restart_ends_the_locked_state(flying):
+    flying.ask(*EMERGENCY_STOPS["supervisor"])
+    flying.run(2.0)
+    assert len(flying.ask(Port.LINK, 3, b"\xfe\x02")) == 1
+    assert flying.ask(Port.LINK, 0, b"ping") == []
+    flying.run(0.5)
+    assert len(flying.ask(Port.LINK, 3, b"\xfe\x03")) == 1
+    flying.run(0.2)
+    assert flying.ask_one(Port.LINK, 0, b"ping") == b"ping"
+    flying.take_off()
+
+
+def test_reset_restarts_at_once(flying):
+    begin = flying.firmware
+    flying.ask(Port.LINK, 3, b"\xfe\xff")
+    flying.ask(Port.LINK, 3, b"\xfe\xf0\x01")
+    assert flying.firmware is not begin
+    flying.run(2.0)
+    assert flying.height == 0.0
+
+
+def test_switched_off_it_says_nothing_any_more(flying):
+    assert len(flying.ask(Port.LINK, 3, b"\xfe\x01")) == 1
+    assert flying.ask(Port.LINK, 3, b"\xfe\x03") == []
+
+
+# The estimate.
+
+
+def test_external_poses_come_before_the_deck(flying):
+    for _ in range(500):
+        # The motion capture's origin is elsewhere.
+        tell_pose(flying, (0.5, 0.0, 0.0))
+        flying.run(0.01)
+    assert flying.physics.position[0] == pytest.approx(-0.5, abs=0.05)
+    # And when they stop, the deck takes over.
+    flying.run(6.0)
+    assert flying.physics.position[0] == pytest.approx(0.0, abs=0.05)
+
+
+def test_without_deck_it_flies_on_external_poses():
+    bench = Bench(positioning="none", init_x=0.3)
+    for k in range(1000):
+        tell_pose(bench)
+        if k == 50:
+            bench.ask(Port.HIGH_LEVEL, 0, struct.pack("<BBff?f", 7, 0, 1.0, 0.0, False, 2.0))
+        bench.run(0.01)
+    assert bench.physics.position == pytest.approx((0.3, 0.0, 1.0), abs=0.05)
+
+
+def test_without_deck_and_poses_the_estimate_drifts_away():
+    bench = Bench(positioning="none", init_x=0.3)
+    for _ in range(200):
+        tell_pose(bench)
+        bench.run(0.01)
+    bench.take_off()
+    for _ in range(100):
+        tell_pose(bench)
+        bench.run(0.01)
+    bench.run(30.0)
+    estimate = bench.firmware.estimate
+    error = np.subtract((estimate.x, estimate.y, estimate.z), bench.physics.position)
+    assert np.linalg.norm(error) > 0.05
+
+
+def test_estimator_can_be_reset(flying):
+    variance = flying.firmware.estimator.variance_position
+    flying.firmware.localization.has_deck = False
+    flying.firmware.reset_estimation = 1
+    flying.run(0.02)
+    assert flying.firmware.reset_estimation == 0
+    assert flying.firmware.estimator.variance_position > 1e3 * variance
+
+
+# Faults.
+
+
+def test_motor_failure_ends_the_flight(flying):
+    flying.vehicle.faults.motor_failure = 2
+    flying.run(3.0)
+    assert flying.height == 0.0
+    assert flying.physics.impact_speed > 0.5
+
+
+def test_low_battery_is_reported_and_ends_the_flight(flying):
+    flying.vehicle.faults.low_battery = 1
+    flying.run(6.0)
+    assert flying.firmware.power.state == LOW
+    assert 3.0 < flying.firmware.power.voltage < 3.2
+    assert flying.height > 0.8
+    for _ in range(60):
+        flying.run(1.0)
+        if flying.vehicle.board is None:
+            break
+    # Exhausted, it has turned itself off.
+    assert flying.vehicle.board is None
+    assert flying.ask(Port.LINK, 3, b"") == []
+    flying.run(2.0)
+    assert flying.height == 0.0
+
+
+def test_battery_drains_in_flight(flying):
+    charge = flying.vehicle.battery.charge
+    flying.run(30.0)
+    assert 0.05 < charge - flying.vehicle.battery.charge < 0.1
+
+
+def test_the_same_seed_gives_the_same_flight_however_often_it_is_asked():
+    def flight(periods, seed):
+        bench = Bench(seed=seed)
+        bench.ask(Port.HIGH_LEVEL, 0, struct.pack("<BBff?f", 7, 0, 1.0, 0.0, False, 2.0))
+        for period in periods:
+            bench.run(period)
+        return bench.physics.position
+
+    assert flight([2.0], 1) == flight([0.01] * 200, 1)
+    assert flight([2.0], 1) != flight([2.0], 2)

@@ -1,0 +1,82 @@
+"""A cflib program, every wait of which has a limit."""
+
+import threading
+import time
+
+import cflib.crtp
+from cflib.crazyflie import Crazyflie
+from cflib.crazyflie.log import LogConfig
+
+LIMIT = 10.0
+
+
+class Client:
+    """A cflib client, and what it was told."""
+
+    def __init__(self, uri, cache=None):
+        cflib.crtp.init_drivers()
+        self.uri = uri
+        self.cf = Crazyflie(rw_cache=cache)
+        self.events = {}
+        self.text = ""
+        self._told = threading.Condition()
+        callbacks = ("connected", "fully_connected", "connection_failed", "connection_lost")
+        for name in callbacks:
+            getattr(self.cf, name).add_callback(lambda *a, name=name: self._tell(name, a))
+        self.cf.console.receivedChar.add_callback(self._print)
+
+    def _tell(self, name, arguments):
+        with self._told:
+            self.events[name] = arguments
+            self._told.notify()
+
+    def _print(self, text):
+        self.text += text
+
+    def open(self):
+        """Begin to connect."""
+        self.cf.open_link(self.uri)
+        return self
+
+    def close(self):
+        """Hang up."""
+        self.cf.close_link()
+
+    def wait_for(self, event):
+        """Wait until cflib has called back; return the arguments."""
+        with self._told:
+            assert self._told.wait_for(lambda: event in self.events, LIMIT), self.events
+        return self.events[event]
+
+    def log(self, *variables, period=10):
+        """Log variables; return the list of (timestamp, values) that grows."""
+        config = LogConfig(variables[0], period)
+        for variable in variables:
+            config.add_variable(variable)
+        rows = []
+        config.data_received_cb.add_callback(lambda stamp, data, _: rows.append((stamp, data)))
+        self.cf.log.add_config(config)
+        config.start()
+        return rows
+
+    def set(self, name, value):
+        """Set a parameter and wait until the vehicle has confirmed it."""
+        told = threading.Event()
+        group, parameter = name.split(".")
+
+        def confirm(_, confirmed):
+            if float(confirmed) == value:
+                told.set()
+
+        self.cf.param.add_update_callback(group, parameter, confirm)
+        self.cf.param.set_value(name, value)
+        assert told.wait(LIMIT), f"{name} was not set"
+        self.cf.param.remove_update_callback(group, parameter, confirm)
+
+
+def wait_until(condition):
+    """Wait until ``condition()`` holds."""
+    end = time.monotonic() + LIMIT
+    while not condition():
+        assert time.monotonic() < end, "nothing happened"
+        time.sleep(0.005)

@@ -1,9 +1,13 @@
 """The controller on a fake process: parameters in a dictionary, no ROS."""
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from crazyflie_lqr import design_command
+from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,
@@ -60,4 +64,12 @@ def test_a_bad_parameter_is_named(parameters):
     bad = {**parameters, "max_tilt": 0}
     assert not process.launch(MyControllerNode(), "/lqr_controller", bad)
     expected = "parameter /lqr_controller/max_tilt is 0; expected a finite number > 0 (rad)"
-    assert process.logged("error") == [expected]
+    assert process.logged("error") == [f"/lqr_controller: {expected}"]
+
+
+def test_gains_are_those_of_the_command_in_their_header(tmp_path):
+    [command] = re.findall("^# design_gains (.*)", K_FILE.read_text(), re.MULTILINE)
+    designed = tmp_path / "K.txt"
+    assert design_command.main([*command.split(), "--out", str(designed)]) == 0
+    expected = load_matrix(str(designed), 4, 7)
+    np.testing.assert_allclose(load_matrix(str(K_FILE), 4, 7), expected, atol=1e-9)

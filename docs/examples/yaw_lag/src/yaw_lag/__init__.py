@@ -1,0 +1,1 @@
+"""A vehicle whose yaw rate lags behind its command."""

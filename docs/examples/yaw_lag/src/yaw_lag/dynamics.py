@@ -1,0 +1,36 @@
+"""Near-hover dynamics with a yaw rate that follows its command with a first-order lag.
+
+State x = (x, y, z, x_dot, y_dot, z_dot, yaw, yaw_dot) in the fixed frame, m, m/s,
+rad and rad/s; control as everywhere: roll, pitch, yaw_dot, thrust.
+"""
+
+from crazyflie_simulator.dynamics import Dynamics, NearHover
+
+
+class YawLag(Dynamics):
+    """Near hover, and yaw_ddot = (commanded yaw_dot - yaw_dot) / time_constant (s)."""
+
+    x_dim = 8
+
+    def __init__(self, time_constant: float):
+        self._time_constant = time_constant
+        self._near_hover = NearHover()
+
+    def initial_state(self, position) -> list:
+        """See `Dynamics.initial_state`; yaw is 0."""
+        return [*self._near_hover.initial_state(position), 0.0]
+
+    def rates(self, t: float, x: list, u: list) -> list:
+        """See `Dynamics.rates`."""
+        *others, yaw_dot = x
+        roll, pitch, commanded, thrust = u
+        rates = self._near_hover.rates(t, others, [roll, pitch, yaw_dot, thrust])
+        return [*rates, (commanded - yaw_dot) / self._time_constant]
+
+    def on_ground(self, x: list) -> list:
+        """See `Dynamics.on_ground`."""
+        return [*self._near_hover.on_ground(x[:7]), x[7]]
+
+    def pose(self, x: list, u: list) -> tuple:
+        """See `Dynamics.pose`: roll and pitch are those of the control."""
+        return self._near_hover.pose(x[:7], u)

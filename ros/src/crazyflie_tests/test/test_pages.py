@@ -1,0 +1,142 @@
+"""The manual agrees with the workspace: commands, code, links, tables."""
+
+import re
+from xml.etree import ElementTree
+
+import pytest
+from catkin_pkg.packages import find_package_paths
+from pages import PACKAGE_PAGES, PAGES, Block, Page
+from workspaces import TOP
+
+COMMANDS = {"./run", "apt", "catkin_make", "git", "pip", "python3", "source", "sudo"}
+ROS_COMMAND = re.compile(r"ros(launch|run|service|topic|param|node|msg|bag|test|pack|core)")
+CODE_SPAN = re.compile(r"`([^`]+)`")
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+
+
+def named(paths):
+    """Return a parametrization by the names of pages."""
+    return pytest.mark.parametrize("path", paths, ids=lambda path: str(path.relative_to(TOP)))
+
+
+def is_command(text):
+    """Tell whether text is a command and not only the name of a program."""
+    program, _, arguments = text.strip().partition(" ")
+    return bool(arguments) and (program in COMMANDS or ROS_COMMAND.fullmatch(program) is not None)
+
+
+def is_in(excerpt, source):
+    """Tell whether lines stand together in a file, but for indentation and empty lines."""
+    excerpt, source = ([line for line in lines if line.strip()] for lines in (excerpt, source))
+    for start in range(len(source) - len(excerpt) + 1):
+        indentation = source[start].partition(excerpt[0])[0]
+        if not indentation.strip() and source[start : start + len(excerpt)] == [
+            indentation + line for line in excerpt
+        ]:
+            return True
+    return False
+
+
+@named(PAGES)
+def test_every_command_is_run_or_says_why_not(path):
+    page = Page(path)
+    assert page.indented == [], "lines of code that are not fenced"
+    for block in page.blocks:
+        where = f"{path.name}, line {block.line}"
+        assert block.language, f"{where}: name the language"
+        if block.language == "sh":
+            assert re.match("run$|run: until /", block.comment) or block.excuse, where
+        else:
+            commands = [line for line in block.lines if is_command(line)]
+            assert commands == [], f"{where}: commands belong into a block of the language sh"
+
+
+@pytest.fixture(scope="module")
+def commands():
+    """Return the commands in the blocks of all pages."""
+    blocks = [block for path in PAGES for block in Page(path).blocks if block.language == "sh"]
+    return {command for block in blocks for command in block.commands}
+
+
+@named(PAGES)
+def test_a_command_in_a_sentence_stands_in_a_block_as_well(path, commands):
+    spans = CODE_SPAN.findall("\n".join(Page(path).prose))
+    assert {span for span in spans if is_command(span)} <= commands
+
+
+@named(PAGES)
+def test_code_stands_so_in_its_file(path):
+    for block in Page(path).blocks:
+        where = f"{path.name}, line {block.line}"
+        if block.comment.startswith("from: "):
+            source = (TOP / block.comment.removeprefix("from: ")).read_text()
+            assert is_in(block.lines, source.splitlines()), where
+        else:
+            assert block.language in ("sh", "text"), f"{where}: say from which file the code is"
+
+
+@named([*PAGES, *PACKAGE_PAGES])
+def test_links_lead_somewhere(path):
+    page = Page(path)
+    prose = CODE_SPAN.sub("", "\n".join(page.prose))
+    for link in LINK.findall(prose):
+        if re.match("[a-z]+:", link):
+            continue
+        target, _, anchor = link.partition("#")
+        file = (path.parent / target).resolve() if target else path
+        assert file.exists(), link
+        if anchor:
+            assert anchor in Page(file).headings, link
+
+
+@named(PAGES)
+def test_comments_are_understood(path):
+    page = Page(path)
+    known = "run$|run: until /[a-z_/]+$|end$|every shell: |from: |arguments of: "
+    for part in page.parts:
+        assert not isinstance(part, str) or re.match(known, part), part
+    for comment, follower in zip(page.parts, page.parts[1:], strict=False):
+        if isinstance(comment, str) and comment.startswith(("run", "from: ")):
+            assert isinstance(follower, Block), f"{comment}: there is no block below"
+            assert follower.comment == comment
+
+
+TABLES = [
+    (path, table)
+    for path in [*PAGES, *PACKAGE_PAGES]
+    for table in Page(path).tables
+    if table.comment.startswith("arguments of: ")
+]
+
+
+@pytest.mark.parametrize(("path", "table"), TABLES, ids=lambda part: getattr(part, "name", ""))
+def test_tables_of_arguments_agree_with_the_launch_file(path, table):
+    file = TOP / table.comment.removeprefix("arguments of: ")
+    arguments = ElementTree.parse(file).getroot().findall("arg")
+    expected = {
+        arg.get("name"): arg.get("default") for arg in arguments if arg.get("value") is None
+    }
+    documented = {name.strip("`"): default.strip("`") for name, default, *_ in table.rows[1:]}
+    for name, default in expected.items():
+        # A formula is described in words.
+        if default is not None and default.startswith("$(eval") and documented.get(name):
+            expected[name] = documented[name]
+    assert documented == expected
+
+
+def test_the_launch_file_of_the_software_example_has_its_table():
+    files = [table.comment for _, table in TABLES]
+    assert "arguments of: ros/src/crazyflie_examples/launch/sw_hover.launch" in files
+
+
+@pytest.mark.parametrize("path", find_package_paths(str(TOP / "ros" / "src")))
+def test_every_package_is_named(path):
+    readme = Page(TOP / "README.md")
+    assert f"`{path}`" in {row[0] for table in readme.tables for row in table.rows}
+    tree = Page(TOP / "docs" / "organisation.md").blocks[0].text
+    assert re.search(rf"^ +{path.rpartition('/')[2]}\b", tree, re.MULTILINE)
+
+
+def test_every_page_is_in_the_table_of_contents():
+    contents = LINK.findall((TOP / "docs" / "README.md").read_text())
+    assert {path.name for path in PAGES} - {"README.md"} <= set(contents)

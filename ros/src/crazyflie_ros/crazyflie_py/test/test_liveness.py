@@ -49,18 +49,28 @@ def test_quality_is_the_share_of_answered_pings():
     liveness = Liveness(0.0)
     assert liveness.quality() == 1.0
     for k in range(100):
-        liveness.ping_sent()
+        liveness.ping_sent(bytes([k]))
         if k % 4:
-            liveness.ping_answered(0.1 * k)
+            liveness.ping_answered(bytes([k]), 0.1 * k)
     assert liveness.quality() == pytest.approx(0.75, abs=0.05)
 
 
 def test_an_answer_under_way_is_not_lost():
     liveness = Liveness(0.0)
-    liveness.ping_sent()
+    liveness.ping_sent(b"1")
     assert liveness.quality() == 1.0
-    liveness.ping_answered(0.0)
-    liveness.ping_sent()
+    liveness.ping_answered(b"1", 0.0)
+    liveness.ping_sent(b"2")
     assert liveness.quality() == 1.0
-    liveness.ping_sent()
+    liveness.ping_sent(b"3")
     assert liveness.quality() == 0.5
+    liveness.ping_answered(b"2", 0.0)
+    assert liveness.quality() == 1.0
+
+
+def test_an_answer_may_be_heard_before_the_ping_is_noted():
+    liveness = Liveness(0.0)
+    for content in (b"1", b"2", b"3"):
+        liveness.ping_answered(content, 0.0)
+        liveness.ping_sent(content)
+    assert liveness.quality() == 1.0

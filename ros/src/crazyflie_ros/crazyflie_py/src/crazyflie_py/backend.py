@@ -18,6 +18,9 @@ _init_lock = threading.Lock()
 _LINK_SOURCE_CHANNEL = 1
 _UDP_RECEIVE_LIMIT = 0.1
 
+_JOIN_LIMIT = 0.3
+"""How long, in s, the end of a link waits for a callback that is at work."""
+
 # cflib logs what it also reports, with tracebacks; we report it in other words.
 if logging.getLogger("cflib").level == logging.NOTSET:
     logging.getLogger("cflib").setLevel(logging.CRITICAL)
@@ -104,7 +107,7 @@ class Backend(CflibCrazyflie):
             if link is not None:
                 _wake_receiver(link)
             if self.incoming.is_alive() and not self.is_called_by_incoming_handler_thread():
-                self.incoming.join(timeout=1.0)
+                self.incoming.join(timeout=_JOIN_LIMIT)
             self.link = None
             if link is not None:
                 link.close()

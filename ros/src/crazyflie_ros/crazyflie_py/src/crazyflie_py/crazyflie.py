@@ -23,6 +23,8 @@ from crazyflie_py.trajectory import Trajectories
 CHECK_PERIOD = 0.1
 """How often the link is looked at, s."""
 
+_JOIN_LIMIT = 0.3
+
 FIRST_PAUSE, LONGEST_PAUSE = 0.5, 10.0
 """Pause before the first attempt to connect again, and the longest one, s; each is
 twice the one before."""
@@ -218,7 +220,7 @@ class Crazyflie:
         self._drop("the link was closed")
         watcher = self._watcher
         if watcher is not None and watcher is not threading.current_thread():
-            watcher.join(timeout=2.0)
+            watcher.join(timeout=_JOIN_LIMIT)
         self._set_state(LinkState.DISCONNECTED, "the link was closed")
 
     # The link and its end.

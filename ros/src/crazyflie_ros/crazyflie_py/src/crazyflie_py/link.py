@@ -278,7 +278,7 @@ class Link:
             if (port, channel) == (CRTPPort.LOGGING, _LOG_DATA_CHANNEL):
                 self.liveness.heard(now)
             elif (port, channel) == (CRTPPort.LINKCTRL, _PING_CHANNEL):
-                self.liveness.ping_answered(now)
+                self.liveness.ping_answered(data, now)
         self._exchange.hear(port, channel, data)
         if self._on_packet is not None:
             try:
@@ -291,4 +291,4 @@ class Link:
             CRTPPort.LINKCTRL,
             _PING_CHANNEL,
         ):
-            self.liveness.ping_sent()
+            self.liveness.ping_sent(bytes(sent.data))

@@ -6,7 +6,6 @@ when neither a log packet nor the answer to a ping has come for a while.
 """
 
 import threading
-from collections import deque
 
 LOST_AFTER = 0.5
 """Age of the last sign of life, in s, at which a link is lost: the firmware, too,
@@ -34,25 +33,25 @@ class Liveness:
         self._heard = now
         self._checked = now
         self._lock = threading.Lock()
-        self._pings = deque(maxlen=_WINDOW)
+        self._pings = {}
 
     def heard(self, now: float) -> None:
         """Take note of a sign of life."""
         self._heard = now
 
-    def ping_sent(self) -> None:
+    def ping_sent(self, content: bytes) -> None:
         """Take note of a ping that was sent."""
         with self._lock:
-            self._pings.append(False)
+            # The thread that hears answers may be faster than the one that has sent.
+            self._pings.setdefault(content, False)
+            while len(self._pings) > _WINDOW:
+                del self._pings[next(iter(self._pings))]
 
-    def ping_answered(self, now: float) -> None:
-        """Take note of an answer: it counts for the latest ping without one."""
+    def ping_answered(self, content: bytes, now: float) -> None:
+        """Take note of the answer to a ping, which is its echo."""
         self.heard(now)
         with self._lock:
-            for index in range(len(self._pings) - 1, -1, -1):
-                if not self._pings[index]:
-                    self._pings[index] = True
-                    return
+            self._pings[content] = True
 
     def age(self, now: float) -> float:
         """Return the age of the last sign of life, s."""
@@ -64,7 +63,7 @@ class Liveness:
         The very latest is left out: its answer may be under way.
         """
         with self._lock:
-            pings = list(self._pings)[:-1]
+            pings = list(self._pings.values())[:-1]
         return sum(pings) / len(pings) if pings else 1.0
 
     def is_lost(self, now: float) -> bool:

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from cflib.crazyflie.log import LogConfig, LogTocElement
+from cflib.utils.encoding import decompress_quaternion
 
 from crazyflie_py.errors import (
     CrazyflieError,
@@ -20,6 +21,14 @@ SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS = 10, 2540
 
 MOST_BYTES = 26
 """Bytes of values that fit in a log packet."""
+
+
+def quaternion_from_compressed(number: int) -> tuple:
+    """Return the unit quaternion (x, y, z, w) of the log variable stateEstimateZ.quat.
+
+    It has 32 bits: which component is largest, and the three others with 10 bits each.
+    """
+    return tuple(map(float, decompress_quaternion(int(number))))
 
 
 @dataclass(frozen=True)

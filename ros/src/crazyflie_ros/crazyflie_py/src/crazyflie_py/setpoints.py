@@ -97,7 +97,7 @@ class Setpoints:
         """Stop the motors."""
         self._stream(lambda c: c.send_stop_setpoint())
 
-    def zeros(self, count: int = ZEROS, period: float = 0.002) -> None:
+    def zeros(self, count: int = ZEROS, period: float = 0.001) -> None:
         """Send zero thrust ``count`` times, every ``period`` seconds; blocks until they are sent.
 
         It opens the firmware's thrust lock, and stops a vehicle that flies on setpoints.

@@ -1,0 +1,1 @@
+"""ROS driver for Crazyflies."""

@@ -1,0 +1,80 @@
+"""Firmware parameters as ROS parameters, PREFIX/GROUP/NAME."""
+
+from crazyflie_py.errors import CrazyflieError
+from crazyflie_utils import ParameterError, ServiceError
+
+_XMLRPC_INTEGERS = range(-(2**31), 2**31)
+
+
+class FirmwareParameters:
+    """Copy parameters from the vehicle to ROS, and back on demand; all methods block.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    prefix : str
+        Namespace of the vehicle.
+    vehicle : crazyflie_py.Crazyflie
+    """
+
+    def __init__(self, handle, prefix: str, vehicle):
+        self._handle = handle
+        self._prefix = prefix
+        self._vehicle = vehicle
+
+    def publish(self) -> int:
+        """Set the ROS parameters to the firmware's values; return how many there are."""
+        groups = {}
+        values = self._vehicle.parameters.values()
+        for name, value in values.items():
+            group, _, parameter = name.partition(".")
+            groups.setdefault(group, {})[parameter] = _portable(value)
+        # Group by group: all in one would take everything else below the prefix away.
+        for group, parameters in groups.items():
+            self._handle.set_param(f"{self._prefix}/{group}", parameters)
+        return len(values)
+
+    def write(self, names: list) -> None:
+        """Write parameters, named GROUP/NAME, with the values of the ROS parameters.
+
+        All are tried; the ROS parameters are then what the firmware has confirmed.
+
+        Raises
+        ------
+        ServiceError
+            With the text of every one that could not be written.
+        """
+        problems = []
+        for name in names:
+            try:
+                self._write(name)
+            except (CrazyflieError, ParameterError) as error:
+                problems.append(str(error))
+        if problems:
+            raise ServiceError("; ".join(problems))
+
+    def _write(self, name):
+        group, _, parameter = name.strip("/").replace(".", "/").partition("/")
+        if not group or not parameter:
+            raise ParameterError(f"{name!r} is no firmware parameter; expected GROUP/NAME")
+        full_name = f"{self._prefix}/{group}/{parameter}"
+        value = self._handle.param(full_name, _Value())
+        confirmed = self._vehicle.parameters.write(f"{group}.{parameter}", value)
+        self._handle.set_param(full_name, _portable(confirmed))
+
+
+class _Value:
+    """A number, or a truth value for a switch."""
+
+    def __call__(self, value):
+        if not isinstance(value, (bool, int, float)):
+            raise ValueError
+        return value
+
+    def __str__(self):
+        return "a number"
+
+
+def _portable(value):
+    # XML-RPC, and so ROS, knows integers of 32 bits only.
+    return float(value) if isinstance(value, int) and value not in _XMLRPC_INTEGERS else value

@@ -1,0 +1,149 @@
+"""Publish what a vehicle sends by itself."""
+
+import genpy
+from std_msgs.msg import Float32, Header
+
+from crazyflie_driver import telemetry
+from crazyflie_driver.msg import GenericLogData, crtpPacket
+from crazyflie_py.log import LogBlock
+from crazyflie_py.supervisor import SupervisorState
+
+STATUS_PERIOD_MS = 500
+"""Period of the log block that the diagnostics rest on, ms."""
+
+_MOST_DATA = 30
+_OWN_PORTS = frozenset({(0, 0), (5, 2), (15, 0), (15, 1), (15, 2), (15, 3)})
+"""Ports and channels of console, log data and pings, which are no packets for users."""
+
+
+class LogTopics:
+    """Have a vehicle send log blocks and publish them.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    options : VehicleOptions
+    vehicle : crazyflie_py.Crazyflie
+    fixed_frame : str
+        Frame of the pose.
+
+    Attributes
+    ----------
+    voltage, rssi : float or None
+        Latest values of the battery (V) and the vehicle's reception (-dBm).
+    supervisor : SupervisorState or None
+        Latest state.
+    """
+
+    def __init__(self, handle, options, vehicle, fixed_frame: str):
+        self.voltage = None
+        self.rssi = None
+        self.supervisor = None
+        self._handle = handle
+        self._options = options
+        self._vehicle = vehicle
+        self._fixed_frame = fixed_frame
+        self._packets = None
+        self._rssi_publisher = None
+
+    def start(self) -> None:
+        """Announce the topics and start the log blocks; blocks.
+
+        Raises
+        ------
+        CrazyflieError
+            A custom block is not possible, or the vehicle does not reply.
+        """
+        options = self._options
+        if "packets" in options.topics:
+            self._packets = self._publisher("packets", crtpPacket)
+        self._rssi_publisher = self._publisher("rssi", Float32)
+        known = self._vehicle.log.variables()
+        self._start_status(known)
+        wanted = [topic for topic in telemetry.STANDARD if topic.name in options.topics]
+        groups, missing = telemetry.packed(wanted, known)
+        for name, variables in missing.items():
+            self._handle.warn(
+                f"{options.name}: no topic {name}: the firmware has no {', '.join(variables)}"
+            )
+        for group in groups:
+            self._start_standard(group)
+        for block in options.custom_blocks:
+            self._start_custom(block)
+
+    def hear_packet(self, port: int, channel: int, data: bytes) -> None:
+        """Publish a packet from the vehicle, if it is not one of the driver's own."""
+        publisher = self._packets
+        if publisher is None or (port, channel) in _OWN_PORTS:
+            return
+        message = crtpPacket(
+            size=len(data),
+            header=port << 4 | channel,
+            data=data[:_MOST_DATA].ljust(_MOST_DATA, b"\0"),
+        )
+        self._handle.run_soon(publisher.publish, message)
+
+    def _start_status(self, known):
+        wanted = ("pm.vbat", "radio.rssi", "supervisor.info")
+        variables = tuple(variable for variable in wanted if variable in known)
+        if variables:
+            self._add(
+                "status",
+                STATUS_PERIOD_MS,
+                variables,
+                lambda _, values: self._note_status(dict(zip(variables, values, strict=True))),
+            )
+
+    def _note_status(self, latest):
+        self.voltage = latest.get("pm.vbat")
+        if "supervisor.info" in latest:
+            self.supervisor = SupervisorState(latest["supervisor.info"])
+        # The Crazyradio's figure is the same, and comes without the firmware's help.
+        self.rssi = self._vehicle.rssi
+        if self.rssi is None:
+            self.rssi = latest.get("radio.rssi")
+        if self.rssi is not None:
+            self._rssi_publisher.publish(Float32(self.rssi))
+
+    def _start_standard(self, group):
+        publishers = [self._publisher(topic.name, topic.message_type) for topic in group]
+        variables = sum((topic.variables for topic in group), ())
+
+        def publish(stamp, values):
+            begin = 0
+            for topic, publisher in zip(group, publishers, strict=True):
+                end = begin + len(topic.variables)
+                header = self._header(stamp, topic.in_world)
+                publisher.publish(topic.convert(header, values[begin:end]))
+                begin = end
+
+        name = "+".join(topic.name for topic in group)
+        self._add(name, group[0].period_ms, variables, publish)
+
+    def _start_custom(self, block):
+        publisher = self._publisher(block.topic, GenericLogData)
+
+        def publish(stamp, values):
+            publisher.publish(telemetry.generic(self._header(stamp, False), values))
+
+        self._add(block.topic, block.period_ms, block.variables, publish)
+
+    def _add(self, name, period_ms, variables, receive):
+        handle = self._handle
+
+        def hand_over(time_ms, values):
+            handle.run_soon(receive, self._stamp(time_ms), values)
+
+        self._vehicle.add_log_block(LogBlock(name, period_ms, variables, hand_over))
+
+    def _publisher(self, name, message_type):
+        return self._handle.publisher(f"{self._options.prefix}/{name}", message_type)
+
+    def _stamp(self, time_ms):
+        if self._options.use_ros_time:
+            return self._handle.stamp()
+        return genpy.Time(*divmod(time_ms * 1_000_000, 1_000_000_000))
+
+    def _header(self, stamp, in_world):
+        frame = self._fixed_frame if in_world else f"{self._options.name}/base_link"
+        return Header(stamp=stamp, frame_id=frame)

@@ -1,0 +1,121 @@
+"""The driver: a server that vehicles are added to and removed from."""
+
+from concurrent.futures import Future, wait
+
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import Header
+
+from crazyflie_driver.options import VehicleOptions
+from crazyflie_driver.srv import (
+    AddCrazyflie,
+    AddCrazyflieResponse,
+    RemoveCrazyflie,
+    RemoveCrazyflieResponse,
+)
+from crazyflie_driver.vehicle import Vehicle
+from crazyflie_py.errors import CrazyflieError
+from crazyflie_utils import Node, ServiceError
+from crazyflie_utils.parameters import FRAME
+
+ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"
+"""Services of the server."""
+
+_DIAGNOSTICS_PERIOD = 1.0
+_LEAVE_LIMIT = 1.5
+"""How long, in s, the end of the server waits for its vehicles to be stopped."""
+
+
+class CrazyflieServerNode(Node):
+    """Connect to vehicles side by side, and serve each until it is removed."""
+
+    def __init__(self):
+        super().__init__()
+        self._fixed_frame = None
+        self._diagnostics = None
+        self._vehicles = {}
+
+    def load_parameters(self, handle) -> None:
+        """See `Node.load_parameters`."""
+        self._fixed_frame = handle.param("frames/fixed", FRAME, "world")
+
+    def register_callbacks(self, handle) -> None:
+        """See `Node.register_callbacks`."""
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
+        handle.advertise_service(ADD, AddCrazyflie, self._on_add)
+        handle.advertise_service(REMOVE, RemoveCrazyflie, self._on_remove)
+        handle.timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+
+    def shutdown(self) -> None:
+        """Stop the motors of all vehicles and disconnect from them."""
+        wait([vehicle.leave() for vehicle in self._vehicles.values()], _LEAVE_LIMIT)
+
+    def _on_add(self, request):
+        options = VehicleOptions.from_request(request)
+        for other in self._vehicles.values():
+            if other.options.uri == options.uri:
+                raise ServiceError(f"{options.uri} has been added already, as {other.options.name}")
+            if other.options.prefix == options.prefix:
+                raise ServiceError(
+                    f"tf_prefix {options.name} is in use by {other.options.uri}; choose another"
+                )
+        try:
+            vehicle = Vehicle(self._handle, options, self._fixed_frame)
+        except CrazyflieError as error:
+            self._handle.error(f"{options.name}: {error}")
+            raise ServiceError(str(error)) from None
+        self._vehicles[options.uri] = vehicle
+        self._handle.info(f"{options.name}: connecting to {options.uri}")
+        return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
+
+    def _finish_adding(self, vehicle, error):
+        if error is not None:
+            self._forget(vehicle)
+        return AddCrazyflieResponse()
+
+    def _on_remove(self, request):
+        vehicle = self._vehicles.get(request.uri.strip())
+        if vehicle is None:
+            known = ", ".join(self._vehicles) or "none"
+            raise ServiceError(f"no vehicle {request.uri!r} has been added; known: {known}")
+        if vehicle.is_leaving:
+            raise ServiceError(f"{request.uri} is being removed already")
+        return self._when_done(vehicle.leave(), self._finish_removing, vehicle)
+
+    def _finish_removing(self, vehicle, error):
+        self._forget(vehicle)
+        self._handle.info(f"{vehicle.options.name}: removed")
+        return RemoveCrazyflieResponse()
+
+    def _forget(self, vehicle):
+        if self._vehicles.get(vehicle.options.uri) is vehicle:
+            del self._vehicles[vehicle.options.uri]
+
+    def _when_done(self, done, finish, vehicle):
+        # ``finish`` runs in its turn with the other callbacks, before the answer goes out.
+        answer = Future()
+
+        def settle():
+            error = done.exception()
+            response = finish(vehicle, error)
+            if error is None:
+                answer.set_result(response)
+            else:
+                answer.set_exception(error)
+
+        done.add_done_callback(lambda _: self._handle.run_soon(settle))
+        return answer
+
+    def _publish_diagnostics(self):
+        now = self._handle.time()
+        component = self._handle.name.strip("/")
+        self._diagnostics.publish(
+            DiagnosticArray(
+                header=Header(stamp=self._handle.stamp()),
+                status=[
+                    vehicle.status(now).message(
+                        f"{component}: {vehicle.options.name}", vehicle.options.uri
+                    )
+                    for vehicle in self._vehicles.values()
+                ],
+            )
+        )

@@ -1,0 +1,193 @@
+"""Services of one vehicle."""
+
+from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
+
+from crazyflie_driver import srv
+from crazyflie_py.errors import CrazyflieError
+from crazyflie_py.trajectory import PolynomialPiece
+from crazyflie_utils import ServiceError
+
+
+class VehicleServices:
+    """Announce a vehicle's services and carry them out.
+
+    What waits for the vehicle is done by its worker; what does not, at once.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    vehicle : Vehicle
+
+    Attributes
+    ----------
+    are_advertised : bool
+    """
+
+    def __init__(self, handle, vehicle):
+        self.are_advertised = False
+        self._handle = handle
+        self._vehicle = vehicle
+
+    def advertise(self) -> None:
+        """Offer all services that the vehicle has."""
+        vehicle = self._vehicle
+        offered = [
+            ("emergency", Empty, self._emergency),
+            ("arm", SetBool, self._arm),
+            ("update_params", srv.UpdateParams, self._update_params),
+            ("set_group_mask", srv.SetGroupMask, self._set_group_mask),
+            ("takeoff", srv.Takeoff, self._takeoff),
+            ("land", srv.Land, self._land),
+            ("stop", srv.Stop, self._stop),
+            ("go_to", srv.GoTo, self._go_to),
+            ("upload_trajectory", srv.UploadTrajectory, self._upload_trajectory),
+            ("start_trajectory", srv.StartTrajectory, self._start_trajectory),
+            ("notify_setpoints_stop", srv.NotifySetpointsStop, self._notify_setpoints_stop),
+            ("send_packet", srv.sendPacket, self._send_packet),
+        ]
+        if vehicle.link.address.is_radio:
+            offered.append(("reboot", Empty, self._reboot))
+        for name, service_type, callback in offered:
+            self._handle.advertise_service(
+                f"{vehicle.options.prefix}/{name}", service_type, callback
+            )
+        self.are_advertised = True
+
+    # At once.
+
+    def _emergency(self, _):
+        try:
+            self._vehicle.stop_in_emergency()
+        except CrazyflieError as error:
+            text = f"emergency stop not sent, it will be once the link is back: {error}"
+            self._handle.error(f"{self._vehicle.options.name}: {text}")
+            raise ServiceError(text) from None
+        self._handle.error(f"{self._vehicle.options.name}: emergency stop")
+        return EmptyResponse()
+
+    def _notify_setpoints_stop(self, request):
+        self._at_once(lambda: self._vehicle.hand_over(request.remainValidMillisecs))
+        return srv.NotifySetpointsStopResponse()
+
+    def _send_packet(self, request):
+        packet = request.packet
+        data = bytes(packet.data)
+        if packet.size > len(data):
+            raise ServiceError(f"size is {packet.size}; a packet has at most {len(data)} bytes")
+        self._at_once(
+            lambda: self._vehicle.link.send_packet(
+                packet.header >> 4, packet.header & 3, data[: packet.size]
+            )
+        )
+        return srv.sendPacketResponse()
+
+    @staticmethod
+    def _at_once(send):
+        try:
+            send()
+        except CrazyflieError as error:
+            raise ServiceError(str(error)) from None
+
+    # By the worker.
+
+    def _arm(self, request):
+        vehicle = self._vehicle
+
+        def work():
+            try:
+                if request.data:
+                    vehicle.refuse_in_emergency()
+                vehicle.link.supervisor.arm(request.data)
+            except (CrazyflieError, ServiceError) as error:
+                return SetBoolResponse(False, str(error))
+            return SetBoolResponse(True, "armed" if request.data else "disarmed")
+
+        return vehicle.do("arming", work)
+
+    def _update_params(self, request):
+        def work():
+            self._vehicle.write_parameters(request.params)
+            return srv.UpdateParamsResponse()
+
+        return self._vehicle.do("update_params", work)
+
+    def _reboot(self, _):
+        def work():
+            self._vehicle.link.reboot()
+            return EmptyResponse()
+
+        return self._vehicle.do("reboot", work)
+
+    def _set_group_mask(self, request):
+        def work():
+            self._vehicle.link.high_level.set_group_mask(request.groupMask)
+            return srv.SetGroupMaskResponse()
+
+        return self._vehicle.do("set_group_mask", work)
+
+    def _upload_trajectory(self, request):
+        pieces = [
+            PolynomialPiece(
+                piece.duration.to_sec(), piece.poly_x, piece.poly_y, piece.poly_z, piece.poly_yaw
+            )
+            for piece in request.pieces
+        ]
+
+        def work():
+            self._vehicle.link.trajectories.upload(
+                request.trajectoryId, request.pieceOffset, pieces
+            )
+            return srv.UploadTrajectoryResponse()
+
+        return self._vehicle.do("upload_trajectory", work)
+
+    # High-level commands.
+
+    def _takeoff(self, request):
+        duration = request.duration.to_sec()
+
+        def send(high_level):
+            self._vehicle.make_ready()
+            high_level.take_off(request.height, duration, request.groupMask)
+            return srv.TakeoffResponse()
+
+        return self._vehicle.command("takeoff", send, duration)
+
+    def _land(self, request):
+        duration = request.duration.to_sec()
+
+        def send(high_level):
+            high_level.land(request.height, duration, request.groupMask)
+            return srv.LandResponse()
+
+        return self._vehicle.command("land", send, duration)
+
+    def _stop(self, request):
+        def send(high_level):
+            high_level.stop(request.groupMask)
+            return srv.StopResponse()
+
+        return self._vehicle.command("stop", send)
+
+    def _go_to(self, request):
+        duration = request.duration.to_sec()
+        goal = (request.goal.x, request.goal.y, request.goal.z)
+
+        def send(high_level):
+            high_level.go_to(goal, request.yaw, duration, request.relative, request.groupMask)
+            return srv.GoToResponse()
+
+        return self._vehicle.command("go_to", send, duration)
+
+    def _start_trajectory(self, request):
+        def send(high_level):
+            high_level.start_trajectory(
+                request.trajectoryId,
+                request.timescale,
+                request.relative,
+                request.reversed,
+                request.groupMask,
+            )
+            return srv.StartTrajectoryResponse()
+
+        return self._vehicle.command("start_trajectory", send)

@@ -1,0 +1,140 @@
+"""Log data of the firmware as messages: which variables, how often, in which units."""
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
+from sensor_msgs.msg import Imu, MagneticField, Temperature
+from std_msgs.msg import Float32
+
+from crazyflie_driver.msg import GenericLogData
+from crazyflie_py.log import quaternion_from_compressed
+from crazyflie_utils.units import GRAVITY
+
+FAST_MS, SLOW_MS = 10, 100
+"""Periods of imu and pose, and of the rest, ms: those of the C++ driver."""
+
+TESLA = 1e-4
+"""Tesla in a gauss, in which the firmware measures the magnetic field."""
+
+_UNKNOWN = -1.0
+"""First element of a covariance that says: there is no such measurement
+(sensor_msgs/Imu)."""
+
+
+class StandardTopic(NamedTuple):
+    """A topic that every vehicle has.
+
+    Attributes
+    ----------
+    name : str
+    message_type : type
+    period_ms : int
+    variables : tuple of str
+    convert : callable
+        ``convert(header, values)`` returns the message.
+    in_world : bool
+        Whether its frame is the fixed one, not the vehicle's.
+    """
+
+    name: str
+    message_type: type
+    period_ms: int
+    variables: tuple
+    convert: Callable
+    in_world: bool = False
+
+
+def _imu(header, values):
+    message = Imu(header=header)
+    message.orientation_covariance[0] = _UNKNOWN
+    # The firmware measures in g and degrees/s.
+    message.linear_acceleration = Vector3(*(GRAVITY * value for value in values[:3]))
+    message.angular_velocity = Vector3(*map(math.radians, values[3:]))
+    return message
+
+
+def _pose(header, values):
+    message = PoseStamped(header=header)
+    message.pose.position = Point(*values[:3])
+    message.pose.orientation = Quaternion(*quaternion_from_compressed(values[3]))
+    return message
+
+
+STANDARD = (
+    StandardTopic(
+        "imu", Imu, FAST_MS, ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y", "gyro.z"), _imu
+    ),
+    StandardTopic(
+        "pose",
+        PoseStamped,
+        FAST_MS,
+        ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimateZ.quat"),
+        _pose,
+        in_world=True,
+    ),
+    StandardTopic(
+        "magnetic_field",
+        MagneticField,
+        SLOW_MS,
+        ("mag.x", "mag.y", "mag.z"),
+        lambda header, values: MagneticField(
+            header=header, magnetic_field=Vector3(*(TESLA * value for value in values))
+        ),
+    ),
+    StandardTopic(
+        "temperature",
+        Temperature,
+        SLOW_MS,
+        ("baro.temp",),
+        lambda header, values: Temperature(header=header, temperature=values[0]),
+    ),
+    StandardTopic(
+        "pressure", Float32, SLOW_MS, ("baro.pressure",), lambda header, values: Float32(values[0])
+    ),
+    StandardTopic(
+        "battery", Float32, SLOW_MS, ("pm.vbat",), lambda header, values: Float32(values[0])
+    ),
+)
+
+
+def packed(topics: list, known) -> tuple:
+    """Put the variables of topics that have the same period into common log blocks.
+
+    Parameters
+    ----------
+    topics : list of StandardTopic
+    known : container of str
+        Variables that the vehicle has.
+
+    Returns
+    -------
+    groups : list of list of StandardTopic
+        Each fits in a log packet.
+    missing : dict
+        Name of a topic that the vehicle cannot fill -> variables that it lacks.
+    """
+    missing, groups = {}, []
+    for topic in topics:
+        lacking = [variable for variable in topic.variables if variable not in known]
+        if lacking:
+            missing[topic.name] = lacking
+            continue
+        for group in groups:
+            size = sum(len(other.variables) for other in group) + len(topic.variables)
+            if group[0].period_ms == topic.period_ms and size <= _MOST_VARIABLES:
+                group.append(topic)
+                break
+        else:
+            groups.append([topic])
+    return groups, missing
+
+
+_MOST_VARIABLES = 6
+"""Variables of four bytes that fit in a log packet's 26 bytes."""
+
+
+def generic(header, values) -> GenericLogData:
+    """Return the message of a custom log block."""
+    return GenericLogData(header=header, values=list(map(float, values)))

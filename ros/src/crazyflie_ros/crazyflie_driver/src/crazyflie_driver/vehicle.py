@@ -1,0 +1,267 @@
+"""One vehicle of the server: its link, its topics and services, from adding to removing."""
+
+import threading
+from concurrent.futures import Future
+
+from crazyflie_driver.firmware_parameters import FirmwareParameters
+from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.services import VehicleServices
+from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_driver.status import Status
+from crazyflie_driver.worker import Worker
+from crazyflie_py.crazyflie import Crazyflie, LinkState
+from crazyflie_py.errors import CrazyflieError
+from crazyflie_py.supervisor import SupervisorState
+from crazyflie_utils import ServiceError
+
+_UNABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
+
+
+class Vehicle:
+    """A vehicle that is being connected, is connected, or has lost its link.
+
+    What takes time is done by the vehicle's own worker, so that no vehicle waits for
+    another.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+        Of the server; the vehicle takes a part of it.
+    options : VehicleOptions
+    fixed_frame : str
+
+    Raises
+    ------
+    CrazyflieError
+        The address is malformed.
+    """
+
+    def __init__(self, handle, options, fixed_frame: str):
+        self.options = options
+        self._handle = handle.part()
+        self._server = handle
+        self._link_text = f"connecting to {options.uri}"
+        self._is_emergency = False
+        self.is_leaving = False
+        self.link = Crazyflie(
+            options.uri,
+            reconnect=True,
+            on_state=self._hear_state,
+            on_console=lambda line: self._handle.info(f"{options.name}: {line}"),
+            on_packet=self._on_packet,
+        )
+        self._worker = Worker(options.name)
+        self._announcing = threading.Lock()
+        self._log = LogTopics(self._handle, options, self.link, fixed_frame)
+        self._setpoints = SetpointTopics(self._handle, options, self.link, self._log)
+        self._parameters = FirmwareParameters(self._handle, options.prefix, self.link)
+        self._services = VehicleServices(self._handle, self)
+
+    # Life.
+
+    def connect(self) -> Future:
+        """Connect and announce all topics and services; the result is None.
+
+        The future fails with `ServiceError` when that is not possible; then nothing
+        remains of the vehicle.
+        """
+        return self.do("connecting", self._connect)
+
+    def leave(self) -> Future:
+        """Stop the motors, end the link, take topics and services down; the result is None.
+
+        Also while the vehicle is being connected, or its worker waits for it.
+        """
+        self.is_leaving = True
+        self._setpoints.is_blocked = True
+        farewell = Worker(f"{self.options.name}-farewell")
+        done = farewell.submit(self._leave)
+        farewell.close()
+        return done
+
+    def do(self, what: str, work) -> Future:
+        """Have ``work()`` done by the vehicle's worker; the result is its own.
+
+        What goes wrong is logged, and fails the future with `ServiceError`.
+        """
+
+        def job():
+            try:
+                return work()
+            except (CrazyflieError, ServiceError) as error:
+                self._server.error(f"{self.options.name}: {what} failed: {error}")
+                raise ServiceError(str(error)) from None
+
+        return self._worker.submit(job)
+
+    def _connect(self):
+        try:
+            self.link.connect()
+            with self._announcing:
+                if self.is_leaving:
+                    raise ServiceError("removed while connecting")
+                self._log.start()
+                if self.options.enable_parameters:
+                    self._parameters.publish()
+                self._open_thrust_lock(is_new=True)
+                self._services.advertise()
+                self._setpoints.subscribe()
+        except BaseException:
+            self.is_leaving = True
+            self._end()
+            raise
+        self._server.info(f"{self.options.name}: connected to {self.options.uri}")
+
+    def _leave(self):
+        try:
+            if self.link.state is LinkState.CONNECTED:
+                self._setpoints.zeros()
+        except CrazyflieError as error:
+            self._server.warn(f"{self.options.name}: cannot stop the motors: {error}")
+        self._end()
+
+    def _end(self):
+        # First the link, so that whoever waits for an answer lets go.
+        self.link.close()
+        with self._announcing:
+            self._handle.close()
+        self._worker.close()
+
+    def _open_thrust_lock(self, is_new):
+        # Zero thrust would take a vehicle out of the air that flies by itself,
+        # or that was flying when the link was lost.
+        state = self.link.supervisor.read()
+        is_flying = not is_new if state is None else SupervisorState.FLYING in state
+        if is_flying:
+            self._server.warn(
+                f"{self.options.name}: the vehicle may be flying: its thrust stays locked until a "
+                "setpoint of zero thrust comes"
+            )
+        else:
+            self._setpoints.zeros()
+
+    # Commands.
+
+    @property
+    def is_emergency(self) -> bool:
+        """Whether the emergency stop is latched."""
+        return self._is_emergency
+
+    def stop_in_emergency(self) -> None:
+        """Stop the motors at once and for good; does not block.
+
+        Raises
+        ------
+        LinkLostError
+            Nothing can be sent now; it will be when the link is back.
+        """
+        self._is_emergency = True
+        self._setpoints.is_blocked = True
+        self.link.supervisor.emergency_stop()
+
+    def hand_over(self, remain_valid_ms: int = 0) -> None:
+        """Tell the vehicle that setpoints stop; does not block."""
+        self._setpoints.hand_over(remain_valid_ms)
+
+    def command(self, what: str, send, duration: float = 0.0) -> Future:
+        """Have a high-level command sent, after a hand-over if setpoints were streamed.
+
+        Parameters
+        ----------
+        what : str
+        send : callable
+            ``send(high_level)`` blocks; the future's result is its own.
+        duration : float
+            How long the vehicle will be at it, s.
+        """
+
+        def work():
+            self.refuse_in_emergency()
+            if self._setpoints.is_streaming:
+                self._setpoints.hand_over()
+            response = send(self.link.high_level)
+            self._setpoints.high_level_until(self._handle.time() + duration)
+            return response
+
+        return self.do(what, work)
+
+    def make_ready(self) -> None:
+        """See to it that the vehicle can take off: arm it, if it is not armed; blocks.
+
+        Raises
+        ------
+        ServiceError
+            It cannot fly.
+        CrazyflieError
+            It refuses, or does not reply.
+        """
+        state = self.link.supervisor.read()
+        if state is None:
+            return
+        if state & _UNABLE:
+            raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
+        if SupervisorState.ARMED not in state:
+            self.link.supervisor.arm()
+
+    def write_parameters(self, names: list) -> None:
+        """Write ROS parameters GROUP/NAME to the firmware; blocks."""
+        self._parameters.write(names)
+
+    def refuse_in_emergency(self) -> None:
+        """Raise `ServiceError` after an emergency stop."""
+        if self._is_emergency:
+            raise ServiceError(
+                f"emergency stop: remove {self.options.uri}, restart the vehicle and add it again"
+            )
+
+    # What comes from the vehicle.
+
+    def status(self, now: float) -> Status:
+        """Return the vehicle's status at a moment (s)."""
+        figures = {}
+        try:
+            figures = {
+                "quality": self.link.quality(),
+                "latency": self.link.latency(),
+                "age": self.link.age(),
+            }
+        except CrazyflieError:
+            # Without a link there are none.
+            pass
+        return Status(
+            self.link.state,
+            self._link_text,
+            self._is_emergency,
+            voltage=self._log.voltage,
+            rssi=self._log.rssi,
+            supervisor=self._log.supervisor,
+            setpoint_rate=self._setpoints.rate(now),
+            ignored=self._setpoints.ignored,
+            **figures,
+        )
+
+    def _hear_state(self, state, text):
+        # From the link's own thread. At the end nobody must wait for the callbacks'
+        # turn, since the node waits for the end.
+        self._link_text = text
+        if not self.is_leaving:
+            self._handle.run_soon(self._on_state, state, text)
+
+    def _on_state(self, state, text):
+        if state is LinkState.LOST:
+            self._handle.error(f"{self.options.name}: {text}; trying to connect again")
+        elif state is LinkState.CONNECTED and self._services.are_advertised:
+            self._handle.warn(f"{self.options.name}: {text}")
+            self.do("taking up the link again", self._resume)
+
+    def _resume(self):
+        if self._is_emergency:
+            self.link.supervisor.emergency_stop()
+            return
+        if self.options.enable_parameters:
+            self._parameters.publish()
+        self._open_thrust_lock(is_new=False)
+
+    def _on_packet(self, port, channel, data):
+        if not self.is_leaving:
+            self._log.hear_packet(port, channel, data)

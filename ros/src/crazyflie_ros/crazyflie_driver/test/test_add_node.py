@@ -1,0 +1,97 @@
+"""The node that has the server add a vehicle."""
+
+import pytest
+
+from crazyflie_driver.add_node import CrazyflieAddNode
+from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieResponse
+from crazyflie_utils import ServiceError
+from crazyflie_utils.fake import FakeProcess
+
+PARAMETERS = {"uri": "udp://127.0.0.1:19850", "tf_prefix": "cf1"}
+
+
+class Launch:
+    """A server that keeps requests, and the node."""
+
+    def __init__(self, parameters, refusal=None):
+        self.requests = []
+        self.process = FakeProcess()
+
+        def answer(request):
+            self.requests.append(request)
+            if refusal is not None:
+                raise ServiceError(refusal)
+            return AddCrazyflieResponse()
+
+        self.process.handle("/server").advertise_service("/add_crazyflie", AddCrazyflie, answer)
+        self.has_begun = self.process.launch(CrazyflieAddNode(), "/add", parameters)
+
+
+def test_defaults_are_those_of_the_cpp_driver():
+    launch = Launch(PARAMETERS)
+    (request,) = launch.requests
+    assert (request.uri, request.tf_prefix) == ("udp://127.0.0.1:19850", "cf1")
+    assert (request.roll_trim, request.pitch_trim) == (0.0, 0.0)
+    flags = {name: getattr(request, name) for name in request.__slots__ if "enable" in name}
+    assert flags.pop("enable_logging_pose") is False
+    assert set(flags.values()) == {True}
+    assert len(flags) == 8
+    assert request.use_ros_time is True
+    assert request.log_blocks == []
+    assert launch.process.exit_status == 0
+
+
+def test_all_parameters_arrive():
+    changes = {
+        "roll_trim": 1,
+        "pitch_trim": -0.5,
+        "enable_logging": False,
+        "use_ros_time": False,
+        "enable_logging_pose": True,
+        "enable_logging_packets": False,
+        "genericLogTopics": ["a", "b"],
+        "genericLogTopicFrequencies": [10, 500],
+        "genericLogTopic_a_Variables": ["pm.vbat"],
+        "genericLogTopic_b_Variables": ["mag.x", "mag.y"],
+    }
+    (request,) = Launch({**PARAMETERS, **changes}).requests
+    assert (request.roll_trim, request.pitch_trim) == (1.0, -0.5)
+    assert not request.enable_logging
+    assert not request.use_ros_time
+    assert request.enable_logging_pose
+    assert not request.enable_logging_packets
+    blocks = [(b.topic_name, b.frequency, b.variables) for b in request.log_blocks]
+    assert blocks == [("a", 10, ["pm.vbat"]), ("b", 500, ["mag.x", "mag.y"])]
+
+
+def test_a_refusal_ends_the_process_with_status_1():
+    launch = Launch(PARAMETERS, refusal="nothing listens on this port")
+    assert launch.process.exit_status == 1
+    assert "nothing listens on this port" in launch.process.logged("error")[0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"uri": None}, "uri"),
+        ({"tf_prefix": None}, "tf_prefix"),
+        ({"roll_trim": "left"}, "roll_trim"),
+        ({"enable_logging_imu": 1}, "enable_logging_imu"),
+        ({"genericLogTopics": "a"}, "genericLogTopics"),
+        ({"genericLogTopics": ["a"]}, "genericLogTopicFrequencies"),
+        (
+            {"genericLogTopics": ["a"], "genericLogTopicFrequencies": [5]},
+            "genericLogTopicFrequencies",
+        ),
+        (
+            {"genericLogTopics": ["a"], "genericLogTopicFrequencies": [10]},
+            "genericLogTopic_a_Variables",
+        ),
+    ],
+)
+def test_bad_parameters_are_named(changes, name):
+    parameters = {k: v for k, v in {**PARAMETERS, **changes}.items() if v is not None}
+    launch = Launch(parameters)
+    assert not launch.has_begun
+    assert f"parameter /add/{name}" in launch.process.logged("error")[0]
+    assert "expected" in launch.process.logged("error")[0]

@@ -1,0 +1,142 @@
+"""What the vehicle sends by itself, as messages."""
+
+import threading
+import time
+
+import pytest
+
+from crazyflie_utils import ServiceError
+
+LIMIT = 20.0
+
+ALL = {
+    f"enable_logging_{name}": True
+    for name in (
+        "imu",
+        "temperature",
+        "magnetic_field",
+        "pressure",
+        "battery",
+        "pose",
+        "packets",
+    )
+}
+
+
+def published(server, topic, count=1):
+    """Wait for messages on a topic and return them."""
+    end = time.monotonic() + LIMIT
+    patience = threading.Event()
+    while len(server.process.published(topic)) < count:
+        assert time.monotonic() < end, f"nothing on {topic}"
+        patience.wait(0.01)
+    return server.process.published(topic)
+
+
+@pytest.fixture
+def logging(server):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, enable_logging=True, **ALL)
+    return vehicle
+
+
+def test_standard_topics_in_ros_units(server, logging):
+    imu = published(server, "/cf1/imu")[0]
+    assert (imu.header.frame_id, imu.header.stamp.to_sec()) == ("cf1/base_link", 100.0)
+    acceleration, rate = imu.linear_acceleration, imu.angular_velocity
+    assert (acceleration.x, acceleration.y, acceleration.z) == pytest.approx((4.905, -2.4525, 9.81))
+    assert (rate.x, rate.y, rate.z) == pytest.approx((1.5707963, -3.1415927, 0.7853982))
+    assert imu.orientation_covariance[0] == -1.0
+
+    pose = published(server, "/cf1/pose")[0]
+    assert pose.header.frame_id == "world"
+    position, orientation = pose.pose.position, pose.pose.orientation
+    assert (position.x, position.y, position.z) == (1.5, -2.5, 0.75)
+    assert (orientation.x, orientation.y, orientation.z, orientation.w) == pytest.approx(
+        (0.7071068, 0.0, 0.0, 0.7071068)
+    )
+
+    field = published(server, "/cf1/magnetic_field")[0].magnetic_field
+    assert (field.x, field.y, field.z) == pytest.approx((5e-5, -2.5e-5, 1e-4))
+    assert published(server, "/cf1/temperature")[0].temperature == 25.5
+    assert published(server, "/cf1/pressure")[0].data == 1013.25
+    assert published(server, "/cf1/battery")[0].data == 3.75
+    assert published(server, "/cf1/rssi")[0].data == 47.0
+
+
+def test_standard_topics_need_four_log_blocks(logging):
+    """Status, imu, pose, and the slow ones together: 16 there are."""
+    created = [data for data in logging.packets(5, 1) if data[0] == 6]
+    started = [data[2] for data in logging.packets(5, 1) if data[0] == 3]
+    assert len(created) == 4
+    assert sorted(started) == [1, 1, 10, 50]
+
+
+def test_packets_of_others(server, logging):
+    count = len(server.process.published("/cf1/packets"))
+    logging.say(13, 2, b"app data")
+    packet = published(server, "/cf1/packets", count + 1)[count]
+    assert (packet.size, packet.header) == (8, 13 << 4 | 2)
+    assert bytes(packet.data) == b"app data".ljust(30, b"\0")
+
+
+def test_the_frequency_of_a_custom_block_is_a_period_in_ms(server, log_block):
+    vehicle = server.make_vehicle()
+    blocks = [log_block("motors", 20, "motor.m1", "pm.vbat"), log_block("slow", 1000, "mag.x")]
+    server.add(vehicle.uri, enable_logging=True, log_blocks=blocks)
+    started = [data[2] for data in vehicle.packets(5, 1) if data[0] == 3]
+    assert sorted(started) == [2, 50, 100]
+    message = published(server, "/cf1/motors", 2)[0]
+    assert message.values == [4321.0, 3.75]
+    assert message.header.frame_id == "cf1/base_link"
+    assert published(server, "/cf1/slow")[0].values == [0.5]
+
+
+def test_stamps_of_the_vehicle(server, log_block):
+    vehicle = server.make_vehicle()
+    server.add(
+        vehicle.uri,
+        enable_logging=True,
+        use_ros_time=False,
+        log_blocks=[log_block("test", 10, "mag.x")],
+    )
+    messages = published(server, "/cf1/test", 5)
+    stamps = [message.header.stamp.to_sec() for message in messages]
+    # 24 bits of milliseconds.
+    assert all(0.0 <= stamp < 16777.216 for stamp in stamps)
+    assert stamps == sorted(stamps)
+    assert stamps[-1] > stamps[0]
+
+
+def test_without_logging_there_is_only_the_status(server, log_block):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, log_blocks=[log_block("test", 10, "mag.x")], **ALL)
+    assert len([data for data in vehicle.packets(5, 1) if data[0] == 6]) == 1
+    assert set(server.process.transport.outlets) == {"/diagnostics", "/cf1/rssi"}
+
+
+def test_topics_that_the_firmware_cannot_fill_are_left_out(server):
+    vehicle = server.make_vehicle()
+    del vehicle.log["baro.temp"]
+    server.add(vehicle.uri, enable_logging=True, **ALL)
+    assert "/cf1/temperature" not in server.process.transport.outlets
+    assert published(server, "/cf1/pressure")[0].data == 1013.25
+    assert "no topic temperature: the firmware has no baro.temp" in server.process.logged("warn")[0]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "text"),
+    [
+        ([("test", 10, "mag.X")], "did you mean mag.x"),
+        ([("test", 5, "mag.x")], "its period is 5 ms"),
+        ([("test", 100)], "no variables"),
+        ([("test", 100, "mag.x"), ("test", 10, "mag.x")], "two log blocks are called 'test'"),
+        ([("imu", 100, "mag.x")], "cannot be called 'imu'"),
+        ([("my log", 100, "mag.x")], "'my log'; expected a topic's name"),
+    ],
+)
+def test_custom_blocks_that_are_not_possible(server, log_block, blocks, text):
+    vehicle = server.make_vehicle()
+    blocks = [log_block(*block) for block in blocks]
+    with pytest.raises(ServiceError, match=text):
+        server.add(vehicle.uri, enable_logging=True, log_blocks=blocks)

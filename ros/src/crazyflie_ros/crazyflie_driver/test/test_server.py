@@ -1,0 +1,180 @@
+"""Adding, removing, losing and finding vehicles again."""
+
+import struct
+import threading
+import time
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticStatus
+from genpy import Duration
+from geometry_msgs.msg import Twist, Vector3
+
+from crazyflie_driver.srv import TakeoffRequest
+from crazyflie_utils import ServiceError
+
+LIMIT = 20.0
+ZERO = struct.pack("<fffH", 0, 0, 0, 0)
+
+
+def wait_until(condition, what):
+    end = time.monotonic() + LIMIT
+    patience = threading.Event()
+    while not condition():
+        assert time.monotonic() < end, f"waited {LIMIT} s for {what}"
+        patience.wait(0.01)
+
+
+def status(server, name="cf1"):
+    server.process.advance(1.0)
+    (found,) = [
+        each
+        for each in server.process.published("/diagnostics")[-1].status
+        if each.name == f"crazyflie_server: {name}"
+    ]
+    return found
+
+
+def test_a_hundred_zeros_after_connecting_and_before_leaving(server):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri)
+    assert vehicle.packets(3, 0) == [ZERO] * 100
+    server.remove(vehicle.uri)
+    assert vehicle.wait_for_packets(3, 0, 200) == [ZERO] * 200
+
+
+def test_zeros_are_not_sent_to_a_vehicle_that_flies(server):
+    vehicle = server.make_vehicle()
+    vehicle.answers[9, 0, 0x0C] = b"\x8c\x1a\x00"
+    server.add(vehicle.uri)
+    assert vehicle.packets(3, 0) == []
+    assert "may be flying" in server.process.logged("warn")[0]
+
+
+def test_many_vehicles_and_one_that_is_stuck(server):
+    stuck = server.make_vehicle()
+    stuck.deaf.add((4, 0, b""))
+    good = [server.make_vehicle() for _ in range(3)]
+    failing = server.begin_adding(stuck.uri, "stuck")
+    adding = [server.begin_adding(v.uri, f"cf{k}") for k, v in enumerate(good)]
+    for answer in adding:
+        answer.result(timeout=LIMIT)
+    assert not failing.done()
+    for k, vehicle in enumerate(good):
+        vehicle.received.clear()
+        server.process.publish(f"/cf{k}/cmd_vel", Twist(Vector3(0, 0, 1000.0 + k), Vector3()))
+        assert struct.unpack_from("<H", vehicle.wait_for_packets(3, 0)[0], 12) == (1000 + k,)
+    with pytest.raises(ServiceError, match="the connection is stuck"):
+        failing.result(timeout=LIMIT)
+    # Nothing remains of it.
+    stuck.deaf.clear()
+    server.add(stuck.uri, "stuck")
+
+
+@pytest.mark.parametrize(
+    ("uri", "text"),
+    [
+        ("radio://0/25/2M/E7E7E7E701", "no Crazyradio dongle found.*udev"),
+        ("radio://0/25", "is no address of a vehicle: expected radio://"),
+        ("udp://127.0.0.1:1", "nothing listens on this port"),
+    ],
+)
+def test_errors_that_an_operator_can_act_on(server, uri, text):
+    with pytest.raises(ServiceError, match=text):
+        server.add(uri)
+    assert any(uri in line for line in server.process.logged("error"))
+
+
+def test_a_silent_port(server):
+    vehicle = server.make_vehicle()
+    vehicle.is_frozen = True
+    with pytest.raises(ServiceError, match="nobody has answered within 2 s"):
+        server.add(vehicle.uri)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"prefix": ""}, "tf_prefix is ''"),
+        ({"prefix": "my vehicle"}, "tf_prefix is 'my vehicle'"),
+        ({"roll_trim": float("nan")}, "roll_trim is nan"),
+    ],
+)
+def test_requests_that_make_no_sense(server, changes, text):
+    vehicle = server.make_vehicle()
+    with pytest.raises(ServiceError, match=text):
+        server.add(vehicle.uri, **changes)
+    assert vehicle.received == []
+
+
+def test_nothing_is_added_twice(server, vehicle):
+    with pytest.raises(ServiceError, match="has been added already, as cf1"):
+        server.add(vehicle.uri, "cf2")
+    with pytest.raises(ServiceError, match="tf_prefix cf1 is in use"):
+        server.add("udp://127.0.0.1:1", "/cf1/")
+
+
+def test_a_vehicle_that_is_removed_leaves_nothing_and_can_come_again(server, vehicle):
+    transport = server.process.transport
+    services = set(transport.services)
+    assert all(transport.inlets.values())
+    server.remove(vehicle.uri)
+    assert set(transport.services) == {"/add_crazyflie", "/remove_crazyflie"}
+    assert [topic for topic, listeners in transport.inlets.items() if listeners] == ["/clock"]
+    with pytest.raises(ServiceError, match="known: none"):
+        server.remove(vehicle.uri)
+    server.add(vehicle.uri)
+    assert set(transport.services) == services
+
+
+def test_a_vehicle_can_be_removed_while_it_is_connecting(server):
+    vehicle = server.make_vehicle()
+    vehicle.deaf.add((5, 0, b""))
+    adding = server.begin_adding(vehicle.uri)
+    vehicle.wait_for_packets(5, 0)
+    server.remove(vehicle.uri)
+    with pytest.raises(ServiceError, match="closed"):
+        adding.result(timeout=LIMIT)
+
+
+def test_a_link_that_is_lost_and_comes_back(server, vehicle):
+    assert status(server).level == DiagnosticStatus.OK
+    vehicle.is_frozen = True
+    wait_until(lambda: status(server).level == DiagnosticStatus.ERROR, "the loss")
+    assert "has not been heard" in status(server).message
+    assert "trying to connect again" in server.process.logged("error")[0]
+    server.process.publish("/cf1/cmd_vel", Twist(Vector3(0, 0, 1000.0), Vector3()))
+    assert any("ignoring cmd_vel: no link" in text for text in server.process.logged("warn"))
+    with pytest.raises(ServiceError, match="no link to the vehicle"):
+        server.call("/cf1/takeoff", TakeoffRequest(0, 1.0, Duration(2)))
+    vehicle.is_frozen = False
+    wait_until(lambda: status(server).level == DiagnosticStatus.OK, "the link's return")
+    # The vehicle stands: its thrust lock is opened again.
+    wait_until(lambda: vehicle.packets(3, 0).count(ZERO) == 100, "zeros")
+    server.call("/cf1/takeoff", TakeoffRequest(0, 1.0, Duration(2)))
+
+
+def test_diagnostics_tell_what_an_operator_needs(server, vehicle):
+    wait_until(lambda: values(server)["battery (V)"] != "unknown", "the battery")
+    found = values(server)
+    assert status(server).hardware_id == vehicle.uri
+    assert found["battery (V)"] == "3.75"
+    assert found["rssi (-dBm)"] == "47"
+    assert found["state"] == "armed, can fly"
+    assert found["link"] == "connected"
+    assert float(found["link quality (%)"]) > 50.0
+    assert found["findings"] == "none"
+
+
+def values(server):
+    return {each.key: each.value for each in status(server).values}
+
+
+def test_the_end_of_the_server_stops_all_motors(server):
+    vehicles = [server.make_vehicle() for _ in range(3)]
+    for k, vehicle in enumerate(vehicles):
+        server.add(vehicle.uri, f"cf{k}")
+        vehicle.received.clear()
+    process, node = server.process, server.node
+    process.shut_down({"/crazyflie_server": node})
+    for vehicle in vehicles:
+        assert vehicle.packets(3, 0) == [ZERO] * 100

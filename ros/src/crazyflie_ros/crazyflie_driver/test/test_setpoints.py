@@ -1,0 +1,132 @@
+"""From a ROS message to the bytes on the link."""
+
+import math
+import struct
+
+import pytest
+from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion, Twist, Vector3
+from std_msgs.msg import Empty as EmptyMessage
+
+from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+
+NAN = math.nan
+
+
+def cmd_vel(x=0.0, y=0.0, z=0.0, yaw=0.0):
+    return Twist(Vector3(x, y, z), Vector3(0.0, 0.0, yaw))
+
+
+def test_cmd_vel(flying):
+    """Roll and yaw rate as they are, pitch negated, thrust as an integer."""
+    server, vehicle = flying
+    server.process.publish("/cf1/cmd_vel", cmd_vel(x=10.0, y=-5.0, z=42000.9, yaw=-30.0))
+    assert vehicle.wait_for_packets(3, 0) == [struct.pack("<fffH", -5.0, -10.0, -30.0, 42000)]
+
+
+@pytest.mark.parametrize(
+    ("thrust", "sent"), [(-1.0, 0), (0.0, 0), (59999.0, 59999), (60001.0, 60000), (math.inf, 60000)]
+)
+def test_thrust_is_limited(flying, thrust, sent):
+    server, vehicle = flying
+    server.process.publish("/cf1/cmd_vel", cmd_vel(z=thrust))
+    assert vehicle.wait_for_packets(3, 0) == [struct.pack("<fffH", 0.0, -0.0, 0.0, sent)]
+
+
+def test_trims_are_added_before_the_sign(server):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, roll_trim=1.5, pitch_trim=-0.5)
+    vehicle.received.clear()
+    server.process.publish("/cf1/cmd_vel", cmd_vel(x=2.0, y=3.0, z=100.0))
+    assert vehicle.wait_for_packets(3, 0) == [struct.pack("<fffH", 4.5, -1.5, 0.0, 100)]
+
+
+def test_full_state(flying):
+    server, vehicle = flying
+    message = FullState(
+        pose=Pose(Point(1.0, -2.0, 0.5), Quaternion(0.0, 0.0, 0.0, 1.0)),
+        twist=Twist(Vector3(0.25, 0.5, -0.75), Vector3(0.125, -0.25, 3.0)),
+        acc=Vector3(0.0, 1.0, -9.75),
+    )
+    server.process.publish("/cf1/cmd_full_state", message)
+    (data,) = vehicle.wait_for_packets(7, 0)
+    assert struct.unpack("<B9hI3h", data) == (
+        *(6, 1000, -2000, 500, 250, 500, -750, 0, 1000, -9750),
+        *(3 << 30, 125, -250, 3000),
+    )
+
+
+def test_velocities_positions_and_stop(flying):
+    server, vehicle = flying
+    sends = [
+        (
+            "cmd_velocity_world",
+            VelocityWorld(vel=Vector3(0.5, -0.25, 1.0), yawRate=30.0),
+            struct.pack("<Bffff", 8, 0.5, -0.25, 1.0, 30.0),
+        ),
+        (
+            "cmd_hover",
+            Hover(vx=0.5, vy=-0.25, yawrate=30.0, zDistance=1.5),
+            struct.pack("<Bffff", 10, 0.5, -0.25, 30.0, 1.5),
+        ),
+        (
+            "cmd_position",
+            Position(x=0.5, y=-0.25, z=1.5, yaw=90.0),
+            struct.pack("<Bffff", 7, 0.5, -0.25, 1.5, 90.0),
+        ),
+        ("cmd_stop", EmptyMessage(), b"\0"),
+    ]
+    for count, (topic, message, data) in enumerate(sends, start=1):
+        server.process.publish(f"/cf1/{topic}", message)
+        assert vehicle.wait_for_packets(7, 0, count)[-1] == data
+
+
+def test_external_poses(flying):
+    server, vehicle = flying
+    server.process.publish("/cf1/external_position", PointStamped(point=Point(1.0, 2.0, 3.0)))
+    assert vehicle.wait_for_packets(6, 0) == [struct.pack("<fff", 1, 2, 3)]
+    pose = Pose(Point(1.0, 2.0, 3.0), Quaternion(0.0, 1.0, 0.0, 0.0))
+    server.process.publish("/cf1/external_pose", PoseStamped(pose=pose))
+    assert vehicle.wait_for_packets(6, 1) == [struct.pack("<B7f", 8, 1, 2, 3, 0, 1, 0, 0)]
+
+
+def test_what_is_not_finite_is_not_sent(flying):
+    server, vehicle = flying
+    publish = server.process.publish
+    publish("/cf1/cmd_vel", cmd_vel(x=NAN))
+    publish("/cf1/cmd_vel", cmd_vel(z=NAN))
+    publish("/cf1/cmd_hover", Hover(vx=NAN))
+    publish("/cf1/cmd_full_state", FullState())
+    publish("/cf1/external_position", PointStamped(point=Point(NAN, 0.0, 0.0)))
+    publish("/cf1/external_pose", PoseStamped())
+    publish("/cf1/cmd_position", Position(z=1.0))
+    assert len(vehicle.wait_for_packets(7, 0)) == 1
+    assert vehicle.packets(3, 0) == vehicle.packets(6, 0) == vehicle.packets(6, 1) == []
+    warnings = server.process.logged("warn")
+    for topic in ("cmd_vel", "cmd_hover", "cmd_full_state", "external_position", "external_pose"):
+        assert sum(f"cf1: ignoring {topic}:" in text for text in warnings) == 1
+
+
+def test_nothing_is_repeated(flying):
+    server, vehicle = flying
+    server.process.publish("/cf1/cmd_vel", cmd_vel(z=1.0))
+    vehicle.wait_for_packets(3, 0)
+    vehicle.received.clear()
+    vehicle.wait_for_packets(15, 0, 5)
+    assert {(port, channel) for port, channel, _ in vehicle.received} == {(15, 0)}
+
+
+def test_an_unarmed_vehicle_is_pointed_out(server):
+    vehicle = server.make_vehicle()
+    vehicle.log["supervisor.info"] = ("H", 1)
+    server.add(vehicle.uri)
+    process = server.process
+    assert vehicle.wait_for(lambda: warned(process), limit=0.0) is False
+    for _ in range(200):
+        process.publish("/cf1/cmd_vel", cmd_vel(z=1000.0))
+        if vehicle.wait_for(lambda: warned(process), limit=0.05):
+            break
+    assert warned(process)
+
+
+def warned(process):
+    return any("cf1: not armed, call /cf1/arm" in text for text in process.logged("warn"))

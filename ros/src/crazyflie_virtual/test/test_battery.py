@@ -67,7 +67,9 @@ def test_monitor_gives_up_after_five_critical_seconds():
         assert monitor.is_exhausted == (k > 69)
 
 
-@pytest.mark.parametrize(("voltage", "level"), [(2.9, 0), (3.5, 0), (3.8, 10), (3.93, 50), (4.2, 90)])
+@pytest.mark.parametrize(
+    ("voltage", "level"), [(2.9, 0), (3.5, 0), (3.8, 10), (3.93, 50), (4.2, 90)]
+)
 def test_level_is_guessed_from_the_voltage(voltage, level):
     monitor = PowerMonitor()
     monitor.update(0.0, voltage)

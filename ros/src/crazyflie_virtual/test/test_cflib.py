@@ -116,9 +116,7 @@ def test_parameters(connected):
 def test_memories(connected):
     vehicle, client = connected
     (trajectory,) = client.cf.mem.get_mems(MemoryElement.TYPE_TRAJ)
-    pieces = [
-        Poly4D(1.0 + k, *(Poly4D.Poly([k + 0.5] * 8) for _ in range(4))) for k in range(31)
-    ]
+    pieces = [Poly4D(1.0 + k, *(Poly4D.Poly([k + 0.5] * 8) for _ in range(4))) for k in range(31)]
     trajectory.trajectory = pieces
     done = threading.Event()
     trajectory.write_data(lambda *_: done.set())

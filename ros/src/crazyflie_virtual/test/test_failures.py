@@ -51,11 +51,10 @@ def test_port_closed_is_a_failed_connection(client):
 
 
 def test_silence_from_the_start_connects_nobody(serve, client):
-    _, uri = serve(silence=1e6)
+    server, uri = serve(silence=1e6)
     someone = client(uri).open()
-    rows = client(serve()[1]).open()
-    # As long as another takes to connect, this one hears nothing, not even a failure.
-    rows.wait_for("fully_connected")
+    # Several times as long as it takes to connect, it hears nothing, not even a failure.
+    wait_until(lambda: server.vehicle.time > 0.8)
     assert someone.events == {}
     assert not someone.cf.is_connected()
 
@@ -170,8 +169,3 @@ def test_packets_are_late_both_ways(serve):
         pinger.sendto(b"\xfcping", server.address)
         assert pinger.recv(64) == b"\xfcping"
         assert time.monotonic() - begin >= 0.2
-
-
-def test_a_client_connects_in_spite_of_delay(serve, client):
-    _, uri = serve(delay=0.001)
-    client(uri).open().wait_for("fully_connected")

@@ -154,3 +154,8 @@ def test_a_port_that_is_taken(watch):
     server, _ = watch()
     with pytest.raises(OSError, match="Address already in use"):
         MocapServer(MocapSettings(command_port=server.address[1], observer_port=0))
+
+
+def test_an_address_that_is_none():
+    with pytest.raises(OSError, match="multicast_address is 'somewhere'; expected an IPv4 address"):
+        MocapServer(MocapSettings(command_port=0, observer_port=0, multicast_address="somewhere"))

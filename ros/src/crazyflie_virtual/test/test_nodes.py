@@ -87,7 +87,10 @@ def test_switches_may_be_changed_while_it_runs(launch):
 
 @pytest.mark.parametrize(
     ("switches", "text"),
-    [({"loss": "a lot"}, "loss must be a finite number"), ({"wings": 1}, "there is no switch wings")],
+    [
+        ({"loss": "a lot"}, "loss must be a finite number"),
+        ({"wings": 1}, "there is no switch wings"),
+    ],
 )
 def test_bad_switches_are_told_and_change_nothing(launch, switches, text):
     node = VirtualCrazyflieNode()

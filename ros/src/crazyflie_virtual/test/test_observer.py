@@ -3,6 +3,8 @@
 import socket
 import time
 
+import pytest
+
 from crazyflie_virtual.observer import Observation, decode
 from crazyflie_virtual.server import Server
 from crazyflie_virtual.settings import Settings
@@ -20,6 +22,18 @@ def test_observations_come_back():
 def test_rubbish_is_no_observation():
     assert decode(b"") is None
     assert decode(bytes(200)) is None
+
+
+@pytest.mark.parametrize(("port", "name"), [(19850, "cf1"), (19859, "cf10"), (17850, "cf17850")])
+def test_names_follow_from_ports(port, name):
+    try:
+        server = Server(Settings(port=port, observer_port=0))
+    except OSError:
+        pytest.skip(f"port {port} is taken")
+    try:
+        assert server.observe().name == name
+    finally:
+        server.stop()
 
 
 def test_a_vehicle_tells_its_observer():

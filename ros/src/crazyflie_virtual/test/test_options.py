@@ -1,4 +1,7 @@
-"""Options from a command line."""
+"""Options from a command line, and what the programs need."""
+
+import subprocess
+import sys
 
 import pytest
 
@@ -52,3 +55,17 @@ def test_help_tells_every_option(capsys):
     text = capsys.readouterr().out
     for name in ("--observer-rate", "--fault-silence", "--thrust-error"):
         assert name in text
+
+
+@pytest.mark.parametrize("package", ["crazyflie_virtual", "crazyflie_virtual.mocap"])
+def test_programs_need_no_ros(package):
+    code = (
+        "import runpy, sys\n"
+        "sys.modules.update(dict.fromkeys(('rospy', 'rosgraph', 'genpy', 'roslib')))\n"
+        "sys.argv[1:] = ['--port=0', '--help']\n"
+        f"import {package}.server\n"
+        f"runpy.run_module('{package}', run_name='__main__')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert "usage:" in done.stdout

@@ -38,4 +38,6 @@ def test_rotations_agree_with_scipy(components, vector):
     np.testing.assert_allclose(
         rotate(quaternion, vector), Rotation.from_quat(quaternion).apply(vector), atol=1e-12
     )
-    np.testing.assert_allclose(rotate_back(quaternion, rotate(quaternion, vector)), vector, atol=1e-12)
+    np.testing.assert_allclose(
+        rotate_back(quaternion, rotate(quaternion, vector)), vector, atol=1e-12
+    )

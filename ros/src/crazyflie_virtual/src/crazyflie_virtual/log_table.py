@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from crazyflie_virtual.kinds import FLOAT, I8, I16, I32, U8, U16, U32, Kind
 
-XYZ = ("x", "y", "z")
+_XYZ = ("x", "y", "z")
 
 
 class LogVariable(NamedTuple):
@@ -143,11 +143,11 @@ _GROUPS = {
     ],
     "ring": [("fadeTime", FLOAT, 0.5)],
     "kalman": [
-        *((f"state{axis.upper()}", FLOAT, f"estimate.{axis}") for axis in XYZ),
-        *((f"stateP{axis.upper()}", FLOAT, f"estimate.v{axis}") for axis in XYZ),
+        *((f"state{axis.upper()}", FLOAT, f"estimate.{axis}") for axis in _XYZ),
+        *((f"stateP{axis.upper()}", FLOAT, f"estimate.v{axis}") for axis in _XYZ),
         *((f"stateD{i}", FLOAT, 0.0) for i in range(3)),
-        *((f"var{axis.upper()}", FLOAT, "estimator.variance_position") for axis in XYZ),
-        *((f"varP{axis.upper()}", FLOAT, "estimator.variance_velocity") for axis in XYZ),
+        *((f"var{axis.upper()}", FLOAT, "estimator.variance_position") for axis in _XYZ),
+        *((f"varP{axis.upper()}", FLOAT, "estimator.variance_velocity") for axis in _XYZ),
         *((f"varD{i}", FLOAT, "estimator.variance_attitude") for i in range(3)),
         *_fields(FLOAT, "q0:qw q1:qx q2:qy q3:qz", "estimate"),
         ("rtUpdate", FLOAT, 100.0),
@@ -174,12 +174,12 @@ _GROUPS = {
     "pid_attitude": _pid(_ANGLES, "stabilizer.attitude"),
     "pid_rate": _pid(_RATES, "stabilizer.attitude"),
     "posCtl": [
-        *((f"targetV{a.upper()}", FLOAT, f"stabilizer.position.v{a}.desired") for a in XYZ),
-        *((f"target{a.upper()}", FLOAT, f"stabilizer.position.{a}.desired") for a in XYZ),
+        *((f"targetV{a.upper()}", FLOAT, f"stabilizer.position.v{a}.desired") for a in _XYZ),
+        *((f"target{a.upper()}", FLOAT, f"stabilizer.position.{a}.desired") for a in _XYZ),
         *_fields(FLOAT, "bodyVX:body_vx bodyVY:body_vy", "stabilizer.position"),
         *_fields(FLOAT, "bodyX:body_x bodyY:body_y", "stabilizer.position"),
-        *(row for a in XYZ for row in _position_pid(a.upper(), a)),
-        *(row for a in XYZ for row in _position_pid("V" + a.upper(), "v" + a)),
+        *(row for a in _XYZ for row in _position_pid(a.upper(), a)),
+        *(row for a in _XYZ for row in _position_pid("V" + a.upper(), "v" + a)),
     ],
     "memTst": [("errCntW", U32, "memory_tester.errors")],
     "crtp": [

@@ -55,8 +55,8 @@ class Server:
         self._observer = (settings.observer_host, settings.observer_port)
         self._observation_period = 1.0 / settings.observer_rate
         self._next_observation = self._begin
-        number = max(1, self.address[1] - FIRST_PORT + 1)
-        self._body_id = settings.body_id or number & 0x7FFF
+        number = _number(self.address[1])
+        self._body_id = settings.body_id or number
         self._body_name = settings.body_name or f"cf{number}"
         self._is_stopping = False
         self._thread = None
@@ -130,3 +130,10 @@ class Server:
             missed = (now - self._next_observation) // self._observation_period
             self._next_observation += (1 + missed) * self._observation_period
             send(self._socket, self.observe().encode(), self._observer)
+
+
+def _number(port):
+    # 1, 2, ... for the ports that clients scan; in any case different for
+    # different ports, nearly.
+    number = port - FIRST_PORT + 1 if port >= FIRST_PORT else port
+    return number & 0x7FFF or 1

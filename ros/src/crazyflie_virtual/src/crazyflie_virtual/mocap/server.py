@@ -39,11 +39,12 @@ class MocapServer:
     Raises
     ------
     OSError
-        A port is taken.
+        A port is taken, or an address is none.
     """
 
     def __init__(self, settings, warn=None):
         self._settings = settings
+        _check_address("multicast_address", settings.multicast_address)
         self.switches = settings.switches()
         self._scene = Scene(
             self.switches, settings.position_noise, settings.attitude_noise, settings.seed
@@ -158,3 +159,10 @@ class MocapServer:
             return [(settings.multicast_address, settings.data_port)]
         self._clients = {c: t for c, t in self._clients.items() if now - t < _CLIENT_LIMIT}
         return list(self._clients)
+
+
+def _check_address(name, text):
+    try:
+        socket.inet_aton(text)
+    except OSError:
+        raise OSError(f"{name} is {text!r}; expected an IPv4 address") from None

@@ -1,0 +1,1 @@
+"""Flight to a goal by PID control."""

@@ -1,0 +1,254 @@
+"""A flight from the ground to a goal and back, as a state machine that lives by `Flight.tick`.
+
+Times are s of any clock that does not run backwards; if it is reset, what was
+under way goes on from there.
+"""
+
+import math
+from enum import Enum
+
+from crazyflie_controller.go_to import GoToController, Pose, Setpoint
+from crazyflie_utils.held import HOLD_LIMIT
+from crazyflie_utils.units import GRAVITY, HOVER_PWM
+
+TAKEOFF_RATE = 10000.0
+"""How fast the thrust of a takeoff grows, PWM/s."""
+
+LIFT_OFF_HEIGHT = 0.05
+"""Height above the start, m, at which a takeoff ends, and a landing's last part begins."""
+
+LIFT_OFF_EXCESS = TAKEOFF_RATE * (6.0 * LIFT_OFF_HEIGHT * HOVER_PWM / (GRAVITY * TAKEOFF_RATE)) ** (
+    1.0 / 3.0
+)
+"""How much more than its weight lifts a vehicle when it has reached `LIFT_OFF_HEIGHT`, PWM.
+
+With a thrust that grows at a constant rate it climbs by g rate t^3 / (6 hover), so that
+the time since it left the ground depends on its weight by the cube root only."""
+
+HOVER_HEIGHT = 0.5
+"""Height above the start, m, at which a vehicle waits that has never been given a goal."""
+
+DESCENT_SPEED = 0.3
+"""Speed of a landing, m/s."""
+
+PRESS_DEPTH = 0.3
+"""How far below the start the goal of a landing sinks, m, so that the vehicle meets the
+ground with its speed also when it hangs above the goal."""
+
+DESCENT_MARGIN = 3.0
+"""How much longer than calculated a descent may take, s: the floor may be higher there."""
+
+TOUCHDOWN_RATE = 20000.0
+"""How fast the thrust decreases in the last part of a landing, PWM/s."""
+
+TOUCHDOWN_DURATION = 1.0
+"""How long it does, s; zero thrust follows."""
+
+OFF_LIMIT = 2.0
+"""The firmware stops its motors when it has had no setpoint for this long, s."""
+
+
+class State(Enum):
+    """What the controller is doing."""
+
+    IDLE = "idle"
+    TAKING_OFF = "taking off"
+    AUTOMATIC = "automatic"
+    LANDING = "landing"
+
+
+class RefusalError(Exception):
+    """A takeoff or landing makes no sense now; the text says why. Nothing has changed."""
+
+
+class Flight:
+    """One vehicle's flights.
+
+    Without a pose that is new within `HOLD_LIMIT` the vehicle is blind: in the air it
+    is given no setpoints, so that its own watchdog levels it out; when that has
+    lasted for `OFF_LIMIT` its motors are off, and the flight has ended.
+
+    Parameters
+    ----------
+    controller : GoToController
+    """
+
+    def __init__(self, controller: GoToController):
+        self._controller = controller
+        self._state = State.IDLE
+        self._remark = None
+        self._goal = None
+        self._hover = None
+        self._pose = None
+        self._stamp = None
+        self._seen = -math.inf
+        self._time = -math.inf
+        self._entered = -math.inf
+        self._interval = None
+        self._setpoint = Setpoint()
+        self._ground = 0.0
+        self._descent_from = None
+        self._touchdown = None
+
+    @property
+    def state(self) -> State:
+        """What the controller is doing."""
+        return self._state
+
+    def take_remark(self) -> str | None:
+        """Return what an operator should know of the last tick, once; or None."""
+        remark, self._remark = self._remark, None
+        return remark
+
+    def set_goal(self, goal: Pose) -> None:
+        """Fly there, now or after the next takeoff."""
+        self._goal = goal
+
+    def take_off(self) -> None:
+        """Begin to take off.
+
+        Raises
+        ------
+        RefusalError
+            The vehicle is in flight, or nobody knows where it is.
+        """
+        if self._state is not State.IDLE:
+            raise RefusalError(f"the controller is {self._state.value}; land first")
+        if self._is_blind(HOLD_LIMIT):
+            raise RefusalError(f"there has been no new pose for {HOLD_LIMIT:g} s")
+        self._ground = self._pose.z
+        self._enter(State.TAKING_OFF)
+
+    def land(self) -> None:
+        """Begin to land where the vehicle is.
+
+        Raises
+        ------
+        RefusalError
+            The vehicle is on the ground, or landing already.
+        """
+        if self._state in (State.IDLE, State.LANDING):
+            raise RefusalError(f"the controller is {self._state.value}")
+        self._descent_from = self._pose
+        self._touchdown = None
+        if self._state is State.TAKING_OFF:
+            self._touch_down()
+        self._enter(State.LANDING)
+
+    def tick(self, time: float, stamp: float | None, pose: Pose | None) -> Setpoint | None:
+        """Go on.
+
+        Parameters
+        ----------
+        time : float
+            Now, s.
+        stamp : float or None
+            When the pose was measured, s of any clock; the same stamp is the same pose.
+        pose : Pose or None
+            The latest one; None when there is none.
+
+        Returns
+        -------
+        Setpoint or None
+            None when the vehicle is better left to its own watchdog.
+        """
+        self._follow_clock(time)
+        self._look(stamp, pose)
+        self._setpoint = self._ACTIONS[self._state](self)
+        return self._setpoint
+
+    # One action for each state.
+
+    def _rest(self):
+        return Setpoint()
+
+    def _take_off(self):
+        thrust = TAKEOFF_RATE * (self._time - self._entered)
+        if self._is_blind(HOLD_LIMIT):
+            return self._give_up(f"takeoff ended: no new pose for {HOLD_LIMIT:g} s")
+        if self._pose.z > self._ground + LIFT_OFF_HEIGHT:
+            self._hover = self._pose._replace(z=self._ground + HOVER_HEIGHT)
+            self._controller.reset(thrust - LIFT_OFF_EXCESS)
+            self._enter(State.AUTOMATIC)
+            return self._go()
+        if thrust >= self._controller.max_thrust:
+            return self._give_up(f"takeoff ended: not lifted off with a thrust of {thrust:.0f} PWM")
+        return Setpoint(thrust=thrust)
+
+    def _go(self):
+        return self._fly_to(self._hover if self._goal is None else self._goal)
+
+    def _land(self):
+        if self._touchdown is None:
+            elapsed = self._time - self._entered
+            start = self._descent_from
+            lowest = min(self._ground - PRESS_DEPTH, start.z)
+            limit = max(start.z - self._ground, 0.0) / DESCENT_SPEED + DESCENT_MARGIN
+            if self._pose.z > self._ground + LIFT_OFF_HEIGHT and elapsed <= limit:
+                z = max(start.z - DESCENT_SPEED * elapsed, lowest)
+                return self._fly_to(start._replace(z=z))
+            self._touch_down()
+        began, thrust = self._touchdown
+        elapsed = self._time - began
+        if elapsed >= TOUCHDOWN_DURATION:
+            self._enter(State.IDLE)
+            return Setpoint()
+        return Setpoint(thrust=max(thrust - TOUCHDOWN_RATE * elapsed, 0.0))
+
+    _ACTIONS = {
+        State.IDLE: _rest,
+        State.TAKING_OFF: _take_off,
+        State.AUTOMATIC: _go,
+        State.LANDING: _land,
+    }
+
+    def _fly_to(self, goal):
+        if self._is_blind(OFF_LIMIT):
+            return self._give_up(
+                f"flight ended: no new pose for {OFF_LIMIT:g} s, so that the vehicle has "
+                "stopped its motors"
+            )
+        if self._is_blind(HOLD_LIMIT):
+            self._remark = f"no new pose for {HOLD_LIMIT:g} s: sending no setpoints"
+            return None
+        if self._interval is None:
+            return self._setpoint
+        return self._controller.update(self._pose, goal, self._interval)
+
+    def _give_up(self, remark):
+        self._remark = remark
+        self._enter(State.IDLE)
+        return Setpoint()
+
+    def _touch_down(self):
+        thrust = 0.0 if self._setpoint is None else self._setpoint.thrust
+        self._touchdown = (self._time, thrust)
+
+    def _enter(self, state):
+        self._state = state
+        self._entered = self._time
+
+    # Eyes and clock.
+
+    def _look(self, stamp, pose):
+        self._interval = None
+        if pose is None or stamp == self._stamp:
+            return
+        interval = math.inf if self._stamp is None else stamp - self._stamp
+        if not 0.0 < interval <= HOLD_LIMIT:
+            self._controller.forget_error()
+            interval = 0.0
+        self._interval = interval
+        self._stamp, self._pose, self._seen = stamp, pose, self._time
+
+    def _is_blind(self, limit):
+        return self._time - self._seen > limit
+
+    def _follow_clock(self, time):
+        if time < self._time:
+            step = time - self._time
+            self._seen += step
+            self._entered += step
+            if self._touchdown is not None:
+                self._touchdown = (self._touchdown[0] + step, self._touchdown[1])
+        self._time = time

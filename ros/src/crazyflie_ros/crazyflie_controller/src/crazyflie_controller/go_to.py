@@ -1,0 +1,108 @@
+"""From where a vehicle is and where it should be to the setpoint that takes it there."""
+
+from typing import NamedTuple
+
+from crazyflie_controller.pid import Gains, Pid
+from crazyflie_utils.angles import rotate_by_yaw, wrap_to_pi
+
+AXES = ("X", "Y", "Z", "Yaw")
+"""Names of the four controllers."""
+
+
+class Pose(NamedTuple):
+    """Position, m, and heading, rad, in the world frame."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+
+
+class Setpoint(NamedTuple):
+    """What cmd_vel carries.
+
+    Attributes
+    ----------
+    pitch : float
+        deg, positive accelerates ahead: ``linear.x``.
+    roll : float
+        deg, positive accelerates to the right: ``linear.y``.
+    thrust : float
+        PWM: ``linear.z``.
+    yaw_rate : float
+        deg/s, positive is clockwise: ``angular.z``.
+    """
+
+    pitch: float = 0.0
+    roll: float = 0.0
+    thrust: float = 0.0
+    yaw_rate: float = 0.0
+
+
+class GoToController:
+    """Four PID controllers on the error that the vehicle sees.
+
+    The position error is that in the heading frame: ahead, to the left, up. The
+    vehicle's tilt is left out of it on purpose: to a vehicle that leans ahead, a goal
+    far below would seem to lie ahead, and make it lean even more.
+
+    Parameters
+    ----------
+    gains : dict of str to Gains
+        One for each of `AXES`; their outputs are pitch, roll, thrust and yaw rate of
+        `Setpoint`, from errors in m and rad.
+    """
+
+    def __init__(self, gains: dict[str, Gains]):
+        self._pids = [Pid(gains[axis]) for axis in AXES]
+        self._error = None
+
+    @property
+    def max_thrust(self) -> float:
+        """Largest thrust that the controller sets, PWM."""
+        return self._pids[2].gains.max_output
+
+    def reset(self, thrust: float) -> None:
+        """Begin anew with the integrals empty but for that of Z, which gives ``thrust`` (PWM)."""
+        for pid, output in zip(self._pids, (0.0, 0.0, thrust, 0.0), strict=True):
+            pid.reset(output)
+        self.forget_error()
+
+    def forget_error(self) -> None:
+        """Take no rate of change from the next error: it is not a sequel of the last one."""
+        self._error = None
+
+    def update(self, pose: Pose, goal: Pose, interval: float) -> Setpoint:
+        """Return the setpoint.
+
+        Parameters
+        ----------
+        pose, goal : Pose
+        interval : float
+            Time between the last pose and this one, s; > 0 unless the error has
+            been forgotten.
+        """
+        error = [*(g - p for g, p in zip(goal[:3], pose[:3], strict=True))]
+        error.append(wrap_to_pi(goal.yaw - pose.yaw))
+        slope = [0.0] * 4
+        if self._error is None:
+            interval = 0.0
+        else:
+            change = [e - last for e, last in zip(error, self._error, strict=True)]
+            change[3] = wrap_to_pi(change[3])
+            slope = [c / interval for c in change]
+        self._error = error
+        outputs = [
+            pid.update(*parts, interval)
+            for pid, *parts in zip(
+                self._pids, _seen(error, pose.yaw), _seen(slope, pose.yaw), strict=True
+            )
+        ]
+        pitch, roll, thrust, yaw_rate = outputs
+        return Setpoint(pitch, roll, thrust, yaw_rate)
+
+
+def _seen(error, yaw):
+    # The slope is turned after it has been taken, so that the vehicle's own turning
+    # does not pass for a motion of the goal.
+    return [*rotate_by_yaw(error[0], error[1], -yaw), *error[2:]]

@@ -1,0 +1,178 @@
+"""The tools: each reads its arguments, prints what was asked for and returns its exit status.
+
+Their arguments are by default those of the process. What needs cflib is loaded when the
+arguments are right.
+"""
+
+import argparse
+import math
+import queue
+import time
+
+import numpy as np
+
+import crazyflie_py
+from crazyflie_py.errors import NoAnswerError
+from crazyflie_tools.program import FINE, LIMIT, add_timeout, add_uri, make_parser, run, seconds
+
+_CHECK_PERIOD = 0.1
+
+
+def scan(arguments: list | None = None) -> int:
+    """List the vehicles within reach."""
+    parser = make_parser(
+        "scan",
+        "List the addresses of the vehicles within reach: by radio on all channels and data rates, "
+        "by USB, and on the UDP ports 19850 to 19859 of 127.0.0.1 or of the environment variable "
+        "SCAN_ADDRESS.",
+    )
+    parser.add_argument(
+        "--address",
+        type=_radio_address,
+        default="E7E7E7E7E7",
+        help="radio address to call; by default %(default)s",
+    )
+    add_timeout(parser)
+    options = parser.parse_args(arguments)
+    return run(parser.prog, lambda: _scan(options.address), options.timeout)
+
+
+def _scan(address):
+    found, problems = crazyflie_py.scan(address)
+    print(*found, sep="\n", end="\n" if found else "")
+    if not found:
+        reasons = "".join(f"\n  {problem}" for problem in problems)
+        raise NoAnswerError(
+            f"no vehicle found by radio (address {address}), by USB or by UDP{reasons}"
+        )
+
+
+def list_params(arguments: list | None = None) -> int:
+    """List the parameters of a vehicle with their values."""
+    parser = make_parser("listParams", "List the parameters of a vehicle: name, type, value.")
+    return _talk(parser, arguments, _list_params)
+
+
+def _list_params(vehicle, _):
+    values = vehicle.parameters.values()
+    for name, (c_type, is_writable) in vehicle.parameters.types().items():
+        access = "" if is_writable else ", readonly"
+        print(f"{name} ({_short(c_type)}{access}) {_text(values[name])}")
+
+
+def list_log_variables(arguments: list | None = None) -> int:
+    """List the log variables of a vehicle."""
+    parser = make_parser("listLogVariables", "List the log variables of a vehicle: name, type.")
+    return _talk(parser, arguments, _list_log_variables)
+
+
+def _list_log_variables(vehicle, _):
+    for name, c_type in vehicle.log.variables().items():
+        print(f"{name} ({_short(c_type)})")
+
+
+def get_param(arguments: list | None = None) -> int:
+    """Print parameters of a vehicle."""
+    parser = make_parser("getParam", "Print the values of parameters of a vehicle, one a line.")
+    parser.add_argument("name", nargs="+", metavar="GROUP.NAME", help="such as ring.effect")
+    return _talk(parser, arguments, _get_param)
+
+
+def _get_param(vehicle, options):
+    values = [vehicle.parameters.read(name) for name in options.name]
+    print(*map(_text, values), sep="\n")
+
+
+def set_param(arguments: list | None = None) -> int:
+    """Set a parameter of a vehicle."""
+    parser = make_parser("setParam", "Set a parameter of a vehicle, and print what it confirms.")
+    parser.add_argument("name", metavar="GROUP.NAME", help="such as ring.effect")
+    parser.add_argument(
+        "value", type=_number, metavar="VALUE", help="a number; one like -1e-3 only after --"
+    )
+    return _talk(parser, arguments, _set_param)
+
+
+def _set_param(vehicle, options):
+    print(_text(vehicle.parameters.write(options.name, options.value)))
+
+
+def reboot(arguments: list | None = None) -> int:
+    """Restart the firmware of a vehicle."""
+    parser = make_parser("reboot", "Restart the firmware of a vehicle; only by radio.")
+    add_uri(parser)
+    add_timeout(parser)
+    options = parser.parse_args(arguments)
+    return run(parser.prog, crazyflie_py.Crazyflie(options.uri.uri).reboot, options.timeout)
+
+
+def console(arguments: list | None = None) -> int:
+    """Print what the firmware of a vehicle says."""
+    parser = make_parser("console", "Print what the firmware of a vehicle says.")
+    parser.add_argument(
+        "--duration",
+        type=seconds,
+        default=math.inf,
+        metavar="SECONDS",
+        help="when to end; by default at Ctrl-C",
+    )
+    add_uri(parser)
+    options = parser.parse_args(arguments)
+    limit = LIMIT + options.duration if math.isfinite(options.duration) else None
+    work = lambda: _console(options.uri.uri, options.duration)  # noqa: E731
+    return run(parser.prog, work, limit, interrupted=FINE)
+
+
+def _console(uri, duration):
+    lines = queue.SimpleQueue()
+    with crazyflie_py.Crazyflie(uri, on_console=lines.put) as vehicle:
+        end = time.monotonic() + duration
+        while time.monotonic() < end:
+            try:
+                print(lines.get(timeout=_CHECK_PERIOD), flush=True)
+            except queue.Empty:
+                # Raises the reason when the link is lost.
+                vehicle.link()
+
+
+def _talk(parser, arguments, work):
+    """Connect, let ``work(vehicle, options)`` talk to the vehicle, return the exit status."""
+    add_uri(parser)
+    add_timeout(parser)
+    options = parser.parse_args(arguments)
+
+    def talk():
+        with crazyflie_py.Crazyflie(options.uri.uri) as vehicle:
+            work(vehicle, options)
+
+    return run(parser.prog, talk, options.timeout)
+
+
+def _radio_address(text):
+    digits = text[2:] if text[:2].lower() == "0x" else text
+    if not (0 < len(digits) <= 10 and set(digits) <= set("0123456789abcdefABCDEF")):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected up to 10 hexadecimal digits")
+    return digits.upper()
+
+
+def _number(text):
+    try:
+        return int(text, 0)
+    except ValueError:
+        pass
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r}: expected a finite number")
+    return value
+
+
+def _short(c_type):
+    return c_type.removesuffix("_t")
+
+
+def _text(value):
+    # The vehicle's numbers have 32 bits: 0.1, not 0.10000000149011612.
+    return str(np.float32(value)) if isinstance(value, float) else str(value)

@@ -1,0 +1,59 @@
+"""Axes of motion capture systems, and those of ROS: x forward, y left, z up (REP 103)."""
+
+import math
+
+UP_AXES = ("z", "y")
+"""Axes that may point up in a stream."""
+
+_NORM_TOLERANCE = 0.01
+"""How far the norm of a measured quaternion may be from 1."""
+
+
+def to_z_up(up_axis: str, position: tuple, quaternion: tuple) -> tuple:
+    """Return a pose of a stream in coordinates whose z axis points up.
+
+    From y up, the axes are turned by +90 degrees about x, those of the body too:
+    what was (x, y, z) becomes (x, -z, y), in the vector part of the quaternion
+    likewise.
+
+    Parameters
+    ----------
+    up_axis : str
+        Of the stream, one of `UP_AXES`.
+    position : tuple, 3 components
+        m.
+    quaternion : tuple, 4 components
+        (x, y, z, w).
+
+    Returns
+    -------
+    tuple
+        Position and quaternion.
+    """
+    if up_axis == "z":
+        return position, quaternion
+    x, y, z = position
+    a, b, c, w = quaternion
+    return (x, -z, y), (a, -c, b, w)
+
+
+def normalized(quaternion: tuple) -> tuple | None:
+    """Return a measured quaternion with norm 1; None when it is no rotation."""
+    norm = math.hypot(*quaternion)
+    # Also false when a component is not a number.
+    if not abs(norm - 1.0) < _NORM_TOLERANCE:
+        return None
+    return tuple(part / norm for part in quaternion)
+
+
+def heading(quaternion: tuple) -> float:
+    """Return where the body's x axis points on the ground, rad in [-pi, pi] from +x to +y.
+
+    Parameters
+    ----------
+    quaternion : tuple, 4 components
+        (x, y, z, w), of norm 1, in coordinates whose z axis points up. This is
+        tf's yaw (roll, pitch and yaw about fixed axes), as ground poses have it.
+    """
+    x, y, z, w = quaternion
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -1,0 +1,49 @@
+"""What a motion capture system says, whatever its make."""
+
+from typing import NamedTuple
+
+
+class Body(NamedTuple):
+    """A rigid body in a frame.
+
+    Attributes
+    ----------
+    body_id : int or None
+        Number that the server streams the body under; None when it has none.
+    name : str or None
+        Name of the body on the server; None when it is not known.
+    position : tuple, 3 components
+        m, in the server's coordinates.
+    quaternion : tuple, 4 components
+        (x, y, z, w), from the body's axes to the server's coordinates.
+    is_tracked : bool
+        Whether the cameras saw the body in this frame; otherwise the pose is an
+        old one, or none.
+    """
+
+    body_id: int | None
+    name: str | None
+    position: tuple
+    quaternion: tuple
+    is_tracked: bool
+
+
+class Frame(NamedTuple):
+    """All rigid bodies at one moment.
+
+    Attributes
+    ----------
+    exposure : float or None
+        When the cameras took the frame, s of the server's clock; None when the
+        server does not tell.
+    sent : float or None
+        When the server sent it, s of the same clock; None like `exposure`.
+    arrival : float
+        When it arrived, s of the local clock.
+    bodies : tuple of Body
+    """
+
+    exposure: float | None
+    sent: float | None
+    arrival: float
+    bodies: tuple

@@ -1,0 +1,221 @@
+"""How well motion capture works, in figures and in words."""
+
+import math
+from typing import NamedTuple
+
+OK, WARN, ERROR = range(3)
+"""Levels, as in diagnostic_msgs/DiagnosticStatus."""
+
+_GRACE = 2.0
+"""How long a body may be missing before that is a fault: nothing is seen in the
+first moments of a stream, s."""
+
+_MOST_OTHERS = 10
+"""Bodies nobody asked for that are remembered, so that a message can name them."""
+
+
+class Status(NamedTuple):
+    """The state of the stream or of a body.
+
+    Attributes
+    ----------
+    component : str
+        What it is about.
+    level : int
+        `OK`, `WARN` or `ERROR`.
+    message : str
+        For an operator.
+    values : dict of str to str
+        Figures, with their units in the keys.
+    """
+
+    component: str
+    level: int
+    message: str
+    values: dict
+
+
+class Health:
+    """Counts what happens between two reports.
+
+    Parameters
+    ----------
+    bodies : sequence of RigidBody
+    stale_after : float
+        Gaps longer than this are a fault, s.
+    now : float
+        s.
+    """
+
+    def __init__(self, bodies, stale_after: float, now: float):
+        self._bodies = {body.key: _BodyCount() for body in bodies}
+        self._labels = {body.key: body.label for body in bodies}
+        self._stale_after = stale_after
+        self._server = None
+        self._trouble = "not connected so far"
+        self._last_frame = None
+        self._stream_begin = None
+        self._others = {}
+        self._begin_period(now)
+
+    def learning(self) -> None:
+        """Take note of a frame that came before the server's clock was known."""
+        self._learning += 1
+
+    def clock_set(self) -> None:
+        """Take note that the server's clock has jumped."""
+        self._jumps += 1
+
+    def stale(self) -> None:
+        """Take note of a frame that was too old, or not new."""
+        self._stale += 1
+
+    def frame(self, now: float, latency: float) -> None:
+        """Take note of a good frame and its latency from exposure to arrival (s)."""
+        if self._last_frame is not None:
+            self._longest_gap = max(self._longest_gap, now - self._last_frame)
+        if self._stream_begin is None:
+            self._stream_begin = now
+        self._last_frame = now
+        self._latencies.append(latency)
+
+    def body(self, body, now: float, is_tracked: bool) -> None:
+        """Take note that a wanted body was in a good frame, tracked or not."""
+        count = self._bodies[body.key]
+        count.frames += 1
+        if is_tracked:
+            count.tracked += 1
+            count.last = now
+
+    def other(self, body) -> None:
+        """Take note of a `Body` in a good frame that nobody asked for."""
+        if len(self._others) < _MOST_OTHERS:
+            self._others[body.body_id, body.name] = body
+
+    def connected(self, server: str) -> None:
+        """Take note of a new connection."""
+        self._server = server
+
+    def disconnected(self, trouble: str) -> None:
+        """Take note that there is no connection: what was seen before does not count."""
+        self._server = None
+        self._trouble = trouble
+        self._stream_begin = None
+        self._last_frame = None
+        self._others.clear()
+        for count in self._bodies.values():
+            count.begin_period()
+
+    def report(self, now: float) -> list:
+        """Return the state since the last report; counting begins anew.
+
+        Parameters
+        ----------
+        now : float
+            s.
+
+        Returns
+        -------
+        list of Status
+            Of the stream, then of every body.
+        """
+        statuses = [self._stream_status(now)]
+        statuses += [self._body_status(key, now) for key in self._bodies]
+        self._begin_period(now)
+        return statuses
+
+    def _begin_period(self, now):
+        self._begin = now
+        self._latencies = []
+        self._longest_gap = 0.0
+        self._learning = 0
+        self._jumps = 0
+        self._stale = 0
+        for count in self._bodies.values():
+            count.begin_period()
+
+    def _stream_status(self, now):
+        period = now - self._begin
+        frames = len(self._latencies)
+        rate = frames / period if period > 0.0 else 0.0
+        gap = self._longest_gap
+        if self._last_frame is not None:
+            gap = max(gap, now - self._last_frame)
+        values = {
+            "server": self._server or "none",
+            "rate (Hz)": f"{rate:.1f}",
+            "longest gap (ms)": _milliseconds(gap),
+            "stale frames": str(self._stale),
+        }
+        if frames:
+            mean = math.fsum(self._latencies) / frames
+            values["latency, mean (ms)"] = _milliseconds(mean)
+            values["latency, maximum (ms)"] = _milliseconds(max(self._latencies))
+        return Status("stream", *self._stream_verdict(values, gap), values)
+
+    def _stream_verdict(self, values, gap):
+        if self._server is None:
+            return ERROR, self._trouble
+        if self._jumps > 1:
+            return ERROR, (
+                "the server's clock keeps jumping: do two servers send to the same address?"
+            )
+        if not self._latencies:
+            if self._learning:
+                return WARN, "learning the server's clock"
+            if self._stale:
+                return ERROR, "all frames are stale: is the server paused or playing a recording?"
+            return ERROR, "no frames"
+        if gap > self._stale_after:
+            return WARN, f"gaps of up to {values['longest gap (ms)']} ms"
+        return OK, (
+            f"{values['rate (Hz)']} frames per second, {values['latency, mean (ms)']} ms old"
+        )
+
+    def _body_status(self, key, now):
+        count = self._bodies[key]
+        values = {"frames": str(count.frames), "tracked": str(count.tracked)}
+        if count.last is not None:
+            values["last seen (s ago)"] = f"{now - count.last:.2f}"
+        level, message = self._body_verdict(count, now)
+        return Status(f"rigid body {self._labels[key]}", level, message, values)
+
+    def _body_verdict(self, count, now):
+        if self._last_frame is None or now - self._last_frame > self._stale_after:
+            return ERROR, "no frames"
+        if count.last is None or count.last < self._stream_begin:
+            is_early = now - self._stream_begin < _GRACE
+            level = WARN if is_early else ERROR
+            if count.frames:
+                return level, "in the stream, but not tracked so far"
+            return level, f"not in the stream so far; {self._other_bodies()}"
+        if now - count.last > self._stale_after:
+            return ERROR, f"not tracked for {now - count.last:.1f} s"
+        if count.tracked < count.frames:
+            return WARN, f"tracked in {count.tracked} of {count.frames} frames"
+        return OK, "tracked"
+
+    def _other_bodies(self):
+        if not self._others:
+            return "it shows no others that are not configured"
+        names = [_describe(body) for body in self._others.values()]
+        return "it shows others that are not configured: " + ", ".join(names)
+
+
+class _BodyCount:
+    def __init__(self):
+        self.last = None
+        self.begin_period()
+
+    def begin_period(self):
+        self.frames = 0
+        self.tracked = 0
+
+
+def _describe(body):
+    parts = [str(part) for part in (body.body_id, body.name) if part is not None]
+    return f"{parts[0]} ({parts[1]})" if len(parts) == 2 else "".join(parts)
+
+
+def _milliseconds(seconds):
+    return f"{1e3 * seconds:.1f}"

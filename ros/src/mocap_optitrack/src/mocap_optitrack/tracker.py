@@ -1,0 +1,114 @@
+"""From a system's frames to the poses that are published."""
+
+import math
+from typing import NamedTuple
+
+from mocap_optitrack.axes import normalized, to_z_up
+from mocap_optitrack.clock_offset import ClockOffset
+from mocap_optitrack.frames import Frame
+from mocap_optitrack.settings import RigidBody
+
+
+class Sighting(NamedTuple):
+    """A rigid body where the cameras saw it.
+
+    Attributes
+    ----------
+    body : RigidBody
+    time : float
+        When, s of the local clock.
+    position : tuple, 3 components
+        m, z up.
+    quaternion : tuple, 4 components
+        (x, y, z, w), of norm 1.
+    """
+
+    body: RigidBody
+    time: float
+    position: tuple
+    quaternion: tuple
+
+
+class Tracker:
+    """Finds the wanted bodies in frames and drops what is invalid or stale.
+
+    A frame counts once: one that is not newer than the last one is dropped, and
+    so is one that is older than ``stale_after`` on arrival. Of a frame, bodies are
+    dropped that were not tracked or whose pose is none.
+
+    Parameters
+    ----------
+    bodies : sequence of RigidBody
+    up_axis : str
+        Of the stream; see `axes.UP_AXES`.
+    stale_after : float
+        s.
+    health : Health
+        Is told what happens.
+    """
+
+    def __init__(self, bodies, up_axis: str, stale_after: float, health):
+        self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
+        self._by_name = {body.name: body for body in bodies if body.name is not None}
+        self._up_axis = up_axis
+        self._stale_after = stale_after
+        self._health = health
+        self._newest = -math.inf
+        self._clock = ClockOffset()
+
+    def restart(self) -> None:
+        """Take note that a new connection begins: the server's clock may be another one."""
+        self._clock = ClockOffset()
+
+    def take(self, frame: Frame) -> list:
+        """Return what is to be published of a frame.
+
+        Returns
+        -------
+        list of Sighting
+            All of the same time, which is later than that of the frame before. Empty
+            during the first half second of a stream, in which the server's clock is
+            learned.
+        """
+        time = self._time_of(frame)
+        if time is None:
+            self._health.learning()
+            return []
+        age = frame.arrival - time
+        if time <= self._newest or age > self._stale_after:
+            self._health.stale()
+            return []
+        self._newest = time
+        self._health.frame(frame.arrival, age)
+        sightings = []
+        for body in frame.bodies:
+            wanted = self._wanted(body)
+            if wanted is None:
+                self._health.other(body)
+                continue
+            pose = _pose(body, self._up_axis)
+            self._health.body(wanted, frame.arrival, pose is not None)
+            if pose is not None:
+                sightings.append(Sighting(wanted, time, *pose))
+        return sightings
+
+    def _time_of(self, frame):
+        if frame.exposure is None:
+            return frame.arrival
+        if not self._clock.update(frame.sent, frame.arrival):
+            self._health.clock_set()
+        return self._clock.to_local(frame.exposure) if self._clock.is_settled else None
+
+    def _wanted(self, body):
+        # Systems without numbers may well call a body "1".
+        number = body.name if body.body_id is None else str(body.body_id)
+        return self._by_number.get(number) or self._by_name.get(body.name)
+
+
+def _pose(body, up_axis):
+    if not body.is_tracked or not all(map(math.isfinite, body.position)):
+        return None
+    quaternion = normalized(body.quaternion)
+    if quaternion is None:
+        return None
+    return to_z_up(up_axis, body.position, quaternion)

@@ -1,0 +1,94 @@
+"""What mocap.yaml may say."""
+
+import pytest
+
+from mocap_optitrack.settings import Address, RigidBodies, RigidBody, StreamVersion
+
+ROBOT = {
+    "pose": "Robot_1/pose",
+    "pose2d": "Robot_1/ground_pose",
+    "child_frame_id": "Robot_1/base_link",
+    "parent_frame_id": "world",
+}
+
+
+def test_a_body_by_its_number():
+    (body,) = RigidBodies()({"1": ROBOT})
+    assert body == RigidBody("1", None, *ROBOT.values())
+    assert body.label == "1"
+
+
+def test_bodies_by_name():
+    key_is_name, name_apart = RigidBodies()(
+        {"cf7": {"pose": "pose7"}, "2": {"name": "My Drone", "child_frame_id": "/drone"}}
+    )
+    assert key_is_name == RigidBody("cf7", "cf7", "pose7", None, None, "world")
+    assert name_apart == RigidBody("2", "My Drone", None, None, "drone", "world")
+    assert (key_is_name.label, name_apart.label) == ("cf7", "2 (My Drone)")
+
+
+def test_a_number_without_quotes_is_a_number_too():
+    assert RigidBodies()({1: ROBOT}) == RigidBodies()({"1": ROBOT})
+
+
+def test_what_means_nothing_is_told():
+    kind = RigidBodies()
+    kind({"1": {**ROBOT, "odom": "Robot_1/Odom", "tf": "tf"}})
+    assert kind.unknown == ["1/odom", "1/tf"]
+
+
+@pytest.mark.parametrize(
+    ("value", "reason"),
+    [
+        ([], ""),
+        ({}, ""),
+        ({"1": None}, "1 is None"),
+        ({"1": {}}, "1 has neither"),
+        ({"1": {"parent_frame_id": "world"}}, "1 has neither"),
+        ({"1": {"pose": "not a topic"}}, "1/pose is 'not a topic'"),
+        ({"1": {"pose2d": 3}}, "1/pose2d is 3"),
+        ({"1": {"child_frame_id": ""}}, "1/child_frame_id is ''"),
+        ({"1": {"pose": "a"}, "2": {"pose": "a"}}, "1 and 2 share pose 'a'"),
+        ({"1": {"pose": "a", "pose2d": "a"}}, "share pose2d 'a'"),
+        (
+            {"1": {"child_frame_id": "a"}, "2": {"child_frame_id": "/a"}},
+            "1 and 2 share child_frame_id",
+        ),
+        ({"1": {"name": "a", "pose": "b"}, "a": {"pose": "c"}}, "1 and a share name 'a'"),
+    ],
+)
+def test_bad_bodies_are_refused(value, reason):
+    with pytest.raises(ValueError) as error:
+        RigidBodies()(value)
+    assert reason in str(error.value)
+
+
+@pytest.mark.parametrize("value", ["192.168.1.20", "127.0.0.1"])
+def test_addresses(value):
+    assert Address()(value) == value
+    with pytest.raises(ValueError):
+        Address(multicast=True)(value)
+
+
+@pytest.mark.parametrize("value", ["224.0.0.1", "239.255.42.99"])
+def test_addresses_of_groups(value):
+    assert Address(multicast=True)(value) == value
+    with pytest.raises(ValueError):
+        Address()(value)
+
+
+@pytest.mark.parametrize("value", ["", "motive", "300.1.1.1", 5, None])
+def test_what_is_no_address(value):
+    with pytest.raises(ValueError):
+        Address()(value)
+
+
+@pytest.mark.parametrize("value", ["3.1", 3.1, "3.1.0.0", [3, 1, 0, 0], [3, 1]])
+def test_stream_versions(value):
+    assert StreamVersion()(value) == "3.1"
+
+
+@pytest.mark.parametrize("value", ["", "new", 3, True, [3], [1, 9], "3.x", "4.1.0.0.0"])
+def test_what_is_no_stream_version(value):
+    with pytest.raises(ValueError):
+        StreamVersion()(value)

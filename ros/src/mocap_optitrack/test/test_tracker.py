@@ -1,0 +1,129 @@
+"""Which bodies of which frames are published, and with what time."""
+
+import math
+
+import pytest
+
+from mocap_optitrack.frames import Body, Frame
+from mocap_optitrack.health import Health
+from mocap_optitrack.settings import RigidBodies
+from mocap_optitrack.tracker import Tracker
+
+UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+BODIES = RigidBodies()(
+    {"1": {"pose": "one"}, "cf7": {"pose": "seven"}, "3": {"name": "My Drone", "pose": "drone"}}
+)
+
+
+def tracker(up_axis="z", stale_after=0.2):
+    """Return a tracker of one body by its number and two by their names."""
+    return Tracker(BODIES, up_axis, stale_after, Health(BODIES, stale_after, 0.0))
+
+
+def body(number=1, name=None, position=(1.0, 2.0, 3.0), quaternion=UPRIGHT, is_tracked=True):
+    """Return a body of a frame."""
+    return Body(number, name, position, quaternion, is_tracked)
+
+
+def frame(*bodies, time=10.0):
+    """Return a frame of a system that tells no times."""
+    return Frame(None, None, time, bodies)
+
+
+def keys(sightings):
+    """Return the configured keys of what was seen."""
+    return [sighting.body.key for sighting in sightings]
+
+
+def test_bodies_are_found_by_number_and_by_name():
+    seen = tracker().take(frame(body(1, "x"), body(2, "cf7"), body(8, "My Drone"), body(9, "y")))
+    assert keys(seen) == ["1", "cf7", "3"]
+
+
+def test_a_name_of_its_own_counts_more_than_a_number():
+    assert keys(tracker().take(frame(body(3, "another one")))) == []
+
+
+def test_systems_without_numbers_may_call_a_body_one():
+    assert keys(tracker().take(frame(body(None, "1"), body(None, "cf7")))) == ["1", "cf7"]
+
+
+@pytest.mark.parametrize(
+    "invalid",
+    [
+        {"is_tracked": False},
+        {"position": (math.nan, 0.0, 0.0)},
+        {"position": (0.0, math.inf, 0.0)},
+        {"quaternion": (0.0, 0.0, 0.0, 0.0)},
+        {"quaternion": (0.0, 0.0, 0.0, 2.0)},
+        {"quaternion": (0.0, math.nan, 0.0, 1.0)},
+    ],
+)
+def test_invalid_bodies_are_dropped(invalid):
+    seen = tracker().take(frame(body(1, **invalid), body(2, "cf7")))
+    assert keys(seen) == ["cf7"]
+
+
+def test_poses_have_z_up_and_norm_1():
+    (seen,) = tracker(up_axis="y").take(frame(body(quaternion=(0.0, 0.6, 0.0, 0.8001))))
+    assert seen.position == (1.0, -3.0, 2.0)
+    assert seen.quaternion == pytest.approx((0.0, 0.0, 0.6, 0.8), abs=1e-4)
+    assert math.hypot(*seen.quaternion) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_frames_without_a_time_have_that_of_their_arrival():
+    (seen,) = tracker().take(frame(body(), time=12.5))
+    assert seen.time == 12.5
+
+
+@pytest.mark.parametrize("time", [10.0, 9.9])
+def test_a_frame_that_is_not_new_is_dropped(time):
+    one = tracker()
+    assert one.take(frame(body()))
+    assert not one.take(frame(body(), time=time))
+    assert one.take(frame(body(), time=10.1))
+
+
+def timed(server_time, latency=0.03, network=0.001):
+    """Return a frame of a server whose clock is 500 s behind."""
+    sent = server_time + latency
+    return Frame(server_time, sent, sent + 500.0 + network, (body(),))
+
+
+def settled(one):
+    """Let a tracker learn the server's clock; return the server's time afterwards."""
+    for k in range(1, 100):
+        one.take(timed(0.01 * k))
+    return 1.0
+
+
+def test_nothing_is_published_before_the_servers_clock_is_known():
+    one = tracker()
+    assert not one.take(timed(0.01))
+    assert not one.take(timed(0.02))
+    assert one.take(timed(settled(one)))
+
+
+def test_poses_have_the_time_of_their_exposure():
+    one = tracker()
+    time = settled(one)
+    (seen,) = one.take(timed(time))
+    assert seen.time == pytest.approx(500.0 + time, abs=0.0011)
+    # One that has been held up on the way has it too.
+    (seen,) = one.take(timed(time + 0.01, network=0.1))
+    assert seen.time == pytest.approx(500.0 + time + 0.01, abs=0.0011)
+
+
+def test_a_frame_that_is_too_old_is_dropped():
+    one = tracker(stale_after=0.2)
+    time = settled(one)
+    assert not one.take(timed(time, network=0.18))
+    assert one.take(timed(time + 0.01, network=0.16))
+    assert not one.take(timed(time + 0.02, latency=0.25))
+
+
+def test_a_new_connection_is_learned_anew():
+    one = tracker()
+    time = settled(one)
+    one.restart()
+    assert not one.take(timed(time))

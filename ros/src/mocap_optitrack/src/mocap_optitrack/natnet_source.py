@@ -1,0 +1,239 @@
+"""OptiTrack's Motive, and whatever else speaks NatNet."""
+
+import contextlib
+import select
+import socket
+import time
+
+from mocap_optitrack import natnet_messages as natnet
+from mocap_optitrack.settings import NatNetSettings
+from mocap_optitrack.source import Source, SourceError
+
+_ANSWER_LIMIT = 2.0
+"""How long a server may take to answer, s."""
+
+_ASK_AGAIN = 0.5
+"""Datagrams get lost: from one request for an answer to the next, s."""
+
+_NAMES_AGAIN = 2.0
+"""From one request for the names of bodies to the next, s."""
+
+_KEEP_ALIVE = 1.0
+"""From one sign of life to the next, without which a server stops sending, s."""
+
+_LARGEST = 65536
+_THIS_MACHINE = "127.0.0.1"
+
+
+class NatNetSource(Source):
+    """A NatNet server, unicast or multicast as the server has it.
+
+    Parameters
+    ----------
+    settings : NatNetSettings
+    clock : callable
+        Returns the local time, s.
+    warn : callable
+        Called with a text about every datagram that is dropped.
+    """
+
+    def __init__(self, settings: NatNetSettings, clock, warn):
+        self._settings = settings
+        self._clock = clock
+        self._warn = warn
+        self._sockets = []
+        self._commands = None
+        self._server = None
+        self._info = None
+        self._group = None
+        self._names = {}
+        self._wants_names = True
+        self._asked_names_at = None
+        self._kept_alive_at = None
+
+    def open(self) -> str:
+        """See `Source.open`."""
+        try:
+            self._commands = self._udp_socket()
+            self._commands.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+            self._commands.bind(("", 0))
+            self._info = self._ask_for_server() or self._silent_server()
+            self._group = self._find_group()
+            if self._group is not None:
+                self._join(*self._group)
+        except OSError as error:
+            raise SourceError(f"cannot open a NatNet connection: {error}") from None
+        return self._description()
+
+    def read(self, limit: float):
+        """See `Source.read`."""
+        try:
+            if self._server is not None:
+                self._speak()
+            ready, _, _ = select.select(self._sockets, [], [], limit)
+            for each in ready:
+                frame = self._take(*each.recvfrom(_LARGEST), self._clock())
+                if frame is not None:
+                    return frame
+        except OSError as error:
+            raise SourceError(f"the NatNet connection failed: {error}") from None
+        return None
+
+    @property
+    def silence_hint(self) -> str:
+        """See `Source.silence_hint`."""
+        if self._group is None:
+            return (
+                f"{self._where()} has answered but sends nothing: does it stream rigid bodies, "
+                "and is its recording or live view running?"
+            )
+        address, port = self._group
+        return (
+            f"nothing comes to the multicast group {address}:{port}: is streaming on, does a "
+            "firewall let UDP pass, and is optitrack_config/local_address the address of this "
+            "machine in the cameras' network?"
+        )
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        for each in self._sockets:
+            each.close()
+        self._sockets = []
+
+    def _udp_socket(self):
+        made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._sockets.append(made)
+        return made
+
+    def _targets(self):
+        settings = self._settings
+        if settings.server_address is None:
+            return [a for a in (settings.multicast_address, _THIS_MACHINE) if a is not None]
+        try:
+            return [socket.gethostbyname(settings.server_address)]
+        except OSError as error:
+            raise SourceError(
+                f"optitrack_config/server_address {settings.server_address!r} is unknown: {error}"
+            ) from None
+
+    def _ask_for_server(self):
+        targets = self._targets()
+        port = self._settings.command_port
+        if self._settings.local_address is not None:
+            interface = socket.inet_aton(self._settings.local_address)
+            self._commands.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
+        end = time.monotonic() + _ANSWER_LIMIT
+        ask_at = 0.0
+        while (now := time.monotonic()) < end:
+            if now >= ask_at:
+                self._ask(targets, port)
+                ask_at = now + _ASK_AGAIN
+            ready, _, _ = select.select([self._commands], [], [], min(end, ask_at) - now)
+            if not ready:
+                continue
+            datagram, sender = self._commands.recvfrom(_LARGEST)
+            with contextlib.suppress(natnet.DecodeError):
+                number, payload = natnet.split(datagram)
+                if number == natnet.SERVER_INFO:
+                    info = natnet.read_server_info(payload)
+                    self._server = sender
+                    return info
+        return None
+
+    def _silent_server(self):
+        # Frames can be had from a group without a word from the server.
+        settings = self._settings
+        if settings.version is not None and settings.multicast_address is not None:
+            return natnet.ServerInfo("a server that does not answer", settings.version)
+        raise SourceError(
+            f"no NatNet server answers at {' or '.join(self._targets())}, UDP port "
+            f"{settings.command_port}: is Motive running and streaming, is "
+            "optitrack_config/server_address right, and does a firewall let UDP pass?"
+        )
+
+    def _ask(self, targets, port):
+        failures = []
+        for target in targets:
+            try:
+                self._commands.sendto(natnet.request(natnet.CONNECT, "Ping"), (target, port))
+            except OSError as error:
+                failures.append(f"{target}: {error.strerror}")
+        if len(failures) == len(targets):
+            raise SourceError(f"cannot send to the NatNet server at {', '.join(failures)}")
+
+    def _find_group(self):
+        # A server's own word counts; older ones say nothing of how they send.
+        info, settings = self._info, self._settings
+        if info.is_multicast is False:
+            return None
+        address = info.multicast_address or settings.multicast_address
+        if address is None:
+            return None
+        return address, info.data_port or settings.data_port
+
+    def _join(self, address, port):
+        frames = self._udp_socket()
+        # Other programs on this machine may listen to the same group.
+        frames.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        frames.bind((address, port))
+        membership = socket.inet_aton(address) + socket.inet_aton(self._interface())
+        frames.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+
+    def _interface(self):
+        if self._settings.local_address is not None:
+            return self._settings.local_address
+        if self._server is None:
+            return "0.0.0.0"
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+            probe.connect(self._server)
+            return probe.getsockname()[0]
+
+    def _speak(self):
+        now = time.monotonic()
+        if not self._info.is_multicast and _is_due(self._kept_alive_at, _KEEP_ALIVE, now):
+            self._kept_alive_at = now
+            self._tell(natnet.KEEP_ALIVE)
+        if self._wants_names and _is_due(self._asked_names_at, _NAMES_AGAIN, now):
+            self._asked_names_at = now
+            self._tell(natnet.REQUEST_MODEL)
+
+    def _tell(self, number):
+        self._commands.sendto(natnet.request(number), self._server)
+
+    def _take(self, datagram, sender, arrival):
+        try:
+            return self._understand(*natnet.split(datagram), arrival)
+        except natnet.DecodeError as error:
+            self._warn(f"ignoring a datagram from {sender[0]}: {error}")
+            return None
+
+    def _understand(self, number, payload, arrival):
+        version = self._info.version
+        if number == natnet.MODEL:
+            self._names = natnet.read_names(payload, version)
+            self._wants_names = False
+        if number != natnet.FRAME:
+            return None
+        frequency = self._info.clock_frequency
+        frame = natnet.read_frame(payload, version, frequency, self._names, arrival)
+        if any(body.name is None for body in frame.bodies):
+            self._wants_names = True
+        return frame
+
+    def _where(self):
+        return f"{self._info.name} at {self._server[0]}:{self._server[1]}"
+
+    def _description(self):
+        where = self._info.name if self._server is None else self._where()
+        if self._group is None:
+            return f"{where}, NatNet {self._info.version}, unicast"
+        address, port = self._group
+        text = f"{where}, NatNet {self._info.version}, multicast to {address}:{port}"
+        configured = (self._settings.multicast_address, self._settings.data_port)
+        if None not in configured and configured != self._group:
+            text += f" (which overrules the configured {configured[0]}:{configured[1]})"
+        return text
+
+
+def _is_due(last, period, now):
+    return last is None or now - last >= period

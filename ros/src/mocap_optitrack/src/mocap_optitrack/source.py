@@ -1,0 +1,115 @@
+"""A connection to a motion capture system, and the thread that keeps it alive."""
+
+import threading
+import time
+import traceback
+from abc import ABC, abstractmethod
+
+from mocap_optitrack.frames import Frame
+
+_SILENCE = 1.0
+"""A connection without a frame for this long is given up and made anew, s."""
+
+_RETRY = 1.0
+"""From a failure to the next attempt, s."""
+
+_POLL = 0.1
+"""How long a source may wait for a frame before it looks up, s."""
+
+_STOP_LIMIT = 0.5
+"""How long `Receiver.stop` waits for the thread, s."""
+
+
+class SourceError(Exception):
+    """A motion capture system cannot be used; the text says why and what to do."""
+
+
+class Source(ABC):
+    """One connection to one system. All of it is used from a single thread."""
+
+    @abstractmethod
+    def open(self) -> str:
+        """Connect, within a few seconds, and return to what.
+
+        Raises
+        ------
+        SourceError
+        """
+
+    @abstractmethod
+    def read(self, limit: float) -> Frame | None:
+        """Return the next frame; None if there is none within ``limit`` seconds or so.
+
+        Raises
+        ------
+        SourceError
+            The connection has ended.
+        """
+
+    @property
+    @abstractmethod
+    def silence_hint(self) -> str:
+        """What may be the matter when no frames come over an open connection."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Disconnect; also after a failure of `open`."""
+
+
+class Receiver:
+    """A thread that hands over frames and connects again and again when it must.
+
+    Parameters
+    ----------
+    make_source : callable
+        Returns a new `Source`.
+    on_connected : callable
+        Called with what `Source.open` returned.
+    on_frame : callable
+        Called with every `Frame`.
+    on_trouble : callable
+        Called with a text whenever a connection fails or ends; there will be
+        another attempt.
+    """
+
+    def __init__(self, make_source, on_connected, on_frame, on_trouble):
+        self._make_source = make_source
+        self._on_connected = on_connected
+        self._on_frame = on_frame
+        self._on_trouble = on_trouble
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="motion capture", daemon=True)
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End; returns after half a second even if the thread is still busy."""
+        self._stopping.set()
+        self._thread.join(_STOP_LIMIT)
+
+    def _run(self):
+        while not self._stopping.is_set():
+            source = self._make_source()
+            try:
+                self._on_connected(source.open())
+                self._receive(source)
+            except SourceError as error:
+                self._on_trouble(str(error))
+            except Exception:
+                # The thread must live, whatever a system or a library comes up with.
+                self._on_trouble(f"motion capture failed\n{traceback.format_exc()}")
+            finally:
+                source.close()
+            self._stopping.wait(_RETRY)
+
+    def _receive(self, source):
+        last = time.monotonic()
+        while not self._stopping.is_set():
+            frame = source.read(_POLL)
+            if frame is not None:
+                last = time.monotonic()
+                self._on_frame(frame)
+            elif time.monotonic() - last > _SILENCE:
+                raise SourceError(f"no frames for {_SILENCE:g} s; {source.silence_hint}")

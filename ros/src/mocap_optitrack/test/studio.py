@@ -1,0 +1,111 @@
+"""A motion capture studio in software: processes, and a scene to look at."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+import threading
+import time
+
+import yaml
+
+from crazyflie_virtual.observer import Observation
+
+LIMIT = 20.0
+
+_PERIOD = 0.05
+"""From one look at the scene to the next, s."""
+
+
+def free_port():
+    """Return a UDP port that nobody uses."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextlib.contextmanager
+def process(*command):
+    """Run a program for the length of a block."""
+    child = subprocess.Popen([str(part) for part in command], start_new_session=True)
+    try:
+        yield child
+    finally:
+        # roslaunch and rosrun have children of their own.
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(child.pid, signal.SIGINT)
+        try:
+            child.wait(LIMIT)
+        except subprocess.TimeoutExpired:
+            os.killpg(child.pid, signal.SIGKILL)
+            raise
+
+
+def virtual_mocap(command_port, observer_port, name="virtual_mocap", latency=0.0):
+    """Run ``rosrun crazyflie_virtual virtual_mocap``."""
+    options = {
+        "__name": name,
+        "_command_port": command_port,
+        "_observer/port": observer_port,
+        "_latency": latency,
+    }
+    arguments = [f"{key}:={value}" for key, value in options.items()]
+    return process("rosrun", "crazyflie_virtual", "virtual_mocap", *arguments)
+
+
+def mocap_launch(folder, config):
+    """Run mocap.launch with a configuration."""
+    path = folder / "mocap.yaml"
+    path.write_text(yaml.safe_dump(config))
+    return process("roslaunch", "mocap_optitrack", "mocap.launch", f"mocap_config_file:={path}")
+
+
+class Scene:
+    """Vehicles that fly straight on, and tell the virtual cameras so.
+
+    Parameters
+    ----------
+    port : int
+        Where the cameras listen.
+    vehicles : dict of int to tuple
+        Number to name, position (m) when the scene begins, velocity (m/s) and
+        quaternion.
+    """
+
+    def __init__(self, port, vehicles):
+        self._port = port
+        self._vehicles = vehicles
+        self._begin = time.monotonic()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+
+    def __enter__(self):
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception):
+        self._over.set()
+        self._thread.join(LIMIT)
+
+    def position(self, number, moment):
+        """Return the position (m) of a vehicle at a moment of the monotonic clock (s)."""
+        _, start, velocity, _ = self._vehicles[number]
+        dt = moment - self._begin
+        return [a + b * dt for a, b in zip(start, velocity, strict=True)]
+
+    def _run(self):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            while not self._over.wait(_PERIOD):
+                now = time.monotonic()
+                for number, (name, _, velocity, quaternion) in self._vehicles.items():
+                    observation = Observation(
+                        number,
+                        name,
+                        now,
+                        self.position(number, now),
+                        velocity,
+                        quaternion,
+                        (0, 0, 0),
+                    )
+                    sender.sendto(observation.encode(), ("127.0.0.1", self._port))

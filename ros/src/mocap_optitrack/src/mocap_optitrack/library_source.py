@@ -1,0 +1,134 @@
+"""Vicon, Qualisys and VRPN, over the motioncapture package in a process of its own."""
+
+import json
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+
+from mocap_optitrack import library_worker
+from mocap_optitrack.frames import Body, Frame
+from mocap_optitrack.source import Source, SourceError
+
+SYSTEMS = ("vicon", "qualisys", "vrpn")
+"""What the package can do beside NatNet."""
+
+_MARGIN = 2.0
+"""How much longer than the worker's own limit an answer is waited for, s."""
+
+_CHUNK = 65536
+
+
+class LibrarySource(Source):
+    """A system that the motioncapture package knows.
+
+    The package tells neither when a frame was taken nor which bodies are tracked.
+    So frames have the time of their arrival, and a body counts as tracked when its
+    pose is not, to the last bit, the one it had in the frame before: measurements of
+    a body at rest differ by their noise, and a system that has lost a body, or its
+    cameras, repeats itself.
+
+    Parameters
+    ----------
+    system : str
+        One of `SYSTEMS`.
+    host : str
+        Name or address of the server.
+    clock : callable
+        Returns the local time, s.
+    """
+
+    def __init__(self, system: str, host: str, clock):
+        self._system = system
+        self._host = host
+        self._clock = clock
+        self._worker = None
+        self._received = b""
+        self._last = {}
+
+    def open(self) -> str:
+        """See `Source.open`."""
+        try:
+            # The package does not take names.
+            address = socket.gethostbyname(self._host)
+        except OSError as error:
+            raise SourceError(
+                f"motioncapture_config/hostname {self._host!r} is unknown: {error}"
+            ) from None
+        command = [sys.executable, "-m", library_worker.__name__, self._system, address]
+        self._worker = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0
+        )
+        line = self._read_line(library_worker.CONNECT_LIMIT + _MARGIN)
+        if line is None:
+            raise SourceError(self._no_answer())
+        self._parse(line)
+        return f"{self._system} at {self._host}, over the motioncapture package"
+
+    def read(self, limit: float):
+        """See `Source.read`."""
+        line = self._read_line(limit)
+        if line is None:
+            return None
+        arrival = self._clock()
+        bodies = [self._body(*entry) for entry in self._parse(line)]
+        if not any(body.is_tracked for body in bodies):
+            # Some systems give frames whether they know anything new or not.
+            return None
+        return Frame(None, None, arrival, tuple(bodies))
+
+    @property
+    def silence_hint(self) -> str:
+        """See `Source.silence_hint`."""
+        return (
+            f"{self._system} at {self._host} shows no body that moves by so much as its noise: "
+            "is it live, and are its objects enabled?"
+        )
+
+    def close(self) -> None:
+        """See `Source.close`."""
+        if self._worker is not None:
+            self._worker.kill()
+            self._worker.wait()
+            self._worker.stdout.close()
+            self._worker = None
+
+    def _body(self, name, *pose):
+        is_new = self._last.get(name, pose) != pose
+        self._last[name] = pose
+        return Body(None, name, tuple(pose[:3]), tuple(pose[3:]), is_new)
+
+    def _parse(self, line):
+        value = json.loads(line)
+        if isinstance(value, dict):
+            raise SourceError(f"{self._system} at {self._host}: {value['error']}")
+        return value
+
+    def _read_line(self, limit):
+        output = self._worker.stdout
+        while b"\n" not in self._received:
+            if not select.select([output], [], [], limit)[0]:
+                return None
+            chunk = os.read(output.fileno(), _CHUNK)
+            if not chunk:
+                raise SourceError(self._why_it_ended())
+            self._received += chunk
+        line, _, self._received = self._received.partition(b"\n")
+        return line
+
+    def _why_it_ended(self):
+        status = self._worker.wait()
+        if status == -signal.SIGALRM:
+            return self._no_answer()
+        return (
+            f"the motioncapture package ended with status {status} while it was connected to "
+            f"{self._system} at {self._host}"
+        )
+
+    def _no_answer(self):
+        return (
+            f"{self._system} at {self._host} does not answer: is it running and streaming, is "
+            "motioncapture_config/hostname right, and does a firewall let it pass?"
+        )

@@ -1,0 +1,252 @@
+"""The node on a fake process, with frames made by hand."""
+
+import math
+from pathlib import Path
+
+import pytest
+import yaml
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import Point, Pose2D, Quaternion
+
+from crazyflie_utils.fake import FakeProcess
+from mocap_optitrack.frames import Body, Frame
+from mocap_optitrack.library_source import LibrarySource
+from mocap_optitrack.mocap_node import MocapNode
+from mocap_optitrack.natnet_source import NatNetSource
+from mocap_optitrack.settings import NatNetSettings
+
+SHIPPED = Path(__file__).parents[1] / "config" / "mocap.yaml"
+
+TURNED = (0.0, 0.0, math.sin(0.2), math.cos(0.2))
+BODIES = {
+    "1": {
+        "pose": "Robot_1/pose",
+        "pose2d": "Robot_1/ground_pose",
+        "child_frame_id": "Robot_1/base_link",
+        "parent_frame_id": "lab",
+    },
+    "cf7": {"pose": "/seven", "child_frame_id": "seven"},
+    "9": {"pose2d": "nine"},
+}
+
+
+class NoReceiver:
+    """In the place of the thread that frames come from."""
+
+    def start(self):
+        """Do nothing: the test calls the node."""
+
+    def stop(self):
+        """Do nothing."""
+
+
+class SilentNode(MocapNode):
+    """A node that is not connected to anything, but says how it would be."""
+
+    def make_receiver(self, handle):
+        self.source = self._make_source(handle)
+        return NoReceiver()
+
+
+def flat(parameters, prefix=""):
+    """Return a tree of parameters by their full names, with its branches as they are."""
+    result = {}
+    for key, value in parameters.items():
+        result[prefix + key] = value
+        if isinstance(value, dict):
+            result |= flat(value, f"{prefix}{key}/")
+    return result
+
+
+def launch(**changes):
+    """Return a process and the node in it."""
+    process, node = FakeProcess(), SilentNode()
+    assert process.launch(node, "/mocap_node", flat({"rigid_bodies": BODIES, **changes}))
+    return process, node
+
+
+def refusal(**changes):
+    """Return what is logged when the node refuses to start."""
+    process = FakeProcess()
+    parameters = {"rigid_bodies": BODIES, **changes}
+    assert not process.launch(SilentNode(), "/mocap_node", flat(parameters))
+    return process.logged("error")[0]
+
+
+def body(number, name=None, is_tracked=True):
+    """Return a body that is somewhere."""
+    return Body(number, name, (1.0, 2.0, 3.0), TURNED, is_tracked)
+
+
+def show(process, node, *bodies):
+    """Let a frame come."""
+    process.advance(0.01)
+    node.on_frame(Frame(None, None, process.clock.time(), bodies))
+
+
+def test_poses_ground_poses_and_tf():
+    process, node = launch()
+    show(process, node, body(1), body(5, "cf7"))
+    (pose,) = process.published("/mocap_node/Robot_1/pose")
+    assert pose.header.stamp.to_sec() == pytest.approx(100.01)
+    assert pose.header.frame_id == "lab"
+    assert pose.pose.position == Point(1.0, 2.0, 3.0)
+    assert pose.pose.orientation == Quaternion(*TURNED)
+    (ground_pose,) = process.published("/mocap_node/Robot_1/ground_pose")
+    assert ground_pose == Pose2D(1.0, 2.0, pytest.approx(0.4))
+    (tf,) = process.published("/tf")
+    frames = [(t.header.frame_id, t.child_frame_id) for t in tf.transforms]
+    assert frames == [("lab", "Robot_1/base_link"), ("world", "seven")]
+    assert all(t.header.stamp == pose.header.stamp for t in tf.transforms)
+    assert tf.transforms[0].transform.translation.y == 2.0
+    assert tf.transforms[0].transform.rotation == pose.pose.orientation
+    assert len(process.published("/seven")) == 1
+
+
+def test_what_is_not_configured_is_not_published():
+    process, node = launch()
+    show(process, node, body(9))
+    assert len(process.published("/mocap_node/nine")) == 1
+    assert process.published("/tf") == []
+    show(process, node, body(1, is_tracked=False), body(2))
+    assert process.published("/mocap_node/Robot_1/pose") == []
+    assert "/cf7/pose2d" not in process.transport.outlets
+
+
+def test_a_stream_with_y_up():
+    process, node = launch(up_axis="y")
+    show(process, node, body(1))
+    (pose,) = process.published("/mocap_node/Robot_1/pose")
+    assert pose.pose.position == Point(1.0, -3.0, 2.0)
+    assert "axis y of its stream points up" in process.logged("info")[0]
+
+
+def test_stale_frames_are_dropped():
+    process, node = launch(stale_after=0.05)
+    show(process, node, body(1))
+    node.on_frame(Frame(None, None, process.clock.time(), (body(1),)))
+    assert len(process.published("/mocap_node/Robot_1/pose")) == 1
+
+
+def test_diagnostics():
+    process, node = launch()
+    node.on_connected("a server")
+    for _ in range(99):
+        show(process, node, body(1), body(9, is_tracked=False))
+    process.advance(0.01)
+    (message,) = process.published("/diagnostics")
+    assert message.header.stamp.to_sec() == pytest.approx(101.0)
+    assert [(s.name, s.level) for s in message.status] == [
+        ("mocap_node: stream", DiagnosticStatus.OK),
+        ("mocap_node: rigid body 1", DiagnosticStatus.OK),
+        ("mocap_node: rigid body cf7", DiagnosticStatus.WARN),
+        ("mocap_node: rigid body 9", DiagnosticStatus.WARN),
+    ]
+    assert {s.hardware_id for s in message.status} == {"natnet"}
+    figures = {value.key: value.value for value in message.status[0].values}
+    assert figures["rate (Hz)"] == "99.0"
+    assert process.logged("warn") == []
+
+
+def test_a_body_that_is_never_seen_is_warned_of_once_in_a_while():
+    process, node = launch()
+    node.on_connected("a server")
+    for _ in range(500):
+        show(process, node, body(1), body(9), body(3, "cf3"))
+    (text,) = process.logged("warn")
+    assert "rigid body cf7: not in the stream so far" in text
+    assert "3 (cf3)" in text
+
+
+def test_trouble_is_warned_of_and_reported():
+    process, node = launch()
+    for _ in range(3):
+        node.on_trouble("no server answers")
+    process.advance(1.0)
+    assert process.logged("warn") == ["/mocap_node: no server answers (trying again)"]
+    (message,) = process.published("/diagnostics")
+    assert {status.level for status in message.status} == {DiagnosticStatus.ERROR}
+    assert message.status[0].message == "no server answers"
+    node.on_connected("a server")
+    assert "/mocap_node: connected to a server" in process.logged("info")
+
+
+def test_natnet_is_the_default():
+    _, node = launch()
+    assert isinstance(node.source, NatNetSource)
+    assert node._settings == NatNetSettings()
+
+
+def test_the_configuration_of_natnet():
+    config = {
+        "server_address": "motive",
+        "local_address": "192.168.1.20",
+        "multicast_address": "224.0.0.1",
+        "command_port": 1520,
+        "data_port": 9000,
+        "version": [3, 0, 0, 0],
+    }
+    _, node = launch(optitrack_config=config)
+    assert node._settings == NatNetSettings(**{**config, "version": "3.0"})
+
+
+@pytest.mark.parametrize("backend", ["vicon", "qualisys", "vrpn"])
+def test_other_systems(backend):
+    process, node = launch(backend=backend, motioncapture_config={"hostname": "10.0.0.1"})
+    assert isinstance(node.source, LibrarySource)
+    assert f"looking for {backend}" in process.logged("info")[0]
+
+
+def test_the_shipped_configuration():
+    process, node = FakeProcess(), SilentNode()
+    parameters = yaml.safe_load(SHIPPED.read_text())
+    assert process.launch(node, "/mocap_node", flat(parameters))
+    assert process.logged("warn") == []
+    assert node._settings == NatNetSettings(multicast_address="224.0.0.1")
+    assert isinstance(node.source, NatNetSource)
+    show(process, node, body(1), body(2))
+    assert len(process.published("/mocap_node/Robot_1/pose")) == 1
+    assert len(process.published("/mocap_node/Robot_1/ground_pose")) == 1
+    (transform,) = process.published("/tf")[0].transforms
+    assert (transform.header.frame_id, transform.child_frame_id) == ("world", "Robot_1/base_link")
+
+
+def test_what_means_nothing_is_warned_of():
+    process, _ = launch(rigid_bodies={"1": {"pose": "one", "odom": "Odom"}})
+    (text,) = process.logged("warn")
+    assert "/mocap_node/rigid_bodies/1/odom means nothing here" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "name", "reason"),
+    [
+        ({"rigid_bodies": {"1": {"pose": 3}}}, "rigid_bodies", "1/pose is 3; expected the name"),
+        ({"rigid_bodies": 5}, "rigid_bodies", "expected a dictionary of number or name"),
+        ({"backend": "kinect"}, "backend", "expected one of natnet, vicon, qualisys, vrpn"),
+        ({"up_axis": "x"}, "up_axis", "expected one of z, y"),
+        ({"stale_after": 0}, "stale_after", "> 0 (s)"),
+        ({"backend": "vicon"}, "motioncapture_config/hostname", "is not set"),
+        (
+            {"optitrack_config": {"multicast_address": "192.168.1.1"}},
+            "optitrack_config/multicast_address",
+            "expected a multicast address, 224.0.0.0 to 239.255.255.255",
+        ),
+        (
+            {"optitrack_config": {"local_address": "eth0"}},
+            "optitrack_config/local_address",
+            "expected an IP address",
+        ),
+        ({"optitrack_config": {"command_port": 0}}, "optitrack_config/command_port", "1 to 65535"),
+        ({"optitrack_config": {"version": "new"}}, "optitrack_config/version", "such as 3.1"),
+    ],
+)
+def test_bad_parameters_are_named(changes, name, reason):
+    text = refusal(**changes)
+    assert f"/mocap_node/{name} is" in text
+    assert reason in text
+
+
+def test_the_bodies_are_required():
+    process = FakeProcess()
+    assert not process.launch(SilentNode(), "/mocap_node", {})
+    assert "parameter /mocap_node/rigid_bodies is not set" in process.logged("error")[0]

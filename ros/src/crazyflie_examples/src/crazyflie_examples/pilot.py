@@ -6,6 +6,7 @@ from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_examples.flight_record import FlightRecord
 from crazyflie_examples.flight_recorder_node import FlightRecorderNode
+from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils.transport import ServiceError
 
 
@@ -34,6 +35,7 @@ class Pilot:
         self._recorder = FlightRecorderNode()
         if not self._recorder.initialize(self._handle):
             raise FlightError("the flight recorder could not be started; see the log")
+        self._reference = self._handle.publisher("ref", PositionVelocityStateStamped)
         if start:
             process.start()
 
@@ -62,6 +64,13 @@ class Pilot:
         state = self._recorder.record.state
         end = state.last_time + duration
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")
+
+    def refer_to(self, point) -> None:
+        """Publish a point (x, y, z), m, as reference, to be at rest there."""
+        x, y, z = map(float, point)
+        reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=z))
+        reference.header.stamp = self._handle.stamp()
+        self._reference.publish(reference)
 
     def land(self) -> None:
         """Call land and wait for its answer, and for what the vehicle does then."""

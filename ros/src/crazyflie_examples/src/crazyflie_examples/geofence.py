@@ -1,0 +1,179 @@
+"""A box that a vehicle does not leave: least-restrictive control by stopping distance.
+
+Where a vehicle would come to rest, if it began to brake now, decides. For each
+axis, with position x and velocity v, that is the stopping point
+
+    X = x + v T + v |v| / (2 b)
+
+for a reaction time T and a deceleration b. As long as X is in the box, x is
+inside and can be kept inside. Its rate is X' = v + (T + |v| / b) a, so that the
+acceleration a has an immediate hold on it.
+
+An inner box lies within the box, smaller by a margin on all sides. With e the
+signed distance of X from the inner box, the fence asks for the acceleration
+
+    a = -(v + r e) / (T + |v| / b),
+
+which gives X' = -r e: the stopping point returns to the inner box exponentially,
+at the rate r. Its say s is 0 while X is in the inner box and rises smoothly with
+|e| to 1 where X reaches the wall. Mixed with what the regular controller wants,
+
+    X' = (1 - s) (v + (T + |v| / b) a_regular) - s r e,
+
+which points inwards at the wall whatever the regular controller does; one whose
+acceleration is limited and that pushes against the wall is held in the margin.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from crazyflie_lqr.linear_feedback import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_utils.angles import rotate_by_yaw
+from crazyflie_utils.units import GRAVITY
+
+MAX_HORIZONTAL = GRAVITY * math.tan(MAX_TILT)
+"""Horizontal acceleration that the fence asks for at most, m/s^2."""
+
+MAX_HORIZONTAL_BRAKING = MAX_HORIZONTAL / math.sqrt(2.0)
+"""What of it is left for an axis when both brake, in a corner of the box, m/s^2."""
+
+MAX_VERTICAL_BRAKING = min(GRAVITY - MIN_THRUST, MAX_THRUST - GRAVITY)
+"""What thrust can do upwards as well as downwards, m/s^2."""
+
+
+@dataclass(frozen=True)
+class Braking:
+    """How the vehicle can be stopped along an axis.
+
+    Attributes
+    ----------
+    deceleration : float
+        What can be counted on, m/s^2: along x and y at most `MAX_HORIZONTAL_BRAKING`,
+        along z at most `MAX_VERTICAL_BRAKING`.
+    reaction_time : float
+        From a state until the vehicle decelerates because of it, s.
+    """
+
+    deceleration: float
+    reaction_time: float
+
+
+class Geofence:
+    """Prioritised controller that keeps a vehicle in a box.
+
+    Parameters
+    ----------
+    lower, upper : array_like, shape (3,)
+        Corners of the box, m, fixed frame.
+    margin : float
+        From the box to the inner box, m; upper - lower >= 2 margin.
+    horizontal, vertical : Braking
+        Of x and y; of z.
+    recovery_rate : float
+        At which the stopping point is brought back to the inner box, 1/s.
+    """
+
+    def __init__(
+        self, lower, upper, margin: float, horizontal: Braking, vertical: Braking, recovery_rate
+    ):
+        self._inner_lower = np.asarray(lower, dtype=float) + margin
+        self._inner_upper = np.asarray(upper, dtype=float) - margin
+        self._margin = margin
+        axes = (horizontal, horizontal, vertical)
+        self._deceleration = np.array([axis.deceleration for axis in axes])
+        self._reaction_time = np.array([axis.reaction_time for axis in axes])
+        self._recovery_rate = recovery_rate
+
+    def stopping_point(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return where the vehicle would come to rest, m, shape (3,)."""
+        braking_time = np.abs(velocity) / self._deceleration
+        return position + velocity * (self._reaction_time + braking_time / 2.0)
+
+    def excess(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return by how much the stopping point is outside the inner box, m, shape (3,), signed."""
+        stop = self.stopping_point(position, velocity)
+        return stop - np.clip(stop, self._inner_lower, self._inner_upper)
+
+    def say(self, excess: np.ndarray) -> np.ndarray:
+        """Return how much the fence decides on each axis, 0 ... 1, shape (3,)."""
+        x = np.minimum(np.abs(excess) / self._margin, 1.0)
+        return x * x * (3.0 - 2.0 * x)
+
+    def acceleration(self, velocity: np.ndarray, excess: np.ndarray) -> np.ndarray:
+        """Return what brings the stopping point back, m/s^2, shape (3,), fixed frame.
+
+        Horizontally at most `MAX_HORIZONTAL`, in the right direction.
+        """
+        hold = self._reaction_time + np.abs(velocity) / self._deceleration
+        wanted = -(velocity + self._recovery_rate * excess) / hold
+        size = math.hypot(wanted[0], wanted[1])
+        if size > MAX_HORIZONTAL:
+            wanted[:2] *= MAX_HORIZONTAL / size
+        return wanted
+
+    def control(
+        self, position: np.ndarray, velocity: np.ndarray, yaw: float, regular: np.ndarray
+    ) -> tuple:
+        """Return a control and the priority with which it is to be mixed with the regular one.
+
+        The priority is the largest say of the axes. Where the fence has less say
+        it moves its control towards the regular one, so that the mixture gives
+        each axis its own: a wall ahead does not keep the vehicle from moving along
+        it, or from holding its height.
+
+        Parameters
+        ----------
+        position, velocity : ndarray, shape (3,)
+            m and m/s, fixed frame.
+        yaw : float
+            rad.
+        regular : ndarray, shape (4,)
+            Regular control: roll, pitch in rad, yaw rate in rad/s, thrust in m/s^2.
+
+        Returns
+        -------
+        ndarray, shape (4,)
+            Control; the yaw rate is the regular one.
+        float
+            Priority, 0 ... 1.
+        """
+        excess = self.excess(position, velocity)
+        say = self.say(excess)
+        priority = float(say.max())
+        share = say / priority if priority > 0.0 else say
+        fence = self.acceleration(velocity, excess)
+        wanted = acceleration_from_control(regular, yaw)
+        return control_from_acceleration(
+            share * fence + (1.0 - share) * wanted, yaw, regular[2]
+        ), priority
+
+
+def acceleration_from_control(control: np.ndarray, yaw: float) -> np.ndarray:
+    """Return the acceleration, m/s^2, shape (3,), fixed frame, of a vehicle near hover.
+
+    x'' = g tan(pitch), y'' = -g tan(roll), z'' = thrust cos(roll) cos(pitch) - g in the
+    heading frame, with tilt limited to `MAX_TILT`.
+    """
+    roll, pitch, _, thrust = control
+    roll, pitch = _limited_tilt(roll), _limited_tilt(pitch)
+    x, y = rotate_by_yaw(GRAVITY * math.tan(pitch), -GRAVITY * math.tan(roll), yaw)
+    return np.array([x, y, thrust * math.cos(roll) * math.cos(pitch) - GRAVITY])
+
+
+def control_from_acceleration(acceleration: np.ndarray, yaw: float, yaw_dot: float) -> np.ndarray:
+    """Return the control of an acceleration: the inverse of `acceleration_from_control`.
+
+    Tilt and thrust are limited as those of the regular controller are.
+    """
+    x, y, z = acceleration
+    forward, left = rotate_by_yaw(x, y, -yaw)
+    roll = _limited_tilt(-math.atan(left / GRAVITY))
+    pitch = _limited_tilt(math.atan(forward / GRAVITY))
+    thrust = (GRAVITY + z) / (math.cos(roll) * math.cos(pitch))
+    return np.array([roll, pitch, yaw_dot, min(max(thrust, MIN_THRUST), MAX_THRUST)])
+
+
+def _limited_tilt(angle):
+    return min(max(angle, -MAX_TILT), MAX_TILT)

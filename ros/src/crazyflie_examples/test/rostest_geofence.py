@@ -1,0 +1,184 @@
+"""Flights against the walls of the geofence."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+import rospy
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_examples.flight_record import CONTROL_FIELDS, Series
+from crazyflie_examples.geofence import MAX_HORIZONTAL, MAX_VERTICAL_BRAKING
+from crazyflie_examples.pilot import Pilot
+from crazyflie_lqr.linear_feedback import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_msgs.msg import ControlStamped
+from crazyflie_utils.runner import ros_process
+from crazyflie_utils.units import GRAVITY
+from crazyflie_utils.vectors import to_vector
+
+PERIOD = 0.01
+HOME = (0.0, 0.0, 1.0)
+# Reference, and for how long, s.
+OUTSIDE = [
+    ((6.0, 0.0, 1.0), 4.0),
+    ((-6.0, 0.0, 1.0), 4.0),
+    ((0.0, 6.0, 1.0), 4.0),
+    ((0.0, -6.0, 1.0), 4.0),
+    ((0.0, 0.0, 9.0), 3.0),
+    ((0.0, 0.0, -9.0), 3.0),
+    ((6.0, 6.0, 9.0), 4.0),
+    ((-6.0, -6.0, -9.0), 4.0),
+    ((1.1, 0.0, 1.0), 4.0),
+]
+CLOSE = 0.3
+"""How near to the walls it comes at least, m."""
+
+# Of the fence, as launched: margin, deceleration, reaction time, recovery rate.
+MARGIN, HORIZONTAL, VERTICAL, RATE = 0.5, (1.5, 0.4), (4.0, 0.2), 1.0
+
+
+@dataclass
+class Flight:
+    """What was recorded: true positions, regular and final control, and the legs."""
+
+    positions: Series
+    regular: Series
+    final: Series
+    legs: list
+
+    @property
+    def start(self):
+        return self.legs[0][0]
+
+    @property
+    def end(self):
+        return self.legs[-1][1]
+
+    def common_controls(self):
+        """Return times, regular and final controls of the states that both answer."""
+        regular = {round(t, 3): u for t, u in self._during(self.regular)}
+        final = {round(t, 3): u for t, u in self._during(self.final)}
+        times = sorted(set(regular) & set(final))
+        return (
+            np.array(times),
+            np.array([regular[t] for t in times]),
+            np.array([final[t] for t in times]),
+        )
+
+    def _during(self, series):
+        rows = zip(series.times, series.values, strict=True)
+        return [(t, u) for t, u in rows if self.start <= t <= self.end]
+
+
+def record(process, flight):
+    """Subscribe for a flight; return the handle to close."""
+    handle = process.handle("/geofence_recorder")
+
+    def on_transforms(message):
+        for transform in message.transforms:
+            if transform.child_frame_id == "crazyflie":
+                at = transform.transform.translation
+                flight.positions.append(transform.header.stamp.to_sec(), (at.x, at.y, at.z))
+
+    def on_control(message):
+        flight.regular.append(message.header.stamp.to_sec(), to_vector(message.control))
+
+    handle.subscribe("/tf", TFMessage, on_transforms)
+    handle.subscribe("/control/lqr", ControlStamped, on_control)
+    return handle
+
+
+@pytest.fixture(scope="module")
+def flight():
+    """Fly once, against every wall and then home."""
+    process = ros_process()
+    flight = Flight(Series(("x", "y", "z")), Series(CONTROL_FIELDS), None, [])
+    handle = record(process, flight)
+    pilot = Pilot(process)
+    pilot.wait_until_ready()
+    pilot.takeoff()
+    for reference, duration in [*OUTSIDE, (HOME, 8.0)]:
+        start = flight.positions.last_time
+        pilot.refer_to(reference)
+        pilot.hover(duration)
+        flight.legs.append((start, flight.positions.last_time))
+    flight.final = pilot.finish().final_control
+    handle.close()
+    process.stop()
+    return flight
+
+
+@pytest.fixture(scope="module")
+def box():
+    """Return the corners, shape (2, 3), as launched."""
+    corners = [rospy.get_param(f"/geofence/box/{end}") for end in ("min", "max")]
+    return np.array([[corner[axis] for axis in "xyz"] for corner in corners])
+
+
+def test_never_leaves_the_box(flight, box):
+    positions = flight.positions.between(flight.start, flight.end)
+    assert len(positions) > 0.9 * (flight.end - flight.start) / PERIOD
+    assert np.all(positions > box[0])
+    assert np.all(positions < box[1])
+
+
+@pytest.mark.parametrize("number", range(len(OUTSIDE)))
+def test_stays_close_to_the_walls_in_its_way(flight, box, number):
+    reference = OUTSIDE[number][0]
+    end = flight.legs[number][1]
+    position = flight.positions.between(end - 0.5, end).mean(axis=0)
+    # Where there is no wall in the way, the vehicle is where it should be.
+    expected = np.clip(reference, *box)
+    tolerance = np.where(expected == reference, 0.1, CLOSE)
+    assert np.all(np.abs(position - expected) < tolerance)
+
+
+def test_comes_home_undisturbed(flight):
+    end = flight.legs[-1][1]
+    positions = flight.positions.between(end - 1.0, end)
+    # The integrator of the quadrotor's controller takes its time.
+    assert max(math.dist(position, HOME) for position in positions) < 0.15
+    times, regular, final = flight.common_controls()
+    inside = times > end - 2.0
+    assert inside.sum() > 100
+    np.testing.assert_array_equal(final[inside], regular[inside])
+
+
+def largest_step(speed, acceleration, braking, span):
+    """Return by how much the fence may change a control in one period.
+
+    The stopping point moves at X' = v + (T + v / b) a at most. The say has the
+    slope 1.5 / margin and goes with the span between regular and fence's control;
+    the fence's acceleration changes by (a + r X') / T.
+    """
+    deceleration, reaction_time = braking
+    rate = speed + (reaction_time + speed / deceleration) * acceleration
+    say = 1.5 / MARGIN * rate * PERIOD
+    own = (acceleration + RATE * rate) / reaction_time * PERIOD
+    return say * span, own
+
+
+def test_takes_over_smoothly(flight):
+    speeds = np.abs(np.diff(flight.positions.values, axis=0)).max(axis=0) / PERIOD
+    tilt, own = largest_step(max(speeds[:2]), MAX_HORIZONTAL, HORIZONTAL, 2.0 * MAX_TILT)
+    tilt += own / GRAVITY
+    lift = sum(
+        largest_step(speeds[2], MAX_VERTICAL_BRAKING, VERTICAL, MAX_THRUST - MIN_THRUST),
+    )
+    # A switch from one controller to the other would be 0.52 rad or 12 m/s^2.
+    assert tilt < 0.15
+    assert lift < 3.5
+    times, regular, final = flight.common_controls()
+    of_regular = np.abs(np.diff(regular, axis=0))
+    of_final = np.abs(np.diff(final, axis=0))
+    # What the regular controller does at once the fence may pass on a period or
+    # two later: it answers the state before, with the regular control before that.
+    passed_on = np.maximum(np.maximum(of_regular[2:], of_regular[1:-1]), of_regular[:-2])
+    consecutive = times[3:] - times[:-3] < 3.5 * PERIOD
+    assert consecutive.sum() > 0.8 * (flight.end - flight.start) / PERIOD
+    by_fence = (of_final[2:] - passed_on)[consecutive].max(axis=0)
+    print(f"speeds {speeds}; steps by the fence {by_fence}, bounds {tilt}, {lift}")
+    assert by_fence[0] < tilt
+    assert by_fence[1] < tilt
+    assert by_fence[3] < lift

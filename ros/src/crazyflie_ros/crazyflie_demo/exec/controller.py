@@ -1,0 +1,7 @@
+#!/usr/bin/env python
+"""A joystick's buttons, for the vehicle in whose namespace this node is."""
+
+from crazyflie_demo.joystick_controller_node import JoystickControllerNode
+from crazyflie_utils import run
+
+run(JoystickControllerNode, "joystick_controller")

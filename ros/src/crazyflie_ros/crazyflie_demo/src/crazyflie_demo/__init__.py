@@ -1,0 +1,1 @@
+"""Demos: joystick and keyboard, goals, waypoints, high-level flights, trajectories."""

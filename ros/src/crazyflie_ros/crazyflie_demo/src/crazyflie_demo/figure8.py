@@ -1,0 +1,73 @@
+"""The figure eight of ``data/figure8.csv``.
+
+A curve of Lissajous, x = WIDTH sin(phase), y = HEIGHT sin(2 phase), z = 0, yaw = 0, run
+through once. The phase begins at rest, reaches a constant rate after `RAMP`, and ends at
+rest; its rate follows 10 s^3 - 15 s^4 + 6 s^5, so that position, velocity, acceleration and jerk
+are continuous, and the last three zero at both ends. Between knots `PIECE` apart the
+curve is the polynomial of the 7th degree that shares all four with it at both knots.
+
+Make the file again with ``python3 -m crazyflie_demo.figure8 data/figure8.csv``.
+"""
+
+import math
+import sys
+
+import numpy as np
+
+from crazyflie_demo.polynomials import Piece, hermite, save
+
+WIDTH, HEIGHT = 0.75, 0.375
+"""Amplitudes along x and y, m."""
+
+DURATION, RAMP, PIECE = 10.0, 2.0, 1.0
+"""s."""
+
+_RATE = 2.0 * math.pi / (DURATION - RAMP)
+"""Of the phase between the ramps, rad/s."""
+
+
+def phase(time: float) -> np.ndarray:
+    """Return the phase and its first three derivatives, shape (4,), at a time (s)."""
+    if time > DURATION - RAMP:
+        # The end is the beginning, backwards.
+        mirrored = phase(DURATION - time)
+        return np.array([2.0 * math.pi, 0.0, 0.0, 0.0]) - [1.0, -1.0, 1.0, -1.0] * mirrored
+    s = min(time / RAMP, 1.0)
+    ramp = [
+        RAMP * (2.5 * s**4 - 3.0 * s**5 + s**6),
+        10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5,
+        (30.0 * s**2 - 60.0 * s**3 + 30.0 * s**4) / RAMP,
+        (60.0 * s - 180.0 * s**2 + 120.0 * s**3) / RAMP**2,
+    ]
+    return _RATE * np.array(ramp) + [_RATE * max(time - RAMP, 0.0), 0.0, 0.0, 0.0]
+
+
+def sine(amplitude: float, multiple: int, time: float) -> np.ndarray:
+    """Return amplitude sin(multiple phase) and its first three derivatives, shape (4,)."""
+    p, v, a, j = multiple * phase(time)
+    sin, cos = math.sin(p), math.cos(p)
+    return amplitude * np.array(
+        [
+            sin,
+            v * cos,
+            a * cos - v * v * sin,
+            j * cos - 3.0 * v * a * sin - v**3 * cos,
+        ]
+    )
+
+
+def figure8() -> list[Piece]:
+    """Return the pieces of the figure eight."""
+    knots = np.arange(0.0, DURATION + PIECE / 2.0, PIECE)
+    pieces = []
+    for begin, end in zip(knots, knots[1:], strict=False):
+        coefficients = np.zeros((4, 8))
+        for axis, amplitude in enumerate((WIDTH, HEIGHT)):
+            ends = (sine(amplitude, axis + 1, time) for time in (begin, end))
+            coefficients[axis] = hermite(*ends, PIECE)
+        pieces.append(Piece(PIECE, coefficients))
+    return pieces
+
+
+if __name__ == "__main__":
+    save(sys.argv[1], figure8())

@@ -1,0 +1,86 @@
+"""What Linux says about a joystick, byte by byte (linux/joystick.h)."""
+
+import struct
+
+EVENT = struct.Struct("=IhBB")
+"""struct js_event: time in ms, value, type, number of the axis or button."""
+
+BUTTON, AXIS = 0x01, 0x02
+"""Types of events."""
+
+INITIAL = 0x80
+"""Added to the type of events that only tell how a joystick was found."""
+
+_FULL = 32767
+"""Value of an axis at its end."""
+
+
+class Joystick:
+    """Axes and buttons of a joystick, as far as they have been heard of.
+
+    Parameters
+    ----------
+    deadzone : float
+        How far an axis may be off its centre without counting, as a fraction, < 1.
+
+    Attributes
+    ----------
+    axes : list of float
+        -1 to 1; left and up are positive.
+    buttons : list of int
+        1 is pressed.
+    """
+
+    def __init__(self, deadzone: float = 0.0):
+        self.axes = []
+        self.buttons = []
+        self._deadzone = deadzone
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list:
+        """Take what has been read from the device.
+
+        Returns
+        -------
+        list of tuple
+            The states (axes, buttons) that have come about: one after every change of a
+            button, so that no short press is lost, and the last one.
+        """
+        data = self._rest + data
+        whole = len(data) - len(data) % EVENT.size
+        self._rest = data[whole:]
+        states = []
+        is_told = True
+        for _, value, kind, number in EVENT.iter_unpack(data[:whole]):
+            if kind & ~INITIAL == AXIS:
+                _put(self.axes, number, self._deflection(value), 0.0)
+            elif kind & ~INITIAL == BUTTON:
+                _put(self.buttons, number, int(value != 0), 0)
+            else:
+                continue
+            is_told = kind == BUTTON
+            if is_told:
+                states.append(self.state())
+        return states if is_told else [*states, self.state()]
+
+    def release(self) -> tuple:
+        """Let everything go back to zero, as when the joystick has been unplugged; return it."""
+        self.axes = [0.0] * len(self.axes)
+        self.buttons = [0] * len(self.buttons)
+        self._rest = b""
+        return self.state()
+
+    def state(self) -> tuple:
+        """Return the state (axes, buttons), in new lists."""
+        return list(self.axes), list(self.buttons)
+
+    def _deflection(self, value):
+        # Linux counts right and down positive.
+        part = max(-1.0, min(1.0, -value / _FULL))
+        beyond = max(0.0, abs(part) - self._deadzone) / (1.0 - self._deadzone)
+        return beyond if part > 0.0 else -beyond if beyond else 0.0
+
+
+def _put(values, number, value, neutral):
+    values.extend([neutral] * (number + 1 - len(values)))
+    values[number] = value

@@ -1,0 +1,72 @@
+"""ROS interface of a joystick's buttons: services of the vehicle."""
+
+from sensor_msgs.msg import Joy
+from std_srvs.srv import Empty, EmptyRequest
+
+from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
+from crazyflie_utils.node import Node
+from crazyflie_utils.parameters import BOOLEAN, TOPIC, Integer
+
+LAND, EMERGENCY, TAKEOFF, HEADLIGHT = 0, 1, 2, 4
+"""Buttons."""
+
+_HEADLIGHT_PARAMETER = "ring/headlightEnable"
+
+_LIMIT = 5.0
+"""How long a service may take, s."""
+
+
+class JoystickControllerNode(Node):
+    """Land, take off, stop in an emergency, switch the headlight: at the press of a button.
+
+    Takeoff and landing are those of crazyflie_controller, if the parameter
+    ``use_crazyflie_controller`` says that there is one.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self._joy_topic = None
+        self._has_controller = False
+        self._buttons = ()
+
+    def load_parameters(self, handle) -> None:
+        """See `Node.load_parameters`."""
+        self._joy_topic = handle.param("joy_topic", TOPIC, "joy")
+        self._has_controller = handle.param("use_crazyflie_controller", BOOLEAN, False)
+
+    def register_callbacks(self, handle) -> None:
+        """See `Node.register_callbacks`."""
+        handle.subscribe(self._joy_topic, Joy, self._on_joy)
+
+    def _on_joy(self, message):
+        before, self._buttons = self._buttons, message.buttons
+        for button, is_pressed in enumerate(self._buttons):
+            was_pressed = button < len(before) and before[button]
+            if is_pressed and not was_pressed:
+                self._press(button)
+
+    def _press(self, button):
+        if button == EMERGENCY:
+            self._call("emergency")
+        elif button in (LAND, TAKEOFF) and self._has_controller:
+            self._call("land" if button == LAND else "takeoff")
+        elif button == HEADLIGHT:
+            self._switch_headlight()
+
+    def _switch_headlight(self):
+        name = self._handle.resolve(_HEADLIGHT_PARAMETER)
+        is_on = self._handle.param(name, Integer(0, 255), 0)
+        self._handle.set_param(name, 0 if is_on else 1)
+        request = UpdateParamsRequest([_HEADLIGHT_PARAMETER])
+        self._call("update_params", UpdateParams, request)
+
+    def _call(self, service, service_type=Empty, request=None):
+        request = EmptyRequest() if request is None else request
+        self._handle.info(f"{self._handle.resolve(service)} requested")
+
+        def report(done):
+            error = done.exception()
+            if error is not None:
+                self._handle.error(f"{self._handle.resolve(service)} failed: {error}")
+
+        self._handle.call_service(service, service_type, request, _LIMIT).add_done_callback(report)

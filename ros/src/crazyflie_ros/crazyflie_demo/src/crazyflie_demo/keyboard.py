@@ -1,0 +1,117 @@
+"""A keyboard in the place of a joystick: keys come, axes and buttons go out.
+
+A terminal tells when a key is pressed and, while it is held, repeats it; it does
+not tell when it is let go. So a deflection lasts until the repetition would have come.
+"""
+
+from typing import NamedTuple
+
+FIRST_HOLD = 0.6
+"""How long a key counts as held after it was pressed, s: repetition begins late."""
+
+REPEAT_HOLD = 0.15
+"""How long it does after a repetition, s."""
+
+ROLL, PITCH, YAW, LIFT = 3, 4, 0, 1
+"""Axes, as on a gamepad with the right stick for tilt: left, up and forward are positive."""
+
+LAND, EMERGENCY, TAKEOFF, HEADLIGHT = 0, 1, 2, 4
+"""Buttons."""
+
+AXES, BUTTONS = 8, 11
+"""How many a gamepad has."""
+
+_DEFLECTIONS = {
+    "\x1b[A": (PITCH, 1.0),
+    "\x1b[B": (PITCH, -1.0),
+    "\x1b[D": (ROLL, 1.0),
+    "\x1b[C": (ROLL, -1.0),
+    "w": (LIFT, 1.0),
+    "s": (LIFT, -1.0),
+    "a": (YAW, 1.0),
+    "d": (YAW, -1.0),
+}
+
+_PRESSES = {"t": TAKEOFF, "l": LAND, " ": EMERGENCY, "h": HEADLIGHT}
+
+_RELEASE = "x"
+
+HELP = """\
+t  take off        arrows  ahead, back, left, right
+l  land            w s     up, down
+h  headlight       a d     turn left, right
+x  let all go      space   EMERGENCY STOP          Ctrl-C  end"""
+
+
+class _Held(NamedTuple):
+    value: float
+    until: float
+
+
+class Keyboard:
+    """Axes and buttons that keys move.
+
+    Parameters
+    ----------
+    deflection : float
+        How far a key moves an axis, up to 1.
+    lift_step : float
+        0: w and s move their axis while they are held, like the others. Otherwise each
+        time by this much, and it stays there, from 0 to 1: a thrust.
+    """
+
+    def __init__(self, deflection: float, lift_step: float = 0.0):
+        self._deflection = deflection
+        self._lift_step = lift_step
+        self._lift = 0.0
+        self._held = {}
+        self._rest = ""
+
+    def feed(self, text: str, time: float) -> list:
+        """Take what was typed until ``time`` (s); return the buttons that were pressed."""
+        presses = []
+        for key in self._keys(text):
+            if key in _PRESSES:
+                presses.append(_PRESSES[key])
+            if key in (_RELEASE, " "):
+                self._held.clear()
+                self._lift = 0.0
+            if key in _DEFLECTIONS:
+                self._deflect(*_DEFLECTIONS[key], time)
+        return presses
+
+    def axes(self, time: float) -> list:
+        """Return the axes at ``time`` (s)."""
+        axes = [0.0] * AXES
+        for axis, held in self._held.items():
+            if time < held.until:
+                axes[axis] = held.value
+        if self._lift_step > 0.0:
+            axes[LIFT] = self._lift
+        return axes
+
+    def _deflect(self, axis, direction, time):
+        if axis == LIFT and self._lift_step > 0.0:
+            self._lift = min(max(self._lift + direction * self._lift_step, 0.0), 1.0)
+            return
+        before = self._held.get(axis)
+        value = direction * self._deflection
+        is_repeated = before is not None and time < before.until and before.value == value
+        hold = REPEAT_HOLD if is_repeated else FIRST_HOLD
+        until = max(time + hold, before.until if is_repeated else time)
+        self._held[axis] = _Held(value, until)
+
+    def _keys(self, text):
+        text = self._rest + text
+        self._rest = ""
+        while text:
+            if text in ("\x1b", "\x1b[", "\x1bO"):
+                # The rest of an arrow key may be on its way.
+                self._rest = text
+                return
+            if text[:2] in ("\x1b[", "\x1bO"):
+                yield f"\x1b[{text[2]}"
+                text = text[3:]
+            else:
+                yield text[0].lower()
+                text = text[1:]

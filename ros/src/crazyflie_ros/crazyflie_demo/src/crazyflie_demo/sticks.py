@@ -1,0 +1,30 @@
+"""What the sticks of a joystick say at present."""
+
+import math
+
+JOY_LIMIT = 0.5
+"""How long, in s, the last message of a joystick counts: joy_node repeats it all the time."""
+
+
+class Sticks:
+    """The axes that were heard last, as long as they are fresh."""
+
+    def __init__(self):
+        self._axes = ()
+        self._heard = None
+
+    def hear(self, axes, time: float) -> None:
+        """Take the axes of a message that has come at ``time`` (s)."""
+        self._axes = tuple(axes)
+        self._heard = time
+
+    def is_fresh(self, time: float) -> bool:
+        """Tell whether the joystick is alive at ``time`` (s)."""
+        return self._heard is not None and time - self._heard <= JOY_LIMIT
+
+    def axis(self, index: int, time: float) -> float:
+        """Return an axis, -1 to 1; 0 if there is none, or the joystick is silent."""
+        if not self.is_fresh(time) or index >= len(self._axes):
+            return 0.0
+        value = self._axes[index]
+        return max(-1.0, min(1.0, value)) if math.isfinite(value) else 0.0

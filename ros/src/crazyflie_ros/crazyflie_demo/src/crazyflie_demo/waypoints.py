@@ -1,0 +1,99 @@
+"""A tour from waypoint to waypoint."""
+
+import math
+from typing import NamedTuple
+
+from crazyflie_utils.angles import wrap_to_pi
+from crazyflie_utils.parameters import DURATION, FINITE
+
+
+class Waypoint(NamedTuple):
+    """Position (m) and heading (rad) in the world frame, and how long to stay there, s."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    seconds: float
+
+
+class WaypointList:
+    """Kind of a parameter that is a list of waypoints."""
+
+    def __call__(self, value) -> list[Waypoint]:
+        """Return the waypoints."""
+        if not isinstance(value, list) or not value:
+            raise ValueError
+        return [self._waypoint(number, entry) for number, entry in enumerate(value)]
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return (
+            "a list of waypoints [x, y, z, yaw, seconds] in m, rad and s, all finite, seconds >= 0"
+        )
+
+    @staticmethod
+    def _waypoint(number, entry):
+        if not isinstance(entry, (list, tuple)) or len(entry) != len(Waypoint._fields):
+            raise ValueError(f"waypoint {number} is {entry!r}")
+        kinds = [*[FINITE] * 4, DURATION]
+        try:
+            return Waypoint(*(kind(part) for kind, part in zip(kinds, entry, strict=True)))
+        except ValueError:
+            raise ValueError(f"waypoint {number} is {entry!r}") from None
+
+
+class Tour:
+    """Which waypoint comes next.
+
+    A waypoint is reached when the vehicle is near enough; after its seconds the next
+    one comes. The last one stays.
+
+    Parameters
+    ----------
+    waypoints : list of Waypoint
+    position_tolerance : float
+        m.
+    yaw_tolerance : float
+        rad.
+    """
+
+    def __init__(self, waypoints: list, position_tolerance: float, yaw_tolerance: float):
+        self._waypoints = waypoints
+        self._position_tolerance = position_tolerance
+        self._yaw_tolerance = yaw_tolerance
+        self._reached = None
+        self.index = 0
+        self.is_finished = False
+
+    @property
+    def goal(self) -> Waypoint:
+        """Where to be now."""
+        return self._waypoints[self.index]
+
+    def see(self, time: float, position: tuple, yaw: float) -> None:
+        """Go on, knowing where the vehicle is.
+
+        Parameters
+        ----------
+        time : float
+            Now, s.
+        position : tuple of float
+            x, y, z, m.
+        yaw : float
+            rad.
+        """
+        if self._reached is None and self._is_there(position, yaw):
+            self._reached = time
+        if self._reached is None or time - self._reached < self.goal.seconds:
+            return
+        if self.index + 1 < len(self._waypoints):
+            self.index += 1
+            self._reached = None
+        else:
+            self.is_finished = True
+
+    def _is_there(self, position, yaw):
+        distance = math.dist(position, self.goal[:3])
+        turn = abs(wrap_to_pi(yaw - self.goal.yaw))
+        return distance <= self._position_tolerance and turn <= self._yaw_tolerance

@@ -1,0 +1,55 @@
+"""The services of a driver, which only remember that they were called."""
+
+from std_srvs.srv import Empty
+
+from crazyflie_driver import srv
+from crazyflie_utils.node import Node
+from crazyflie_utils.transport import ServiceError
+
+SERVICES = {
+    "emergency": Empty,
+    "update_params": srv.UpdateParams,
+    "takeoff": srv.Takeoff,
+    "land": srv.Land,
+    "stop": srv.Stop,
+    "go_to": srv.GoTo,
+    "upload_trajectory": srv.UploadTrajectory,
+    "start_trajectory": srv.StartTrajectory,
+}
+
+
+class FakeDriver(Node):
+    """Services of a vehicle /cf.
+
+    Attributes
+    ----------
+    calls : list of tuple
+        Time (s), name and request of every call.
+    refused : dict
+        Name -> why it is refused.
+    """
+
+    def __init__(self):
+        super().__init__()
+        self.calls = []
+        self.refused = {}
+
+    def load_parameters(self, handle):
+        pass
+
+    def register_callbacks(self, handle):
+        for name, service_type in SERVICES.items():
+            handle.advertise_service(f"/cf/{name}", service_type, self._answer(name, service_type))
+
+    def names(self):
+        """Return the names of the services that were called."""
+        return [name for _, name, _ in self.calls]
+
+    def _answer(self, name, service_type):
+        def answer(request):
+            self.calls.append((self._handle.time(), name, request))
+            if name in self.refused:
+                raise ServiceError(self.refused[name])
+            return service_type._response_class()
+
+        return answer

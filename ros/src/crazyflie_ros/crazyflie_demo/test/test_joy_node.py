@@ -1,0 +1,119 @@
+"""The joystick node reads a FIFO or a terminal in the place of a joystick."""
+
+import errno
+import os
+
+import pytest
+from sensor_msgs.msg import Joy
+from test_joystick import axis, button
+
+from crazyflie_demo.joy_node import JoyNode
+from crazyflie_utils.fake import FakeProcess
+
+
+@pytest.fixture
+def fifo(tmp_path):
+    path = tmp_path / "js0"
+    os.mkfifo(path)
+    return path
+
+
+def launch(dev, **changes):
+    process = FakeProcess()
+    node = JoyNode()
+    assert process.launch(node, "/crazyflie/joy", {"dev": str(dev), **changes})
+    process.node = node
+    return process
+
+
+def states(process):
+    """Return what was published: a list of (axes, buttons)."""
+    return [(list(m.axes), list(m.buttons)) for m in process.published("/crazyflie/joy")]
+
+
+def test_replays_a_stream_of_events(fifo):
+    process = launch(fifo, autorepeat_rate=0.0, deadzone=0.0)
+    with open(fifo, "wb", buffering=0) as stick:
+        stick.write(axis(0, 0, True) + axis(1, 0, True) + button(0, 0, True))
+        process.advance(0.05)
+        stick.write(axis(1, -32767))
+        process.advance(0.05)
+        stick.write(button(0, 1) + button(0, 0))
+        process.advance(0.05)
+        process.advance(1.0)
+    assert states(process) == [
+        ([0.0, 0.0], [0]),
+        ([0.0, 1.0], [0]),
+        ([0.0, 1.0], [1]),
+        ([0.0, 1.0], [0]),
+    ]
+    message = process.published("/crazyflie/joy")[0]
+    assert isinstance(message, Joy)
+    assert message.header.stamp.to_sec() == pytest.approx(100.0, abs=0.02)
+    process.node.shutdown()
+
+
+def test_repeats_itself(fifo):
+    process = launch(fifo, autorepeat_rate=10.0)
+    process.advance(1.0)
+    assert states(process) == []
+    with open(fifo, "wb", buffering=0) as stick:
+        stick.write(axis(0, -32767))
+        process.advance(1.0)
+        assert len(states(process)) == pytest.approx(11, abs=1)
+        assert set(map(str, states(process))) == {"([1.0], [])"}
+    process.node.shutdown()
+
+
+def test_waits_for_the_joystick_and_says_so(tmp_path):
+    process = launch(tmp_path / "js0")
+    process.advance(2.5)
+    (warning,) = process.logged("warn")
+    assert "js0: No such file or directory; is it plugged in" in warning
+    os.mkfifo(tmp_path / "js0")
+    process.advance(1.1)
+    assert "reading" in process.logged("info")[0]
+    process.node.shutdown()
+
+
+def test_an_unplugged_joystick_is_released_and_taken_up_again(fifo, monkeypatch):
+    process = launch(fifo)
+    with open(fifo, "wb", buffering=0) as stick:
+        stick.write(axis(1, -32767) + button(3, 1))
+        process.advance(0.2)
+        assert states(process)[-1] == ([0.0, 1.0], [0, 0, 0, 1])
+        with monkeypatch.context() as unplugged:
+            # What the kernel says of a joystick that is gone, and then of its file.
+            unplugged.setattr("os.read", refuse(errno.ENODEV))
+            process.advance(0.05)
+            unplugged.setattr("os.open", refuse(errno.ENOENT))
+            assert states(process)[-1] == ([0.0, 0.0], [0, 0, 0, 0])
+            assert "lost" in process.logged("error")[0]
+            # It is silent as long as there is none.
+            count = len(states(process))
+            process.advance(3.0)
+            assert len(states(process)) == count
+        process.advance(1.1)
+    with open(fifo, "wb", buffering=0) as stick:
+        stick.write(axis(0, 32767))
+        process.advance(0.05)
+    assert states(process)[-1] == ([-1.0, 0.0], [0, 0, 0, 0])
+    process.node.shutdown()
+
+
+def refuse(code):
+    """Return a system call that fails."""
+
+    def call(*_):
+        raise OSError(code, os.strerror(code))
+
+    return call
+
+
+@pytest.mark.parametrize(
+    "changes", [{"dev": ""}, {"deadzone": 1.0}, {"deadzone": -0.1}, {"autorepeat_rate": -1.0}]
+)
+def test_a_bad_parameter_is_named(changes):
+    process = FakeProcess()
+    assert not process.launch(JoyNode(), "/joy", changes)
+    assert f"/joy/{next(iter(changes))}" in process.logged("error")[0]

@@ -74,9 +74,9 @@ class Client:
         self.cf.param.remove_update_callback(group, parameter, confirm)
 
 
-def wait_until(condition):
+def wait_until(condition, limit=LIMIT):
     """Wait until ``condition()`` holds."""
-    end = time.monotonic() + LIMIT
+    end = time.monotonic() + limit
     while not condition():
         assert time.monotonic() < end, "nothing happened"
         time.sleep(0.005)

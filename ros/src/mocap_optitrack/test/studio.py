@@ -42,10 +42,9 @@ def process(*command):
             raise
 
 
-def virtual_mocap(command_port, observer_port, name="virtual_mocap", latency=0.0):
+def virtual_mocap(command_port, observer_port, latency):
     """Run ``rosrun crazyflie_virtual virtual_mocap``."""
     options = {
-        "__name": name,
         "_command_port": command_port,
         "_observer/port": observer_port,
         "_latency": latency,

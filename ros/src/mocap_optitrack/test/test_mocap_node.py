@@ -208,7 +208,7 @@ def test_the_shipped_configuration():
     assert len(process.published("/mocap_node/Robot_1/pose")) == 1
     assert len(process.published("/mocap_node/Robot_1/ground_pose")) == 1
     (transform,) = process.published("/tf")[0].transforms
-    assert (transform.header.frame_id, transform.child_frame_id) == ("world", "Robot_1/base_link")
+    assert (transform.header.frame_id, transform.child_frame_id) == ("world", "vicon/cf7/cf7")
 
 
 def test_what_means_nothing_is_warned_of():

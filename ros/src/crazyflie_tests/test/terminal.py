@@ -1,5 +1,6 @@
 """A shell on a terminal of its own, used as a person uses one."""
 
+import contextlib
 import os
 import pty
 import re
@@ -7,13 +8,18 @@ import select
 import signal
 import subprocess
 import time
+from pathlib import Path
 
-_STATUS = re.compile(r"status=(\d+)\r?\n")
+_PROMPT = re.compile(r"\[status (\d+)\]\r?\n")
+"""What the shell prints when it wants the next command: the status of the last one."""
+
+_PROMPT_SETTINGS = {"PROMPT_COMMAND": 'echo "[status $?]"', "PS1": "", "PS2": "", "TERM": "dumb"}
+"""They are inherited by a shell that is started in the shell."""
 
 _INTERRUPT = "\x03"
 
-_INTERRUPT_LIMIT = 30.0
-"""How long a command may take to end after Ctrl-C, s."""
+_SHELL_LIMIT = 30.0
+"""How long a shell may take to start, and a command to end after Ctrl-C, s."""
 
 
 class CommandError(Exception):
@@ -33,26 +39,28 @@ class Terminal:
 
     def __init__(self, folder, environment: dict):
         self._terminal, other_end = pty.openpty()
-        # Without line editing, and with a prompt that says nothing, the output is
-        # what the commands print and an echo of what is typed.
         self._shell = subprocess.Popen(
             ["bash", "--norc", "--noediting", "-i"],
             stdin=other_end,
             stdout=other_end,
             stderr=other_end,
             cwd=folder,
-            env={**environment, "TERM": "dumb", "PS1": "", "PS2": ""},
+            env={**environment, **_PROMPT_SETTINGS},
             start_new_session=True,
         )
         os.close(other_end)
         self._output = ""
-        self._begin = 0
-        self.is_busy = False
+        self._wait_for_prompt("the shell did not start", _SHELL_LIMIT)
 
     @property
     def output(self) -> str:
-        """What the last command has printed so far."""
-        return self._output[self._begin :]
+        """What the last command has printed so far, below what was typed."""
+        return self._output
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether the last command goes on, as far as has been read."""
+        return not _PROMPT.search(self._output)
 
     def run(self, command: str, limit: float = 60.0) -> str:
         """Type a command, wait for its end and return what it printed.
@@ -63,36 +71,23 @@ class Terminal:
             Its status is not 0, or it has not ended within ``limit`` seconds.
         """
         self.start(command)
-        self._ask_for_status()
-        end = time.monotonic() + limit
-        while not (match := _STATUS.search(self._output, self._begin)):
-            if time.monotonic() > end:
-                raise CommandError(f"{command!r} has not ended after {limit:g} s\n{self.output}")
-            self.read(0.1)
-        self.is_busy = False
-        printed = self._output[self._begin : match.start()]
-        if match.group(1) != "0":
-            raise CommandError(f"{command!r} ended with status {match.group(1)}\n{printed}")
+        prompt = self._wait_for_prompt(f"{command!r} has not ended", limit)
+        printed = self._output[: prompt.start()]
+        if prompt.group(1) != "0":
+            raise CommandError(f"{command!r} ended with status {prompt.group(1)}\n{printed}")
         return printed
 
     def start(self, command: str) -> None:
         """Type a command that goes on until `interrupt`."""
         if self.is_busy:
             raise CommandError(f"cannot type {command!r}: the last command goes on")
-        self._begin = len(self._output)
-        self.is_busy = True
+        self._output = ""
         self._type(command + "\n")
 
     def interrupt(self) -> None:
-        """Press Ctrl-C and wait for the end of the command."""
+        """Press Ctrl-C and wait for the end of the command, which must have begun."""
         self._type(_INTERRUPT)
-        self._ask_for_status()
-        end = time.monotonic() + _INTERRUPT_LIMIT
-        while not _STATUS.search(self._output, self._begin):
-            if time.monotonic() > end:
-                raise CommandError(f"Ctrl-C did not end it\n{self.output}")
-            self.read(0.1)
-        self.is_busy = False
+        self._wait_for_prompt("Ctrl-C did not end it", _SHELL_LIMIT)
 
     def close(self) -> None:
         """End the shell, and with it what still runs in it."""
@@ -100,10 +95,10 @@ class Terminal:
             try:
                 self.interrupt()
             except CommandError:
-                self._kill()
+                self._kill_jobs()
         self._shell.send_signal(signal.SIGHUP)
         try:
-            self._shell.wait(5.0)
+            self._shell.wait(_SHELL_LIMIT)
         except subprocess.TimeoutExpired:
             self._shell.kill()
             self._shell.wait()
@@ -116,21 +111,24 @@ class Terminal:
         try:
             self._output += os.read(self._terminal, 65536).decode(errors="replace")
         except OSError:
-            raise CommandError(f"the shell has ended\n{self.output}") from None
+            raise CommandError(f"the shell has ended\n{self._output}") from None
 
-    def _ask_for_status(self):
-        # In two words, so that the echo of the question is no answer.
-        self._type('echo "status""=$?"\n')
+    def _wait_for_prompt(self, complaint, limit):
+        end = time.monotonic() + limit
+        while not (prompt := _PROMPT.search(self._output)):
+            if time.monotonic() > end:
+                raise CommandError(f"{complaint} after {limit:g} s\n{self._output}")
+            self.read(0.1)
+        return prompt
 
     def _type(self, text):
         os.write(self._terminal, text.encode())
 
-    def _kill(self):
-        # Every job of an interactive shell is a process group of its own.
-        session = os.getsid(self._shell.pid)
-        listed = subprocess.run(
-            ["ps", "-o", "pid=", "-s", str(session)], capture_output=True, text=True, check=False
-        )
-        for pid in map(int, listed.stdout.split()):
-            if pid != self._shell.pid:
-                os.kill(pid, signal.SIGKILL)
+    def _kill_jobs(self):
+        # Every job of an interactive shell is a process group of its own, in one session.
+        for path in Path("/proc").glob("[0-9]*/stat"):
+            with contextlib.suppress(OSError):
+                _, _, _, session, *_ = path.read_text().rpartition(")")[2].split()
+                pid = int(path.parent.name)
+                if int(session) == self._shell.pid != pid:
+                    os.kill(pid, signal.SIGKILL)

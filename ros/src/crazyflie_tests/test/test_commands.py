@@ -72,6 +72,7 @@ class Reader:
     def _wait_for(self, name, terminal):
         end = time.monotonic() + START_LIMIT
         while not self._has(name):
+            assert terminal.is_busy, f"it has ended\n{terminal.output}"
             assert time.monotonic() < end, f"there is no {name}\n{terminal.output}"
             terminal.read(0.2)
 

@@ -11,6 +11,7 @@ from workspaces import TOP
 COMMANDS = {"./run", "apt", "catkin_make", "git", "pip", "python3", "source", "sudo"}
 ROS_COMMAND = re.compile(r"ros(launch|run|service|topic|param|node|msg|bag|test|pack|core)")
 CODE_SPAN = re.compile(r"`([^`]+)`")
+RUN = re.compile("run$|run: until /[a-z_/]+$")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
@@ -37,18 +38,59 @@ def is_in(excerpt, source):
     return False
 
 
+def unmarked(page):
+    """Return what is wrong with the commands of a page, by lines."""
+    complaints = {number: "code that is not fenced" for number in page.indented}
+    for block in page.blocks:
+        if not block.language:
+            complaints[block.line] = "no language"
+        elif block.language != "sh" and any(map(is_command, block.lines)):
+            complaints[block.line] = "commands belong into a block of the language sh"
+        elif block.language == "sh" and not (RUN.match(block.comment) or block.excuse):
+            complaints[block.line] = "commands are neither run nor is it said why not"
+    return complaints
+
+
+BAD_PAGE = """
+    roslaunch a b.launch
+
+```
+code
+```
+
+```text
+rosservice call /takeoff
+```
+
+```sh
+true
+```
+
+The above is not run. `rosrun a b` is.
+
+<!-- run -->
+
+```sh
+true
+```
+
+```sh
+true
+```
+
+*Not run by the tests: it is futile.*
+"""
+
+
+def test_commands_that_are_not_marked_are_found(tmp_path):
+    file = tmp_path / "bad.md"
+    file.write_text(BAD_PAGE)
+    assert list(unmarked(Page(file))) == [2, 4, 8, 12]
+
+
 @named(PAGES)
 def test_every_command_is_run_or_says_why_not(path):
-    page = Page(path)
-    assert page.indented == [], "lines of code that are not fenced"
-    for block in page.blocks:
-        where = f"{path.name}, line {block.line}"
-        assert block.language, f"{where}: name the language"
-        if block.language == "sh":
-            assert re.match("run$|run: until /", block.comment) or block.excuse, where
-        else:
-            commands = [line for line in block.lines if is_command(line)]
-            assert commands == [], f"{where}: commands belong into a block of the language sh"
+    assert unmarked(Page(path)) == {}
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +134,7 @@ def test_links_lead_somewhere(path):
 @named(PAGES)
 def test_comments_are_understood(path):
     page = Page(path)
-    known = "run$|run: until /[a-z_/]+$|end$|every shell: |from: |arguments of: "
+    known = f"{RUN.pattern}|end$|every shell: |from: |arguments of: "
     for part in page.parts:
         assert not isinstance(part, str) or re.match(known, part), part
     for comment, follower in zip(page.parts, page.parts[1:], strict=False):

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+import rospy
 
 from crazyflie_examples.flight_report import FlightReport
 from crazyflie_examples.pilot import FlightError, Pilot
@@ -22,7 +23,7 @@ def flight():
     refusals = [refusal(pilot.land)]
     pilot.takeoff()
     refusals.append(refusal(pilot.takeoff))
-    pilot.hover(6.0)
+    pilot.hover(rospy.get_param("/hover_duration", 6.0))
     pilot.land()
     refusals.append(refusal(pilot.land))
     yield pilot.finish(), refusals

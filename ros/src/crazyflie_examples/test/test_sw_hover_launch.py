@@ -84,7 +84,7 @@ def test_gains_can_be_chosen():
     _, parameters = expand(dynamics="quadrotor", K_file="/my/K.txt", integrator_k_z="-1.5")
     assert parameters["/lqr_controller/K_file"] == "/my/K.txt"
     assert parameters["/lqr_controller/integrator/k/z"] == -1.5
-    assert parameters["/lqr_controller/integrator/k/x"] == -0.1
+    assert parameters["/lqr_controller/integrator/k/x"] == -0.15
 
 
 def test_an_unknown_model_is_refused_with_the_choices():

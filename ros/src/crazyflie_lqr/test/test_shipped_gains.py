@@ -44,13 +44,13 @@ def test_soft_gains_are_the_hardware_ones():
 
 def test_quadrotor_gains_have_the_closed_form_of_their_weights():
     K = load_matrix(str(CONFIG / "K_quadrotor.txt"), 4, 7)
-    tilt, lift = 1.0 / 2.0, 2.0 * 3.0
+    tilt, lift = math.sqrt(2.0 / 4.0), math.sqrt(16.0 / 0.0625)
     expected = gains(
         tilt,
-        math.sqrt((1.0 / 2.0) ** 2 + 2.0 * tilt / G),
-        10.0 / 3.0,
+        math.sqrt(0.5 / 4.0 + 2.0 * tilt / G),
+        math.sqrt(100.0 / 9.0),
         lift,
-        math.sqrt((2.0 * 3.0) ** 2 + 2.0 * lift),
+        math.sqrt(3.0 / 0.0625 + 2.0 * lift),
     )
     np.testing.assert_allclose(K, expected, rtol=1e-9)
 

@@ -1,10 +1,16 @@
 """Link to a Crazyflie: connections with limits, log blocks, parameters, commands.
 
-The names below are loaded when they are first used, so that the modules
-without cflib (`crazyflie_py.errors`, `crazyflie_py.address`, ...) can be had alone.
+The names below are loaded when they are first used, so that the modules that need
+little (`crazyflie_py.errors`, `crazyflie_py.address`, ...) can be had without the rest.
 """
 
 import importlib
+import warnings
+
+# cflib switches deprecation warnings on for the whole process, so that rospy's were
+# printed to the operator. Its drivers, which take long to load, are not loaded here.
+with warnings.catch_warnings():
+    import cflib  # noqa: F401
 
 _HOME = {
     "Crazyflie": "crazyflie_py.crazyflie",

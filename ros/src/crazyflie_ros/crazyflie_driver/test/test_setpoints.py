@@ -115,9 +115,16 @@ def test_nothing_is_repeated(flying):
     assert {(port, channel) for port, channel, _ in vehicle.received} == {(15, 0)}
 
 
-def test_an_unarmed_vehicle_is_pointed_out(server):
+@pytest.mark.parametrize(
+    ("info", "text"),
+    [(1, "cf1: not armed, call /cf1/arm"), (1 << 6, "cf1: cannot fly (locked): restart")],
+)
+def test_a_vehicle_that_will_not_fly_is_pointed_out(server, info, text):
+    def warned(process):
+        return any(text in warning for warning in process.logged("warn"))
+
     vehicle = server.make_vehicle()
-    vehicle.log["supervisor.info"] = ("H", 1)
+    vehicle.log["supervisor.info"] = ("H", info)
     server.add(vehicle.uri)
     process = server.process
     assert vehicle.wait_for(lambda: warned(process), limit=0.0) is False
@@ -126,7 +133,3 @@ def test_an_unarmed_vehicle_is_pointed_out(server):
         if vehicle.wait_for(lambda: warned(process), limit=0.05):
             break
     assert warned(process)
-
-
-def warned(process):
-    return any("cf1: not armed, call /cf1/arm" in text for text in process.logged("warn"))

@@ -87,7 +87,9 @@ class Receiver:
     def stop(self) -> None:
         """End; returns after half a second even if the thread is still busy."""
         self._stopping.set()
-        self._thread.join(_STOP_LIMIT)
+        # The thread itself may be running the callbacks that end the node.
+        if self._thread is not threading.current_thread():
+            self._thread.join(_STOP_LIMIT)
 
     def _run(self):
         while not self._stopping.is_set():

@@ -134,8 +134,11 @@ class SetpointTopics:
         # In this order a NaN stays one, and is refused.
         thrust = min(max(message.linear.z, 0.0), MOST_PWM)
         state = self._log.supervisor
-        if thrust > 0.0 and state is not None and SupervisorState.ARMED not in state:
-            self._warn(f"not armed, call {self._options.prefix}/arm", key="armed")
+        if thrust > 0.0 and state is not None:
+            if state & (SupervisorState.LOCKED | SupervisorState.CRASHED):
+                self._warn(f"cannot fly ({state.words()}): restart the vehicle", key="locked")
+            elif SupervisorState.ARMED not in state:
+                self._warn(f"not armed, call {self._options.prefix}/arm", key="armed")
         self._vehicle.setpoints.attitude(
             message.linear.y + self._options.roll_trim,
             message.linear.x + self._options.pitch_trim,

@@ -66,7 +66,9 @@ def test_topics_speak_in_order(record):
 
 def test_no_zero_thrust_from_takeoff_to_landing(record):
     events = record.events
-    thrusts = record.takeoff_control.between(events["takeoff"] + 0.2, events["flying"])[:, 3]
+    thrusts = record.takeoff_control.between(events["takeoff"], events["flying"])[:, 3]
+    # Zero thrust is repeated until the call has arrived, which takes long for a fast clock.
+    thrusts = thrusts[np.flatnonzero(thrusts)[0] :]
     assert thrusts.size > 50
     np.testing.assert_allclose(thrusts, GRAVITY + 0.2)
     assert record.takeoff_control.between(events["flying"] + 0.2, events["land"]).size == 0

@@ -17,7 +17,11 @@ from crazyflie_examples.launching import launched
 
 HIDDEN_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf_static")
 HIDDEN_NODES = ("/rosout",)
-_LIMIT = 30.0
+_LIMIT = 60.0
+
+_QUIET = 2.0
+"""A graph that has not changed for this long, in s, is complete: nodes register their
+topics one by one."""
 
 
 def dot(published: list, subscribed: list) -> str:
@@ -50,7 +54,7 @@ def dot(published: list, subscribed: list) -> str:
 
 
 def running_graph(expected: set) -> tuple:
-    """Return publications and subscriptions once all ``expected`` nodes are there.
+    """Return publications and subscriptions once all ``expected`` nodes have registered theirs.
 
     Raises
     ------
@@ -59,12 +63,15 @@ def running_graph(expected: set) -> tuple:
     """
     master = rosgraph.Master("/node_graph")
     deadline = time.monotonic() + _LIMIT
+    graph, since = ([], []), time.monotonic()
     while time.monotonic() < deadline:
         if rosgraph.is_master_online():
             published, subscribed, _ = master.getSystemState()
+            if (published, subscribed) != graph:
+                graph, since = (published, subscribed), time.monotonic()
             present = {node for _, nodes in published + subscribed for node in nodes}
-            if expected <= present:
-                return published, subscribed
+            if expected <= present and time.monotonic() - since > _QUIET:
+                return graph
         time.sleep(0.2)
     raise TimeoutError(f"not all of {sorted(expected)} were running after {_LIMIT:g} s")
 

@@ -2,6 +2,8 @@
 
 import pytest
 import workspaces
+from pages import Page
+from reader import Reader
 
 
 @pytest.fixture(scope="session")
@@ -12,24 +14,19 @@ def home(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def workspace(tmp_path_factory, home):
-    """Return the top of a copy of this repository, built."""
+    """Return the top of a copy of this repository, built and installed as the manual says."""
     top = workspaces.copy(tmp_path_factory.mktemp("workspace") / "crazyflie")
-    terminal = workspaces.shell(top, home)
+    reader = Reader(top, home)
     try:
-        terminal.run("./run build", workspaces.BUILD_LIMIT)
+        reader.follow(Page(workspaces.INSTALLATION))
     finally:
-        terminal.close()
+        reader.close()
     return top
 
 
-@pytest.fixture(scope="session")
-def install_space(workspace, home):
-    """Return an install space of the copy."""
-    terminal = workspaces.shell(workspace / "ros", home)
-    try:
-        terminal.run("catkin_make install", workspaces.BUILD_LIMIT)
-    finally:
-        terminal.close()
+@pytest.fixture
+def install_space(workspace):
+    """Return the install space of the copy."""
     return workspace / "ros" / "install"
 
 

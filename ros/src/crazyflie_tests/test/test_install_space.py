@@ -51,6 +51,12 @@ def test_flies(terminal):
     terminal.run(f"python3 {FLY} crazyflie_examples sw_hover.launch {FAST}")
 
 
+def test_knows_of_nothing_else(terminal, workspace):
+    environment = terminal.run("env")
+    for folder in ("devel", "src", "build"):
+        assert f"{workspace}/ros/{folder}" not in environment
+
+
 def test_modules_and_launch_files_are_complete(terminal, install_space):
     terminal.run(f"python3 {INSPECT} {install_space} {' '.join(PACKAGES)}")
 

@@ -6,17 +6,10 @@ import pytest
 from workspaces import BUILD_LIMIT, FAST, FLY, overlay
 
 
-@pytest.fixture(params=["devel", "install"])
-def underlay(request, workspace):
-    """Return the setup file of the space that is built upon."""
-    if request.param == "install":
-        request.getfixturevalue("install_space")
-    return workspace / "ros" / request.param / "setup.bash"
-
-
-def test_controller_of_ones_own_flies(underlay, shell, tmp_path):
+@pytest.mark.parametrize("underlay", ["devel", "install"])
+def test_controller_of_ones_own_flies(underlay, workspace, shell, tmp_path):
     terminal = shell(overlay(tmp_path / "my_workspace", "my_controller"))
-    terminal.run(f"source {underlay}")
+    terminal.run(f"source {workspace}/ros/{underlay}/setup.bash")
     terminal.run("catkin_make", BUILD_LIMIT)
     terminal.run("source devel/setup.bash")
     executable = terminal.run("catkin_find --first-only my_controller my_controller_node")

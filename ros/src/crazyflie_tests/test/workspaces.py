@@ -11,6 +11,9 @@ from crazyflie_examples.launching import free_port
 TOP = Path(__file__).resolve().parents[4]
 """Top of the repository."""
 
+INSTALLATION = TOP / "docs" / "installation.md"
+"""The page that tells how a workspace is built and installed."""
+
 FLY = Path(__file__).with_name("fly.py")
 
 FAST = "rviz:=false sim_time:=true real_time_factor:=0 simulator_dt:=0.01 composed:=true"

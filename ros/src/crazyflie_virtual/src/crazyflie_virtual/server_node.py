@@ -53,7 +53,8 @@ class ServerNode(Node):
             )
         except OSError as error:
             raise ParameterError(
-                f"{handle.name} cannot listen: {error}; change its parameters host and port"
+                f"{handle.name} cannot listen: {error}; is another one running? If not, "
+                "choose another port"
             ) from None
         self._server.start()
         handle.info(self._server.description)

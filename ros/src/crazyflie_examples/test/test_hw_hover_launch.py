@@ -1,0 +1,80 @@
+"""The hardware example's launch files, expanded by roslaunch without a master."""
+
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import launch_files
+import pytest
+import rospkg
+
+LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"
+
+# What users' own launch files may set, with the defaults they count on; None for a
+# path, or for what is a matter of tuning.
+ARGUMENTS = {
+    "reference_topic": "/ref",
+    "state_topic": "/state",
+    "lqr_control_topic": "/control/lqr",
+    "takeoff_control_topic": "/control/takeoff",
+    "final_control_topic": "/control/final",
+    "in_flight_topic": "/in_flight",
+    "fixed_frame": "world",
+    "robot_frame": "crazyflie",
+    "takeoff_hover_x": 0.0,
+    "takeoff_hover_y": 0.0,
+    "takeoff_hover_z": 1.0,
+    "K_file": None,
+    "u_ref_file": None,
+    "estimator_dt": 0.01,
+    "x_dim": 7,
+    "u_dim": 4,
+    "uri": "radio://0/25/2M/E7E7E7E701",
+    "mocap_frame": "vicon/cf7/cf7",
+    "joy_dev": "/dev/input/js0",
+}
+
+
+def test_arguments_of_hw_hover():
+    root = ElementTree.parse(LAUNCH / "hw_hover.launch").getroot()
+    defaults = {entry.get("name"): entry.get("default") for entry in root.findall("arg")}
+    for name, expected in ARGUMENTS.items():
+        assert defaults[name] is not None
+        if expected is not None:
+            assert type(expected)(defaults[name]) == expected
+    assert not [name for name in defaults if name.startswith(("sim_", "simulator_"))]
+
+
+@pytest.mark.parametrize("composed", ["true", "false"])
+def test_names_of_one_vehicle_reach_all_nodes(composed):
+    _, parameters = launch_files.expand(
+        LAUNCH / "hw_hover.launch",
+        rviz="false",
+        composed=composed,
+        uri="udp://127.0.0.1:19999",
+        robot_frame="cf3",
+        final_control_topic="/control/cf3",
+    )
+    added = "/crazyflie/crazyflie_add_cf3"
+    assert parameters[f"{added}/uri"] == "udp://127.0.0.1:19999"
+    assert parameters[f"{added}/tf_prefix"] == "cf3"
+    assert parameters["/cmd_vel_converter/topics/cmd_vel"] == "/cf3/cmd_vel"
+    assert parameters["/cmd_vel_converter/topics/control"] == "/control/cf3"
+    assert parameters["/state_estimator/frames/robot"] == "cf3"
+
+
+def test_the_virtual_pair_meets_on_the_ports_that_are_given():
+    _, parameters = launch_files.expand(
+        LAUNCH / "virtual_hw_hover.launch",
+        rviz="false",
+        port=19999,
+        observer_port=19998,
+        command_port=15299,
+        data_port=15298,
+    )
+    assert parameters["/virtual_crazyflie/port"] == 19999
+    for node in ("virtual_crazyflie", "virtual_mocap"):
+        assert parameters[f"/{node}/observer/port"] == 19998
+    settings = "/mocap_node/optitrack_config"
+    assert parameters["/virtual_mocap/command_port"] == 15299
+    assert parameters[f"{settings}/command_port"] == 15299
+    assert parameters[f"{settings}/data_port"] == 15298

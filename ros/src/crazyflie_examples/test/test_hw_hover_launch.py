@@ -78,3 +78,20 @@ def test_the_virtual_pair_meets_on_the_ports_that_are_given():
     assert parameters["/virtual_mocap/command_port"] == 15299
     assert parameters[f"{settings}/command_port"] == 15299
     assert parameters[f"{settings}/data_port"] == 15298
+
+
+def test_arguments_of_hw_hover_can_be_given_to_the_virtual_one():
+    _, parameters = launch_files.expand(
+        LAUNCH / "virtual_hw_hover.launch",
+        rviz="false",
+        port=19999,
+        takeoff_hover_z=0.5,
+        fixed_frame="lab",
+        mocap_frame="cf7/body",
+        robot_frame="cf7",
+    )
+    assert parameters["/crazyflie/crazyflie_add_cf7/uri"] == "udp://127.0.0.1:19999"
+    assert parameters["/takeoff_server/hover/z"] == 0.5
+    body = "/mocap_node/rigid_bodies/cf7"
+    assert parameters[f"{body}/parent_frame_id"] == parameters["/state_estimator/frames/fixed"]
+    assert parameters[f"{body}/child_frame_id"] == "cf7/body"

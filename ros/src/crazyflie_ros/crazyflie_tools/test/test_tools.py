@@ -53,6 +53,11 @@ def test_values_come_in_the_order_asked_for(answer):
     assert answer(tools.get_param, *names) == (0, ["6", "0.1", "-3"], [])
 
 
+def test_names_may_be_written_as_ros_writes_them(answer):
+    assert answer(tools.get_param, "ring/effect", "/motor/trim") == (0, ["6", "-3"], [])
+    assert answer(tools.set_param, "ring/effect", "5") == (0, ["5"], [])
+
+
 def test_an_unknown_name_is_an_error_with_a_suggestion(answer):
     status, lines, (error,) = answer(tools.get_param, "motor.trim", "ring.efect")
     assert (status, lines) == (1, [])

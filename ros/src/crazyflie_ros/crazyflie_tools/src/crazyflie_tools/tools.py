@@ -74,7 +74,9 @@ def _list_log_variables(vehicle, _):
 def get_param(arguments: list | None = None) -> int:
     """Print parameters of a vehicle."""
     parser = make_parser("getParam", "Print the values of parameters of a vehicle, one a line.")
-    parser.add_argument("name", nargs="+", metavar="GROUP.NAME", help="such as ring.effect")
+    parser.add_argument(
+        "name", nargs="+", type=_name, metavar="GROUP.NAME", help="such as ring.effect"
+    )
     return _talk(parser, arguments, _get_param)
 
 
@@ -86,7 +88,7 @@ def _get_param(vehicle, options):
 def set_param(arguments: list | None = None) -> int:
     """Set a parameter of a vehicle."""
     parser = make_parser("setParam", "Set a parameter of a vehicle, and print what it confirms.")
-    parser.add_argument("name", metavar="GROUP.NAME", help="such as ring.effect")
+    parser.add_argument("name", type=_name, metavar="GROUP.NAME", help="such as ring.effect")
     parser.add_argument(
         "value", type=_number, metavar="VALUE", help="a number; one like -1e-3 only after --"
     )
@@ -153,6 +155,11 @@ def _radio_address(text):
     if not (0 < len(digits) <= 10 and set(digits) <= set("0123456789abcdefABCDEF")):
         raise argparse.ArgumentTypeError(f"{text!r}: expected up to 10 hexadecimal digits")
     return digits.upper()
+
+
+def _name(text):
+    # GROUP/NAME is what the driver's update_params and ROS call it.
+    return text.strip("/").replace("/", ".")
 
 
 def _number(text):

@@ -1,0 +1,91 @@
+"""A virtual vehicle is flown by hand: by a joystick that is replayed, and by keys."""
+
+import os
+import pty
+import signal
+import termios
+import time
+
+import rospy
+from flights import LIMIT, Observer, Stick, launched, running, virtual_vehicle, wait_for_service
+from sensor_msgs.msg import Joy
+
+from crazyflie_demo.keyboard import EMERGENCY, HEADLIGHT, LIFT, PITCH, ROLL, TAKEOFF, YAW
+from crazyflie_utils.angles import rpy_from_quaternion
+
+CLIMB, HOVER = 0.78, 0.7
+"""Of the thrust stick's way; 60000 PWM at the end, and a dead zone at the beginning."""
+
+
+def heading(truth):
+    return rpy_from_quaternion(*truth.quaternion)[2]
+
+
+def wait_until(is_it):
+    end = time.monotonic() + LIMIT
+    while not is_it():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def headlight():
+    return rospy.get_param("/crazyflie/ring/headlightEnable", None)
+
+
+def test_a_joystick(tmp_path):
+    with (
+        Observer() as observer,
+        Stick(tmp_path / "js0") as stick,
+        virtual_vehicle(**{"observer/port": observer.port}) as uri,
+        launched("crazyflie_demo", "teleop_xbox360.launch", uri=uri, joy_dev=tmp_path / "js0"),
+    ):
+        wait_for_service("/crazyflie/emergency")
+        wait_until(lambda: headlight() == 0)
+        stick.press(HEADLIGHT)
+        wait_until(lambda: headlight() == 1)
+
+        stick.tilt(LIFT, 0.0)
+        rospy.wait_for_message("/crazyflie/cmd_vel", rospy.AnyMsg, LIMIT)
+        stick.tilt(LIFT, CLIMB)
+        observer.track_until(lambda truth: truth.position[2] > 0.5)
+        stick.tilt(LIFT, HOVER)
+
+        stick.tilt(PITCH, 0.4)
+        observer.track_until(lambda truth: truth.velocity[0] > 0.5)
+        stick.tilt(PITCH, 0.0)
+        stick.tilt(ROLL, 0.4)
+        observer.track_until(lambda truth: truth.velocity[1] > 0.5)
+        stick.tilt(ROLL, 0.0)
+        stick.tilt(YAW, 0.5)
+        observer.track_until(lambda truth: heading(truth) > 0.4)
+        stick.tilt(YAW, 0.0)
+
+        stick.press(EMERGENCY)
+        observer.track_until(lambda truth: truth.position[2] < 0.02)
+        # The sticks have no say any more.
+        stick.tilt(LIFT, 1.0)
+        end = time.monotonic() + 1.0
+        track = observer.track_until(lambda truth: time.monotonic() > end)
+        assert max(truth.position[2] for truth in track) < 0.1
+
+
+def test_a_keyboard_and_its_terminal():
+    keys, terminal = pty.openpty()
+    before = termios.tcgetattr(terminal)
+    command = ["rosrun", "crazyflie_demo", "keyboard_teleop.py", "__ns:=crazyflie"]
+    with running(*command, stdin=terminal) as keyboard:
+        first = rospy.wait_for_message("/crazyflie/joy", Joy, LIMIT)
+        assert not any(first.buttons)
+        assert termios.tcgetattr(terminal) != before
+        heard = []
+        subscriber = rospy.Subscriber("/crazyflie/joy", Joy, heard.append)
+        wait_until(lambda: heard)
+        os.write(keys, b"t\x1b[A")
+        wait_until(lambda: any(message.buttons[TAKEOFF] for message in heard))
+        wait_until(lambda: any(message.axes[PITCH] > 0.0 for message in heard))
+        subscriber.unregister()
+        keyboard.send_signal(signal.SIGINT)
+        assert keyboard.wait(LIMIT) == 0
+    assert termios.tcgetattr(terminal) == before
+    os.close(keys)
+    os.close(terminal)

@@ -1,0 +1,27 @@
+"""A virtual vehicle flies the figure eight."""
+
+from pathlib import Path
+
+import numpy as np
+from flights import Observer, launched, virtual_vehicle
+
+from crazyflie_demo.polynomials import load
+
+FIGURE8 = Path(__file__).parents[1] / "data" / "figure8.csv"
+
+
+def test_a_figure_eight():
+    with (
+        Observer() as observer,
+        virtual_vehicle(**{"observer/port": observer.port}) as uri,
+        launched("crazyflie_demo", "execute_trajectory.launch", uri=uri),
+    ):
+        start = observer.track_until(lambda truth: truth.position[2] > 0.4)[-1].position
+        track = observer.track_until(lambda truth: truth.position[2] < 0.02)
+    flown = np.array([truth.position[:2] for truth in track]) - start[:2]
+    times = np.linspace(0.0, 1.0, 100)
+    curve = np.hstack([piece.evaluate(times)[:2] for piece in load(FIGURE8)]).T
+    # Every point of the path is near the curve, and every point of the curve near the path.
+    distances = np.linalg.norm(flown[::5, None, :] - curve[None, ::5, :], axis=2)
+    assert distances.min(axis=1).max() < 0.12
+    assert distances.min(axis=0).max() < 0.12

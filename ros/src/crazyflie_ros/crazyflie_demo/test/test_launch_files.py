@@ -1,0 +1,178 @@
+"""The launch files, expanded by roslaunch without a master; every node takes its parameters."""
+
+import functools
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+import rospkg
+from roslaunch.config import load_config_default
+
+from crazyflie_utils.fake import FakeProcess
+from mocap_optitrack.mocap_node import MocapNode
+
+PACKAGE = Path(__file__).parents[1]
+LAUNCH_FILES = sorted((PACKAGE / "launch").glob("*.launch"))
+OWN = ("crazyflie_controller", "crazyflie_demo", "crazyflie_driver")
+
+DRIVER = {"/crazyflie_server": "crazyflie_server"}
+ONE = {**DRIVER, "/crazyflie/crazyflie_add_crazyflie": "crazyflie_add"}
+JOYSTICK = {"joy": "joy_node"}
+
+
+@functools.cache
+def expand(file, **arguments):
+    """Return nodes and values of parameters, by full name."""
+    given = [f"{name}:={value}" for name, value in arguments.items()]
+    path = str(PACKAGE / "launch" / file)
+    config = load_config_default([(path, given)], None, verbose=False, assign_machines=False)
+    nodes = {node.namespace.rstrip("/") + "/" + node.name: node for node in config.nodes}
+    return nodes, {name: parameter.value for name, parameter in config.params.items()}
+
+
+def types(nodes):
+    return {name: node.type for name, node in nodes.items()}
+
+
+def controlled(prefix, goal_type):
+    """Return what is expected for a vehicle with a controller."""
+    return {
+        f"/{prefix}/crazyflie_add_{prefix}": "crazyflie_add",
+        f"/{prefix}/controller": "crazyflie_controller",
+        f"/{prefix}/joystick_controller": "controller.py",
+        f"/{prefix}/goal_source": goal_type,
+    }
+
+
+@pytest.mark.parametrize("pad", ["xbox360", "ps3"])
+def test_teleop(pad):
+    nodes, parameters = expand(f"teleop_{pad}.launch", uri="udp://127.0.0.1:1", joy_dev="/dev/js7")
+    assert types(nodes) == {
+        **ONE,
+        "/crazyflie/joy": "joy_node",
+        "/crazyflie/joystick_controller": "controller.py",
+        "/crazyflie/teleop": "teleop.py",
+    }
+    assert parameters["/crazyflie/joy/dev"] == "/dev/js7"
+    assert parameters["/crazyflie/crazyflie_add_crazyflie/uri"] == "udp://127.0.0.1:1"
+
+
+@pytest.mark.parametrize("system", ["mocap", "vicon", "vrpn"])
+def test_hover(system):
+    nodes, parameters = expand(f"hover_{system}.launch", z=0.8)
+    assert types(nodes) == {
+        **DRIVER,
+        **controlled("crazyflie", "publish_pose_teleop.py"),
+        "/crazyflie/joy": "joy_node",
+        "/mocap_node": "mocap_node",
+    }
+    assert parameters["/crazyflie/goal_source/z"] == 0.8
+
+
+@pytest.mark.parametrize("system", ["mocap", "vicon", "vrpn"])
+@pytest.mark.parametrize(
+    ("what", "goals"),
+    [
+        ("hover", ("publish_pose.py", "publish_pose.py")),
+        ("waypoint", ("demo1.py", "demo2.py")),
+    ],
+)
+def test_two_vehicles(system, what, goals):
+    nodes, parameters = expand(f"multi_{what}_{system}.launch")
+    assert types(nodes) == {
+        **DRIVER,
+        **controlled("crazyflie1", goals[0]),
+        **controlled("crazyflie2", goals[1]),
+        "/joy": "joy_node",
+        "/mocap_node": "mocap_node",
+    }
+    uris = [parameters[f"/crazyflie{i}/crazyflie_add_crazyflie{i}/uri"] for i in (1, 2)]
+    assert len(set(uris)) == 2
+
+
+def motion_capture_files():
+    return [path.name for path in LAUNCH_FILES if path.stem.endswith(("_mocap", "_vicon", "_vrpn"))]
+
+
+@pytest.mark.parametrize("file", motion_capture_files())
+def test_motion_capture_publishes_the_frames_that_are_flown_by(file):
+    _, parameters = expand(file)
+    published = {value for name, value in parameters.items() if name.endswith("child_frame_id")}
+    flown = {value for name, value in parameters.items() if name.endswith("/controller/frame")}
+    assert flown
+    assert flown <= published
+
+
+@pytest.mark.parametrize("file", motion_capture_files())
+def test_joystick_and_motion_capture_can_be_left_out(file):
+    nodes, _ = expand(file, joy="false", mocap="false")
+    assert not {"joy_node", "mocap_node"} & set(types(nodes).values())
+
+
+@pytest.mark.parametrize("file", ["hover_vicon.launch", "multi_waypoint_vrpn.launch"])
+def test_the_server_of_motion_capture(file):
+    _, parameters = expand(file, hostname="10.0.0.3")
+    assert parameters["/mocap_node/motioncapture_config/hostname"] == "10.0.0.3"
+    assert parameters["/mocap_node/backend"] in ("vicon", "vrpn")
+
+
+def test_buttons_call_the_controller_and_not_the_driver():
+    nodes, _ = expand("multi_hover_mocap.launch")
+    for prefix in ("/crazyflie1", "/crazyflie2"):
+        for name in ("controller", "joystick_controller"):
+            assert sorted(map(list, nodes[f"{prefix}/{name}"].remap_args)) == [
+                ["land", "controller/land"],
+                ["takeoff", "controller/takeoff"],
+            ]
+
+
+def test_custom_log_blocks():
+    nodes, parameters = expand("customLogBlocks.launch")
+    assert types(nodes) == {**DRIVER, "/crazyflie_add_crazyflie": "crazyflie_add"}
+    prefix = "/crazyflie_add_crazyflie"
+    topics = parameters[f"{prefix}/genericLogTopics"]
+    assert len(parameters[f"{prefix}/genericLogTopicFrequencies"]) == len(topics)
+    for topic in topics:
+        assert parameters[f"{prefix}/genericLogTopic_{topic}_Variables"]
+
+
+@pytest.mark.parametrize("name", ["test_high_level", "execute_trajectory"])
+def test_high_level_flights(name):
+    nodes, _ = expand(f"{name}.launch")
+    assert types(nodes) == {**ONE, f"/crazyflie/{name}": f"{name}.py"}
+
+
+def tree(parameters, prefix):
+    """Return the parameters below a name as the parameter server does."""
+    root = {}
+    for name, value in parameters.items():
+        if name.startswith(prefix):
+            *branches, leaf = name.removeprefix(prefix).split("/")
+            branch = root
+            for key in branches:
+                branch = branch.setdefault(key, {})
+            branch[leaf] = value
+    return root
+
+
+def node_class(node):
+    """Return the class that an executable runs."""
+    package = Path(rospkg.RosPack().get_path(node.package))
+    text = (package / "exec" / node.type).read_text()
+    module, name = re.search(r"^from (crazyflie_\w+\.\w+) import (\w+)$", text, re.M).groups()
+    return getattr(importlib.import_module(module), name)
+
+
+@pytest.mark.parametrize("file", [path.name for path in LAUNCH_FILES])
+def test_every_node_accepts_its_parameters(file):
+    nodes, parameters = expand(file)
+    for name, node in nodes.items():
+        if node.package in OWN:
+            # Each for itself, as in a process of its own.
+            process = FakeProcess(parameters)
+            assert process.launch(node_class(node)(), name), process.logged("error")
+        elif node.type == "mocap_node":
+            bodies = tree(parameters, f"{name}/rigid_bodies/")
+            process = FakeProcess({**parameters, f"{name}/rigid_bodies": bodies})
+            MocapNode().load_parameters(process.handle(name))

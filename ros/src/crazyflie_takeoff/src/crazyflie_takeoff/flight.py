@@ -213,10 +213,7 @@ class Flight:
         elapsed = time - self._entered + _ROUNDING
         if elapsed < RAMP_DURATION:
             return GRAVITY - RAMP_RATE * (time - self._entered), None
-        # Who is told that the landing is over must find the motors without thrust,
-        # so a zero has had time to get there.
-        is_over = self._is_down(position) or elapsed > RAMP_DURATION + TOUCHDOWN_LIMIT
-        if is_over and elapsed >= RAMP_DURATION + ZERO_THRUST_PERIOD:
+        if self._is_down(position) or elapsed > RAMP_DURATION + TOUCHDOWN_LIMIT:
             self._enter(FlightState.ON_GROUND)
         return self._zero_thrust(time), None
 

@@ -35,8 +35,8 @@ class CrazyflieAddNode(Node):
             log_blocks=_log_blocks(handle),
         )
         for topic in STANDARD_TOPICS:
-            name = f"enable_logging_{topic}"
-            setattr(self._request, name, handle.param(name, BOOLEAN, topic != "pose"))
+            is_wanted = handle.param(f"enable_logging_{topic}", BOOLEAN, topic != "pose")
+            setattr(self._request, f"enable_logging_{topic}", is_wanted)
 
     def register_callbacks(self, handle) -> None:
         """See `Node.register_callbacks`."""

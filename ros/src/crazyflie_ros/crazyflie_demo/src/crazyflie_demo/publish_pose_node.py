@@ -25,8 +25,12 @@ class PublishPoseNode(Node):
         self._frame = handle.param("worldFrame", FRAME, "world")
         self._topic = handle.param("name", TOPIC, "goal")
         self._period = 1.0 / handle.param("rate", Number("Hz", above=0.0, maximum=500.0), 30.0)
-        self._goal = [handle.param(axis, METRES) for axis in "xyz"]
-        self._goal.append(handle.param("yaw", FINITE, 0.0))
+        self._goal = [
+            handle.param("x", METRES),
+            handle.param("y", METRES),
+            handle.param("z", METRES),
+            handle.param("yaw", FINITE, 0.0),
+        ]
 
     def register_callbacks(self, handle) -> None:
         """See `Node.register_callbacks`."""

@@ -6,12 +6,14 @@ import sys
 from pathlib import Path
 
 from crazyflie_examples import flight_plot, flight_report
-from crazyflie_examples.launching import launched
+from crazyflie_examples.launching import LaunchError, complaints, launched
 from crazyflie_examples.pilot import FlightError, Pilot
 from crazyflie_utils import runner
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0
+LIMIT = 30.0
+"""The longest that a part of the flight may take, s; a takeoff takes six."""
 
 
 def fly(folder: Path, launch_arguments: list) -> int:
@@ -24,7 +26,7 @@ def fly(folder: Path, launch_arguments: list) -> int:
     with launched(arguments, log):
         print(f"watch it with  export ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}", flush=True)
         try:
-            pilot = Pilot(runner.begin("demo_pilot"))
+            pilot = Pilot(runner.begin("demo_pilot"), limit=LIMIT)
             pilot.wait_until_ready()
             print("rosservice call /takeoff", flush=True)
             pilot.takeoff()
@@ -34,6 +36,7 @@ def fly(folder: Path, launch_arguments: list) -> int:
             pilot.land()
         except FlightError as error:
             print(f"the flight failed: {error}; see {log}", file=sys.stderr)
+            print(*complaints(log), sep="\n", file=sys.stderr)
             return 1
     record = pilot.finish()
     record.save_csv(folder / "sw_hover.csv")
@@ -41,9 +44,12 @@ def fly(folder: Path, launch_arguments: list) -> int:
     report = flight_report.FlightReport.of(record, HOVER)
     print(report.table())
     print(f"plot: {folder / 'sw_hover.png'}\ndata: {folder / 'sw_hover.csv'}")
+    if not report.complaints():
+        return 0
     for complaint in report.complaints():
         print(f"bad flight: {complaint}", file=sys.stderr)
-    return 1 if report.complaints() else 0
+    print(*complaints(log), sep="\n", file=sys.stderr)
+    return 1
 
 
 def main() -> int:
@@ -52,7 +58,11 @@ def main() -> int:
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for plot, data, log")
     parser.add_argument("launch_arguments", nargs="*", help="such as composed:=true")
     options = parser.parse_args()
-    return fly(options.out.resolve(), options.launch_arguments)
+    try:
+        return fly(options.out.resolve(), options.launch_arguments)
+    except LaunchError as error:
+        print(error, file=sys.stderr)
+        return 1
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ two is in this module.
 """
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -32,9 +33,21 @@ def join(components) -> np.ndarray:
     return np.stack(np.broadcast_arrays(*components), axis=-1)
 
 
+_NUMPY = SimpleNamespace(
+    sin=np.sin,
+    cos=np.cos,
+    tan=np.tan,
+    sqrt=np.sqrt,
+    hypot=np.hypot,
+    asin=np.arcsin,
+    atan2=np.arctan2,
+)
+"""numpy by math's names, which numpy itself knows since version 2 only."""
+
+
 def functions(value):
-    """Return the module, math or numpy, whose sin, cos, ... take ``value``."""
-    return math if isinstance(value, float) else np
+    """Return math, or numpy under the same names, whose sin, cos, ... take ``value``."""
+    return math if isinstance(value, float) else _NUMPY
 
 
 def where(condition, value, other):

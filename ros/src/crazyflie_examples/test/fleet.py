@@ -3,7 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 
 from crazyflie_examples.pilot import Pilot
-from crazyflie_utils.runner import ros_process
+from crazyflie_utils.runtime.runner import ros_process
 
 
 def fly(names: list, hover: float) -> dict:

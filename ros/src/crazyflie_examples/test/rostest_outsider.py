@@ -9,7 +9,7 @@ import rosservice
 
 from crazyflie_examples.pilot import Pilot
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.runner import ros_process
+from crazyflie_utils.runtime.runner import ros_process
 
 LIMIT = 20.0
 TOPICS = {

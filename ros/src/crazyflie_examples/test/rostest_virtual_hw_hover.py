@@ -4,7 +4,7 @@ import pytest
 
 from crazyflie_examples.flight_report import TOUCHDOWN_LIMIT
 from crazyflie_examples.pilot import Pilot
-from crazyflie_utils.runner import ros_process
+from crazyflie_utils.runtime.runner import ros_process
 
 HOVER = (0.0, 0.0, 1.0)
 SETTLING = 10.0

@@ -18,7 +18,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.runner import NodeClasses
+from crazyflie_utils.runtime.runner import NodeClasses
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"

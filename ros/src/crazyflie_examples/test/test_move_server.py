@@ -13,7 +13,7 @@ from std_srvs.srv import EmptyRequest, EmptyResponse
 from crazyflie_examples.move_server_node import MoveServerNode
 from crazyflie_examples.tour import DEFAULT_POINTS, Points, Tour
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.runner import NodeClasses
+from crazyflie_utils.runtime.runner import NodeClasses
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch" / "move.launch"

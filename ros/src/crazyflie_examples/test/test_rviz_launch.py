@@ -10,7 +10,7 @@ import yaml
 
 from crazyflie_description.visualizer_node import VisualizerNode
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.runner import NodeClasses
+from crazyflie_utils.runtime.runner import NodeClasses
 
 PACKAGES = rospkg.RosPack()
 FRAGMENT = Path(PACKAGES.get_path("launch_shared")) / "launch" / "rviz.launch"

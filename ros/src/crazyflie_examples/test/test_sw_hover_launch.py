@@ -10,7 +10,7 @@ from roslaunch.core import RLException
 
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.runner import NodeClasses
+from crazyflie_utils.runtime.runner import NodeClasses
 
 PACKAGES = rospkg.RosPack()
 SW_HOVER = Path(PACKAGES.get_path("crazyflie_examples")) / "launch" / "sw_hover.launch"

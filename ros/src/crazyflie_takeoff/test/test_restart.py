@@ -9,7 +9,7 @@ from takeoff_helpers import BARE, FILTER, SERVER, HoverNetwork, Network, control
 
 from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.runtime.transport import ServiceError
 
 GAP = 1.0
 """How long there is no server or filter, s."""

@@ -9,7 +9,7 @@ from takeoff_helpers import BARE, GRAVITY, SERVER, state
 
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.runtime.transport import ServiceError
 
 
 def launch(parameters=BARE, **changes):

@@ -21,7 +21,7 @@ import rospy
 
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils import Node, run
-from crazyflie_utils.runner import begin
+from crazyflie_utils.runtime.runner import begin
 
 _COUNT = 5000
 _LIMIT = 30.0

@@ -67,7 +67,7 @@ def test_every_message_comes_exactly_once(ends):
     assert c.empty()
 
 
-def test_outsider_in_the_middle_is_heard_exactly_once(ends):
+def test_outsider_in_the_middle_has_subscribers_exactly_once(ends):
     _, b_publisher, _, c = ends
     before = len(written())
     for number in range(COUNT):

@@ -13,8 +13,9 @@ from std_msgs.msg import Float64, Int64, String
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from crazyflie_utils import ServiceError
-from crazyflie_utils.parameters import BOOLEAN, FINITE, TEXT, Integer, ParameterError
-from crazyflie_utils.runner import ros_process
+from crazyflie_utils.parameter_types import BOOLEAN, FINITE, TEXT, Integer
+from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.runtime.runner import ros_process
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +49,7 @@ def outlet(process, outsiders):
     heard = queue.Queue()
     handle.subscribe("/from", Int64, heard.put)
     publisher = handle.publisher("/to", Int64)
-    wait_until(lambda: publisher._outlet.is_heard(), "the relay to connect")
+    wait_until(lambda: publisher._outlet.has_subscribers(), "the relay to connect")
 
     def both_ways():
         publisher.publish(Int64(0))
@@ -69,7 +70,7 @@ def test_messages_go_out_and_come_in(outlet):
 
 
 def test_nobody_listens_to_a_new_topic(handle):
-    assert not handle.publisher("/nobody_listens", String)._outlet.is_heard()
+    assert not handle.publisher("/nobody_listens", String)._outlet.has_subscribers()
 
 
 def test_latched_message_reaches_an_outsider_that_comes_later(handle):
@@ -96,7 +97,7 @@ def test_process_does_not_connect_to_itself(process, outlet):
         assert heard.get(timeout=LIMIT).data == -number
         assert heard.get(timeout=LIMIT).data == number + 1000
     assert heard.empty()
-    assert not inside._outlet.is_heard()
+    assert not inside._outlet.has_subscribers()
 
 
 # Services.
@@ -174,7 +175,7 @@ def test_call_of_a_service_that_does_not_answer(handle):
 
 
 def test_part_of_a_node_takes_down_what_it_has_made(handle):
-    part = handle.part()
+    part = handle.child()
     publisher = part.publisher("~part_out", String)
     part.subscribe("~part_in", String, lambda message: None)
     part.advertise_service("~part_service", Trigger, lambda request: TriggerResponse())
@@ -206,21 +207,21 @@ def test_part_of_a_node_takes_down_what_it_has_made(handle):
 )
 def test_parameters_of_every_type(handle, value, kind):
     rospy.set_param(f"{handle.name}/some/value", value)
-    assert handle.param("some/value", kind) == value
+    assert handle.get_param("~some/value", kind) == value
 
 
 def test_parameters_for_others(handle):
     handle.set_param("/cf/ring", {"effect": 7})
     assert rospy.get_param("/cf/ring/effect") == 7
-    assert handle.param("/cf/ring/effect", Integer(0, 13)) == 7
+    assert handle.get_param("/cf/ring/effect", Integer(0, 13)) == 7
 
 
 def test_parameters_that_are_bad_or_missing(handle):
     rospy.set_param(f"{handle.name}/not_a_number", math.nan)
     with pytest.raises(ParameterError, match=f"parameter {handle.name}/not_a_number is nan"):
-        handle.param("not_a_number", FINITE)
+        handle.get_param("~not_a_number", FINITE)
     with pytest.raises(ParameterError, match=f"parameter {handle.name}/missing is not set"):
-        handle.param("missing", FINITE)
+        handle.get_param("~missing", FINITE)
 
 
 # Names: the launch file puts this process into /fleet and remaps.
@@ -260,4 +261,4 @@ def test_remapped_topics_are_handed_over(process, handle):
 
 def test_parameters_are_remapped(handle):
     rospy.set_param("/fleet/parameters/gain", 3.0)
-    assert handle.param("gain", FINITE) == 3.0
+    assert handle.get_param("~gain", FINITE) == 3.0

@@ -7,33 +7,43 @@ import threading
 from std_msgs.msg import Float64, Int64
 from std_srvs.srv import Trigger, TriggerResponse
 
-from crazyflie_utils import Node, ServiceError, run
-from crazyflie_utils.parameters import TIME_STEP, TOPIC, Integer
+from crazyflie_utils import Node, Parameters, ServiceError, parameter, run
+from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Integer
 
 SAFE = -1.0
 """What a `Ticker` says at last."""
+
+
+class RelayParameters(Parameters):
+    """What a `Relay` is told."""
+
+    offset: int = parameter(Integer(0, 10**9), "added to every number", live=True)
+    in_topic: str = parameter(TOPIC, "where numbers come from", name="topics/in")
+    out_topic: str = parameter(TOPIC, "where they go", name="topics/out")
 
 
 class Relay(Node):
     """Passes on every number, increased by ~offset."""
 
     def load_parameters(self, handle):
-        self._offset = handle.param("offset", Integer(0, 10**9))
-        self._topics = [handle.param(f"topics/{name}", TOPIC) for name in ("in", "out")]
+        self._parameters = handle.load(RelayParameters, self._reconfigure)
 
     def register_callbacks(self, handle):
-        self._publisher = handle.publisher(self._topics[1], Int64)
-        handle.subscribe(self._topics[0], Int64, self._on_number)
+        self._publisher = handle.publisher(self._parameters.out_topic, Int64)
+        handle.subscribe(self._parameters.in_topic, Int64, self._on_number)
+
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
 
     def _on_number(self, message):
-        self._publisher.publish(Int64(message.data + self._offset))
+        self._publisher.publish(Int64(message.data + self._parameters.offset))
 
 
 class Ledger(Node):
     """Writes down every number; ~report tells them."""
 
     def load_parameters(self, handle):
-        self._topic = handle.param("topics/in", TOPIC)
+        self._topic = handle.get_param("~topics/in", TOPIC)
 
     def register_callbacks(self, handle):
         self._numbers = []
@@ -52,7 +62,7 @@ class Herald(Node):
     """Says 42 once, latched."""
 
     def load_parameters(self, handle):
-        self._topic = handle.param("topics/out", TOPIC)
+        self._topic = handle.get_param("~topics/out", TOPIC)
 
     def register_callbacks(self, handle):
         handle.publisher(self._topic, Int64, latch=True).publish(Int64(42))
@@ -62,7 +72,7 @@ class Ticker(Node):
     """Tells the time every ~time_step."""
 
     def load_parameters(self, handle):
-        self._time_step = handle.param("time_step", TIME_STEP)
+        self._time_step = handle.get_param("~time_step", TIME_STEP)
 
     def register_callbacks(self, handle):
         self._publisher = handle.publisher("~time", Float64)

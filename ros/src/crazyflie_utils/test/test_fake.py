@@ -39,8 +39,8 @@ def test_advance_in_small_steps_misses_nothing(process):
 def test_parameters_of_the_process_and_of_launch():
     process = FakeProcess({"/shared/a": 1})
     process.launch(Launched(), "/node", {"b": 2})
-    assert process.handle("/shared").param("a", int) == 1
-    assert process.handle("/node").param("b", int) == 2
+    assert process.handle("/shared").get_param("~a", int) == 1
+    assert process.handle("/node").get_param("~b", int) == 2
 
 
 class Launched:
@@ -48,7 +48,7 @@ class Launched:
 
     def initialize(self, handle):
         self.name = handle.name
-        return handle.param("b", int) == 2
+        return handle.get_param("~b", int) == 2
 
 
 def test_launch_returns_what_initialize_returns(process):

@@ -5,7 +5,7 @@ from std_msgs.msg import String
 
 from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import POSITIVE
+from crazyflie_utils.parameter_types import POSITIVE
 
 
 class Echo(Node):
@@ -19,7 +19,7 @@ class Echo(Node):
 
     def load_parameters(self, handle):
         self.order.append("parameters")
-        self.gain = handle.param("gain", POSITIVE)
+        self.gain = handle.get_param("~gain", POSITIVE)
         if self._fails_in == "parameters":
             raise RuntimeError("no algorithm")
 
@@ -66,8 +66,8 @@ def test_bad_parameter_is_named_and_nothing_is_registered(process):
     assert process.logged("error") == [
         "/ns/echo: parameter /ns/echo/gain is -1.0; expected a finite number > 0"
     ]
-    assert process.transport.outlets == {}
-    assert list(process.transport.inlets) == ["/clock"]
+    assert process.transport.publishers == {}
+    assert list(process.transport.subscribers) == ["/clock"]
 
 
 @pytest.mark.parametrize(

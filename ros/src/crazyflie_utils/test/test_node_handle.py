@@ -9,8 +9,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerResponse
 
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.services import Service
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.runtime.transport import ServiceError
 
 LIMIT = 20.0
 
@@ -50,7 +49,7 @@ def test_names_at_the_root(process):
 def test_remappings_apply_to_everything(process, handle, monkeypatch):
     monkeypatch.setattr(process.transport, "remap", lambda name: name.replace("/ns/", "/other/"))
     process.transport.parameters["/other/node/gain"] = 2.0
-    assert handle.param("gain", float) == 2.0
+    assert handle.get_param("~gain", float) == 2.0
     handle.publisher("state", String).publish(String("x"))
     assert [m.data for m in process.published("/other/state")] == ["x"]
     handle.advertise_service("~go", Trigger, lambda request: TriggerResponse())
@@ -167,24 +166,6 @@ def test_service_that_is_cancelled_says_so(process, handle):
         answer.result(LIMIT)
 
 
-def settle(process, handle):
-    """Wait for a service that does not answer, as a real transport does."""
-    service = Service(process, handle, lambda request: Future(), faults=None)
-    return service.settle(service.begin(None))
-
-
-def test_caller_is_not_left_waiting_at_shutdown(process, handle, monkeypatch):
-    monkeypatch.setattr(process.transport, "is_shutdown", lambda: True)
-    with pytest.raises(ServiceError, match="/ns/node is shutting down"):
-        settle(process, handle)
-
-
-def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(process, handle, monkeypatch):
-    monkeypatch.setattr("crazyflie_utils.services._STALL_LIMIT", 0.05)
-    with pytest.raises(ServiceError, match="/clock stands still"):
-        settle(process, handle)
-
-
 def test_nodes_call_services_without_waiting(process, handle):
     handle.advertise_service(
         "go", SetBool, lambda request: SetBoolResponse(request.data, str(order.append("served")))
@@ -273,7 +254,7 @@ def test_log_names_the_node(process, handle):
 
 def test_throttled_warnings(process, handle, monkeypatch):
     now = [50.0]
-    monkeypatch.setattr("crazyflie_utils.node_handle.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("crazyflie_utils.runtime.handle.time.monotonic", lambda: now[0])
     for _ in range(3):
         handle.warn("a", throttle=1.0)
         handle.warn("b", throttle=1.0)
@@ -388,7 +369,7 @@ def test_callbacks_of_many_threads_never_meet(process, handle):
 
 def test_a_part_of_a_node_takes_down_what_it_has_made(process, handle):
     received = []
-    part = handle.part()
+    part = handle.child()
     part.subscribe("a", String, received.append)
     part.advertise_service("go", Trigger, lambda request: TriggerResponse())
     part.timer(1.0, lambda: received.append("tick"))
@@ -407,13 +388,13 @@ def test_a_part_of_a_node_takes_down_what_it_has_made(process, handle):
 
 
 def test_a_callback_of_a_part_that_waits_does_not_begin_after_its_end(process, handle):
-    part = handle.part()
+    part = handle.child()
     ran = []
     part.subscribe("a", String, lambda message: ran.append(message))
 
     def end_it(_):
         handle.publisher("a", String).publish(String("x"))
-        part.run_soon(ran.append, "soon")
+        part.submit(ran.append, "soon")
         part.close()
 
     handle.subscribe("end", String, end_it)
@@ -422,7 +403,7 @@ def test_a_callback_of_a_part_that_waits_does_not_begin_after_its_end(process, h
 
 
 def test_a_service_of_a_part_that_waits_refuses_after_its_end(process, handle):
-    part = handle.part()
+    part = handle.child()
     part.advertise_service("go", Trigger, lambda request: TriggerResponse())
     answers = []
 
@@ -436,15 +417,15 @@ def test_a_service_of_a_part_that_waits_refuses_after_its_end(process, handle):
 
 
 def test_a_part_that_was_made_early_is_made_safe_too(process, handle):
-    part, safe = handle.part(), []
+    part, safe = handle.child(), []
     handle.on_fault(lambda: safe.append(True))
-    part.run_soon(lambda: 1 / 0)
+    part.submit(lambda: 1 / 0)
     assert safe == [True]
 
 
 def test_what_a_part_took_down_can_be_made_again(process, handle):
     for _ in range(2):
-        part = handle.part()
+        part = handle.child()
         part.publisher("a", String)
         part.advertise_service("go", Trigger, lambda request: TriggerResponse())
         assert process.call("/ns/go", None) == TriggerResponse()
@@ -454,14 +435,14 @@ def test_what_a_part_took_down_can_be_made_again(process, handle):
 def test_faults_of_a_part_are_the_nodes(process, handle):
     safe = []
     handle.on_fault(lambda: safe.append(True))
-    handle.part().run_soon(lambda: 1 / 0)
+    handle.child().submit(lambda: 1 / 0)
     assert safe == [True]
     assert "ZeroDivisionError" in process.logged("error")[0]
 
 
 def test_another_thread_hands_over(process, handle):
     ran = []
-    thread = threading.Thread(target=handle.run_soon, args=(ran.append, 1))
+    thread = threading.Thread(target=handle.submit, args=(ran.append, 1))
     thread.start()
     thread.join(LIMIT)
     assert ran == [1]
@@ -471,9 +452,9 @@ def test_parameters_of_others(process, handle):
     handle.set_param("/cf/ring", {"effect": 7, "more": {"deep": 1.5}})
     handle.set_param("own", True)
     assert process.transport.parameters["/ns/own"] is True
-    assert handle.param("/cf/ring/effect", int) == 7
-    assert handle.param("/cf/ring/more/deep", float) == 1.5
-    assert handle.param("/cf/ring/none", int, 3) == 3
+    assert handle.get_param("/cf/ring/effect", int) == 7
+    assert handle.get_param("/cf/ring/more/deep", float) == 1.5
+    assert handle.get_param("/cf/ring/none", int, 3) == 3
 
 
 def test_the_end_of_the_process(process, handle):

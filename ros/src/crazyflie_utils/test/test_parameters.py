@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.parameters import (
+from crazyflie_utils.parameter_types import (
     BOOLEAN,
     DURATION,
     FINITE,
@@ -20,9 +20,9 @@ from crazyflie_utils.parameters import (
     TOPIC,
     Integer,
     Number,
-    ParameterError,
     Text,
 )
+from crazyflie_utils.parameters import ParameterError
 
 NUMBERS = [FINITE, METRES, POSITIVE, DURATION, TIME_STEP, Number(minimum=-1.0, maximum=1.0)]
 NOT_NUMBERS = ["1.0", "", True, False, None, [1.0], {"x": 1.0}, math.nan, math.inf, -math.inf]
@@ -78,7 +78,7 @@ EXPECTATIONS = [
     (POSITIVE, "a finite number > 0"),
     (DURATION, "a finite number >= 0 (s)"),
     (TIME_STEP, "a finite number > 0 (s)"),
-    (Number(minimum=-1.0, maximum=0.5), "a finite number >= -1 <= 0.5"),
+    (Number(minimum=-1.0, maximum=0.5), "a finite number >= -1 and <= 0.5"),
     (SEVEN, "the integer 7"),
     (FEW, "an integer from 1 to 5"),
     (BOOLEAN, "true or false"),
@@ -124,7 +124,7 @@ def test_number_takes_what_is_in_range(value, above, minimum, maximum):
 def test_error_names_parameter_value_and_expectation(kind, raw):
     handle = FakeProcess({"/ns/node/a/b": raw}).handle("/ns/node")
     with pytest.raises(ParameterError) as error:
-        handle.param("a/b", kind)
+        handle.get_param("~a/b", kind)
     assert str(error.value).startswith(f"parameter /ns/node/a/b is {raw!r}; expected {kind}")
 
 
@@ -132,7 +132,7 @@ def test_error_names_parameter_value_and_expectation(kind, raw):
 def test_error_names_a_parameter_that_is_missing(kind, text):
     handle = FakeProcess().handle("/ns/node")
     with pytest.raises(ParameterError) as error:
-        handle.param("a/b", kind)
+        handle.get_param("~a/b", kind)
     assert str(error.value) == f"parameter /ns/node/a/b is not set; expected {text}"
 
 
@@ -142,13 +142,13 @@ def test_a_kind_may_give_its_reason():
 
     handle = FakeProcess({"/node/file": "K.txt"}).handle("/node")
     with pytest.raises(ParameterError, match=r"\(line 3 has letters\)$"):
-        handle.param("file", kind)
+        handle.get_param("~file", kind)
 
 
 def test_default_counts_only_where_nothing_is_set():
     handle = FakeProcess({"/node/set": 2, "/node/bad": "x"}).handle("/node")
-    assert handle.param("set", FINITE, 5.0) == 2.0
-    assert handle.param("not_set", FINITE, 5.0) == 5.0
-    assert handle.param("optional", TOPIC, None) is None
+    assert handle.get_param("~set", FINITE, 5.0) == 2.0
+    assert handle.get_param("~not_set", FINITE, 5.0) == 5.0
+    assert handle.get_param("~optional", TOPIC, None) is None
     with pytest.raises(ParameterError, match="/node/bad"):
-        handle.param("bad", FINITE, 5.0)
+        handle.get_param("~bad", FINITE, 5.0)

@@ -9,10 +9,10 @@ from xml.etree import ElementTree
 
 import pytest
 
-from crazyflie_utils import NodeHandle, parameters
+from crazyflie_utils import NodeHandle, parameter_types
 
 README = (Path(__file__).resolve().parents[1] / "README.md").read_text()
-CONSTANTS = [name for name in vars(parameters) if name.isupper()]
+CONSTANTS = [name for name in vars(parameter_types) if name.isupper()]
 METHODS = [name for name in vars(NodeHandle) if not name.startswith("_")]
 
 
@@ -42,11 +42,11 @@ def test_launch_files_are_xml():
 
 
 @pytest.mark.parametrize("name", CONSTANTS)
-def test_every_kind_is_in_the_table(name):
+def test_every_constant_is_in_the_table(name):
     row = next(
         line for line in README.splitlines() if line.startswith("| `") and f"`{name}`" in line
     )
-    assert row.endswith(f"| {getattr(parameters, name)} |")
+    assert row.endswith(f"| {getattr(parameter_types, name)} |")
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -3,7 +3,7 @@
 import pytest
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.runner import NodeClasses
+from crazyflie_utils.runtime.runner import NodeClasses
 
 NODE = "crazyflie_utils.node:Node"
 

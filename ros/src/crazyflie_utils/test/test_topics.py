@@ -3,11 +3,11 @@
 import pytest
 from std_msgs.msg import Empty, String
 
-from crazyflie_utils.topics import Topics
-from crazyflie_utils.transport import Outlet
+from crazyflie_utils.runtime.topics import Topics
+from crazyflie_utils.runtime.transport import ExternalPublisher
 
 
-class Wire(Outlet):
+class Wire(ExternalPublisher):
     """The way out of one topic, with a listener or without."""
 
     def __init__(self, latch):
@@ -16,7 +16,7 @@ class Wire(Outlet):
         self.is_closed = False
         self.sent = []
 
-    def is_heard(self):
+    def has_subscribers(self):
         return self.heard
 
     def publish(self, message):

@@ -12,7 +12,7 @@ from tf2_msgs.msg import TFMessage
 
 from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.transforms import TransformError
+from crazyflie_utils.runtime.transforms import TransformError
 
 
 def transform(parent, child, time, x=0.0, yaw=0.0):
@@ -60,7 +60,7 @@ def test_stamps_come_back_to_the_nanosecond(seconds, nanoseconds):
 
 
 def test_transforms_of_many_threads(process, lookup, monkeypatch):
-    monkeypatch.setattr("crazyflie_utils.transforms._MOST_STAMPS", 3)
+    monkeypatch.setattr("crazyflie_utils.runtime.transforms._MOST_STAMPS", 3)
     failures = []
 
     def broadcast(child):
@@ -171,6 +171,6 @@ def test_nodes_share_one_buffer_and_one_broadcaster(process):
     broadcasts[0]([transform("world", "cf1", 100.0)])
     broadcasts[1]([transform("world", "cf2", 100.0)])
     assert len(process.published("/tf")) == 2
-    assert len(process.transport.inlets["/tf"]) == 1
+    assert len(process.transport.subscribers["/tf"]) == 1
     for lookup in lookups:
         assert lookup("cf1", "cf2").header.stamp.to_sec() == 100.0

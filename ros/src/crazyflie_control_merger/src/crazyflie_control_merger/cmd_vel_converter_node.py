@@ -5,7 +5,7 @@ from geometry_msgs.msg import Twist, Vector3
 from crazyflie_control_merger.cmd_vel import cmd_vel_from_control
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TOPIC
+from crazyflie_utils.parameter_types import TOPIC
 from crazyflie_utils.vectors import is_finite, to_vector
 
 

@@ -3,7 +3,7 @@
 from crazyflie_control_merger.merging import ALL_ENTRIES, MODES, Merger
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TOPIC, Text
+from crazyflie_utils.parameter_types import TOPIC, Text
 from crazyflie_utils.vectors import from_vector, is_finite, to_vector
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from crazyflie_examples import flight_plot, flight_report
 from crazyflie_examples.launching import LaunchError, complaints, launched
 from crazyflie_examples.pilot import FlightError, Pilot
-from crazyflie_utils import runner
+from crazyflie_utils.runtime import runner
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0

@@ -11,7 +11,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TOPIC
+from crazyflie_utils.parameter_types import TOPIC
 from crazyflie_utils.vectors import to_vector
 
 

@@ -14,7 +14,8 @@ from crazyflie_msgs.msg import (
     PrioritizedControlStamped,
 )
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import METRES, TIME_STEP, TOPIC, Number, ParameterError
+from crazyflie_utils.parameter_types import METRES, TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameters import ParameterError
 from crazyflie_utils.vectors import from_vector, is_finite, to_vector
 
 _RATE = Number(unit="1/s", above=0.0)

@@ -5,7 +5,7 @@ from std_srvs.srv import Empty, EmptyResponse
 from crazyflie_examples.tour import DEFAULT_POINTS, Points, Tour
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import SERVICE, TOPIC
+from crazyflie_utils.parameter_types import SERVICE, TOPIC
 
 
 class MoveServerNode(Node):

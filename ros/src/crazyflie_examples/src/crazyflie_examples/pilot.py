@@ -7,7 +7,7 @@ from std_srvs.srv import Empty, EmptyRequest
 from crazyflie_examples.flight_record import FlightRecord
 from crazyflie_examples.flight_recorder_node import FlightRecorderNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.runtime.transport import ServiceError
 
 
 class FlightError(Exception):
@@ -19,7 +19,7 @@ class Pilot:
 
     Parameters
     ----------
-    process : crazyflie_utils.process.Process
+    process : crazyflie_utils.runtime.process.Process
         Not started yet.
     namespace : str
         Of the vehicle's topics and services: of takeoff, land, state and so on.

@@ -6,7 +6,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TOPIC, Text
+from crazyflie_utils.parameter_types import TOPIC, Text
 
 TYPES = {
     "position_velocity_yaw": PositionVelocityYawStateStamped,

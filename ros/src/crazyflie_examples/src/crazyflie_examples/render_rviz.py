@@ -20,7 +20,7 @@ from crazyflie_examples.flight_report import HOVER_TOLERANCE
 from crazyflie_examples.launching import launched
 from crazyflie_examples.pilot import FlightError, Pilot
 from crazyflie_examples.virtual_display import DisplayError, virtual_display
-from crazyflie_utils import runner
+from crazyflie_utils.runtime import runner
 
 SCREEN = (1400, 900)
 """Width and height in pixels of the screen, and of RViz's window in its configuration."""

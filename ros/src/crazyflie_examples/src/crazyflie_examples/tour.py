@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from crazyflie_utils.parameters import METRES
+from crazyflie_utils.parameter_types import METRES
 
 DEFAULT_POINTS = (
     (0.5, 0.5, 1.0),

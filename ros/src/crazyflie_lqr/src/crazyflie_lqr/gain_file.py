@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crazyflie_utils.parameters import TEXT
+from crazyflie_utils.parameter_types import TEXT
 
 
 class GainFileError(ValueError):

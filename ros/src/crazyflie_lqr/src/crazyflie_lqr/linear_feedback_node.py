@@ -7,7 +7,7 @@ from crazyflie_lqr.linear_feedback import LinearFeedback
 from crazyflie_lqr.reference import GuardedReference
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TOPIC, Integer
+from crazyflie_utils.parameter_types import TOPIC, Integer
 from crazyflie_utils.vectors import from_vector, is_finite, to_vector
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from crazyflie_lqr.linear_feedback import LiftController
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
-from crazyflie_utils.parameters import FINITE, Number
+from crazyflie_utils.parameter_types import FINITE, Number
 
 
 class PositionVelocityYawStateLiftLqrNode(LinearFeedbackNode):

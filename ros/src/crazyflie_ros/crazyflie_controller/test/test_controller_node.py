@@ -22,7 +22,7 @@ from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.node import Node
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.vectors import from_vector
 
 NAN = float("nan")

@@ -4,7 +4,7 @@ from std_srvs.srv import Empty
 
 from crazyflie_driver import srv
 from crazyflie_utils.node import Node
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.runtime.transport import ServiceError
 
 SERVICES = {
     "emergency": Empty,

@@ -4,7 +4,7 @@ from crazyflie_simulator.dynamics import Dynamics
 from crazyflie_simulator.simulator_node import SEED, SimulatorNode
 from crazyflie_simulator.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.wind import Wind
-from crazyflie_utils.parameters import TIME_STEP, Number
+from crazyflie_utils.parameter_types import TIME_STEP, Number
 
 _ERROR = Number(minimum=-0.5, maximum=0.5)
 _SPEED = Number(unit="m/s")

@@ -9,7 +9,7 @@ from crazyflie_simulator.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import Vehicle
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import (
+from crazyflie_utils.parameter_types import (
     BOOLEAN,
     DURATION,
     FRAME,
@@ -18,8 +18,8 @@ from crazyflie_utils.parameters import (
     TOPIC,
     Integer,
     Number,
-    ParameterError,
 )
+from crazyflie_utils.parameters import ParameterError
 from crazyflie_utils.vectors import is_finite, to_vector
 
 _LENGTH = Number(unit="m", minimum=0.0)

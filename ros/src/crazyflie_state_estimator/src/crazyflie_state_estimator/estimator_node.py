@@ -18,8 +18,8 @@ from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils.angles import rpy_from_quaternion
 from crazyflie_utils.held import HOLD_LIMIT
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import FRAME, TIME_STEP, TOPIC, Integer, Number, Text
-from crazyflie_utils.transforms import TransformError
+from crazyflie_utils.parameter_types import FRAME, TIME_STEP, TOPIC, Integer, Number, Text
+from crazyflie_utils.runtime.transforms import TransformError
 from crazyflie_utils.vectors import from_vector, is_finite, to_vector
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"

@@ -6,7 +6,7 @@ from crazyflie_msgs.msg import ControlStamped
 from crazyflie_takeoff.control_filter import ControlFilter
 from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TOPIC
+from crazyflie_utils.parameter_types import TOPIC
 from crazyflie_utils.vectors import is_finite
 
 LISTENING_TIME = 0.4

@@ -1,21 +1,34 @@
-"""What every node of the workspace needs: the node handle, parameters, units, angles.
+"""What every node of the workspace needs: the node handle and declared parameters.
 
 The names below are loaded when they are first used, so that algorithms can
-import `crazyflie_utils.angles` and the like without ROS.
+import `crazyflie_utils.parameters` and the like without ROS.
 """
 
 import importlib
 
 _HOME = {
     "Node": "crazyflie_utils.node",
-    "NodeHandle": "crazyflie_utils.node_handle",
+    "NodeHandle": "crazyflie_utils.runtime.handle",
     "ParameterError": "crazyflie_utils.parameters",
-    "ServiceError": "crazyflie_utils.transport",
-    "run": "crazyflie_utils.runner",
-    "run_composed": "crazyflie_utils.runner",
+    "Parameters": "crazyflie_utils.parameters",
+    "ServiceError": "crazyflie_utils.runtime.transport",
+    "TransformError": "crazyflie_utils.runtime.transforms",
+    "parameter": "crazyflie_utils.parameters",
+    "run": "crazyflie_utils.runtime.runner",
+    "run_composed": "crazyflie_utils.runtime.runner",
 }
 
-__all__ = ["Node", "NodeHandle", "ParameterError", "ServiceError", "run", "run_composed"]
+__all__ = [
+    "Node",
+    "NodeHandle",
+    "ParameterError",
+    "Parameters",
+    "ServiceError",
+    "TransformError",
+    "parameter",
+    "run",
+    "run_composed",
+]
 
 
 def __getattr__(name):

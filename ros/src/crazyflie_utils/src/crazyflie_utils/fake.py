@@ -3,16 +3,17 @@
 import io
 import math
 from concurrent.futures import Future
+from typing import Any
 
-from crazyflie_utils.process import Process
-from crazyflie_utils.transport import Outlet, ServiceError, Transport
+from crazyflie_utils.runtime.process import Process
+from crazyflie_utils.runtime.transport import ExternalPublisher, ServiceError, Transport
 
 
-class _Record(Outlet):
+class _Record(ExternalPublisher):
     def __init__(self):
         self.messages = []
 
-    def is_heard(self):
+    def has_subscribers(self):
         return True
 
     def publish(self, message):
@@ -29,8 +30,8 @@ class FakeTransport(Transport):
 
     def __init__(self, parameters: dict):
         self.parameters = dict(parameters)
-        self.outlets = {}
-        self.inlets = {}
+        self.publishers = {}
+        self.subscribers = {}
         self.services = {}
         self.log_records = []
 
@@ -39,8 +40,17 @@ class FakeTransport(Transport):
         return name
 
     def get_param(self, name):
-        """Return an entry of ``parameters``."""
-        return self.parameters[name]
+        """Return an entry of ``parameters``, or those below a namespace."""
+        if name in self.parameters:
+            return self.parameters[name]
+        below = {
+            key.removeprefix(f"{name}/"): value
+            for key, value in self.parameters.items()
+            if key.startswith(f"{name}/")
+        }
+        if not below:
+            raise KeyError(name)
+        return _tree(below)
 
     def set_param(self, name, value):
         """Set an entry of ``parameters``; a dictionary is a namespace, as with ROS."""
@@ -51,18 +61,18 @@ class FakeTransport(Transport):
             self.set_param(f"{name}/{key}", item)
 
     def advertise(self, topic, message_type, latch):
-        """Return an outlet that keeps the messages."""
-        return self.outlets.setdefault(topic, _Record())
+        """Return a publisher that keeps the messages."""
+        return self.publishers.setdefault(topic, _Record())
 
     def subscribe(self, topic, message_type, deliver):
         """Keep ``deliver`` for `FakeProcess.publish`."""
-        inlets = self.inlets.setdefault(topic, [])
-        inlets.append(deliver)
-        return lambda: inlets.remove(deliver)
+        subscribers = self.subscribers.setdefault(topic, [])
+        subscribers.append(deliver)
+        return lambda: subscribers.remove(deliver)
 
-    def advertise_service(self, name, service_type, begin, settle):
-        """Keep ``begin`` for `FakeProcess.call`."""
-        self.services[name] = begin
+    def advertise_service(self, name, service_type, serve, time):
+        """Keep ``serve`` for `FakeProcess.call`."""
+        self.services[name] = serve
         return lambda: self.services.pop(name)
 
     def call_service(self, name, service_type, request, limit):
@@ -79,10 +89,6 @@ class FakeTransport(Transport):
 
     def clock_was_set(self, stamp):
         """Do nothing."""
-
-    def is_shutdown(self):
-        """Return False."""
-        return False
 
 
 class FakeProcess(Process):
@@ -122,12 +128,12 @@ class FakeProcess(Process):
 
     def publish(self, topic: str, message) -> None:
         """Publish from outside the process."""
-        for deliver in _named(self.transport.inlets, topic, "subscriber of"):
+        for deliver in _named(self.transport.subscribers, topic, "subscriber of"):
             deliver(message)
 
     def published(self, topic: str) -> list:
         """Return all messages that left the process on a topic, oldest first."""
-        return _named(self.transport.outlets, topic, "publisher of").messages
+        return _named(self.transport.publishers, topic, "publisher of").messages
 
     def call(self, service: str, request):
         """Call a service from outside.
@@ -159,6 +165,17 @@ class FakeProcess(Process):
             self.clock.set(max(deadline, self.clock.time()))
         # A deadline may be past the end by a rounding error: no step back then.
         self.clock.set(max(end, self.clock.time()))
+
+
+def _tree(leaves):
+    tree: dict[str, Any] = {}
+    for name, value in leaves.items():
+        *folders, leaf = name.split("/")
+        branch = tree
+        for folder in folders:
+            branch = branch.setdefault(folder, {})
+        branch[leaf] = value
+    return tree
 
 
 def _named(things, name, kind):

@@ -3,6 +3,7 @@
 import traceback
 
 from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.runtime.handle import NodeHandle
 
 
 class Node:
@@ -10,21 +11,21 @@ class Node:
 
     A subclass
 
-    1. assigns every attribute in ``__init__``, without a ROS call;
-    2. loads and checks its parameters in `load_parameters`, and builds its
-       algorithm from them;
-    3. announces itself in `register_callbacks`: publishers, then services,
+    1. declares its parameters in a class derived from `Parameters`, loads them in
+       `load_parameters` with one call, and builds its algorithm from them;
+    2. announces itself in `register_callbacks`: publishers, then services,
        then subscribers, timers last;
-    4. if silence is not safe enough, says what is in `make_safe`.
+    3. if silence is not safe enough, says what is in `make_safe`.
+
+    What changes while it runs begins in ``__init__``, without a ROS call.
 
     Callbacks never run before `initialize` is through and never at the same
     time, so a node needs no locks.
     """
 
-    def __init__(self):
-        self._handle = None
+    _handle: NodeHandle
 
-    def initialize(self, handle) -> bool:
+    def initialize(self, handle: NodeHandle) -> bool:
         """Become a living node.
 
         Parameters
@@ -49,17 +50,17 @@ class Node:
         handle.on_fault(self.make_safe)
         return True
 
-    def load_parameters(self, handle) -> None:
-        """Read every parameter and check its presence, type, range and shape.
+    def load_parameters(self, handle: NodeHandle) -> None:
+        """Load the parameters, with `NodeHandle.load`, and build the algorithm.
 
         Raises
         ------
         ParameterError
-            With the full name of the parameter and what was expected.
+            With the full names of parameters and what was expected.
         """
         raise NotImplementedError
 
-    def register_callbacks(self, handle) -> None:
+    def register_callbacks(self, handle: NodeHandle) -> None:
         """Create publishers, services, subscribers and timers, in this order."""
         raise NotImplementedError
 

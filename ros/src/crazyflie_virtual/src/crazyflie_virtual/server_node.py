@@ -3,7 +3,8 @@
 import dataclasses
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import BOOLEAN, Integer, Number, ParameterError, Text
+from crazyflie_utils.parameter_types import BOOLEAN, Integer, Number, Text
+from crazyflie_utils.parameters import ParameterError
 from crazyflie_virtual.options import key_of
 
 _POLL_PERIOD = 0.5

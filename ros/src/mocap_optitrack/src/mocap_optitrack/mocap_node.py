@@ -13,7 +13,7 @@ from geometry_msgs.msg import (
 from std_msgs.msg import Header
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TEXT, Integer, Number, Text
+from crazyflie_utils.parameter_types import TEXT, Integer, Number, Text
 from mocap_optitrack.axes import UP_AXES, heading
 from mocap_optitrack.health import ERROR, Health
 from mocap_optitrack.library_source import SYSTEMS, LibrarySource
@@ -87,9 +87,9 @@ class MocapNode(Node):
         """Return the thread that calls this node's ``on_...`` in their turn."""
         return Receiver(
             lambda: self._make_source(handle),
-            on_connected=lambda text: handle.run_soon(self.on_connected, text),
-            on_frame=lambda frame: handle.run_soon(self.on_frame, frame),
-            on_trouble=lambda text: handle.run_soon(self.on_trouble, text),
+            on_connected=lambda text: handle.submit(self.on_connected, text),
+            on_frame=lambda frame: handle.submit(self.on_frame, frame),
+            on_trouble=lambda text: handle.submit(self.on_trouble, text),
         )
 
     def shutdown(self) -> None:
@@ -133,7 +133,7 @@ class MocapNode(Node):
         return NatNetSource(
             self._settings,
             handle.time,
-            lambda text: handle.run_soon(handle.warn, text, _REPEAT, "datagram"),
+            lambda text: handle.submit(handle.warn, text, _REPEAT, "datagram"),
         )
 
     def _report(self):

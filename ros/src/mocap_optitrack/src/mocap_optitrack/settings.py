@@ -3,7 +3,7 @@
 import ipaddress
 from dataclasses import dataclass
 
-from crazyflie_utils.parameters import FRAME, TEXT, TOPIC
+from crazyflie_utils.parameter_types import FRAME, TEXT, TOPIC
 
 DEFAULT_PARENT_FRAME = "world"
 

@@ -8,9 +8,10 @@ from crazyflie_controller.go_to import AXES, GoToController, Pose
 from crazyflie_controller.pid import Gains
 from crazyflie_utils.angles import rpy_from_quaternion
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import FINITE, FRAME, Number, ParameterError
-from crazyflie_utils.transforms import TransformError
-from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.parameter_types import FINITE, FRAME, Number
+from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.runtime.transforms import TransformError
+from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.vectors import is_finite
 
 _GAINS = {

@@ -5,7 +5,7 @@ from sensor_msgs.msg import Joy
 
 from crazyflie_demo.sticks import Sticks
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TOPIC, Integer, Number
+from crazyflie_utils.parameter_types import TOPIC, Integer, Number
 
 _AXES = {"pitch": 4, "roll": 3, "yaw_rate": 0, "thrust": 1}
 _RANGES = {

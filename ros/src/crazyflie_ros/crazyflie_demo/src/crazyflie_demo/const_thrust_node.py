@@ -3,7 +3,7 @@
 from geometry_msgs.msg import Twist, Vector3
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import Number
+from crazyflie_utils.parameter_types import Number
 
 
 class ConstThrustNode(Node):

@@ -18,7 +18,7 @@ from crazyflie_driver.srv import (
     UpdateParamsRequest,
 )
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import Number
+from crazyflie_utils.parameter_types import Number
 
 _LIMIT = 15.0
 """How long a service may take, and at the beginning the driver to connect, s."""

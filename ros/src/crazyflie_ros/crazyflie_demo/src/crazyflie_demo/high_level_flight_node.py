@@ -4,7 +4,7 @@ from geometry_msgs.msg import Point
 
 from crazyflie_demo.flight_plan_node import FlightPlanNode, Step, seconds
 from crazyflie_driver.srv import GoTo, GoToRequest
-from crazyflie_utils.parameters import METRES
+from crazyflie_utils.parameter_types import METRES
 
 
 class HighLevelFlightNode(FlightPlanNode):

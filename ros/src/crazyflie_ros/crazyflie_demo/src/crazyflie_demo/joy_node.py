@@ -7,7 +7,7 @@ from sensor_msgs.msg import Joy
 
 from crazyflie_demo.joystick import EVENT, Joystick
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TEXT, Number
+from crazyflie_utils.parameter_types import TEXT, Number
 
 _POLL_PERIOD = 0.01
 """Time between two looks at the device, s."""

@@ -5,7 +5,7 @@ from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import BOOLEAN, TOPIC, Integer
+from crazyflie_utils.parameter_types import BOOLEAN, TOPIC, Integer
 
 LAND, EMERGENCY, TAKEOFF, HEADLIGHT = 0, 1, 2, 4
 """Buttons."""

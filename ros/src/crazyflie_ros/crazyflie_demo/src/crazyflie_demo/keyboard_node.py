@@ -11,7 +11,7 @@ from sensor_msgs.msg import Joy
 
 from crazyflie_demo.keyboard import BUTTONS, HELP, Keyboard
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import Number
+from crazyflie_utils.parameter_types import Number
 
 _PERIOD = 0.05
 """Time between two messages, s."""

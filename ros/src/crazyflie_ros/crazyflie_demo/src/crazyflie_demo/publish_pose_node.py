@@ -6,7 +6,7 @@ from sensor_msgs.msg import Joy
 from crazyflie_demo.goals import goal_message
 from crazyflie_demo.sticks import Sticks
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import FINITE, FRAME, METRES, TOPIC, Integer, Number
+from crazyflie_utils.parameter_types import FINITE, FRAME, METRES, TOPIC, Integer, Number
 
 
 class PublishPoseNode(Node):

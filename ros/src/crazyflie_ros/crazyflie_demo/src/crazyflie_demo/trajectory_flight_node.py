@@ -9,7 +9,8 @@ from crazyflie_driver.srv import (
     UploadTrajectory,
     UploadTrajectoryRequest,
 )
-from crazyflie_utils.parameters import BOOLEAN, TEXT, Number, ParameterError
+from crazyflie_utils.parameter_types import BOOLEAN, TEXT, Number
+from crazyflie_utils.parameters import ParameterError
 
 
 class TrajectoryFlightNode(FlightPlanNode):

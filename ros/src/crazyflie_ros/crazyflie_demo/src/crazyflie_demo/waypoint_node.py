@@ -6,8 +6,8 @@ from crazyflie_demo.goals import goal_message
 from crazyflie_demo.waypoints import Tour, Waypoint, WaypointList
 from crazyflie_utils.angles import rpy_from_quaternion
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import FRAME, Number
-from crazyflie_utils.transforms import TransformError
+from crazyflie_utils.parameter_types import FRAME, Number
+from crazyflie_utils.runtime.transforms import TransformError
 
 
 class DemoNode(Node):

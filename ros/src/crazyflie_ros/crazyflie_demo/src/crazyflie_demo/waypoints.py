@@ -4,7 +4,7 @@ import math
 from typing import NamedTuple
 
 from crazyflie_utils.angles import wrap_to_pi
-from crazyflie_utils.parameters import DURATION, FINITE
+from crazyflie_utils.parameter_types import DURATION, FINITE
 
 
 class Waypoint(NamedTuple):

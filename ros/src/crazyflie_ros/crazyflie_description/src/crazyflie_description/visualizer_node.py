@@ -9,8 +9,8 @@ from crazyflie_description.flown_path import FlownPath, circle
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.held import Held
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import FRAME, TOPIC
-from crazyflie_utils.transforms import TransformError
+from crazyflie_utils.parameter_types import FRAME, TOPIC
+from crazyflie_utils.runtime.transforms import TransformError
 from crazyflie_utils.vectors import is_finite
 
 PERIOD = 0.05

@@ -7,7 +7,7 @@ from crazyflie_driver.options import STANDARD_TOPICS
 from crazyflie_driver.server_node import ADD
 from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest
 from crazyflie_utils import Node, ParameterError
-from crazyflie_utils.parameters import BOOLEAN, FINITE, TEXT, Integer
+from crazyflie_utils.parameter_types import BOOLEAN, FINITE, TEXT, Integer
 
 _LIMIT = 60.0
 """How long, in s, the server may take to come up and to connect."""

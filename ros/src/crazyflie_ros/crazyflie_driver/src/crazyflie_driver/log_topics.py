@@ -81,7 +81,7 @@ class LogTopics:
             header=port << 4 | channel,
             data=data[:_MOST_DATA].ljust(_MOST_DATA, b"\0"),
         )
-        self._handle.run_soon(publisher.publish, message)
+        self._handle.submit(publisher.publish, message)
 
     def _start_status(self, known):
         wanted = ("pm.vbat", "radio.rssi", "supervisor.info")
@@ -132,7 +132,7 @@ class LogTopics:
         handle = self._handle
 
         def hand_over(time_ms, values):
-            handle.run_soon(receive, self._stamp(time_ms), values)
+            handle.submit(receive, self._stamp(time_ms), values)
 
         self._vehicle.add_log_block(LogBlock(name, period_ms, variables, hand_over))
 

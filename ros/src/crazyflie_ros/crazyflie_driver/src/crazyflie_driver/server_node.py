@@ -15,7 +15,7 @@ from crazyflie_driver.srv import (
 from crazyflie_driver.vehicle import Vehicle
 from crazyflie_py.errors import CrazyflieError
 from crazyflie_utils import Node, ServiceError
-from crazyflie_utils.parameters import FRAME
+from crazyflie_utils.parameter_types import FRAME
 
 ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"
 """Services of the server."""
@@ -102,7 +102,7 @@ class CrazyflieServerNode(Node):
             else:
                 answer.set_exception(error)
 
-        done.add_done_callback(lambda _: self._handle.run_soon(settle))
+        done.add_done_callback(lambda _: self._handle.submit(settle))
         return answer
 
     def _publish_diagnostics(self):

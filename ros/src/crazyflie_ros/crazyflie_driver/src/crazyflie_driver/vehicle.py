@@ -38,7 +38,7 @@ class Vehicle:
 
     def __init__(self, handle, options, fixed_frame: str):
         self.options = options
-        self._handle = handle.part()
+        self._handle = handle.child()
         self._server = handle
         self._link_text = f"connecting to {options.uri}"
         self._is_emergency = False
@@ -245,7 +245,7 @@ class Vehicle:
         # turn, since the node waits for the end.
         self._link_text = text
         if not self.is_leaving:
-            self._handle.run_soon(self._on_state, state, text)
+            self._handle.submit(self._on_state, state, text)
 
     def _on_state(self, state, text):
         if state is LinkState.LOST:

@@ -2,21 +2,25 @@
 
 import math
 import time
+from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
+from typing import Any, TypeVar
 
 import genpy
 import rosgraph.names
 from rosgraph_msgs.msg import Clock
 
-from crazyflie_utils.faults import Faults
-from crazyflie_utils.parameters import ParameterError
-from crazyflie_utils.services import Service, pass_on
-from crazyflie_utils.timers import Timer
-from crazyflie_utils.topics import Publisher
+from crazyflie_utils.parameter_types import ParameterType
+from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_parameter
+from crazyflie_utils.runtime.faults import Faults
+from crazyflie_utils.runtime.services import pass_on, serve
+from crazyflie_utils.runtime.timers import Timer
+from crazyflie_utils.runtime.topics import Publisher
+from crazyflie_utils.vectors import is_finite
 
-REQUIRED = object()
-"""Default of a parameter that has none."""
+P = TypeVar("P", bound=Parameters)
+M = TypeVar("M", bound=genpy.Message)
 
 
 class NodeHandle:
@@ -43,14 +47,14 @@ class NodeHandle:
         self._undo = []
         self._is_closed = False
 
-    def part(self) -> "NodeHandle":
-        """Return a handle for a part of the node that may end before the node does.
+    def child(self) -> "NodeHandle":
+        """Return another handle of the node, for what may be closed before the node ends.
 
         `close` takes down what was made through it. It may be used from any thread.
         """
-        part = NodeHandle(self._process, self._name)
-        part._faults = self._faults
-        return part
+        child = NodeHandle(self._process, self._name)
+        child._faults = self._faults
+        return child
 
     def close(self) -> None:
         """Take down all publishers, subscribers, services and timers of this handle.
@@ -85,39 +89,76 @@ class NodeHandle:
         """
         return self._process.transport.remap(rosgraph.names.resolve_name(name, self._name))
 
-    def param(self, name: str, kind, default=REQUIRED):
-        """Return one of the node's own (private) parameters.
+    def load(
+        self,
+        parameters: type[P],
+        on_change: Callable[[P], None] | None = None,
+    ) -> P:
+        """Return the node's own (private) parameters, all of them checked.
+
+        Parameters
+        ----------
+        parameters : type
+            Subclass of `Parameters`.
+        on_change : callable, optional
+            Offers the live ones to dynamic_reconfigure: ``on_change(parameters)`` is
+            called between two other callbacks with all of them, checked, after some
+            were changed. It may raise `ParameterError` to refuse.
+
+        Raises
+        ------
+        ParameterError
+            About everything that is not set though required, or not what is expected.
+        """
+        own = self._own_parameters()
+
+        def get(name):
+            full_name = self._parameter_name(name)
+            if not full_name.startswith(self._name + "/"):
+                return self._process.transport.get_param(full_name)
+            value = own
+            for key in full_name.removeprefix(self._name + "/").split("/"):
+                if not isinstance(value, dict):
+                    raise KeyError(name)
+                value = value[key]
+            return value
+
+        loaded = parameters.read(get, self._parameter_name)
+        if on_change is not None:
+            # Here, since most processes do without.
+            from crazyflie_utils.runtime.reconfiguration import Reconfiguration
+
+            Reconfiguration(self, loaded, get, on_change)
+        return loaded
+
+    def _own_parameters(self):
+        # In one request, however many there are.
+        try:
+            return self._process.transport.get_param(self._name)
+        except KeyError:
+            return {}
+
+    def _parameter_name(self, name):
+        return self.resolve(name if name.startswith("/") else "~" + name)
+
+    def get_param(self, name: str, type: ParameterType, default: Any = REQUIRED) -> Any:  # noqa: A002
+        """Return a parameter that cannot be declared: another's, or one of a changing name.
 
         Parameters
         ----------
         name : str
-            Such as "frames/fixed", without the ``~``. One that begins with a slash is
-            not the node's own: it is taken as it is.
-        kind : callable
-            From `crazyflie_utils.parameters`: checks the value and says what
-            is expected.
+            A relative name is in the node's namespace, ``~name`` is the node's own.
+        type : ParameterType
         default : object, optional
             Taken as it is when the parameter is not set.
 
         Raises
         ------
         ParameterError
-            Required but not set, or not what is expected.
+            It is required but not set, or not what is expected.
         """
-        full_name = self.resolve(name if name.startswith("/") else "~" + name)
-        try:
-            value = self._process.transport.get_param(full_name)
-        except KeyError:
-            if default is not REQUIRED:
-                return default
-            raise ParameterError(f"parameter {full_name} is not set; expected {kind}") from None
-        try:
-            return kind(value)
-        except ValueError as error:
-            reason = f" ({error})" if str(error) else ""
-            raise ParameterError(
-                f"parameter {full_name} is {value!r}; expected {kind}{reason}"
-            ) from None
+        declaration = Declaration(self.resolve(name), type, "", default, live=False)
+        return read_parameter(declaration, self._process.transport.get_param)
 
     def set_param(self, name: str, value) -> None:
         """Set a parameter that others may read; blocks for a few milliseconds.
@@ -142,11 +183,31 @@ class NodeHandle:
         self._undo.append(publisher.close)
         return publisher
 
-    def subscribe(self, topic: str, message_type: type, callback) -> None:
+    def subscribe(
+        self,
+        topic: str,
+        message_type: type[M],
+        callback: Callable[[M], None],
+        finite: str = "",
+        on_invalid: Callable[[], None] | None = None,
+    ) -> None:
         """Have ``callback(message)`` called for every message on a topic.
 
         The message belongs to everybody: it must not be changed.
+
+        Parameters
+        ----------
+        topic : str
+        message_type : type
+        callback : callable
+        finite : str, optional
+            A field of the message, such as "control", whose numbers must be finite.
+            Other messages are dropped with a warning, and
+        on_invalid : callable, optional
+            is called instead, without arguments.
         """
+        if finite:
+            callback = self._finite_only(self.resolve(topic), finite, callback, on_invalid)
         guarded = self.guard(callback)
         submit = self._process.executor.submit
         unsubscribe = self._process.topics.subscribe(
@@ -154,16 +215,34 @@ class NodeHandle:
         )
         self._undo.append(unsubscribe)
 
-    def advertise_service(self, name: str, service_type: type, callback) -> None:
+    def _finite_only(self, topic, field, callback, on_invalid):
+        def check(message):
+            if is_finite(getattr(message, field)):
+                callback(message)
+                return
+            self.warn(f"ignoring a message on {topic}: its {field} is not finite", throttle=1.0)
+            if on_invalid is not None:
+                on_invalid()
+
+        return check
+
+    def advertise_service(
+        self, name: str, service_type: type, callback: Callable[[Any], Any]
+    ) -> None:
         """Answer calls of a service.
 
         ``callback(request)`` returns the response; or, for work that takes time, a
         `concurrent.futures.Future` of it, so that the node goes on living
         meanwhile; or raises `ServiceError` with a text for the caller.
         """
-        service = Service(self._process, self, callback, self._faults)
+
+        def begin(request):
+            answer = Future()
+            self._process.executor.submit(partial(serve, callback, request, answer, self))
+            return answer
+
         end = self._process.transport.advertise_service(
-            self.resolve(name), service_type, service.begin, service.settle
+            self.resolve(name), service_type, begin, self._process.clock.time
         )
         self._undo.append(end)
 
@@ -211,7 +290,7 @@ class NodeHandle:
         self._undo.append(timer.stop)
         return timer
 
-    def run_soon(self, callback, *arguments) -> None:
+    def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
         """Have ``callback(*arguments)`` called in its turn with all other callbacks.
 
         This is how threads of a node's own hand over to it.
@@ -272,7 +351,11 @@ class NodeHandle:
         """Log what makes the node fail."""
         self._process.transport.log("error", f"{self._name}: {text}")
 
-    def on_fault(self, make_safe) -> None:
+    def report_fault(self, callback: Callable[..., Any], error: Exception) -> None:
+        """Log that a callback of this node has raised, and have the node made safe."""
+        self._faults.report(callback, error)
+
+    def on_fault(self, make_safe: Callable[[], None]) -> None:
         """Have ``make_safe()`` called after a callback of this node has raised."""
         self._faults.make_safe = make_safe
 
@@ -285,6 +368,6 @@ class NodeHandle:
             try:
                 callback(*args)
             except Exception as error:
-                self._faults.report(callback, error)
+                self.report_fault(callback, error)
 
         return guarded

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
-from crazyflie_utils.executor import Executor
+from crazyflie_utils.runtime.executor import Executor
 
 _TOLERANCE = 1e-6
 """A timer is due this much early, s: more than the rounding of a float that holds

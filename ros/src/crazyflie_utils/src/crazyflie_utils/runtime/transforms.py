@@ -62,8 +62,8 @@ class Transforms:
         """Begin to collect what is said on /tf and /tf_static."""
         if self._buffer is None:
             self._buffer = tf2_ros.Buffer(debug=False)
-            self._topics.subscribe("/tf", TFMessage, self._hear)
-            self._topics.subscribe("/tf_static", TFMessage, self._hear_static)
+            self._topics.subscribe("/tf", TFMessage, self._on_transforms)
+            self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
     def clear(self) -> None:
         """Forget everything: time has been reset."""
@@ -92,22 +92,22 @@ class Transforms:
         found.header.stamp = self._stamps.get(stamp.to_sec(), stamp)
         return found
 
-    def _hear(self, message):
+    def _on_transforms(self, message):
         self._store(message, self._buffer.set_transform)
 
-    def _hear_static(self, message):
+    def _on_static(self, message):
         self._store(message, self._buffer.set_transform_static)
 
     def _store(self, message, store):
         for transform in message.transforms:
-            complaint = _complaint(transform.transform)
-            if complaint is None:
+            reason = _why_invalid(transform.transform)
+            if reason is None:
                 store(transform, "tf")
                 self._remember(transform.header.stamp)
             else:
                 self._warn(
                     f"ignoring a transform {transform.header.frame_id} -> "
-                    f"{transform.child_frame_id} that {complaint}"
+                    f"{transform.child_frame_id} that {reason}"
                 )
 
     def _remember(self, stamp):
@@ -118,7 +118,7 @@ class Transforms:
                 del self._stamps[next(iter(self._stamps))]
 
 
-def _complaint(transform):
+def _why_invalid(transform):
     # tf2 refuses both, too, but says so without a throttle.
     if not is_finite(transform):
         return "is not finite"

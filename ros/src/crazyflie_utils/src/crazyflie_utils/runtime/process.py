@@ -4,12 +4,12 @@ from functools import partial
 
 from rosgraph_msgs.msg import Clock
 
-from crazyflie_utils.clock import SimulatedClock, SteadyClock
-from crazyflie_utils.executor import Executor
-from crazyflie_utils.node_handle import NodeHandle
-from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
-from crazyflie_utils.topics import Topics
-from crazyflie_utils.transforms import Transforms
+from crazyflie_utils.runtime.clock import SimulatedClock, SteadyClock
+from crazyflie_utils.runtime.executor import Executor
+from crazyflie_utils.runtime.handle import NodeHandle
+from crazyflie_utils.runtime.timers import SteadyTimers, Timer, TimerQueue
+from crazyflie_utils.runtime.topics import Topics
+from crazyflie_utils.runtime.transforms import Transforms
 
 
 class Process:
@@ -36,7 +36,7 @@ class Process:
         self.exit_status = None
         if use_sim_time:
             self.clock.on_change(self._run_simulated)
-            self.topics.subscribe("/clock", Clock, self._hear_clock)
+            self.topics.subscribe("/clock", Clock, self._on_clock)
 
     def end(self, status: int) -> None:
         """Have the process shut down and exit with ``status``."""
@@ -92,7 +92,7 @@ class Process:
         for name, node in nodes.items():
             self.executor.submit(self.handle(name).guard(node.shutdown))
 
-    def _hear_clock(self, message):
+    def _on_clock(self, message):
         # As work among the other work: time does not move within a callback, and
         # a reset is not overtaken by what the last simulation still said.
         self.executor.submit(partial(self.clock.set, message.clock.to_sec()))

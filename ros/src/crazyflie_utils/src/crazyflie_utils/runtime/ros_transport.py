@@ -2,13 +2,16 @@
 
 import contextlib
 import threading
-from concurrent.futures import Future, InvalidStateError
+from collections.abc import Callable
+from concurrent.futures import Future, InvalidStateError, wait
 from functools import partial
+from time import monotonic
+from typing import Any
 
 import rospy
 
-from crazyflie_utils import rospy_internals
-from crazyflie_utils.transport import Outlet, ServiceError, Transport
+from crazyflie_utils.runtime import rospy_internals
+from crazyflie_utils.runtime.transport import ExternalPublisher, ServiceError, Transport
 
 _QUEUE_SIZE = 100
 """Messages kept for each slow listener. With a queue rospy sends from a thread of
@@ -16,11 +19,16 @@ its own, so that a listener that is frozen cannot stop a vehicle; a simulation t
 runs as fast as it can fills a short one faster than that thread gets its turn."""
 
 
-class _RosOutlet(Outlet):
+_STALL_LIMIT = 5.0
+"""How long, in s of the machine's clock, the caller of a service waits while simulated time
+stands still."""
+
+
+class _RosPublisher(ExternalPublisher):
     def __init__(self, publisher):
         self._publisher = publisher
 
-    def is_heard(self):
+    def has_subscribers(self):
         return self._publisher.get_num_connections() > 0
 
     def publish(self, message):
@@ -51,22 +59,24 @@ class RosTransport(Transport):
 
     def advertise(self, topic, message_type, latch):
         """Register a publisher with the master."""
-        return _RosOutlet(rospy.Publisher(topic, message_type, latch=latch, queue_size=_QUEUE_SIZE))
+        return _RosPublisher(
+            rospy.Publisher(topic, message_type, latch=latch, queue_size=_QUEUE_SIZE)
+        )
 
     def subscribe(self, topic, message_type, deliver):
         """Register a subscriber with the master."""
         return rospy.Subscriber(topic, message_type, deliver, tcp_nodelay=True).unregister
 
-    def advertise_service(self, name, service_type, begin, settle):
+    def advertise_service(self, name, service_type, serve, time):
         """Register a service with the master."""
 
-        def serve(request):
+        def answer(request):
             try:
-                return settle(begin(request))
+                return wait_for_answer(serve(request), name, time)
             except ServiceError as error:
                 raise rospy.ServiceException(str(error)) from None
 
-        return partial(rospy.Service(name, service_type, serve).shutdown, "no longer offered")
+        return partial(rospy.Service(name, service_type, answer).shutdown, "no longer offered")
 
     def call_service(self, name, service_type, request, limit):
         """Call in a thread of its own, and give up on it after ``limit``."""
@@ -90,10 +100,6 @@ class RosTransport(Transport):
         """Set rospy's own clock, which stamps the log."""
         rospy_internals.set_time(stamp)
 
-    def is_shutdown(self):
-        """Tell whether rospy is shutting down."""
-        return rospy.core.is_shutdown_requested()
-
 
 _LOGGERS = {
     "debug": rospy.logdebug,
@@ -102,6 +108,26 @@ _LOGGERS = {
     "error": rospy.logerr,
     "fatal": rospy.logfatal,
 }
+
+
+def wait_for_answer(answer: Future, name: str, time: Callable[[], float]) -> Any:
+    """Return the outcome of ``answer``, for the caller of the service ``name``.
+
+    Raises
+    ------
+    ServiceError
+        The service's; or the process ends, or ``time()`` stands still, before there
+        is an outcome.
+    """
+    seen, seen_at = time(), monotonic()
+    while not wait([answer], timeout=0.1).done:
+        if rospy.core.is_shutdown_requested():
+            raise ServiceError(f"{name}: the node is shutting down")
+        if time() != seen:
+            seen, seen_at = time(), monotonic()
+        elif monotonic() - seen_at > _STALL_LIMIT:
+            raise ServiceError(f"{name}: /clock stands still")
+    return answer.result()
 
 
 def _call(name, service_type, request, limit, future):

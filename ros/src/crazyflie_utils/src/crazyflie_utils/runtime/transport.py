@@ -5,22 +5,26 @@
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from concurrent.futures import Future
+from typing import Any
+
+import genpy
 
 
 class ServiceError(Exception):
     """A service refused or failed; the text tells the caller why."""
 
 
-class Outlet(ABC):
-    """The way out of the process for one topic."""
+class ExternalPublisher(ABC):
+    """Publishes one topic to those outside the process."""
 
     @abstractmethod
-    def is_heard(self) -> bool:
-        """Tell whether anyone outside this process listens."""
+    def has_subscribers(self) -> bool:
+        """Tell whether anyone outside this process subscribes."""
 
     @abstractmethod
-    def publish(self, message) -> None:
+    def publish(self, message: genpy.Message) -> None:
         """Send a message to those outside."""
 
     @abstractmethod
@@ -36,19 +40,21 @@ class Transport(ABC):
         """Return the name that the launch file puts in the place of ``name``."""
 
     @abstractmethod
-    def get_param(self, name: str):
-        """Return the raw value of a parameter; KeyError when it is not set."""
+    def get_param(self, name: str) -> Any:
+        """Return the raw value of a parameter, a dictionary of a namespace; KeyError without."""
 
     @abstractmethod
-    def set_param(self, name: str, value) -> None:
+    def set_param(self, name: str, value: Any) -> None:
         """Set a parameter."""
 
     @abstractmethod
-    def advertise(self, topic: str, message_type: type, latch: bool) -> Outlet:
+    def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Announce a topic to those outside."""
 
     @abstractmethod
-    def subscribe(self, topic: str, message_type: type, deliver):
+    def subscribe(
+        self, topic: str, message_type: type, deliver: Callable[[Any], None]
+    ) -> Callable[[], None]:
         """Have ``deliver(message)`` called with what those outside publish.
 
         Also with what they have latched; a topic may be subscribed more than once.
@@ -56,15 +62,22 @@ class Transport(ABC):
         """
 
     @abstractmethod
-    def advertise_service(self, name: str, service_type: type, begin, settle):
-        """Answer calls of a service with ``settle(begin(request))``.
+    def advertise_service(
+        self,
+        name: str,
+        service_type: type,
+        serve: Callable[[Any], Future],
+        time: Callable[[], float],
+    ) -> Callable[[], None]:
+        """Answer calls of a service with the outcome of the future ``serve(request)``.
 
-        ``begin`` returns a Future of the response at once; ``settle`` waits for it
-        and may raise `ServiceError`. Returns a function that ends the service.
+        The caller is told of a `ServiceError`, and does not wait on when the process
+        ends or when ``time()``, by which the service lives, stands still. Returns a
+        function that ends the service.
         """
 
     @abstractmethod
-    def call_service(self, name: str, service_type: type, request, limit: float) -> Future:
+    def call_service(self, name: str, service_type: type, request: Any, limit: float) -> Future:
         """Call a service and return at once; see `NodeHandle.call_service`."""
 
     @abstractmethod
@@ -72,9 +85,5 @@ class Transport(ABC):
         """Log at ``level``: debug, info, warn, error or fatal."""
 
     @abstractmethod
-    def clock_was_set(self, stamp) -> None:
+    def clock_was_set(self, stamp: genpy.Time) -> None:
         """Take note that this process, which publishes /clock, moved to ``stamp``."""
-
-    @abstractmethod
-    def is_shutdown(self) -> bool:
-        """Tell whether the process is ending."""

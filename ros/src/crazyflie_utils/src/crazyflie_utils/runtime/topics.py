@@ -24,9 +24,9 @@ class Topic:
 class Publisher:
     """The right to publish on a topic."""
 
-    def __init__(self, topic: Topic, outlet, latch: bool):
+    def __init__(self, topic: Topic, external, latch: bool):
         self._topic = topic
-        self._outlet = outlet
+        self._external = external
         self._latch = latch
         self._is_closed = False
 
@@ -52,8 +52,8 @@ class Publisher:
             return
         if self._latch:
             self._topic.latched = message
-        if self._latch or self._outlet.is_heard():
-            self._outlet.publish(message)
+        if self._latch or self._external.has_subscribers():
+            self._external.publish(message)
         self._topic.deliver(message)
 
     def close(self) -> None:
@@ -61,7 +61,7 @@ class Publisher:
         self._is_closed = True
         if self._latch:
             self._topic.latched = None
-        self._outlet.close()
+        self._external.close()
 
 
 class Topics:

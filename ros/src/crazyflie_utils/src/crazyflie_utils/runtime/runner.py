@@ -8,14 +8,16 @@ import sys
 import threading
 import time
 import traceback
+from typing import Any
 
 import rosgraph
 import rospy
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import BOOLEAN, GraphName, ParameterError
-from crazyflie_utils.process import Process
-from crazyflie_utils.ros_transport import RosTransport
+from crazyflie_utils.parameter_types import BOOLEAN, GraphName, ParameterType
+from crazyflie_utils.parameters import ParameterError, Parameters, parameter
+from crazyflie_utils.runtime.process import Process
+from crazyflie_utils.runtime.ros_transport import RosTransport
 
 _MASTER_LIMIT = 10.0
 """How long, in s, a node waits for a ROS master."""
@@ -23,7 +25,7 @@ _MASTER_LIMIT = 10.0
 _SHUTDOWN_LIMIT = 2.0
 """How long, in s, shutdown waits for a callback that does not return."""
 
-_FAREWELL = 0.2
+_FLUSH_TIME = 0.2
 """How long, in s, the last messages have to be sent by rospy's threads and to be
 read: a subscriber hangs up as soon as the master tells it of the publisher's end."""
 
@@ -52,16 +54,18 @@ def run_composed(default_name: str) -> None:
     """
 
     def make_nodes(handle):
-        classes = handle.param("nodes", NodeClasses())
+        classes = handle.load(ComposedParameters).nodes
         return {handle.resolve(name): make() for name, make in classes.items()}
 
     _run(begin(default_name), make_nodes)
 
 
-class NodeClasses:
-    """Kind of the parameter that lists the nodes of a process."""
+class NodeClasses(ParameterType):
+    """The nodes of a process: a dictionary of name to class."""
 
-    def __call__(self, value) -> dict:
+    label = "dictionary, string to string"
+
+    def __call__(self, value: Any) -> dict[str, type[Node]]:
         """Return node name -> node class."""
         if not isinstance(value, dict) or not value:
             raise ValueError
@@ -70,6 +74,12 @@ class NodeClasses:
     def __str__(self) -> str:
         """Return what is expected."""
         return 'a dictionary of node name: "package.module:Class"'
+
+
+class ComposedParameters(Parameters):
+    """What a process of many nodes is told."""
+
+    nodes: dict[str, type[Node]] = parameter(NodeClasses(), 'node name to "package.module:Class"')
 
 
 def _flatten(tree, prefix=""):
@@ -176,7 +186,7 @@ class _Ending:
             self._process.transport.log(
                 "fatal", f"a callback has not returned within {_SHUTDOWN_LIMIT:g} s; exiting"
             )
-        time.sleep(_FAREWELL)
+        time.sleep(_FLUSH_TIME)
 
 
 def _catch_signals():

@@ -1,0 +1,41 @@
+"""The last valid value of an input, while its source is alive."""
+
+import math
+from typing import Generic, TypeVar
+
+T = TypeVar("T")
+
+HOLD_LIMIT = 0.5
+"""How long, in s, a valid value may stand in for invalid ones: the firmware,
+too, gives up on a setpoint after 500 ms."""
+
+
+class LastValid(Generic[T]):
+    """The latest valid value of an input that may turn invalid.
+
+    A valid value holds until the next one; but when invalid ones come, for at most
+    ``limit`` after the first of them.
+
+    Parameters
+    ----------
+    limit : float
+        s.
+    """
+
+    def __init__(self, limit: float = HOLD_LIMIT):
+        self._limit = limit
+        self._value: T | None = None
+        self._expiry = math.inf
+
+    def update(self, value: T) -> None:
+        """Take a valid value."""
+        self._value = value
+        self._expiry = math.inf
+
+    def invalidate(self, time: float) -> None:
+        """Take note that an invalid value came at ``time`` (s)."""
+        self._expiry = min(self._expiry, time + self._limit)
+
+    def value(self, time: float) -> T | None:
+        """Return the value that holds at ``time`` (s); None before the first and after the last."""
+        return self._value if time < self._expiry else None

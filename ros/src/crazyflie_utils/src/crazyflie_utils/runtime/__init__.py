@@ -1,0 +1,1 @@
+"""What the node handle stands on: one process, its executor, clocks, topics, services and tf."""

@@ -1,0 +1,56 @@
+"""Services that are answered in their turn, at once or later."""
+
+import traceback
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+from crazyflie_utils.runtime.transport import ServiceError
+
+
+def serve(callback: Callable[[Any], Any], request: Any, answer: Future, handle) -> None:
+    """Answer a request of a service.
+
+    Parameters
+    ----------
+    callback : callable
+        See `NodeHandle.advertise_service`.
+    request : genpy.Message
+    answer : Future
+        Is given the response, or a `ServiceError`; now, or when the future that the
+        callback has returned is done.
+    handle : NodeHandle
+        Of the node that offers the service.
+    """
+    if handle.is_closed:
+        answer.set_exception(ServiceError(f"{handle.name} has ended this service"))
+        return
+    try:
+        response = callback(request)
+    except ServiceError as error:
+        answer.set_exception(error)
+    except Exception as error:
+        handle.report_fault(callback, error)
+        answer.set_exception(ServiceError(f"{handle.name}: {error!r}"))
+    else:
+        if isinstance(response, Future):
+            response.add_done_callback(lambda done: pass_on(done, answer, handle))
+        else:
+            answer.set_result(response)
+
+
+def pass_on(done: Future, to: Future, handle) -> None:
+    """Let one future have the outcome of another, any error as a `ServiceError`."""
+    if not to.set_running_or_notify_cancel():
+        return
+    if done.cancelled():
+        to.set_exception(ServiceError(f"{handle.name}: cancelled"))
+        return
+    error = done.exception()
+    if error is None:
+        to.set_result(done.result())
+    elif isinstance(error, ServiceError):
+        to.set_exception(error)
+    else:
+        handle.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
+        to.set_exception(ServiceError(f"{handle.name}: {error!r}"))

@@ -49,7 +49,7 @@ def outlet(process, outsiders):
     heard = queue.Queue()
     handle.subscribe("/from", Int64, heard.put)
     publisher = handle.publisher("/to", Int64)
-    wait_until(lambda: publisher._outlet.has_subscribers(), "the relay to connect")
+    wait_until(lambda: publisher._external.has_subscribers(), "the relay to connect")
 
     def both_ways():
         publisher.publish(Int64(0))
@@ -70,7 +70,7 @@ def test_messages_go_out_and_come_in(outlet):
 
 
 def test_nobody_listens_to_a_new_topic(handle):
-    assert not handle.publisher("/nobody_listens", String)._outlet.has_subscribers()
+    assert not handle.publisher("/nobody_listens", String)._external.has_subscribers()
 
 
 def test_latched_message_reaches_an_outsider_that_comes_later(handle):
@@ -97,7 +97,7 @@ def test_process_does_not_connect_to_itself(process, outlet):
         assert heard.get(timeout=LIMIT).data == -number
         assert heard.get(timeout=LIMIT).data == number + 1000
     assert heard.empty()
-    assert not inside._outlet.has_subscribers()
+    assert not inside._external.has_subscribers()
 
 
 # Services.

@@ -1,0 +1,207 @@
+"""Everything the workspace uses from the system or from PyPI is in its lists.
+
+A package that somebody installed by hand would hide a missing line from every other
+test on that machine. So the lists are compared with what Debian says of its packages.
+"""
+
+import ast
+import functools
+import importlib
+import importlib.metadata
+import importlib.util
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from workspaces import TOP
+
+ROS = TOP / "ros"
+SOURCES = ROS / "src"
+SHARE = Path("/usr/share")
+
+
+def lines(path):
+    """Return the lines of a list without comments, without the empty ones."""
+    texts = (line.partition("#")[0].strip() for line in path.read_text().splitlines())
+    return [text for text in texts if text]
+
+
+def output(*command):
+    """Return what a command prints."""
+    return subprocess.run(
+        command, check=True, capture_output=True, text=True, timeout=120
+    ).stdout
+
+
+@functools.cache
+def installed_by_the_list():
+    """Return the Debian packages that ros/debian.txt brings: those in it, and what they need."""
+    text = output(
+        *("apt-cache", "depends", "--recurse", "--important", "--installed"),
+        *lines(ROS / "debian.txt"),
+    )
+    return {line.strip() for line in text.splitlines() if not line.startswith((" ", "<", "|"))}
+
+
+@functools.cache
+def owner(path):
+    """Return the Debian package that a file belongs to; None for none."""
+    found = subprocess.run(["dpkg", "-S", str(path)], capture_output=True, text=True, timeout=60)
+    return found.stdout.partition(":")[0] or None
+
+
+def files(*suffixes):
+    """Return the paths of the repository's files with one of the suffixes."""
+    paths = (TOP / name for name in output("git", "-C", str(TOP), "ls-files").splitlines())
+    return [path for path in paths if path.suffix in suffixes and path.is_file()]
+
+
+def manifests():
+    """Return the package.xml files, parsed."""
+    return [
+        ElementTree.parse(path).getroot() for path in files(".xml") if path.name == "package.xml"
+    ]
+
+
+def own_packages():
+    """Return the names of the packages in this repository."""
+    return {manifest.findtext("name") for manifest in manifests()}
+
+
+def named_in_launch_files():
+    """Return the packages that launch and test files name."""
+    text = "".join(path.read_text() for path in files(".launch", ".test"))
+    return set(re.findall(r'pkg="([a-z0-9_]+)"', text)) | set(
+        re.findall(r"\$\(find ([a-z0-9_]+)\)", text)
+    )
+
+
+def named_in_manifests():
+    """Return the dependencies that the package.xml files name."""
+    return {
+        child.text
+        for manifest in manifests()
+        for child in manifest
+        if child.tag.endswith("depend")
+    }
+
+
+SYSTEM_PACKAGES = sorted((named_in_launch_files() | named_in_manifests()) - own_packages())
+
+
+def imports():
+    """Return the top-level modules that the repository's Python files import."""
+    found = set()
+    programs = [
+        path
+        for path in files("", ".py")
+        if path.suffix == ".py" or path.read_bytes().startswith(b"#!/usr/bin/env python")
+    ]
+    for path in programs:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                found |= {name.name.partition(".")[0] for name in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                found.add(node.module.partition(".")[0])
+    return found - set(sys.stdlib_module_names)
+
+
+def debian_file(module):
+    """Return the file of a module that Debian has installed; None for any other module."""
+    spec = importlib.util.find_spec(module)
+    assert spec is not None, f"there is no module {module}"
+    place = spec.origin or next(iter(spec.submodule_search_locations))
+    return place if place.startswith("/usr/lib/python3/dist-packages/") else None
+
+
+OWN_MODULES = {path.stem for path in files(".py")} | {
+    path.name for path in SOURCES.glob("**/src/*") if path.is_dir()
+}
+MODULES = sorted(imports() - OWN_MODULES - own_packages())
+
+
+@pytest.mark.parametrize("name", SYSTEM_PACKAGES)
+def test_packages_of_launch_files_and_manifests_are_in_the_list(name):
+    # It is a ROS package, with a manifest or with messages only, or one of Debian's, or PyPI's.
+    manifest = SHARE / name / "package.xml"
+    if manifest.exists():
+        assert owner(manifest) in installed_by_the_list()
+    elif importlib.util.find_spec(name):
+        assert owner(debian_file(name)) in installed_by_the_list()
+    else:
+        pip_name = re.sub("^python3-|-pip$", "", name)
+        assert name in installed_by_the_list() or pip_name in locked_versions()
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_modules_that_are_imported_are_in_the_lists(module):
+    file = debian_file(module)
+    # What is not from Debian is from the virtual environment, which has nothing else.
+    assert file is None or owner(file) in installed_by_the_list()
+
+
+@pytest.mark.parametrize(
+    "program",
+    "catkin_make catkin_lint check_urdf dot git roslaunch rostest rviz Xvfb xauth".split(),
+)
+def test_programs_are_in_the_list(program):
+    path = shutil.which(program)
+    assert path, f"{program} is not installed"
+    base = {"git"}  # Nobody has this repository without it.
+    assert program in base or owner(Path(path).resolve()) in installed_by_the_list()
+
+
+def locked_versions():
+    """Return name -> version of ros/requirements.txt, for this machine."""
+    requirements = [line.partition(";")[0].strip() for line in lines(ROS / "requirements.txt")]
+    return dict(requirement.split("==") for requirement in requirements)
+
+
+TOOLS = {"pip", "setuptools"}
+"""What Python itself puts into a virtual environment."""
+
+
+def test_the_virtual_environment_is_the_list():
+    folder = next((ROS / ".venv" / "lib").glob("python3.*/site-packages"))
+    found = {d.name: d.version for d in importlib.metadata.distributions(path=[str(folder)])}
+    assert {name: version for name, version in found.items() if name not in TOOLS} == {
+        name: version for name, version in locked_versions().items() if name in found
+    }
+    assert set(locked_versions()) - set(found) <= {"motioncapture"}  # Not for every processor.
+
+
+@pytest.mark.parametrize("name", sorted(locked_versions()))
+def test_the_list_has_all_that_its_packages_pull_in(name):
+    if name == "motioncapture" and importlib.util.find_spec(name) is None:
+        pytest.skip("no binary of motioncapture for this processor")
+    for requirement in importlib.metadata.requires(name) or []:
+        needed, _, condition = requirement.partition(";")
+        if "extra ==" not in condition and "python_version" not in condition:
+            # Raises PackageNotFoundError when it is neither locked nor from Debian.
+            importlib.metadata.version(re.split("[<>=!~ (]", needed)[0])
+
+
+@pytest.mark.parametrize("module", ["cv2", "cv_bridge", "cv_bridge.boost.cv_bridge_boost"])
+def test_compiled_modules_of_debian_work_in_the_sourced_environment(module):
+    # They are built for Debian's numpy, as the nodes are that users have.
+    assert importlib.import_module(module)
+
+
+def test_numbers_survive_a_trip_through_cv_bridge():
+    import numpy as np
+    from cv_bridge import CvBridge
+
+    image = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
+    message = CvBridge().cv2_to_imgmsg(image, "bgr8")
+    assert (CvBridge().imgmsg_to_cv2(message) == image).all()
+
+
+def test_tf_transformations_work_in_the_sourced_environment():
+    from tf.transformations import euler_from_quaternion, quaternion_from_euler
+
+    angles = (0.3, -0.4, 1.1)
+    assert euler_from_quaternion(quaternion_from_euler(*angles)) == pytest.approx(angles)

@@ -167,8 +167,8 @@ class Network:
         assert process.launch(node, f"/{name}", parameters), process.logged("error")
         for other in self._processes.values():
             for topic in self.LATCHED:
-                outlet = other.transport.outlets.get(topic)
-                if outlet and outlet.messages and topic in process.transport.inlets:
+                outlet = other.transport.publishers.get(topic)
+                if outlet and outlet.messages and topic in process.transport.subscribers:
                     process.publish(topic, outlet.messages[-1])
         self._processes[name] = process
         self._sent[name] = {}
@@ -215,7 +215,7 @@ class Network:
         while moved:
             moved = False
             for name, process in list(self._processes.items()):
-                for topic, outlet in process.transport.outlets.items():
+                for topic, outlet in process.transport.publishers.items():
                     first = self._sent[name].get(topic, 0)
                     self._sent[name][topic] = len(outlet.messages)
                     for message in outlet.messages[first:]:
@@ -225,7 +225,7 @@ class Network:
 
     def _deliver(self, sender, topic, message):
         for other in self._processes.values():
-            if other is not sender and topic in other.transport.inlets:
+            if other is not sender and topic in other.transport.subscribers:
                 other.publish(topic, message)
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_takeoff.flight import Flight, Plan, RefusalError
+from crazyflie_takeoff.flight import FlightStateMachine, Plan, RefusalError
 from crazyflie_takeoff.flight_state import FlightState
 
 G = 9.81
@@ -56,7 +56,7 @@ class Clock:
 
 def flying(plan=PLAN):
     """Return a flight that has taken off."""
-    flight = Flight(plan)
+    flight = FlightStateMachine(plan)
     flight.takeoff()
     Clock(flight, start=0.0).run(6.01)
     assert flight.state is FLYING
@@ -64,13 +64,13 @@ def flying(plan=PLAN):
 
 
 def test_zero_thrust_is_repeated_at_10_hz_on_the_ground():
-    clock = Clock(Flight(PLAN)).run(1.0)
+    clock = Clock(FlightStateMachine(PLAN)).run(1.0)
     assert clock.thrusts() == [(pytest.approx(0.1 * k), 0.0) for k in range(10)]
     assert clock.references() == clock.toggles() == []
 
 
 def test_takeoff_step_by_step():
-    flight = Flight(PLAN)
+    flight = FlightStateMachine(PLAN)
     clock = Clock(flight).run(0.37)
     clock.said.clear()
     flight.takeoff()
@@ -83,7 +83,7 @@ def test_takeoff_step_by_step():
 
 @pytest.mark.parametrize(("open_loop", "settle"), [(0.0, 1.0), (0.5, 0.0), (0.0, 0.0)])
 def test_durations_may_be_zero(open_loop, settle):
-    flight = Flight(Plan((0.0, 0.0, 1.0), open_loop, settle, 0.3))
+    flight = FlightStateMachine(Plan((0.0, 0.0, 1.0), open_loop, settle, 0.3))
     flight.takeoff()
     clock = Clock(flight).run(3.0)
     assert len(clock.thrusts()) == round(open_loop * 100)
@@ -92,7 +92,7 @@ def test_durations_may_be_zero(open_loop, settle):
 
 
 def test_a_tick_that_is_very_late_skips_nothing():
-    flight = Flight(PLAN)
+    flight = FlightStateMachine(PLAN)
     flight.takeoff()
     flight.tick(0.0)
     output = flight.tick(100.0)
@@ -147,7 +147,7 @@ def test_landing_descends_first():
 
 
 def test_the_ground_is_where_the_vehicle_took_off():
-    flight = Flight(PLAN)
+    flight = FlightStateMachine(PLAN)
     Clock(flight, position=(0.0, 0.0, 0.7), start=0.0).run(0.1)
     flight.takeoff()
     Clock(flight, position=(0.0, 0.0, 1.5), start=1.0).run(6.01)
@@ -201,7 +201,7 @@ def test_a_state_that_goes_stale_ends_the_descent():
 
 
 def test_flights_can_be_repeated():
-    flight = Flight(PLAN)
+    flight = FlightStateMachine(PLAN)
     clock = Clock(flight, position=(0.0, 0.0, 0.0))
     for _ in range(3):
         clock.said.clear()
@@ -217,7 +217,7 @@ def test_flights_can_be_repeated():
 
 def in_state(state):
     """Return a flight in a state that it has reached by itself."""
-    flight = Flight(PLAN)
+    flight = FlightStateMachine(PLAN)
     if state is ON_GROUND:
         return flight
     flight.takeoff()
@@ -282,18 +282,18 @@ def test_a_takeoff_aborted_near_the_ground_was_never_in_flight():
 
 
 def test_goes_on_when_the_clock_is_reset():
-    flight = Flight(PLAN)
+    flight = FlightStateMachine(PLAN)
     flight.takeoff()
     Clock(flight, start=5000.0).run(0.5)
     clock = Clock(flight, start=0.0).run(7.0)
     assert len(clock.thrusts()) == pytest.approx(51, abs=1)
     assert clock.toggles() == [pytest.approx(5.51, abs=0.011)]
-    grounded = Flight(PLAN)
+    grounded = FlightStateMachine(PLAN)
     Clock(grounded, start=5000.0).run(0.55)
     assert len(Clock(grounded, start=0.0).run(1.0).thrusts()) == 10
 
 
 def test_a_recovered_flight_tells_the_truth_by_a_toggle():
-    assert not Flight(PLAN, FLYING).tick(0.0).toggle
-    assert Flight(PLAN, FLYING, announced=False).tick(0.0).toggle
-    assert Flight(PLAN, ON_GROUND, announced=True).tick(0.0).toggle
+    assert not FlightStateMachine(PLAN, FLYING).tick(0.0).toggle
+    assert FlightStateMachine(PLAN, FLYING, announced=False).tick(0.0).toggle
+    assert FlightStateMachine(PLAN, ON_GROUND, announced=True).tick(0.0).toggle

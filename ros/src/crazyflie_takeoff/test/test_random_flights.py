@@ -3,7 +3,7 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from crazyflie_takeoff.flight import Flight, Plan, RefusalError
+from crazyflie_takeoff.flight import FlightStateMachine, Plan, RefusalError
 from crazyflie_takeoff.flight_state import FlightState
 
 G = 9.81
@@ -28,7 +28,7 @@ STEPS = st.lists(
 @given(STEPS, st.sampled_from([PLAN, BARE]))
 def test_whatever_is_called_when(steps, plan):
     """Random calls and times: what must hold at every tick of every flight."""
-    flight = Flight(plan)
+    flight = FlightStateMachine(plan)
     time, in_flight, ramp, last = 0.0, False, None, ON_GROUND
     for step in steps:
         before = flight.state

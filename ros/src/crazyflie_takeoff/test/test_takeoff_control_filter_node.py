@@ -122,3 +122,14 @@ def test_a_word_that_is_no_flight_state_is_ignored(process):
     assert thrusts(process) == [1.0, 2.0]
     assert "asleep" in process.logged("warn")[0]
     assert memory(process) == ["unknown", "flying"]
+
+
+def test_whether_there_is_a_controller_is_told_once_a_change():
+    process = FakeProcess()
+    process.transport.unpublished.add("/control/lqr")
+    assert process.launch(TakeoffControlFilterNode(), "/filter", FILTER)
+    process.advance(1.0)
+    process.transport.unpublished.clear()
+    process.advance(1.0)
+    told = [message.data for message in process.published("/in_flight_controller")]
+    assert told == [False, True]

@@ -3,7 +3,9 @@
 import math
 
 import pytest
-from std_msgs.msg import String
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
+from std_msgs.msg import Bool, String
 from std_srvs.srv import EmptyRequest, EmptyResponse
 from takeoff_helpers import BARE, GRAVITY, SERVER, state
 
@@ -307,3 +309,70 @@ def test_reset_of_the_clock_in_the_middle_of_a_takeoff():
     process.advance(5.6)
     assert future.result() == EmptyResponse()
     assert thrusts(process).count(GRAVITY + 0.2) == pytest.approx(100, abs=2)
+
+
+# Nothing to fly with.
+
+
+def test_takeoff_without_a_fresh_state_is_refused():
+    process = on_ground(SERVER)
+    process.advance(0.6)
+    with pytest.raises(
+        ServiceError, match="/takeoff refused: no state has come on /state for 0.5 s"
+    ):
+        call(process, "/takeoff")
+    process.advance(1.0)
+    assert (states(process), max(thrusts(process))) == (["on_ground"], 0.0)
+    process.publish("/state", state(0.0))
+    assert not call(process, "/takeoff").done()
+
+
+def test_takeoff_without_a_state_that_is_finite_is_refused():
+    process = on_ground(SERVER)
+    process.advance(0.6)
+    process.publish("/state", state(math.nan))
+    with pytest.raises(ServiceError, match="no state has come"):
+        call(process, "/takeoff")
+
+
+def test_takeoff_without_a_controller_is_refused():
+    process = on_ground(SERVER)
+    process.publish("/in_flight_controller", Bool(False))
+    with pytest.raises(ServiceError, match="is the controller running"):
+        call(process, "/takeoff")
+    process.publish("/in_flight_controller", Bool(True))
+    assert not call(process, "/takeoff").done()
+
+
+def test_landing_needs_neither():
+    process = flying(SERVER)
+    process.publish("/in_flight_controller", Bool(False))
+    process.advance(1.0)
+    assert not call(process, "/land").done()
+
+
+# Changes in flight.
+
+
+def reconfigure(process, **values):
+    """Change parameters as dynamic_reconfigure does."""
+    request = ReconfigureRequest(encode_config(values))
+    return process.call("/takeoff_server/set_parameters", request)
+
+
+def test_the_next_takeoff_goes_to_the_new_hover_point():
+    process = on_ground(SERVER)
+    reconfigure(process, **{"hover/z": 1.5})
+    call(process, "/takeoff")
+    for _ in range(110):
+        process.publish("/state", state(0.0))
+        process.advance(0.01)
+    assert process.published("/ref")[-1].state.z == 1.5
+
+
+def test_a_bad_change_is_refused():
+    process = on_ground(SERVER)
+    with pytest.raises(
+        ServiceError, match="/takeoff_server/landing/descent_speed is -1.0; expected"
+    ):
+        reconfigure(process, **{"landing/descent_speed": -1.0})

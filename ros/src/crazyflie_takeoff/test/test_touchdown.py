@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from takeoff_helpers import PointMass, feedback
 
-from crazyflie_takeoff.flight import Flight, Plan
+from crazyflie_takeoff.flight import FlightStateMachine, Plan
 from crazyflie_takeoff.flight_state import FlightState
 
 STIFF, SOFT = (20.0, 20.98), (1.5, 1.0)
@@ -18,7 +18,7 @@ def land(height, gains, speed=0.3, miscalibration=0.0):
     ``miscalibration`` is how much more thrust the vehicle gives than it is
     told, m/s^2; the hover begins in its equilibrium.
     """
-    flight = Flight(Plan((0.0, 0.0, height), 1.0, 5.0, speed), FlightState.FLYING)
+    flight = FlightStateMachine(Plan((0.0, 0.0, height), 1.0, 5.0, speed), FlightState.FLYING)
     vehicle = PointMass(height)
     reference = (height - miscalibration / gains[0], 0.0)
     flight.land()

@@ -4,7 +4,7 @@ import pytest
 from std_msgs.msg import Empty, String
 
 from crazyflie_utils.runtime.topics import Topics
-from crazyflie_utils.runtime.transport import ExternalPublisher
+from crazyflie_utils.runtime.transport import ExternalPublisher, ExternalSubscriber
 
 
 class Wire(ExternalPublisher):
@@ -26,12 +26,27 @@ class Wire(ExternalPublisher):
         self.is_closed = True
 
 
+class Inlet(ExternalSubscriber):
+    """A subscription of a topic outside."""
+
+    def __init__(self, world, key):
+        self._world = world
+        self._key = key
+
+    def has_publishers(self):
+        return self._world.is_published
+
+    def close(self):
+        self._world.subscribed.remove(self._key)
+
+
 class World:
     """The part of a transport that topics need."""
 
     def __init__(self):
         self.wires = []
         self.subscribed = []
+        self.is_published = False
 
     def advertise(self, topic, message_type, latch):
         self.wires.append(Wire(latch))
@@ -39,7 +54,7 @@ class World:
 
     def subscribe(self, topic, message_type, deliver):
         self.subscribed.append((topic, message_type, deliver))
-        return lambda: self.subscribed.remove((topic, message_type, deliver))
+        return Inlet(self, (topic, message_type, deliver))
 
 
 @pytest.fixture
@@ -147,10 +162,10 @@ def test_publisher_knows_its_topic(topics):
 
 def test_who_has_unsubscribed_is_told_no_more(topics, world):
     received = []
-    end_first = topics.subscribe("/a", String, lambda message: received.append("first"))
+    first = topics.subscribe("/a", String, lambda message: received.append("first"))
     topics.subscribe("/a", String, lambda message: received.append("second"))
     publisher = topics.publisher("/a", String, latch=False)
-    end_first()
+    first.close()
     publisher.publish(String("x"))
     assert received == ["second"]
     assert len(world.subscribed) == 1
@@ -162,7 +177,7 @@ def test_unsubscribing_while_a_message_is_delivered_skips_nobody(topics):
 
     def receive_once(message):
         received.append("first")
-        ends[0]()
+        ends[0].close()
 
     ends.append(topics.subscribe("/a", String, receive_once))
     topics.subscribe("/a", String, lambda message: received.append("second"))
@@ -186,3 +201,24 @@ def test_what_a_closed_publisher_says_or_has_latched_is_lost(topics, world):
     publisher.publish(String("too late"))
     assert received == []
     assert [message.data for message in world.wires[0].sent] == ["latched"]
+
+
+def test_what_another_has_latched_stays(topics):
+    received = []
+    first, second = (topics.publisher("/a", String, latch=True) for _ in range(2))
+    first.publish(String("of the first"))
+    second.publish(String("of the second"))
+    second.close()
+    topics.subscribe("/a", String, received.append)
+    assert [message.data for message in received] == ["of the first"]
+
+
+def test_a_subscriber_knows_of_publishers_here_and_outside(topics, world):
+    subscriber = topics.subscribe("/a", String, lambda message: None)
+    assert not subscriber.has_publishers()
+    publisher = topics.publisher("/a", String, latch=False)
+    assert subscriber.has_publishers()
+    publisher.close()
+    assert not subscriber.has_publishers()
+    world.is_published = True
+    assert subscriber.has_publishers()

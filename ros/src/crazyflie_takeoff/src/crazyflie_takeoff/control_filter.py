@@ -15,7 +15,7 @@ class ControlFilter:
     `TAKEOFF_CONTROL_LIMIT`. Otherwise the last takeoff control is repeated.
 
     Whether the vehicle is in flight is what the toggle says, until a flight
-    state has been heard; from then on only the flight state counts, so that a
+    state is known; from then on only the flight state counts, so that a
     toggle and a state that tell the same event cannot cancel each other. Who
     knows by the flight state that the vehicle is on the ground also keeps the
     controller out when zero thrust is no longer repeated, because the server
@@ -63,7 +63,7 @@ class ControlFilter:
         """Take note of a toggle of in_flight."""
         self._toggled = not self._toggled
 
-    def hear_state(self, state: FlightState) -> None:
+    def set_state(self, state: FlightState) -> None:
         """Take note of the server's flight state."""
         self._state = state
 

@@ -1,4 +1,4 @@
-"""Takeoff and landing as a state machine that lives by calls of `Flight.tick`.
+"""Takeoff and landing as a state machine that lives by calls of `FlightStateMachine.tick`.
 
 Heights and positions are in the fixed frame (z up), m. Times are s of any clock
 that does not run backwards; if it is reset, what was under way goes on from there.
@@ -67,7 +67,7 @@ class Plan:
         Speed of the descent, m/s; 0 for none: a landing is the bare ramp.
     """
 
-    hover: tuple
+    hover: tuple[float, float, float]
     open_loop: float
     settle: float
     descent_speed: float
@@ -90,12 +90,17 @@ class Output:
 
     state: FlightState
     thrust: float | None = None
-    reference: tuple | None = None
+    reference: tuple[float, ...] | None = None
     toggle: bool = False
 
 
-class Flight:
+class FlightStateMachine:
     """The vehicle's flight, from the ground to the ground.
+
+    Attributes
+    ----------
+    plan : Plan
+        May be replaced at any time; what has begun already goes on as it was planned.
 
     Parameters
     ----------
@@ -113,14 +118,14 @@ class Flight:
         state: FlightState = FlightState.ON_GROUND,
         announced: bool | None = None,
     ):
-        self._plan = plan
+        self.plan = plan
         self._state = state
         self._announced = state.in_flight if announced is None else announced
         self._ground = 0.0
         self._time = -math.inf
-        self._entered = None
+        self._entered: float | None = None
         self._hover_sent = False
-        self._descent = None
+        self._descent: _Descent | None = None
         self._zero_sent = -math.inf
 
     @property
@@ -157,7 +162,7 @@ class Flight:
         if self._state is FlightState.TAKING_OFF:
             self._enter(self._way_down())
 
-    def tick(self, time: float, position: tuple | None = None) -> Output:
+    def tick(self, time: float, position: tuple[float, float, float] | None = None) -> Output:
         """Go on.
 
         Parameters
@@ -186,13 +191,13 @@ class Flight:
 
     def _take_off(self, time, position):
         elapsed = time - self._entered + _ROUNDING
-        if elapsed < self._plan.open_loop:
+        if elapsed < self.plan.open_loop:
             return LIFT_OFF_THRUST, None
         reference = None
         if not self._hover_sent:
             self._hover_sent = True
-            reference = (*self._plan.hover, 0.0, 0.0, 0.0)
-        if elapsed >= self._plan.open_loop + self._plan.settle:
+            reference = (*self.plan.hover, 0.0, 0.0, 0.0)
+        if elapsed >= self.plan.open_loop + self.plan.settle:
             self._enter(FlightState.FLYING)
         return None, reference
 
@@ -201,7 +206,7 @@ class Flight:
 
     def _descend(self, time, position):
         if position is not None and self._descent is None:
-            self._descent = _Descent(position, self._ground, self._plan.descent_speed)
+            self._descent = _Descent(position, self._ground, self.plan.descent_speed)
         elapsed = time - self._entered
         if self._is_down(position) or elapsed > self._descent.limit:
             self._enter(FlightState.LANDING)
@@ -241,7 +246,7 @@ class Flight:
         self._time = time
 
     def _way_down(self):
-        return FlightState.DESCENDING if self._plan.descent_speed > 0.0 else FlightState.LANDING
+        return FlightState.DESCENDING if self.plan.descent_speed > 0.0 else FlightState.LANDING
 
     def _is_down(self, position):
         # Who does not know the height has to take it for reached.

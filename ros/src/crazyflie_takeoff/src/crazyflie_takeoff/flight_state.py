@@ -1,4 +1,4 @@
-"""The words in which server and filter speak about a flight."""
+"""What server and filter tell each other about a flight."""
 
 import enum
 

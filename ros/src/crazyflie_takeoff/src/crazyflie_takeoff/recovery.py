@@ -1,9 +1,9 @@
 """How a server that has just started finds out where the flight stands.
 
 It may be the first on the ground, or take the place of one that died at any moment.
-There are two witnesses: the control filter, which remembers the flight state
-that the former server published, or else says whether a controller speaks; and
-the measured height.
+There are two sources: the control filter, which keeps the flight state that the former
+server published, or else tells whether a controller sends commands; and the measured
+height.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ FLYING_HEIGHT = 0.15
 
 
 @dataclass(frozen=True)
-class Finding:
+class RecoveredState:
     """Where a flight stands.
 
     Attributes
@@ -34,17 +34,17 @@ class Finding:
     reason: str
 
 
-def find_state(
+def recover_state(
     remembered: FlightState | None,
     height: float | None,
     can_descend: bool = True,
     is_commanded: bool = True,
-) -> Finding:
-    """Conclude from what the witnesses say where the flight stands.
+) -> RecoveredState:
+    """Return where the flight stands.
 
     In doubt it is FLYING: the controller keeps the vehicle, and the operator can
     land. A vehicle that is high up although nothing is remembered and no controller
-    speaks stands on something. An interrupted takeoff or landing is landed if the
+    sends commands stands on something. An interrupted takeoff or landing is landed if the
     height is known: its caller, who got an error, expects the vehicle to be safe.
 
     Parameters
@@ -56,17 +56,17 @@ def find_state(
     can_descend : bool
         Whether landings begin with a descent.
     is_commanded : bool
-        Whether a controller speaks, or may do so.
+        Whether a controller sends commands, or may do so.
 
     Returns
     -------
-    Finding
+    RecoveredState
     """
     seen = "the height is not known" if height is None else f"the height is {height:.2f} m"
     said = "nothing is remembered" if remembered is None else f"{remembered.value} is remembered"
     state = _conclude(remembered, height, can_descend, is_commanded)
     announced = state.in_flight if remembered is None else remembered.in_flight
-    return Finding(state, announced, f"{said}, {seen}")
+    return RecoveredState(state, announced, f"{said}, {seen}")
 
 
 def _conclude(remembered, height, can_descend, is_commanded):

@@ -1,64 +1,96 @@
 """ROS interface of the choice between takeoff control and commanded control."""
 
-from std_msgs.msg import Empty, String
+from std_msgs.msg import Bool, Empty, String
 
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_takeoff.control_filter import ControlFilter
 from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
-from crazyflie_utils.node import Node
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import TOPIC
-from crazyflie_utils.vectors import is_finite
 
 LISTENING_TIME = 0.4
 """How long a filter that has started listens before it passes a controller, s: some
 periods of the zero thrust on the ground, and less than a vehicle flies on without
 controls."""
 
+CONTROLLER_POLL_PERIOD = 0.1
+"""How often it is looked whether there is a controller, s."""
+
+
+class TakeoffControlFilterParameters(Parameters):
+    """What the filter is told."""
+
+    takeoff_control_topic: str = parameter(
+        TOPIC, "the takeoff server's control", name="topics/takeoff_control"
+    )
+    commanded_control_topic: str = parameter(
+        TOPIC, "the controller's control", name="topics/commanded_control"
+    )
+    final_control_topic: str = parameter(
+        TOPIC, "the one that is passed on", name="topics/final_control"
+    )
+    in_flight_topic: str = parameter(
+        TOPIC, "toggles between ground and flight", name="topics/in_flight"
+    )
+    flight_state_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_state`", None, "topics/flight_state"
+    )
+    filter_state_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_filter`", None, "topics/filter_state"
+    )
+    controller_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_controller`", None, "topics/controller"
+    )
+
 
 class TakeoffControlFilterNode(Node):
     """Pass on takeoff control always, and commanded control in flight."""
 
     def __init__(self):
-        super().__init__()
-        self._topics = {}
         self._filter = ControlFilter()
-        self._final = None
-        self._filter_state = None
-        self._published_state = None
-        self._listening_timer = None
+        self._published_state: str | None = None
+        self._published_controller: bool | None = None
 
-    def load_parameters(self, handle) -> None:
+    def load_parameters(self, handle: NodeHandle) -> None:
         """See `Node.load_parameters`."""
-        for name in ("takeoff_control", "commanded_control", "final_control", "in_flight"):
-            self._topics[name] = handle.param(f"topics/{name}", TOPIC)
-        in_flight = self._topics["in_flight"]
-        for name, default in (
-            ("flight_state", f"{in_flight}_state"),
-            ("filter_state", f"{in_flight}_filter"),
-        ):
-            self._topics[name] = handle.param(f"topics/{name}", TOPIC, default)
+        self._parameters = handle.load(TakeoffControlFilterParameters)
 
-    def register_callbacks(self, handle) -> None:
+    def register_callbacks(self, handle: NodeHandle) -> None:
         """See `Node.register_callbacks`."""
-        topics = self._topics
-        self._final = handle.publisher(topics["final_control"], ControlStamped)
-        self._filter_state = handle.publisher(topics["filter_state"], String, latch=True)
+        told = self._parameters
+        in_flight = told.in_flight_topic
+        self._flight_state_topic = told.flight_state_topic or f"{in_flight}_state"
+        self._final = handle.publisher(told.final_control_topic, ControlStamped)
+        self._filter_state = handle.publisher(
+            told.filter_state_topic or f"{in_flight}_filter", String, latch=True
+        )
+        self._controller = handle.publisher(
+            told.controller_topic or f"{in_flight}_controller", Bool, latch=True
+        )
         self._publish_state()
-        handle.subscribe(topics["flight_state"], String, self._on_flight_state)
-        handle.subscribe(topics["in_flight"], Empty, self._on_toggle)
-        handle.subscribe(topics["takeoff_control"], ControlStamped, self._on_takeoff_control)
-        handle.subscribe(topics["commanded_control"], ControlStamped, self._on_commanded_control)
+        handle.subscribe(self._flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(in_flight, Empty, self._on_toggle)
+        handle.subscribe(
+            told.takeoff_control_topic, ControlStamped, self._on_takeoff_control, finite="control"
+        )
+        self._commands = handle.subscribe(
+            told.commanded_control_topic,
+            ControlStamped,
+            self._on_commanded_control,
+            finite="control",
+        )
         # Whether connections come about has nothing to do with simulated time.
         self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
+        handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True)
 
     def _on_flight_state(self, message):
         try:
-            self._filter.hear_state(FlightState(message.data))
+            self._filter.set_state(FlightState(message.data))
         except ValueError:
             self._handle.warn(
-                f"ignoring {message.data!r} on {self._topics['flight_state']}, which is no "
-                "flight state",
+                f"ignoring {message.data!r} on {self._flight_state_topic}: no flight state",
                 throttle=1.0,
+                key="flight state",
             )
         self._publish_state()
 
@@ -67,14 +99,12 @@ class TakeoffControlFilterNode(Node):
         self._publish_state()
 
     def _on_takeoff_control(self, message):
-        if self._is_good(message, "takeoff_control"):
-            now = self._handle.time()
-            self._final.publish(self._filter.takeoff(now, message, message.control.thrust))
+        now = self._handle.time()
+        self._final.publish(self._filter.takeoff(now, message, message.control.thrust))
 
     def _on_commanded_control(self, message):
-        if self._is_good(message, "commanded_control"):
-            self._pass_on(self._filter.commanded(self._handle.time(), message))
-            self._publish_state()
+        self._pass_on(self._filter.commanded(self._handle.time(), message))
+        self._publish_state()
 
     def _stop_listening(self):
         self._listening_timer.stop()
@@ -84,13 +114,11 @@ class TakeoffControlFilterNode(Node):
         if message is not None:
             self._final.publish(message)
 
-    def _is_good(self, message, topic):
-        if is_finite(message.control):
-            return True
-        self._handle.warn(
-            f"ignoring a control on {self._topics[topic]} that is not finite", throttle=1.0
-        )
-        return False
+    def _publish_controller(self):
+        has_controller = self._commands.has_publishers()
+        if has_controller != self._published_controller:
+            self._published_controller = has_controller
+            self._controller.publish(Bool(has_controller))
 
     def _publish_state(self):
         remembered = self._filter.remembered

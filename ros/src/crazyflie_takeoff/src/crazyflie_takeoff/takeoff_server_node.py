@@ -2,7 +2,7 @@
 
 from concurrent.futures import Future
 
-from std_msgs.msg import Empty, String
+from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 
@@ -13,13 +13,12 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_takeoff.flight import Flight, Plan, RefusalError
+from crazyflie_takeoff.flight import FlightStateMachine, Plan, RefusalError
 from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
-from crazyflie_takeoff.recovery import FLYING_HEIGHT, find_state
-from crazyflie_utils.node import Node
+from crazyflie_takeoff.recovery import FLYING_HEIGHT, recover_state
+from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
-from crazyflie_utils.runtime.transport import ServiceError
-from crazyflie_utils.vectors import from_vector, is_finite
+from crazyflie_utils.vectors import from_vector
 
 TIME_STEP = 0.01
 """Period of the server, s."""
@@ -27,73 +26,110 @@ TIME_STEP = 0.01
 STATE_LIMIT = 0.5
 """A measured state older than this is not used, s."""
 
-FINDING_LIMIT = 1.0
+RECOVERY_LIMIT = 1.0
 """How long a server that has started looks for the state of the flight, s."""
+
+
+class TakeoffServerParameters(Parameters):
+    """What the takeoff server is told."""
+
+    control_topic: str = parameter(
+        TOPIC, "thrust of takeoff and landing goes here", name="topics/control"
+    )
+    reference_topic: str = parameter(
+        TOPIC, "hover point and descent go here", name="topics/reference"
+    )
+    in_flight_topic: str = parameter(
+        TOPIC, "toggles between ground and flight", name="topics/in_flight"
+    )
+    state_topic: str | None = parameter(
+        TOPIC, "where the vehicle is; without it nothing is known", None, "topics/state"
+    )
+    flight_state_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_state`", None, "topics/flight_state"
+    )
+    filter_state_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_filter`", None, "topics/filter_state"
+    )
+    controller_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_controller`", None, "topics/controller"
+    )
+    takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
+    land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
+    hover_x: float = parameter(METRES, "hover point after takeoff", name="hover/x", live=True)
+    hover_y: float = parameter(METRES, "hover point after takeoff", name="hover/y", live=True)
+    hover_z: float = parameter(METRES, "hover point after takeoff", name="hover/z", live=True)
+    open_loop: float = parameter(
+        DURATION, "how long thrust g + 0.2 lifts off", 1.0, "duration/open_loop"
+    )
+    settle: float = parameter(
+        DURATION, "how long the controller has to reach the hover point", 5.0, "duration/hover"
+    )
+    descent_speed: float = parameter(
+        Number("m/s", minimum=0.0),
+        "how fast a landing sinks before the ramp; 0 for the bare ramp",
+        0.3,
+        "landing/descent_speed",
+        live=True,
+    )
+
+    def plan(self) -> Plan:
+        """Return how to take off and land."""
+        hover = (self.hover_x, self.hover_y, self.hover_z)
+        return Plan(hover, self.open_loop, self.settle, self.descent_speed)
 
 
 class TakeoffServerNode(Node):
     """Let the vehicle take off and land when a service asks for it."""
 
     def __init__(self):
-        super().__init__()
-        self._plan = None
-        self._topics = {}
-        self._services = {}
-        self._control = None
-        self._reference = None
-        self._in_flight = None
-        self._flight_state = None
-        self._finding_timer = None
         # None until it is known where the flight stands.
-        self._flight = None
-        self._heard_filter = False
-        self._remembered = None
+        self._flight: FlightStateMachine | None = None
+        self._filter_reported = False
+        self._has_controller = True
+        self._remembered: FlightState | None = None
         self._is_commanded = True
-        self._position = None
-        self._position_time = None
-        self._published_state = None
-        self._pending = None
-        self._waiting = []
+        self._position: tuple[float, float, float] | None = None
+        self._position_time = 0.0
+        self._published_state: FlightState | None = None
+        self._pending: Future | None = None
+        self._waiting: list[tuple[str, Future]] = []
 
-    def load_parameters(self, handle) -> None:
+    def load_parameters(self, handle: NodeHandle) -> None:
         """See `Node.load_parameters`."""
-        for name in ("reference", "control", "in_flight"):
-            self._topics[name] = handle.param(f"topics/{name}", TOPIC)
-        in_flight = self._topics["in_flight"]
-        defaults = {
-            "state": None,
-            "flight_state": f"{in_flight}_state",
-            "filter_state": f"{in_flight}_filter",
-        }
-        for name, default in defaults.items():
-            self._topics[name] = handle.param(f"topics/{name}", TOPIC, default)
-        for name in ("takeoff", "land"):
-            self._services[name] = handle.param(f"srv/{name}", SERVICE, f"/{name}")
-        speed = Number(unit="m/s", minimum=0.0)
-        self._plan = Plan(
-            hover=tuple(handle.param(f"hover/{axis}", METRES) for axis in "xyz"),
-            open_loop=handle.param("duration/open_loop", DURATION, 1.0),
-            settle=handle.param("duration/hover", DURATION, 5.0),
-            descent_speed=handle.param("landing/descent_speed", speed, 0.3),
-        )
+        self._parameters = handle.load(TakeoffServerParameters, self._reconfigure)
 
-    def register_callbacks(self, handle) -> None:
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
+        if self._flight is not None:
+            self._flight.plan = parameters.plan()
+
+    def register_callbacks(self, handle: NodeHandle) -> None:
         """See `Node.register_callbacks`."""
-        topics = self._topics
-        self._control = handle.publisher(topics["control"], ControlStamped)
+        told = self._parameters
+        in_flight = told.in_flight_topic
+        self._filter_state_topic = told.filter_state_topic or f"{in_flight}_filter"
+        self._control = handle.publisher(told.control_topic, ControlStamped)
         self._reference = handle.publisher(
-            topics["reference"], PositionVelocityStateStamped, latch=True
+            told.reference_topic, PositionVelocityStateStamped, latch=True
         )
-        self._in_flight = handle.publisher(topics["in_flight"], Empty)
-        self._flight_state = handle.publisher(topics["flight_state"], String, latch=True)
-        handle.advertise_service(self._services["takeoff"], EmptyService, self._on_takeoff)
-        handle.advertise_service(self._services["land"], EmptyService, self._on_land)
-        handle.subscribe(topics["filter_state"], String, self._on_filter_state)
-        if topics["state"]:
-            handle.subscribe(topics["state"], PositionVelocityYawStateStamped, self._on_state)
+        self._in_flight = handle.publisher(in_flight, Empty)
+        self._flight_state = handle.publisher(
+            told.flight_state_topic or f"{in_flight}_state", String, latch=True
+        )
+        handle.advertise_service(told.takeoff_service, EmptyService, self._on_takeoff)
+        handle.advertise_service(told.land_service, EmptyService, self._on_land)
+        handle.subscribe(self._filter_state_topic, String, self._on_filter_state)
+        handle.subscribe(
+            told.controller_topic or f"{in_flight}_controller", Bool, self._on_controller
+        )
+        if told.state_topic is not None:
+            handle.subscribe(
+                told.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
+            )
         handle.timer(TIME_STEP, self._on_timer)
         # Whether connections come about has nothing to do with simulated time.
-        self._finding_timer = handle.timer(FINDING_LIMIT, self._find_state, steady=True)
+        self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover_state, steady=True)
 
     def make_safe(self) -> None:
         """End a takeoff with a landing, let a landing go on, and tell the callers."""
@@ -112,30 +148,41 @@ class TakeoffServerNode(Node):
     # Services.
 
     def _on_takeoff(self, _):
-        return self._serve("takeoff")
+        return self._serve(self._parameters.takeoff_service)
 
     def _on_land(self, _):
-        return self._serve("land")
+        return self._serve(self._parameters.land_service)
 
-    def _serve(self, manoeuvre):
+    def _serve(self, service):
         future = Future()
         if self._flight is None:
-            self._waiting.append((manoeuvre, future))
+            self._waiting.append((service, future))
         else:
-            self._begin(manoeuvre, future)
+            self._begin(service, future)
         return future.result() if future.done() else future
 
-    def _begin(self, manoeuvre, future):
+    def _begin(self, service, future):
         try:
-            if manoeuvre == "takeoff":
+            if service == self._parameters.takeoff_service:
+                self._refuse_without_feedback()
                 self._flight.takeoff()
             else:
                 self._flight.land()
         except RefusalError as reason:
-            service = self._handle.resolve(self._services[manoeuvre])
-            future.set_exception(ServiceError(f"{service} refused: {reason}"))
+            name = self._handle.resolve(service)
+            future.set_exception(ServiceError(f"{name} refused: {reason}"))
         else:
             self._pending = future
+
+    def _refuse_without_feedback(self):
+        topic = self._parameters.state_topic
+        if topic is not None and self._known_position() is None:
+            raise RefusalError(
+                f"no state has come on {self._handle.resolve(topic)} for {STATE_LIMIT:g} s; are "
+                "the estimator and the source of /tf running?"
+            )
+        if not self._has_controller:
+            raise RefusalError("nobody publishes commanded controls; is the controller running?")
 
     # Where the flight stands.
 
@@ -145,20 +192,18 @@ class TakeoffServerNode(Node):
             self._remembered = None if knows_nothing else FlightState(message.data)
         except ValueError:
             self._handle.warn(
-                f"ignoring {message.data!r} on {self._topics['filter_state']}, which is no "
-                "flight state",
+                f"ignoring {message.data!r} on {self._filter_state_topic}: no flight state",
                 throttle=1.0,
+                key="flight state",
             )
         else:
-            self._heard_filter = True
+            self._filter_reported = True
             self._is_commanded = message.data != UNKNOWN
 
+    def _on_controller(self, message):
+        self._has_controller = message.data
+
     def _on_state(self, message):
-        if not is_finite(message.state):
-            self._handle.warn(
-                f"ignoring a state on {self._topics['state']} that is not finite", throttle=1.0
-            )
-            return
         self._position = (message.state.x, message.state.y, message.state.z)
         self._position_time = self._handle.time()
 
@@ -172,32 +217,33 @@ class TakeoffServerNode(Node):
 
     def _has_all_evidence(self):
         position = self._known_position()
-        sees_enough = self._topics["state"] is None or position is not None
-        if not (self._heard_filter and sees_enough):
+        sees_enough = self._parameters.state_topic is None or position is not None
+        if not (self._filter_reported and sees_enough):
             return False
-        # A filter that has only just started may hear a controller yet.
+        # A filter that has only just started may get controls yet.
         is_high = position is not None and position[2] > FLYING_HEIGHT
         return self._is_commanded or not is_high
 
-    def _find_state(self):
-        self._finding_timer.stop()
+    def _recover_state(self):
+        self._recovery_timer.stop()
         if self._flight is not None:
             return
+        plan = self._parameters.plan()
         position = self._known_position()
         height = None if position is None else position[2]
-        can_descend = self._plan.descent_speed > 0.0
-        finding = find_state(self._remembered, height, can_descend, self._is_commanded)
-        self._handle.info(f"begins {finding.state.value}: {finding.reason}")
-        self._flight = Flight(self._plan, finding.state, finding.announced)
+        can_descend = plan.descent_speed > 0.0
+        recovered = recover_state(self._remembered, height, can_descend, self._is_commanded)
+        self._handle.info(f"begins {recovered.state.value}: {recovered.reason}")
+        self._flight = FlightStateMachine(plan, recovered.state, recovered.announced)
         waiting, self._waiting = self._waiting, []
-        for manoeuvre, future in waiting:
-            self._begin(manoeuvre, future)
+        for service, future in waiting:
+            self._begin(service, future)
 
     # The flight.
 
     def _on_timer(self):
         if self._flight is None and self._has_all_evidence():
-            self._find_state()
+            self._recover_state()
         if self._flight is not None:
             self._publish(self._flight.tick(self._handle.time(), self._known_position()))
 

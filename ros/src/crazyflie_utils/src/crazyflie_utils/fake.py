@@ -6,7 +6,12 @@ from concurrent.futures import Future
 from typing import Any
 
 from crazyflie_utils.runtime.process import Process
-from crazyflie_utils.runtime.transport import ExternalPublisher, ServiceError, Transport
+from crazyflie_utils.runtime.transport import (
+    ExternalPublisher,
+    ExternalSubscriber,
+    ServiceError,
+    Transport,
+)
 
 
 class _Record(ExternalPublisher):
@@ -25,13 +30,29 @@ class _Record(ExternalPublisher):
         pass
 
 
+class _FakeSubscriber(ExternalSubscriber):
+    def __init__(self, is_published, close):
+        self._is_published = is_published
+        self._close = close
+
+    def has_publishers(self):
+        return self._is_published()
+
+    def close(self):
+        self._close()
+
+
 class FakeTransport(Transport):
-    """An outside world that remembers everything and does nothing by itself."""
+    """An outside world that remembers everything and does nothing by itself.
+
+    Every topic that is subscribed has publishers there, but for those in ``unpublished``.
+    """
 
     def __init__(self, parameters: dict):
         self.parameters = dict(parameters)
         self.publishers = {}
         self.subscribers = {}
+        self.unpublished = set()
         self.services = {}
         self.log_records = []
 
@@ -68,7 +89,9 @@ class FakeTransport(Transport):
         """Keep ``deliver`` for `FakeProcess.publish`."""
         subscribers = self.subscribers.setdefault(topic, [])
         subscribers.append(deliver)
-        return lambda: subscribers.remove(deliver)
+        return _FakeSubscriber(
+            lambda: topic not in self.unpublished, lambda: subscribers.remove(deliver)
+        )
 
     def advertise_service(self, name, service_type, serve, time):
         """Keep ``serve`` for `FakeProcess.call`."""

@@ -16,7 +16,7 @@ from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_p
 from crazyflie_utils.runtime.faults import Faults
 from crazyflie_utils.runtime.services import pass_on, serve
 from crazyflie_utils.runtime.timers import Timer
-from crazyflie_utils.runtime.topics import Publisher
+from crazyflie_utils.runtime.topics import Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite
 
 P = TypeVar("P", bound=Parameters)
@@ -190,10 +190,11 @@ class NodeHandle:
         callback: Callable[[M], None],
         finite: str = "",
         on_invalid: Callable[[], None] | None = None,
-    ) -> None:
+    ) -> Subscriber:
         """Have ``callback(message)`` called for every message on a topic.
 
-        The message belongs to everybody: it must not be changed.
+        The message belongs to everybody: it must not be changed. The subscriber that is
+        returned tells whether there are publishers.
 
         Parameters
         ----------
@@ -210,10 +211,11 @@ class NodeHandle:
             callback = self._finite_only(self.resolve(topic), finite, callback, on_invalid)
         guarded = self.guard(callback)
         submit = self._process.executor.submit
-        unsubscribe = self._process.topics.subscribe(
+        subscriber = self._process.topics.subscribe(
             self.resolve(topic), message_type, lambda message: submit(partial(guarded, message))
         )
-        self._undo.append(unsubscribe)
+        self._undo.append(subscriber.close)
+        return subscriber
 
     def _finite_only(self, topic, field, callback, on_invalid):
         def check(message):

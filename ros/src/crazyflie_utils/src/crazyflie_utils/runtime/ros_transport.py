@@ -11,7 +11,12 @@ from typing import Any
 import rospy
 
 from crazyflie_utils.runtime import rospy_internals
-from crazyflie_utils.runtime.transport import ExternalPublisher, ServiceError, Transport
+from crazyflie_utils.runtime.transport import (
+    ExternalPublisher,
+    ExternalSubscriber,
+    ServiceError,
+    Transport,
+)
 
 _QUEUE_SIZE = 100
 """Messages kept for each slow listener. With a queue rospy sends from a thread of
@@ -36,6 +41,17 @@ class _RosPublisher(ExternalPublisher):
 
     def close(self):
         self._publisher.unregister()
+
+
+class _RosSubscriber(ExternalSubscriber):
+    def __init__(self, subscriber):
+        self._subscriber = subscriber
+
+    def has_publishers(self):
+        return self._subscriber.get_num_connections() > 0
+
+    def close(self):
+        self._subscriber.unregister()
 
 
 class RosTransport(Transport):
@@ -65,7 +81,7 @@ class RosTransport(Transport):
 
     def subscribe(self, topic, message_type, deliver):
         """Register a subscriber with the master."""
-        return rospy.Subscriber(topic, message_type, deliver, tcp_nodelay=True).unregister
+        return _RosSubscriber(rospy.Subscriber(topic, message_type, deliver, tcp_nodelay=True))
 
     def advertise_service(self, name, service_type, serve, time):
         """Register a service with the master."""

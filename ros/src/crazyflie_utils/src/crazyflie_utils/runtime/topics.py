@@ -5,6 +5,15 @@ object, by a call, and to those outside only when there are any. Subscribers
 must therefore not change what they receive.
 """
 
+from collections.abc import Callable
+from typing import Any
+
+import genpy
+
+from crazyflie_utils.runtime.transport import ExternalPublisher, ExternalSubscriber, Transport
+
+Receiver = Callable[[Any], None]
+
 
 class Topic:
     """One topic as this process sees it."""
@@ -12,30 +21,38 @@ class Topic:
     def __init__(self, name: str, message_type: type):
         self.name = name
         self.message_type = message_type
-        self.receivers = []
-        self.latched = None
+        self.publishers: list[Publisher] = []
+        self.receivers: list[Receiver] = []
 
-    def deliver(self, message) -> None:
+    def deliver(self, message: genpy.Message) -> None:
         """Hand a message to every subscriber in this process."""
         for receiver in self.receivers:
             receiver(message)
 
 
 class Publisher:
-    """The right to publish on a topic."""
+    """The right to publish on a topic.
 
-    def __init__(self, topic: Topic, external, latch: bool):
+    Attributes
+    ----------
+    latched : genpy.Message or None
+        What late subscribers are sent.
+    """
+
+    def __init__(self, topic: Topic, external: ExternalPublisher, latch: bool):
+        self.latched: genpy.Message | None = None
         self._topic = topic
         self._external = external
         self._latch = latch
         self._is_closed = False
+        topic.publishers.append(self)
 
     @property
     def topic(self) -> str:
         """Name of the topic, absolute."""
         return self._topic.name
 
-    def publish(self, message) -> None:
+    def publish(self, message: genpy.Message) -> None:
         """Send a message; it must not be changed afterwards.
 
         Raises
@@ -51,16 +68,36 @@ class Publisher:
         if self._is_closed:
             return
         if self._latch:
-            self._topic.latched = message
+            self.latched = message
         if self._latch or self._external.has_subscribers():
             self._external.publish(message)
         self._topic.deliver(message)
 
     def close(self) -> None:
         """Publish no more; what is published later, and what was latched, is lost."""
-        self._is_closed = True
-        if self._latch:
-            self._topic.latched = None
+        if not self._is_closed:
+            self._is_closed = True
+            self._topic.publishers.remove(self)
+            self._external.close()
+
+
+class Subscriber:
+    """One subscription of a topic."""
+
+    def __init__(self, topic: Topic, receiver: Receiver, external: ExternalSubscriber):
+        self._topic = topic
+        self._receiver = receiver
+        self._external = external
+
+    def has_publishers(self) -> bool:
+        """Tell whether anyone, here or outside, is connected and may publish."""
+        return bool(self._topic.publishers) or self._external.has_publishers()
+
+    def close(self) -> None:
+        """Receive no more."""
+        # Not in place: a message may be on its way to the others.
+        receivers = self._topic.receivers
+        self._topic.receivers = [each for each in receivers if each is not self._receiver]
         self._external.close()
 
 
@@ -72,9 +109,9 @@ class Topics:
     transport : Transport
     """
 
-    def __init__(self, transport):
+    def __init__(self, transport: Transport):
         self._transport = transport
-        self._topics = {}
+        self._topics: dict[str, Topic] = {}
 
     def publisher(self, name: str, message_type: type, latch: bool) -> Publisher:
         """Return a publisher; a latched one repeats its last message to late subscribers.
@@ -87,13 +124,8 @@ class Topics:
         topic = self._topic(name, message_type)
         return Publisher(topic, self._transport.advertise(name, message_type, latch), latch)
 
-    def subscribe(self, name: str, message_type: type, receiver):
+    def subscribe(self, name: str, message_type: type, receiver: Receiver) -> Subscriber:
         """Have ``receiver(message)`` called for every message on a topic.
-
-        Returns
-        -------
-        callable
-            Ends it.
 
         Raises
         ------
@@ -102,18 +134,13 @@ class Topics:
         """
         topic = self._topic(name, message_type)
         topic.receivers.append(receiver)
-        if topic.latched is not None:
-            receiver(topic.latched)
+        for publisher in topic.publishers:
+            if publisher.latched is not None:
+                receiver(publisher.latched)
         # Each receiver for itself, so that one that comes late is sent what an
         # outside publisher has latched; the connection is shared all the same.
-        unsubscribe_outside = self._transport.subscribe(name, message_type, receiver)
-
-        def unsubscribe():
-            # Not in place: a message may be on its way to the others.
-            topic.receivers = [each for each in topic.receivers if each is not receiver]
-            unsubscribe_outside()
-
-        return unsubscribe
+        external = self._transport.subscribe(name, message_type, receiver)
+        return Subscriber(topic, receiver, external)
 
     def _topic(self, name, message_type):
         topic = self._topics.setdefault(name, Topic(name, message_type))

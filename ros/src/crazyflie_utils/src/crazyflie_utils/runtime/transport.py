@@ -32,6 +32,18 @@ class ExternalPublisher(ABC):
         """Tell those outside that no more messages come."""
 
 
+class ExternalSubscriber(ABC):
+    """Receives one topic from those outside the process."""
+
+    @abstractmethod
+    def has_publishers(self) -> bool:
+        """Tell whether anyone outside this process is connected and may publish."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Receive no more."""
+
+
 class Transport(ABC):
     """Parameters, topics, services, logging and life time, by absolute names."""
 
@@ -54,11 +66,10 @@ class Transport(ABC):
     @abstractmethod
     def subscribe(
         self, topic: str, message_type: type, deliver: Callable[[Any], None]
-    ) -> Callable[[], None]:
+    ) -> ExternalSubscriber:
         """Have ``deliver(message)`` called with what those outside publish.
 
         Also with what they have latched; a topic may be subscribed more than once.
-        Returns a function that ends it.
         """
 
     @abstractmethod

@@ -1,6 +1,6 @@
 """Simulator of a vehicle with a lagging yaw rate."""
 
-from crazyflie_simulator.dynamics import Dynamics
+from crazyflie_model.dynamics import Dynamics
 from crazyflie_simulator.simulator_node import SimulatorNode
 from crazyflie_utils.parameters import Number
 from yaw_lag.dynamics import YawLag

@@ -13,11 +13,12 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_takeoff.flight import Flight, Plan, RefusalError
+from crazyflie_takeoff.flight import Flight, Plan
 from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
 from crazyflie_takeoff.recovery import FLYING_HEIGHT, find_state
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameters import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.transport import ServiceError
 from crazyflie_utils.vectors import from_vector, is_finite
 

@@ -1,7 +1,7 @@
-"""What every node of the workspace needs: the node handle, parameters, units, angles.
+"""What every node of the workspace needs: the node handle and parameters.
 
 The names below are loaded when they are first used, so that algorithms can
-import `crazyflie_utils.angles` and the like without ROS.
+import `crazyflie_utils.held` and the like without ROS.
 """
 
 import importlib

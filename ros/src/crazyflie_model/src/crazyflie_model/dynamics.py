@@ -9,10 +9,10 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from crazyflie_simulator.elementwise import functions, join, split, where
-from crazyflie_simulator.integrators import rk4_step
-from crazyflie_utils.angles import quaternion_from_rpy
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_model.elementwise import functions, join, split, where
+from crazyflie_model.integrators import rk4_step
+from crazyflie_model.units import GRAVITY
 
 STEP = 0.001
 """Integration step of every model, s."""
@@ -151,25 +151,29 @@ class Coupled7D(SevenDimensional):
     """Tilt in the heading frame, and at the cost of lift: thrust, tilt and yaw are coupled."""
 
     def rates(self, t: float, x: list, u: list) -> list:
-        """See `Dynamics.rates`.
+        """See `Dynamics.rates` and `coupled_acceleration`; the yaw rate is commanded."""
+        return [*x[3:6], *coupled_acceleration(u, x[6]), u[2]]
 
-        With T = thrust: x_ddot = T (sin(pitch) cos(yaw) + sin(roll) sin(yaw)),
-        y_ddot = T (-sin(roll) cos(yaw) + sin(pitch) sin(yaw)),
-        z_ddot = T cos(roll) cos(pitch) - g, and the yaw rate is commanded.
-        """
-        _, _, _, x_dot, y_dot, z_dot, yaw = x
-        roll, pitch, yaw_dot, thrust = u
-        trigonometry = functions(roll)
-        forward = thrust * trigonometry.sin(pitch)
-        right = thrust * trigonometry.sin(roll)
-        lift = thrust * trigonometry.cos(roll) * trigonometry.cos(pitch)
-        c, s = functions(yaw).cos(yaw), functions(yaw).sin(yaw)
-        return [
-            x_dot,
-            y_dot,
-            z_dot,
-            forward * c + right * s,
-            forward * s - right * c,
-            lift - GRAVITY,
-            yaw_dot,
-        ]
+
+def coupled_acceleration(u, yaw) -> list:
+    """Return the acceleration, m/s^2, fixed frame, of a vehicle that follows a control at once.
+
+    The thrust T, tilted by roll and pitch about the heading, and gravity:
+    x_ddot = T (sin(pitch) cos(yaw) + sin(roll) sin(yaw)),
+    y_ddot = T (-sin(roll) cos(yaw) + sin(pitch) sin(yaw)),
+    z_ddot = T cos(roll) cos(pitch) - g.
+
+    Parameters
+    ----------
+    u : sequence, 4 components
+        Control; the yaw rate is of no consequence.
+    yaw : float or ndarray
+        rad.
+    """
+    roll, pitch, _, thrust = u
+    trigonometry = functions(roll)
+    forward = thrust * trigonometry.sin(pitch)
+    right = thrust * trigonometry.sin(roll)
+    lift = thrust * trigonometry.cos(roll) * trigonometry.cos(pitch)
+    c, s = functions(yaw).cos(yaw), functions(yaw).sin(yaw)
+    return [forward * c + right * s, forward * s - right * c, lift - GRAVITY]

@@ -1,8 +1,7 @@
 """The airframe of a quadrotor: a rigid body with four rotors, without any control.
 
-Frames: fixed (z up) and body (forward-left-up). The rotors are numbered as on
-the Crazyflie, seen from above: 1 front right, 2 back right, 3 back left, 4
-front left; 1 and 3 turn counter-clockwise, 2 and 4 clockwise.
+Frames: fixed (z up) and body (forward-left-up). The rotors are numbered as in
+`mixer`.
 
 State, 17 components: position (3) in m and velocity (3) in m/s in the fixed
 frame, attitude quaternion (x, y, z, w) from body to fixed frame, body rates (3)
@@ -11,11 +10,13 @@ in rad/s, rotor speeds (4) in rad/s. Input, 7 components: commanded rotor speeds
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
-from crazyflie_simulator.elementwise import clip, functions, where
-from crazyflie_simulator.integrators import rk4_step
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.elementwise import clip, functions, where
+from crazyflie_model.integrators import rk4_step
+from crazyflie_model.limits import FULL_PWM
+from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 BODY_DIM = 17
 """Components of the airframe's state."""
@@ -66,12 +67,32 @@ class QuadrotorParameters:
     drag_horizontal: float = 9.1785e-7
     drag_vertical: float = 10.311e-7
     motor_time_constant: float = -0.002 / math.log(0.9695404)
-    max_rotor_speed: float = (0.2685 * 65535.0 + 4070.3) * math.pi / 30.0
+    max_rotor_speed: float = (0.2685 * FULL_PWM + 4070.3) * math.pi / 30.0
 
-    @property
+    @cached_property
     def hover_speed(self) -> float:
         """Speed of all four rotors at which they carry the vehicle, rad/s."""
         return math.sqrt(self.mass * GRAVITY / (4.0 * self.thrust_constant))
+
+    @cached_property
+    def _speed_squared_per_pwm(self):
+        return self.hover_speed**2 / HOVER_PWM
+
+    def rotor_speed(self, pwm):
+        """Return the speed (rad/s) that a motor command (PWM) asks for.
+
+        Thrust, which goes with the square of the speed, is linear in the
+        command, through zero; `HOVER_PWM` hovers.
+        """
+        return functions(pwm).sqrt(self._speed_squared_per_pwm * pwm)
+
+    def with_errors(self, mass_error: float, thrust_error: float) -> "QuadrotorParameters":
+        """Return a vehicle with more mass and thrust constant, as fractions > -1 of these."""
+        return replace(
+            self,
+            mass=self.mass * (1.0 + mass_error),
+            thrust_constant=self.thrust_constant * (1.0 + thrust_error),
+        )
 
 
 CRAZYFLIE = QuadrotorParameters()
@@ -198,23 +219,3 @@ class Airframe:
         climb = where(x[5] > 0.0, x[5], 0.0)
         standing = [x[0], x[1], 0.0, 0.0, 0.0, climb, *upright, 0.0, 0.0, 0.0, *x[13:]]
         return [where(on_ground, after, before) for after, before in zip(standing, x, strict=True)]
-
-
-def euler_angles(quaternion) -> tuple:
-    """Return (roll, pitch, yaw) with ``R = Rz(yaw) Ry(pitch) Rx(roll)``, rad.
-
-    This is the order of the firmware, whose roll and pitch are those in the
-    heading frame; messages use the order of `crazyflie_utils.angles`.
-
-    Parameters
-    ----------
-    quaternion : sequence, 4 components
-        (x, y, z, w), of norm 1.
-    """
-    x, y, z, w = quaternion
-    f = functions(x)
-    return (
-        f.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-        f.asin(clip(2.0 * (w * y - x * z), -1.0, 1.0)),
-        f.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-    )

@@ -1,21 +1,24 @@
 """The full vehicle: airframe and inner loops behind the interface of all models."""
 
-from dataclasses import replace
+from collections.abc import Callable
 
-from crazyflie_simulator import inner_loops
-from crazyflie_simulator.dynamics import STEP, Dynamics
-from crazyflie_simulator.elementwise import functions, where
-from crazyflie_simulator.quadrotor import (
+from crazyflie_model import inner_loops
+from crazyflie_model.angles import zyx_from_quaternion
+from crazyflie_model.dynamics import STEP, Dynamics
+from crazyflie_model.elementwise import where
+from crazyflie_model.quadrotor import (
     BODY_DIM,
     CRAZYFLIE,
     Airframe,
     QuadrotorParameters,
-    euler_angles,
 )
-from crazyflie_simulator.wind import STILL_AIR, Wind
-from crazyflie_utils.units import HOVER_PWM
 
 _STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)
+
+
+def still_air(t: float) -> tuple:
+    """Return the velocity of air that does not move, m/s."""
+    return (0.0, 0.0, 0.0)
 
 
 class StabilizedQuadrotor(Dynamics):
@@ -37,7 +40,8 @@ class StabilizedQuadrotor(Dynamics):
     mass_error, thrust_error : float
         How much more mass and thrust constant the true vehicle has, as a
         fraction of the nominal ones, > -1.
-    wind : Wind
+    wind : callable
+        ``wind(t)``, velocity of the air (3 components) at time t (s), m/s, fixed frame.
     """
 
     x_dim = BODY_DIM + inner_loops.MEMORY_DIM + 4
@@ -47,16 +51,11 @@ class StabilizedQuadrotor(Dynamics):
         parameters: QuadrotorParameters = CRAZYFLIE,
         mass_error: float = 0.0,
         thrust_error: float = 0.0,
-        wind: Wind = STILL_AIR,
+        wind: Callable = still_air,
     ):
-        true = replace(
-            parameters,
-            mass=parameters.mass * (1.0 + mass_error),
-            thrust_constant=parameters.thrust_constant * (1.0 + thrust_error),
-        )
-        self.airframe = Airframe(true)
+        self.airframe = Airframe(parameters.with_errors(mass_error, thrust_error))
+        self._nominal = parameters
         self._wind = wind
-        self._speed_squared_per_pwm = parameters.hover_speed**2 / HOVER_PWM
 
     def initial_state(self, position) -> list:
         """See `Dynamics.initial_state`; in the air the rotors carry the vehicle."""
@@ -65,7 +64,7 @@ class StabilizedQuadrotor(Dynamics):
 
     def rates(self, t: float, x: list, u: list) -> list:
         """See `Dynamics.rates`: of what is continuous; the rest is constant between samples."""
-        body = self.airframe.rates(t, x[:BODY_DIM], [*x[-4:], *self._wind.velocity(t)])
+        body = self.airframe.rates(t, x[:BODY_DIM], [*x[-4:], *self._wind(t)])
         return body + [0.0] * (self.x_dim - BODY_DIM)
 
     def on_ground(self, x: list) -> list:
@@ -82,11 +81,11 @@ class StabilizedQuadrotor(Dynamics):
         if count % _STEPS_PER_SAMPLE == 0:
             memory, commands = self._sample(body, memory, u)
         t = count * STEP
-        body = self.airframe.step(t, body, commands, self._wind.velocity(t), STEP)
+        body = self.airframe.step(t, body, commands, self._wind(t), STEP)
         return body + memory + commands
 
     def _sample(self, body, memory, u):
-        attitude = euler_angles(body[6:10])
+        attitude = zyx_from_quaternion(body[6:10])
         # A real vehicle rocks on its feet until its loops are content. This one
         # stands upright, so its loops rest, or they would wind up.
         standing = body[2] <= 0.0
@@ -94,8 +93,4 @@ class StabilizedQuadrotor(Dynamics):
         memory = [where(standing, a, b) for a, b in zip(resting, memory, strict=True)]
         setpoint = [where(standing, 0.0, part) for part in u[:3]] + [u[3]]
         memory, pwm = inner_loops.update(memory, setpoint, attitude, body[10:13])
-        return memory, [self._rotor_speed(motor) for motor in pwm]
-
-    def _rotor_speed(self, pwm):
-        # The firmware's thrust is linear in its command, through zero.
-        return functions(pwm).sqrt(self._speed_squared_per_pwm * pwm)
+        return memory, [self._nominal.rotor_speed(motor) for motor in pwm]

@@ -8,16 +8,20 @@ of tf's helpers, so nodes convert with this module only. Quaternions are
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from crazyflie_model.elementwise import clip, functions
+from crazyflie_model.elementwise import Number, clip, functions
+
+Triple = tuple[Number, Number, Number]
+Quaternion = tuple[Number, Number, Number, Number]
 
 _SMALLEST_COSINE = 1e-6
 """Of a pitch from which roll and yaw can still be told apart."""
 
 
-def wrap_to_pi(angle: float) -> float:
+def wrap_to_pi(angle: Number) -> Number:
     """Return the angle in [-pi, pi] that points the same way.
 
     Parameters
@@ -34,7 +38,7 @@ def wrap_to_pi(angle: float) -> float:
     return wrapped if wrapped.ndim else float(wrapped)
 
 
-def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> tuple:
+def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Return the quaternion of ``Rx(roll) Ry(pitch) Rz(yaw)``.
 
     Parameters
@@ -59,7 +63,7 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> tuple:
     )
 
 
-def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> tuple:
+def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> Triple:
     """Return the (roll, pitch, yaw) of a quaternion of any non-zero norm.
 
     With the rotation matrix ``R`` of the quaternion: roll = atan2(-R12, R22),
@@ -98,13 +102,13 @@ def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> tuple:
     return math.atan2(-r12, r22), pitch, math.atan2(-r01, r00)
 
 
-def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple:
+def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple[float, float]:
     """Return the horizontal vector (x, y) turned counter-clockwise by ``yaw`` (rad)."""
     c, s = math.cos(yaw), math.sin(yaw)
     return c * x - s * y, s * x + c * y
 
 
-def zyx_from_quaternion(quaternion) -> tuple:
+def zyx_from_quaternion(quaternion: Sequence[Number]) -> Triple:
     """Return (roll, pitch, yaw) with ``R = Rz(yaw) Ry(pitch) Rx(roll)``, rad.
 
     This is the order of the firmware, whose roll and pitch are those in the
@@ -124,7 +128,7 @@ def zyx_from_quaternion(quaternion) -> tuple:
     )
 
 
-def quaternion_from_zyx(roll: float, pitch: float, yaw: float) -> tuple:
+def quaternion_from_zyx(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Return the quaternion of ``Rz(yaw) Ry(pitch) Rx(roll)``; see `zyx_from_quaternion`."""
     sr, cr = math.sin(roll / 2.0), math.cos(roll / 2.0)
     sp, cp = math.sin(pitch / 2.0), math.cos(pitch / 2.0)
@@ -137,7 +141,7 @@ def quaternion_from_zyx(roll: float, pitch: float, yaw: float) -> tuple:
     )
 
 
-def rotate(quaternion, vector) -> tuple:
+def rotate(quaternion: Sequence[Number], vector: Sequence[Number]) -> Triple:
     """Return a vector given in the body frame in the fixed frame.
 
     Parameters
@@ -157,7 +161,7 @@ def rotate(quaternion, vector) -> tuple:
     )
 
 
-def rotate_back(quaternion, vector) -> tuple:
+def rotate_back(quaternion: Sequence[Number], vector: Sequence[Number]) -> Triple:
     """Return a vector given in the fixed frame in the body frame; inverse of `rotate`."""
     x, y, z, w = quaternion
     return rotate((-x, -y, -z, w), vector)

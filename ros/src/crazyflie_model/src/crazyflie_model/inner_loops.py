@@ -13,7 +13,8 @@ unlike the firmware, positive pitch is nose down (accelerates forward).
 import math
 from dataclasses import replace
 
-from crazyflie_model.elementwise import clip, functions, where
+from crazyflie_model.angles import Triple
+from crazyflie_model.elementwise import Number, Vector, clip, functions, where
 from crazyflie_model.mixer import limit, mix
 from crazyflie_model.pid import Gains, terms
 from crazyflie_model.units import pwm_from_thrust
@@ -56,12 +57,14 @@ _TILT, _HEADING = map(_from_rad_to_rad, (TILT, HEADING))
 _TILT_RATE, _HEADING_RATE = map(_from_rad_to_pwm, (TILT_RATE, HEADING_RATE))
 
 
-def initial_memory(yaw) -> list:
+def initial_memory(yaw: Number) -> Vector:
     """Return the memory of loops that begin at a heading ``yaw`` (rad), at rest."""
     return [0.0] * (MEMORY_DIM - 1) + [yaw]
 
 
-def update(memory: list, setpoint: list, attitude: tuple, rates: list) -> tuple:
+def update(
+    memory: Vector, setpoint: Vector, attitude: Triple, rates: Vector
+) -> tuple[Vector, Vector]:
     """Return memory and motor commands after one sample.
 
     Without thrust the motors are off and the loops begin anew.
@@ -79,7 +82,7 @@ def update(memory: list, setpoint: list, attitude: tuple, rates: list) -> tuple:
 
     Returns
     -------
-    tuple of list
+    tuple of Vector
         Memory, 9 components, and the commands of motors 1 to 4, PWM.
     """
     roll_i, pitch_i, yaw_i, p_i, q_i, r_i, p_before, q_before, heading = memory

@@ -7,11 +7,11 @@ The motors are numbered as on the Crazyflie, seen from above: 1 front right, 2 b
 
 import math
 
-from crazyflie_model.elementwise import clip, where
+from crazyflie_model.elementwise import Number, Vector, clip, where
 from crazyflie_model.limits import FULL_PWM
 
 
-def mix(thrust, about_x, about_y, about_z) -> list:
+def mix(thrust: Number, about_x: Number, about_y: Number, about_z: Number) -> Vector:
     """Return what is asked of motors 1 to 4, PWM, not limited.
 
     Parameters
@@ -30,7 +30,7 @@ def mix(thrust, about_x, about_y, about_z) -> list:
     ]
 
 
-def limit(requested: list, idle: float = 0.0) -> list:
+def limit(requested: Vector, idle: float = 0.0) -> Vector:
     """Return commands that motors can follow, PWM.
 
     Where one would exceed `FULL_PWM`, all are lowered alike: attitude comes

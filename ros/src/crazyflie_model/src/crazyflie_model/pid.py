@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from crazyflie_model.elementwise import clip
+from crazyflie_model.elementwise import Number, clip
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,9 @@ class Gains:
     limit: float = 5000.0
 
 
-def terms(gains: Gains, error, integral, slope, dt: float) -> tuple:
+def terms(
+    gains: Gains, error: Number, integral: Number, slope: Number, dt: float
+) -> tuple[Number, Number, Number, Number]:
     """Return the proportional, integral and derivative part of the output, and the integral.
 
     Parameters

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import numpy as np
+from crazyflie_model.elementwise import Number
 
 COEFFICIENTS = 8
 """Most coefficients of a polynomial, the constant first."""
@@ -15,8 +15,6 @@ PIECE_SIZE = 132
 """Bytes of a piece in the vehicle's memory: 4 times 8 coefficients and the duration, float32."""
 
 _PIECE = struct.Struct("<33f")
-
-Number = float | np.ndarray
 
 
 class Goal(NamedTuple):

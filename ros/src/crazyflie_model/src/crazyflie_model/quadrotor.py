@@ -10,16 +10,21 @@ in rad/s, rotor speeds (4) in rad/s. Input, 7 components: commanded rotor speeds
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from crazyflie_model.elementwise import clip, functions, where
+from crazyflie_model.angles import Triple
+from crazyflie_model.elementwise import Number, Vector, clip, functions, where
 from crazyflie_model.integrators import rk4_step
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 BODY_DIM = 17
 """Components of the airframe's state."""
+
+STILL_AIR = (0.0, 0.0, 0.0)
+"""No wind, m/s."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,7 @@ class QuadrotorParameters:
     def _speed_squared_per_pwm(self):
         return self.hover_speed**2 / HOVER_PWM
 
-    def rotor_speed(self, pwm):
+    def rotor_speed(self, pwm: Number) -> Number:
         """Return the speed (rad/s) that a motor command (PWM) asks for.
 
         Thrust, which goes with the square of the speed, is linear in the
@@ -114,7 +119,7 @@ class Airframe:
     def __init__(self, parameters: QuadrotorParameters):
         self.parameters = parameters
 
-    def initial_state(self, position) -> list:
+    def initial_state(self, position: Sequence[Number]) -> Vector:
         """Return the state at rest and level, heading along x.
 
         On the ground the rotors stand still; in the air they carry the vehicle.
@@ -123,7 +128,7 @@ class Airframe:
         speed = where(z > 0.0, self.parameters.hover_speed, 0.0)
         return [x, y, z] + [0.0] * 6 + [1.0] + [0.0] * 3 + [speed] * 4
 
-    def wrench(self, rotor_speeds) -> tuple:
+    def wrench(self, rotor_speeds: Sequence[Number]) -> tuple[Number, Number, Number, Number]:
         """Return thrust (N) and torque about forward, left and up (N m) of the rotors."""
         parameters = self.parameters
         w1, w2, w3, w4 = rotor_speeds
@@ -137,7 +142,7 @@ class Airframe:
             parameters.torque_per_thrust * (f2 + f4 - f1 - f3),
         )
 
-    def rates(self, t: float, x: list, u: list) -> list:
+    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
         """Return the time derivative of the state; see the module for x and u."""
         parameters = self.parameters
         _, _, _, vx, vy, vz, qx, qy, qz, qw, p, q, r, w1, w2, w3, w4 = x
@@ -178,7 +183,7 @@ class Airframe:
             lag * (c4 - w4),
         ]
 
-    def step(self, t: float, x: list, rotor_speeds: list, wind: tuple, dt: float) -> list:
+    def step(self, t: float, x: Vector, rotor_speeds: Vector, wind: Triple, dt: float) -> Vector:
         """Return the state one step later, with the quaternion of norm 1, on or above ground.
 
         Parameters
@@ -201,7 +206,7 @@ class Airframe:
         x[6:10] = qx / norm, qy / norm, qz / norm, qw / norm
         return self.on_ground(x)
 
-    def on_ground(self, x: list) -> list:
+    def on_ground(self, x: Vector) -> Vector:
         """Return the state with the ground, z = 0, taken into account.
 
         A vehicle that is not above the ground stands on it, upright and still;

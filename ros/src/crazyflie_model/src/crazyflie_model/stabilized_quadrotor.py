@@ -1,14 +1,15 @@
 """The full vehicle: airframe and inner loops behind the interface of all models."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from crazyflie_model import inner_loops
-from crazyflie_model.angles import zyx_from_quaternion
+from crazyflie_model.angles import Quaternion, Triple, zyx_from_quaternion
 from crazyflie_model.dynamics import STEP, Dynamics
-from crazyflie_model.elementwise import where
+from crazyflie_model.elementwise import Number, Vector, where
 from crazyflie_model.quadrotor import (
     BODY_DIM,
     CRAZYFLIE,
+    STILL_AIR,
     Airframe,
     QuadrotorParameters,
 )
@@ -16,9 +17,9 @@ from crazyflie_model.quadrotor import (
 _STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)
 
 
-def still_air(t: float) -> tuple:
+def still_air(t: float) -> Triple:
     """Return the velocity of air that does not move, m/s."""
-    return (0.0, 0.0, 0.0)
+    return STILL_AIR
 
 
 class StabilizedQuadrotor(Dynamics):
@@ -51,31 +52,31 @@ class StabilizedQuadrotor(Dynamics):
         parameters: QuadrotorParameters = CRAZYFLIE,
         mass_error: float = 0.0,
         thrust_error: float = 0.0,
-        wind: Callable = still_air,
+        wind: Callable[[float], Triple] = still_air,
     ):
         self.airframe = Airframe(parameters.with_errors(mass_error, thrust_error))
         self._nominal = parameters
         self._wind = wind
 
-    def initial_state(self, position) -> list:
+    def initial_state(self, position: Sequence[Number]) -> Vector:
         """See `Dynamics.initial_state`; in the air the rotors carry the vehicle."""
         body = self.airframe.initial_state(position)
         return body + inner_loops.initial_memory(0.0) + body[-4:]
 
-    def rates(self, t: float, x: list, u: list) -> list:
+    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
         """See `Dynamics.rates`: of what is continuous; the rest is constant between samples."""
         body = self.airframe.rates(t, x[:BODY_DIM], [*x[-4:], *self._wind(t)])
         return body + [0.0] * (self.x_dim - BODY_DIM)
 
-    def on_ground(self, x: list) -> list:
+    def on_ground(self, x: Vector) -> Vector:
         """See `Dynamics.on_ground` and `Airframe.on_ground`."""
         return self.airframe.on_ground(x[:BODY_DIM]) + x[BODY_DIM:]
 
-    def pose(self, x: list, u: list) -> tuple:
+    def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:
         """See `Dynamics.pose`."""
         return tuple(x[:3]), tuple(x[6:10])
 
-    def step(self, count: int, x: list, u: list) -> list:
+    def step(self, count: int, x: Vector, u: Vector) -> Vector:
         """See `Dynamics.step`."""
         body, memory, commands = x[:BODY_DIM], x[BODY_DIM:-4], x[-4:]
         if count % _STEPS_PER_SAMPLE == 0:

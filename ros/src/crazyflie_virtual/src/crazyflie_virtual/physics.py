@@ -4,7 +4,7 @@ import math
 
 from crazyflie_model.angles import rotate_back
 from crazyflie_model.inner_loops import PERIOD
-from crazyflie_model.quadrotor import CRAZYFLIE, Airframe
+from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.battery import FULL_VOLTAGE
 
@@ -13,8 +13,6 @@ STEP = PERIOD
 
 _OVERTURNING = 0.5
 """Cosine of the tilt beyond which a vehicle that comes down lies on its back."""
-
-_STILL_AIR = (0.0, 0.0, 0.0)
 
 
 class Physics:
@@ -101,7 +99,7 @@ class Physics:
         if self.is_overturned:
             commands = (0.0,) * 4
         speeds = [min(top, CRAZYFLIE.rotor_speed(command)) for command in commands]
-        after = self._x = self._airframe.step(0.0, before, speeds, _STILL_AIR, STEP)
+        after = self._x = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
         if before[2] > 0.0 and after[2] <= 0.0:
             self.impact_speed = max(0.0, -before[5])
             up = 1.0 - 2.0 * (before[6] ** 2 + before[7] ** 2)

@@ -12,9 +12,9 @@ from crazyflie_examples.flight_record import CONTROL_FIELDS, Series
 from crazyflie_examples.geofence import MAX_HORIZONTAL, MAX_VERTICAL_BRAKING
 from crazyflie_examples.pilot import Pilot
 from crazyflie_lqr.linear_feedback import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils.runtime.runner import ros_process
-from crazyflie_utils.units import GRAVITY
 from crazyflie_utils.vectors import to_vector
 
 PERIOD = 0.01

@@ -8,8 +8,8 @@ import rospy
 
 from crazyflie_examples.flight_report import FlightReport
 from crazyflie_examples.pilot import FlightError, Pilot
+from crazyflie_model.units import GRAVITY
 from crazyflie_utils.runtime.runner import ros_process
-from crazyflie_utils.units import GRAVITY
 
 HOVER = (0.0, 0.0, 1.0)
 

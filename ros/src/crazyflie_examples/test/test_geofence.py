@@ -18,7 +18,7 @@ from crazyflie_examples.geofence import (
     control_from_acceleration,
 )
 from crazyflie_lqr.linear_feedback import MAX_THRUST, MAX_TILT, MIN_THRUST
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.units import GRAVITY
 
 LOWER, UPPER = np.array([-1.5, -1.0, 0.3]), np.array([1.5, 1.2, 2.5])
 MARGIN, RATE = 0.5, 1.0

@@ -1,33 +1,21 @@
-"""The linear models against derivatives of the nonlinear equations."""
+"""The linear models against derivatives of the nonlinear ones."""
+
+from functools import partial
 
 import numpy as np
 import pytest
 
 from crazyflie_lqr.models import full_state, near_hover
+from crazyflie_model.dynamics import Coupled7D, NearHover, coupled_acceleration
+from crazyflie_model.units import GRAVITY
 
-G = 9.81
-HOVER = np.array([0.0, 0.0, 0.0, G])
-
-
-def near_hover_rates(x, u):
-    return [*x[3:6], G * np.tan(u[1]), -G * np.tan(u[0]), u[3] - G, u[2]]
+HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
 
 
-def coupled_rates(x, u):
-    (roll, pitch, yaw_dot, thrust), yaw = u, x[6]
-    return [
-        *x[3:6],
-        thrust * (np.sin(pitch) * np.cos(yaw) + np.sin(roll) * np.sin(yaw)),
-        thrust * (-np.sin(roll) * np.cos(yaw) + np.sin(pitch) * np.sin(yaw)),
-        thrust * np.cos(roll) * np.cos(pitch) - G,
-        yaw_dot,
-    ]
-
-
-def first_order_attitude_rates(x, u):
+def first_order_attitude(x, u):
     """Return the rates of a vehicle whose roll and pitch lag by 1/6 s, measured 10 ms late."""
     roll_rate, pitch_rate = 6.0 * (u[0] - x[6]), 6.0 * (u[1] - x[7])
-    acceleration = coupled_rates(np.array([*x[:6], x[8]]), [x[6], x[7], u[2], u[3]])[3:6]
+    acceleration = coupled_acceleration([x[6], x[7], u[2], u[3]], x[8])
     measured = (np.array([roll_rate, pitch_rate, u[2]]) - x[9:12]) / 0.01
     return [*x[3:6], *acceleration, roll_rate, pitch_rate, u[2], *measured]
 
@@ -44,9 +32,9 @@ def jacobian(function, at):
 @pytest.mark.parametrize(
     ("model", "rates"),
     [
-        (near_hover(), near_hover_rates),
-        (near_hover(), coupled_rates),
-        (full_state(), first_order_attitude_rates),
+        (near_hover(), partial(NearHover().derivative, 0.0)),
+        (near_hover(), partial(Coupled7D().derivative, 0.0)),
+        (full_state(), first_order_attitude),
     ],
 )
 def test_is_the_derivative_at_hover(model, rates):

@@ -7,18 +7,18 @@ import time
 
 import numpy as np
 
-from crazyflie_simulator.dynamics import Coupled7D, NearHover
-from crazyflie_simulator.elementwise import split
+from crazyflie_model.dynamics import Coupled7D, NearHover
+from crazyflie_model.elementwise import split
+from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_model.units import GRAVITY
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorCoupled7DNode,
     NearHoverSimulatorNode,
 )
-from crazyflie_simulator.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.vehicle import Vehicle
 from crazyflie_simulator.wind import Wind
 from crazyflie_utils.fake import FakeProcess
-from crazyflie_utils.units import GRAVITY
 
 CONTROL = [0.01, 0.02, 0.1, GRAVITY]
 VEHICLES = 100
@@ -75,7 +75,7 @@ def main() -> None:
         ("near_hover", NearHover(), NearHoverSimulatorNode),
         ("coupled_7d", Coupled7D(), NearHoverSimulatorCoupled7DNode),
         ("quadrotor", StabilizedQuadrotor(), QuadrotorSimulatorNode),
-        ("quadrotor, gusts", StabilizedQuadrotor(wind=Wind(gust=1.0)), None),
+        ("quadrotor, gusts", StabilizedQuadrotor(wind=Wind(gust=1.0).velocity), None),
     ]
     print(f"{'us per':18}{'step':>8}{f'step, of {VEHICLES}':>16}{'tick at rest':>16}")
     for name, dynamics, node_class in rows:

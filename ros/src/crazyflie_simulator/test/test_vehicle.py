@@ -5,17 +5,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_simulator.dynamics import Coupled7D, NearHover
-from crazyflie_simulator.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_model.dynamics import Coupled7D, NearHover
+from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_model.units import GRAVITY
 from crazyflie_simulator.vehicle import Vehicle
 from crazyflie_simulator.wind import Wind
-from crazyflie_utils.units import GRAVITY
 
 HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
 
 MODELS = pytest.mark.parametrize(
     "make_dynamics",
-    [NearHover, Coupled7D, lambda: StabilizedQuadrotor(wind=Wind((1.0, 0.0, 0.0), gust=0.5))],
+    [
+        NearHover,
+        Coupled7D,
+        lambda: StabilizedQuadrotor(wind=Wind((1.0, 0.0, 0.0), gust=0.5).velocity),
+    ],
     ids=["near", "coupled", "quadrotor"],
 )
 

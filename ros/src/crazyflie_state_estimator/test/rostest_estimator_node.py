@@ -9,12 +9,12 @@ import rospy
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
+from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import (
     FullStateStamped,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.vectors import to_vector
 
 PERIOD = 0.01

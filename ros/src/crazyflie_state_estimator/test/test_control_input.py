@@ -1,44 +1,13 @@
-"""What a control says about acceleration, against rotation matrices and by its limits."""
+"""When a control says something about acceleration, and what."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
-from crazyflie_state_estimator.control_input import ControlInput, acceleration_from_control
-from crazyflie_utils.held import HOLD_LIMIT
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.units import GRAVITY
+from crazyflie_state_estimator.control_input import ControlInput
+from crazyflie_utils.last_valid import HOLD_LIMIT
 
 HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
-tilts = st.floats(-0.5, 0.5)
-
-
-def test_signs():
-    assert acceleration_from_control((0.1, 0.0, 0.0, GRAVITY), 0.0)[1] < 0.0
-    assert acceleration_from_control((0.0, 0.1, 0.0, GRAVITY), 0.0)[0] > 0.0
-    assert acceleration_from_control((0.0, 0.1, 0.0, GRAVITY), np.pi / 2.0)[1] > 0.0
-    np.testing.assert_allclose(acceleration_from_control(HOVER, 1.0), 0.0)
-
-
-@given(tilts, st.floats(-3.0, 3.0), st.floats(4.0, 16.0))
-def test_pitch_alone_is_a_rotation_of_the_thrust(pitch, yaw, thrust):
-    thrust_axis = (Rotation.from_euler("z", yaw) * Rotation.from_euler("y", pitch)).apply([0, 0, 1])
-    np.testing.assert_allclose(
-        acceleration_from_control((0.0, pitch, 0.0, thrust), yaw),
-        thrust * thrust_axis - [0.0, 0.0, GRAVITY],
-        atol=1e-12,
-    )
-
-
-@given(tilts, st.floats(-3.0, 3.0), st.floats(4.0, 16.0))
-def test_roll_alone_is_a_rotation_of_the_thrust(roll, yaw, thrust):
-    thrust_axis = (Rotation.from_euler("z", yaw) * Rotation.from_euler("x", roll)).apply([0, 0, 1])
-    np.testing.assert_allclose(
-        acceleration_from_control((roll, 0.0, 0.0, thrust), yaw),
-        thrust * thrust_axis - [0.0, 0.0, GRAVITY],
-        atol=1e-12,
-    )
 
 
 def test_nothing_is_known_without_a_control():

@@ -7,13 +7,13 @@ import pytest
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
+from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_state_estimator.estimator_node import (
     FullStateEstimatorNode,
     PositionVelocityStateEstimatorNode,
     PositionVelocityYawStateEstimatorNode,
 )
-from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.vectors import to_vector
 

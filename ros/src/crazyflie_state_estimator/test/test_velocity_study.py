@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from crazyflie_model.units import GRAVITY
 from crazyflie_state_estimator import velocity_study
 from crazyflie_state_estimator.velocity_study import (
     FILTERS,
@@ -18,7 +19,6 @@ from crazyflie_state_estimator.velocity_study import (
     lag,
     rms_error,
 )
-from crazyflie_utils.units import GRAVITY
 
 MAX_ADDED_LAG = 0.020
 LEVEL = np.array([0.0, 0.0, 0.0, GRAVITY])

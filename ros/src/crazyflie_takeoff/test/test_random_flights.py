@@ -3,8 +3,9 @@
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from crazyflie_takeoff.flight import FlightStateMachine, Plan, RefusalError
+from crazyflie_takeoff.flight import FlightStateMachine, Plan
 from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_utils.refusal import RefusalError
 
 G = 9.81
 PLAN = Plan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)

@@ -5,8 +5,8 @@ import pytest
 
 from crazyflie_examples.flight_report import HOVER_TOLERANCE, FlightReport
 from crazyflie_examples.pilot import Pilot
+from crazyflie_model.units import GRAVITY
 from crazyflie_utils.runtime.runner import ros_process
-from crazyflie_utils.units import GRAVITY
 
 HOVER = (0.0, 0.0, 1.0)
 

@@ -32,9 +32,7 @@ def lines(path):
 
 def output(*command):
     """Return what a command prints."""
-    return subprocess.run(
-        command, check=True, capture_output=True, text=True, timeout=120
-    ).stdout
+    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=120).stdout
 
 
 @functools.cache
@@ -83,10 +81,7 @@ def named_in_launch_files():
 def named_in_manifests():
     """Return the dependencies that the package.xml files name."""
     return {
-        child.text
-        for manifest in manifests()
-        for child in manifest
-        if child.tag.endswith("depend")
+        child.text for manifest in manifests() for child in manifest if child.tag.endswith("depend")
     }
 
 

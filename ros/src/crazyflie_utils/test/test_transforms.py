@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.runtime.transforms import TransformError
 
@@ -22,7 +21,7 @@ def transform(parent, child, time, x=0.0, yaw=0.0):
     message.header.stamp = genpy.Time.from_sec(time)
     message.child_frame_id = child
     message.transform.translation = Vector3(x, 0.0, 0.0)
-    message.transform.rotation = Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw))
+    message.transform.rotation = Quaternion(0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0))
     return message
 
 

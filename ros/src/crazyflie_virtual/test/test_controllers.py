@@ -1,10 +1,10 @@
-"""PID, mixer and the signs of the cascade."""
+"""PID and the signs of the cascade."""
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_virtual.firmware import mixer
+from crazyflie_model.pid import Gains
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
 from crazyflie_virtual.firmware.pid import Pid
 from crazyflie_virtual.firmware.position import PositionController
@@ -14,7 +14,7 @@ from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Setp
 
 
 def test_pid_parts():
-    pid = Pid(2.0, 3.0, 0.5, 0.1, kff=0.25)
+    pid = Pid(Gains(2.0, 3.0, 0.5), 0.1, kff=0.25)
     assert pid.update(1.0, 0.0) == pytest.approx(2.0 + 3.0 * 0.1 + 0.25)
     # The derivative is of the measurement: a jump of what is desired does not kick.
     output = pid.update(4.0, 0.2)
@@ -24,7 +24,7 @@ def test_pid_parts():
 
 
 def test_pid_limits_and_reset():
-    pid = Pid(0.0, 1.0, 0.0, 1.0, integral_limit=2.0, output_limit=1.5)
+    pid = Pid(Gains(0.0, 1.0, 0.0, limit=2.0), 1.0, output_limit=1.5)
     assert [pid.update(1.0, 0.0) for _ in range(4)] == [1.0, 1.5, 1.5, 1.5]
     assert pid.out_i == 2.0
     pid.reset()
@@ -37,32 +37,6 @@ def test_wrapped_angles_point_the_same_way(angle):
     assert -180.0 <= wrapped < 180.0
     turns = (angle - wrapped) / 360.0
     assert turns == pytest.approx(round(turns), abs=1e-6)
-
-
-def test_mixer_directions():
-    front_right, back_right, back_left, front_left = range(4)
-    rolled = mixer.mix(100.0, 10.0, 0.0, 0.0)
-    assert rolled[front_left] == rolled[back_left] > rolled[front_right] == rolled[back_right]
-    pitched = mixer.mix(100.0, 0.0, 10.0, 0.0)
-    assert pitched[front_left] == pitched[front_right] > pitched[back_left] == pitched[back_right]
-    # Less of the motors that turn counter-clockwise, 1 and 3, turns to the left.
-    yawed = mixer.mix(100.0, 0.0, 0.0, 10.0)
-    assert yawed[back_right] == yawed[front_left] > yawed[front_right] == yawed[back_left]
-
-
-@given(st.tuples(*[st.floats(-1e5, 2e5)] * 4))
-def test_limited_commands_keep_their_differences_upwards(requested):
-    commands = mixer.limit(requested)
-    assert all(0.0 <= command <= mixer.FULL_PWM for command in commands)
-    if min(requested) > 0.0 and max(requested) - min(requested) < mixer.FULL_PWM:
-        spread = [command - max(commands) for command in commands]
-        expected = [request - max(requested) for request in requested]
-        if all(max(commands) + s > 0.0 for s in expected):
-            assert spread == pytest.approx(expected, abs=1e-6)
-
-
-def test_idle_thrust():
-    assert mixer.limit((0.0, 10.0, 5000.0, 0.0), idle=3000.0) == (3000.0, 3000.0, 5000.0, 3000.0)
 
 
 def setpoint_at(**position):
@@ -103,6 +77,22 @@ def test_yaw_error_takes_the_shorter_way_round():
     assert rates[2] > 0.0
     rates = AttitudeController().desired_rates(Estimate(yaw=-170.0), 0.0, 0.0, 170.0)
     assert rates[2] < 0.0
+
+
+def test_the_cascade_turns_the_vehicle_to_its_setpoint():
+    front_right, back_right, back_left, front_left = range(4)
+
+    def commands(**attitude):
+        setpoint = Setpoint(thrust=30000.0, **attitude)
+        return Stabilizer().update(setpoint, Estimate(), Sensors(noise=False), False, True)
+
+    rolled = commands(roll=5.0)
+    assert rolled[front_left] == rolled[back_left] > rolled[front_right] == rolled[back_right]
+    # Positive pitch is nose up in the firmware.
+    pitched = commands(pitch=5.0)
+    assert pitched[front_left] == pitched[front_right] > pitched[back_left] == pitched[back_right]
+    turned = commands(mode_yaw=ABSOLUTE, yaw=5.0)
+    assert turned[back_right] == turned[front_left] > turned[front_right] == turned[back_left]
 
 
 def test_yaw_rate_moves_the_heading_that_is_held():

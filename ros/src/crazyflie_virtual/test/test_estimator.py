@@ -8,7 +8,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 from scipy.spatial.transform import Rotation
 
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.firmware.states import Estimate
 

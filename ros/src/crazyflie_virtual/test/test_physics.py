@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crazyflie_utils.units import GRAVITY, HOVER_PWM
+from crazyflie_model.units import GRAVITY, HOVER_PWM
 from crazyflie_virtual.battery import FULL_VOLTAGE
 from crazyflie_virtual.firmware.sensors import Sensors
 from crazyflie_virtual.physics import STEP, Physics

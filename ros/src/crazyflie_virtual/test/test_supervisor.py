@@ -52,7 +52,7 @@ def test_ages_of_the_setpoint(flying):
     flying.setpoint_age = 0.0
     assert flying.run(10.0) is State.LOCKED
     assert flying.said == ["SUP: Locked, reboot required"]
-    assert flying.supervisor.bits == 0b1000100
+    assert flying.supervisor.flags == 0b1000100
 
 
 def test_old_setpoints_on_the_ground_are_no_reason_to_lock():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from virtual_bench import Bench, attitude, generic
 
-from crazyflie_utils.units import HOVER_PWM
+from crazyflie_model.units import HOVER_PWM
 from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.firmware.power import LOW
 from crazyflie_virtual.firmware.supervisor import State

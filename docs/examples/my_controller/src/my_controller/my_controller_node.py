@@ -5,7 +5,7 @@ import numpy as np
 from crazyflie_lqr.linear_feedback import PITCH, ROLL, LinearFeedback
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
-from crazyflie_utils.parameters import Number
+from crazyflie_utils.parameter_types import Number
 
 
 class GentleFeedback(LinearFeedback):

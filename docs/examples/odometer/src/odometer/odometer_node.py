@@ -5,7 +5,7 @@ from std_srvs.srv import Empty, EmptyResponse
 
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
 from crazyflie_utils.vectors import is_finite
 from odometer.odometer import Odometer
 

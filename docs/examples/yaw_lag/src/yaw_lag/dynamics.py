@@ -4,7 +4,7 @@ State x = (x, y, z, x_dot, y_dot, z_dot, yaw, yaw_dot) in the fixed frame, m, m/
 rad and rad/s; control as everywhere: roll, pitch, yaw_dot, thrust.
 """
 
-from crazyflie_simulator.dynamics import Dynamics, NearHover
+from crazyflie_model.dynamics import Dynamics, NearHover
 
 
 class YawLag(Dynamics):

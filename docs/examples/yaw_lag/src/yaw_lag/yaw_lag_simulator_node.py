@@ -1,8 +1,8 @@
 """Simulator of a vehicle with a lagging yaw rate."""
 
-from crazyflie_simulator.dynamics import Dynamics
+from crazyflie_model.dynamics import Dynamics
 from crazyflie_simulator.simulator_node import SimulatorNode
-from crazyflie_utils.parameters import Number
+from crazyflie_utils.parameter_types import Number
 from yaw_lag.dynamics import YawLag
 from yaw_lag.gains import TIME_CONSTANT
 

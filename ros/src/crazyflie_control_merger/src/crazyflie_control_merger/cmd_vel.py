@@ -2,7 +2,7 @@
 
 import math
 
-from crazyflie_utils.units import pwm_from_thrust
+from crazyflie_model.units import pwm_from_thrust
 
 
 def cmd_vel_from_control(roll: float, pitch: float, yaw_dot: float, thrust: float) -> tuple:

@@ -5,7 +5,7 @@ Controls are u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2.
 
 import numpy as np
 
-from crazyflie_utils.held import HOLD_LIMIT
+from crazyflie_utils.last_valid import HOLD_LIMIT
 
 MERGE = "MERGE"
 LQR = "LQR"
@@ -21,7 +21,7 @@ NO_YAW_ENTRIES = (0, 1, 3)
 class Merger:
     """Mix the latest prioritised control into regular ones.
 
-    A prioritised control counts for `crazyflie_utils.held.HOLD_LIMIT`. Without
+    A prioritised control counts for `crazyflie_utils.last_valid.HOLD_LIMIT`. Without
     one the regular control is left as it is, in every mode.
 
     Parameters

@@ -29,9 +29,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crazyflie_lqr.linear_feedback import MAX_THRUST, MAX_TILT, MIN_THRUST
-from crazyflie_utils.angles import rotate_by_yaw
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.angles import rotate_by_yaw
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_model.units import GRAVITY
 
 MAX_HORIZONTAL = GRAVITY * math.tan(MAX_TILT)
 """Horizontal acceleration that the fence asks for at most, m/s^2."""

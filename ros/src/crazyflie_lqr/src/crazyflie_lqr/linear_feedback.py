@@ -8,16 +8,10 @@ accelerates to the right of the heading, positive pitch along it.
 
 import numpy as np
 
-from crazyflie_utils.angles import rotate_by_yaw, wrap_to_pi
+from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 
 ROLL, PITCH, YAW_DOT, THRUST = range(4)
-
-MAX_TILT = 0.2618
-"""Largest roll and pitch that `LiftController` asks for, rad (15 degrees)."""
-
-MIN_THRUST = 4.0
-MAX_THRUST = 16.0
-"""Least and most thrust that `LiftController` asks for, m/s^2."""
 
 _LEAST = np.array([-MAX_TILT, -MAX_TILT, -np.inf, MIN_THRUST])
 _MOST = np.array([MAX_TILT, MAX_TILT, np.inf, MAX_THRUST])

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model import inner_loops
+from crazyflie_model.units import GRAVITY
 
 CONTROLS = ("roll", "pitch", "yaw_dot", "thrust")
 
-ATTITUDE_TIME_CONSTANT = 1.0 / 6.0
+ATTITUDE_TIME_CONSTANT = 1.0 / inner_loops.TILT.kp
 """How roll and pitch of the vehicle follow their commands in `full_state`, s: the
-firmware's attitude loop turns an error of 1 rad into a rate of 6 rad/s
-(PID_ROLL_KP and PID_PITCH_KP of crazyflie-firmware), and its rate loop is much
+firmware's attitude loop turns an error into a rate, and its rate loop is much
 faster."""
 
 RATE_TIME_CONSTANT = 0.01

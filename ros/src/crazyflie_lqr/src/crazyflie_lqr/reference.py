@@ -3,14 +3,14 @@
 import numpy as np
 
 from crazyflie_lqr.linear_feedback import at_rest
-from crazyflie_utils.held import Held
+from crazyflie_utils.last_valid import Held
 
 
 class GuardedReference:
     """The last good reference; or, some time after bad ones came, the place reached by then.
 
     A setpoint from a broken source is not followed for ever, yet the vehicle is
-    not dropped: `crazyflie_utils.held.HOLD_LIMIT` after the first bad reference
+    not dropped: `crazyflie_utils.last_valid.HOLD_LIMIT` after the first bad reference
     it stops where it is, and stays there until a good reference comes.
 
     Parameters

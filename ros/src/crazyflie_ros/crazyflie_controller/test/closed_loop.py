@@ -9,10 +9,10 @@ import yaml
 from crazyflie_controller.flight import Flight
 from crazyflie_controller.go_to import AXES, GoToController, Pose
 from crazyflie_controller.pid import Gains
-from crazyflie_simulator.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_model.units import thrust_from_pwm
 from crazyflie_simulator.vehicle import Vehicle
-from crazyflie_utils.angles import rpy_from_quaternion
-from crazyflie_utils.units import thrust_from_pwm
 
 PERIOD = 0.02
 """Of the controller, s."""

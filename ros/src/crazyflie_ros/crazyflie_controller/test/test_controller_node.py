@@ -17,9 +17,9 @@ from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_controller.controller_node import ControllerNode
+from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
-from crazyflie_utils.angles import quaternion_from_rpy
 from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.node import Node
 from crazyflie_utils.runtime.transport import ServiceError

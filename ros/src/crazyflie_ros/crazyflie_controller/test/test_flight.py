@@ -5,8 +5,9 @@ import pytest
 from closed_loop import PERIOD, Loop, control_from_cmd_vel
 
 from crazyflie_control_merger.cmd_vel import cmd_vel_from_control
-from crazyflie_controller.flight import HOLD_LIMIT, OFF_LIMIT, RefusalError, State
+from crazyflie_controller.flight import HOLD_LIMIT, OFF_AGE, State
 from crazyflie_controller.go_to import Pose, Setpoint
+from crazyflie_utils.refusal import RefusalError
 
 OFF = Setpoint()
 VEHICLES = [
@@ -214,7 +215,7 @@ def test_a_flight_ends_when_the_vehicle_has_stopped_its_motors():
     loop = flying()
     loop.run(5.0)
     loop.is_seen = False
-    loop.run(OFF_LIMIT + 0.1)
+    loop.run(OFF_AGE + 0.1)
     assert loop.flight.state is State.IDLE
     # Seen again, it stays where it fell.
     loop.is_seen = True

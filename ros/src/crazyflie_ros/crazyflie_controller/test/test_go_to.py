@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_controller.go_to import GoToController, Pose
-from crazyflie_utils.angles import rotate_by_yaw
+from crazyflie_model.angles import rotate_by_yaw
 
 HOVER = 42000.0
 HERE = Pose(0.0, 0.0, 1.0, 0.0)

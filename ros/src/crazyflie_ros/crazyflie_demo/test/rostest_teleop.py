@@ -11,7 +11,7 @@ from flights import LIMIT, Observer, Stick, launched, running, virtual_vehicle, 
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.keyboard import EMERGENCY, HEADLIGHT, LIFT, PITCH, ROLL, TAKEOFF, YAW
-from crazyflie_utils.angles import rpy_from_quaternion
+from crazyflie_model.angles import rpy_from_quaternion
 
 CLIMB, HOVER = 0.78, 0.7
 """Of the thrust stick's way; 60000 PWM at the end, and a dead zone at the beginning."""

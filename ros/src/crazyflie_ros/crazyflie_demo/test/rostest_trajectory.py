@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from flights import Observer, launched, virtual_vehicle
 
-from crazyflie_demo.polynomials import load
+from crazyflie_demo.trajectory_file import load
 
 FIGURE8 = Path(__file__).parents[1] / "data" / "figure8.csv"
 
@@ -20,7 +20,7 @@ def test_a_figure_eight():
         track = observer.track_until(lambda truth: truth.position[2] < 0.02)
     flown = np.array([truth.position[:2] for truth in track]) - start[:2]
     times = np.linspace(0.0, 1.0, 100)
-    curve = np.hstack([piece.evaluate(times)[:2] for piece in load(FIGURE8)]).T
+    curve = np.hstack([piece.evaluate(times).position[:2] for piece in load(FIGURE8)]).T
     # Every point of the path is near the curve, and every point of the curve near the path.
     distances = np.linalg.norm(flown[::5, None, :] - curve[None, ::5, :], axis=2)
     assert distances.min(axis=1).max() < 0.12

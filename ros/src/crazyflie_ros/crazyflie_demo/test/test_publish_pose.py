@@ -8,7 +8,7 @@ from sensor_msgs.msg import Joy
 
 from crazyflie_demo.const_thrust_node import ConstThrustNode
 from crazyflie_demo.publish_pose_node import PublishPoseNode, PublishPoseTeleopNode
-from crazyflie_utils.angles import rpy_from_quaternion
+from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.fake import FakeProcess
 
 PLACE = {"x": 1.0, "y": -2.0, "z": 0.5}

@@ -5,7 +5,7 @@ from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_demo.waypoint_node import Demo2Node, DemoNode
-from crazyflie_utils.angles import quaternion_from_rpy, rpy_from_quaternion
+from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
 from crazyflie_utils.fake import FakeProcess
 
 

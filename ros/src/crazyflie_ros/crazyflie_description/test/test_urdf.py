@@ -8,10 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from crazyflie_model.quadrotor import CRAZYFLIE
+
 URDF = Path(__file__).resolve().parent.parent / "urdf"
 
 # Motor to motor across a diagonal, height, mass; metres and kilogrammes.
-MODELS = {"crazyflie": (0.090, 0.022, 0.019), "crazyflie2": (0.092, 0.029, 0.027)}
+MODELS = {
+    "crazyflie": (0.090, 0.022, 0.019),
+    "crazyflie2": (2.0 * CRAZYFLIE.arm, 0.029, CRAZYFLIE.mass),
+}
 
 # Sign of x (forward) and y (left) of each motor, in the firmware's numbering.
 CORNERS = {1: (1, -1), 2: (-1, -1), 3: (-1, 1), 4: (1, 1)}

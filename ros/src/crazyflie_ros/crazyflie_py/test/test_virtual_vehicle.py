@@ -5,11 +5,11 @@ import threading
 
 import pytest
 
+from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
 from crazyflie_py.errors import RefusedError
 from crazyflie_py.log import LogBlock
-from crazyflie_py.supervisor import SupervisorState
-from crazyflie_py.trajectory import PolynomialPiece
 from crazyflie_virtual.server import Server
 from crazyflie_virtual.settings import Settings
 

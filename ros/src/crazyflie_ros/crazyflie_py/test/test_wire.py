@@ -4,9 +4,10 @@ import struct
 
 import numpy as np
 import pytest
+from cflib.crazyflie.mem import Poly4D
 
+from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.errors import RefusedError, UnknownNameError, ValueRangeError
-from crazyflie_py.trajectory import PolynomialPiece
 
 NAN = float("nan")
 
@@ -218,10 +219,10 @@ def test_upload_writes_the_pieces_and_defines_the_trajectory(vehicle, flying):
     assert sent(vehicle, 8, 0) == struct.pack("<4BIB", 6, 4, 1, 0, 264, 3)
 
 
-def test_short_polynomials_are_filled_with_zeros():
-    data = PolynomialPiece(2.0, (1.0,), (), (2.0, 3.0), (0.5,)).pack()
-    expected = [1.0] + [0.0] * 7 + [0.0] * 8 + [2.0, 3.0] + [0.0] * 6 + [0.5] + [0.0] * 7 + [2.0]
-    assert struct.unpack("<33f", data) == tuple(expected)
+def test_pieces_are_cflibs():
+    one = piece(1)
+    expected = Poly4D(one.duration, *(Poly4D.Poly(axis) for axis in one.axes)).pack()
+    assert one.pack() == bytes(expected)
 
 
 IMPOSSIBLE_TRAJECTORIES = [

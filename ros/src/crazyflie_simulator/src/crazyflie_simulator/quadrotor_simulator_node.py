@@ -1,8 +1,8 @@
 """ROS interface of a simulated vehicle with motors, inner loops and wind."""
 
-from crazyflie_simulator.dynamics import Dynamics
+from crazyflie_model.dynamics import Dynamics
+from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.simulator_node import SEED, SimulatorNode
-from crazyflie_simulator.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.wind import Wind
 from crazyflie_utils.parameter_types import TIME_STEP, Number
 
@@ -26,5 +26,5 @@ class QuadrotorSimulatorNode(SimulatorNode):
         return StabilizedQuadrotor(
             mass_error=handle.param("mass_error", _ERROR, 0.0),
             thrust_error=handle.param("thrust_error", _ERROR, 0.0),
-            wind=wind,
+            wind=wind.velocity,
         )

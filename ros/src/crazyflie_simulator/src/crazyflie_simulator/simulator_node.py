@@ -4,8 +4,8 @@ import zlib
 
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 
+from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_msgs.msg import ControlStamped
-from crazyflie_simulator.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import Vehicle
 from crazyflie_utils.node import Node

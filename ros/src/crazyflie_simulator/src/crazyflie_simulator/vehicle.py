@@ -4,15 +4,12 @@ import math
 
 import numpy as np
 
-from crazyflie_simulator.dynamics import STEP, Dynamics
-from crazyflie_simulator.elementwise import split
-from crazyflie_utils.held import HOLD_LIMIT
+from crazyflie_model.dynamics import STEP, Dynamics
+from crazyflie_model.elementwise import split
+from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 
-OFF_LIMIT = 2.0
-"""The firmware stops its motors when it has had no setpoint for this long, s."""
-
-_HOLD_STEPS = round(HOLD_LIMIT / STEP)
-_OFF_STEPS = round(OFF_LIMIT / STEP)
+_LEVEL_STEPS = round(LEVEL_AGE / STEP)
+_OFF_STEPS = round(OFF_AGE / STEP)
 _OFF = [0.0, 0.0, 0.0, 0.0]
 
 
@@ -20,8 +17,8 @@ class Vehicle:
     """One simulated vehicle.
 
     It stays put until the first control. When controls stop coming it does what
-    the firmware does: after `HOLD_LIMIT` it levels out with the thrust it has,
-    after `OFF_LIMIT` its motors stop.
+    the firmware does: after `LEVEL_AGE` it levels out with the thrust it has,
+    after `OFF_AGE` its motors stop.
 
     Two vehicles that are given the same controls at the same times fly the
     same, to the last bit, however often `advance_to` is called.
@@ -84,7 +81,7 @@ class Vehicle:
         if self._control_step is None:
             return self._u
         age = self._steps - self._control_step
-        if age < _HOLD_STEPS:
+        if age < _LEVEL_STEPS:
             return self._u
         if age < _OFF_STEPS:
             return [0.0, 0.0, 0.0, self._u[3]]

@@ -44,7 +44,3 @@ class Wind:
             return self._mean
         gust = self._amplitude * np.cos(self._frequencies * t + self._phases).sum(axis=1)
         return tuple(mean + part for mean, part in zip(self._mean, gust.tolist(), strict=True))
-
-
-STILL_AIR = Wind()
-"""No wind."""

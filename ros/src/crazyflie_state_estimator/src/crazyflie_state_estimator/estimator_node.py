@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_msgs.msg import (
     ControlStamped,
     FullState,
@@ -15,8 +16,7 @@ from crazyflie_state_estimator import kalman
 from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.motion import Motion, MotionEstimator
 from crazyflie_state_estimator.rate_filter import FiniteDifference
-from crazyflie_utils.angles import rpy_from_quaternion
-from crazyflie_utils.held import HOLD_LIMIT
+from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import FRAME, TIME_STEP, TOPIC, Integer, Number, Text
 from crazyflie_utils.runtime.transforms import TransformError

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crazyflie_model.angles import wrap_to_pi
 from crazyflie_state_estimator.rate_filter import RateFilter
-from crazyflie_utils.angles import wrap_to_pi
 
 
 class Motion(NamedTuple):
@@ -18,7 +18,7 @@ class Motion(NamedTuple):
     velocity : ndarray, shape (3,)
         m/s.
     attitude : ndarray, shape (3,)
-        Roll, pitch, yaw in rad, in [-pi, pi]; see `crazyflie_utils.angles`.
+        Roll, pitch, yaw in rad, in [-pi, pi]; see `crazyflie_model.angles`.
     attitude_rate : ndarray, shape (3,)
         Time derivatives of roll, pitch, yaw in rad/s (not the body's angular
         velocity).

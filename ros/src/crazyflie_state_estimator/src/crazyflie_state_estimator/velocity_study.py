@@ -12,7 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from crazyflie_state_estimator.control_input import ControlInput, acceleration_from_control
+from crazyflie_model.angles import rotate_by_yaw
+from crazyflie_model.dynamics import coupled_acceleration
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_model.units import GRAVITY
+from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.kalman import (
     ACCELERATION_WALK,
     ACCELERATION_WALK_WITH_CONTROL,
@@ -21,8 +25,6 @@ from crazyflie_state_estimator.kalman import (
 )
 from crazyflie_state_estimator.motion import MotionEstimator
 from crazyflie_state_estimator.rate_filter import FiniteDifference
-from crazyflie_utils.angles import rotate_by_yaw
-from crazyflie_utils.units import GRAVITY
 
 PERIOD = 0.01
 """Time between two poses, s."""
@@ -34,7 +36,6 @@ _STEP = 0.001
 _YAW_RATE = 0.3
 _LEG = 3.0
 _WAYPOINTS = np.array([(0, 0, 1), (0, 0, 1), (1, 0, 1), (1, 1, 1.5), (-1, 0.5, 0.7)], dtype=float)
-_MAX_TILT = 0.2618
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def fly(vehicle: Vehicle, duration: float, seed: int = 0) -> Flight:
         target = control * [1.0, 1.0, 1.0, vehicle.thrust_factor]
         for i in range(steps):
             acting = acting + follow * (target - acting)
-            acceleration = acceleration_from_control(acting, yaw)
+            acceleration = np.array(coupled_acceleration(acting, yaw))
             acceleration += gusts[k * steps + i] - vehicle.drag * velocity
             position = position + _STEP * velocity + 0.5 * _STEP**2 * acceleration
             velocity = velocity + _STEP * acceleration
@@ -136,8 +137,8 @@ def _control(time, position, velocity, yaw):
     error = position - waypoint
     forward, left = rotate_by_yaw(*(0.25 * error[:2] + 0.25 * velocity[:2]), -yaw)
     thrust = GRAVITY - 1.5 * error[2] - 1.0 * velocity[2]
-    roll, pitch = np.clip([left, -forward], -_MAX_TILT, _MAX_TILT)
-    return np.array([roll, pitch, _YAW_RATE, np.clip(thrust, 4.0, 16.0)])
+    roll, pitch = np.clip([left, -forward], -MAX_TILT, MAX_TILT)
+    return np.array([roll, pitch, _YAW_RATE, np.clip(thrust, MIN_THRUST, MAX_THRUST)])
 
 
 def _correlated_noise(rng, steps, deviation):

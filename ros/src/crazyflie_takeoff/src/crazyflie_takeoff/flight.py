@@ -7,8 +7,9 @@ that does not run backwards; if it is reset, what was under way goes on from the
 import math
 from dataclasses import dataclass
 
+from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_utils.units import GRAVITY
+from crazyflie_utils.refusal import RefusalError
 
 LIFT_OFF_THRUST = GRAVITY + 0.2
 """Thrust of the open-loop part of a takeoff, m/s^2."""
@@ -45,10 +46,6 @@ _REFUSALS = {
     FlightState.DESCENDING: "a landing is under way",
     FlightState.LANDING: "a landing is under way",
 }
-
-
-class RefusalError(Exception):
-    """A takeoff or landing makes no sense now; the text says why. Nothing has changed."""
 
 
 @dataclass(frozen=True)

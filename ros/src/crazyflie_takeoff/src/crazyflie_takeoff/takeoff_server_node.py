@@ -13,11 +13,12 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_takeoff.flight import FlightStateMachine, Plan, RefusalError
+from crazyflie_takeoff.flight import FlightStateMachine, Plan
 from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
 from crazyflie_takeoff.recovery import FLYING_HEIGHT, recover_state
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector
 
 TIME_STEP = 0.01

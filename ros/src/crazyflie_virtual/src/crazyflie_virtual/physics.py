@@ -1,20 +1,18 @@
-"""The body of the vehicle: the adapter to the simulator's airframe."""
+"""The body of the vehicle: the airframe, what is felt in it, and coming down on the back."""
 
 import math
-from dataclasses import replace
 
-from crazyflie_simulator.quadrotor import Airframe, QuadrotorParameters
-from crazyflie_utils.units import GRAVITY, HOVER_PWM
+from crazyflie_model.angles import rotate_back
+from crazyflie_model.inner_loops import PERIOD
+from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe
+from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.battery import FULL_VOLTAGE
-from crazyflie_virtual.rotations import rotate_back
 
-STEP = 0.002
+STEP = PERIOD
 """Step of the integration, s: that of the firmware's attitude controller."""
 
 _OVERTURNING = 0.5
 """Cosine of the tilt beyond which a vehicle that comes down lies on its back."""
-
-_STILL_AIR = (0.0, 0.0, 0.0)
 
 
 class Physics:
@@ -47,17 +45,7 @@ class Physics:
         mass_error: float = 0.0,
         thrust_error: float = 0.0,
     ):
-        nominal = QuadrotorParameters()
-        self._airframe = Airframe(
-            replace(
-                nominal,
-                mass=nominal.mass * (1.0 + mass_error),
-                thrust_constant=nominal.thrust_constant * (1.0 + thrust_error),
-            )
-        )
-        self._speed_squared_per_pwm = nominal.hover_speed**2 / HOVER_PWM
-        self._max_speed = nominal.max_rotor_speed
-        self._hover_speed = nominal.hover_speed
+        self._airframe = Airframe(CRAZYFLIE.with_errors(mass_error, thrust_error))
         x = self._airframe.initial_state([float(part) for part in position])
         x[6:10] = [0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]
         x[13:17] = [0.0] * 4
@@ -89,7 +77,7 @@ class Physics:
     @property
     def load(self) -> float:
         """Mean of the third powers of the rotor speeds over the hover speed's."""
-        return sum((speed / self._hover_speed) ** 3 for speed in self._x[13:17]) / 4.0
+        return sum((speed / CRAZYFLIE.hover_speed) ** 3 for speed in self._x[13:17]) / 4.0
 
     def put_upright(self) -> None:
         """Pick the vehicle up and put it on its feet."""
@@ -106,14 +94,12 @@ class Physics:
         voltage : float
             Of the battery, V: it limits the speed of the motors.
         """
-        top = self._max_speed * voltage / FULL_VOLTAGE
-        per_pwm = self._speed_squared_per_pwm
+        top = CRAZYFLIE.max_rotor_speed * voltage / FULL_VOLTAGE
         before = self._x
         if self.is_overturned:
             commands = (0.0,) * 4
-        # Thrust, the square of the speed, is linear in the command.
-        speeds = [min(top, math.sqrt(per_pwm * command)) for command in commands]
-        after = self._x = self._airframe.step(0.0, before, speeds, _STILL_AIR, STEP)
+        speeds = [min(top, CRAZYFLIE.rotor_speed(command)) for command in commands]
+        after = self._x = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
         if before[2] > 0.0 and after[2] <= 0.0:
             self.impact_speed = max(0.0, -before[5])
             up = 1.0 - 2.0 * (before[6] ** 2 + before[7] ** 2)

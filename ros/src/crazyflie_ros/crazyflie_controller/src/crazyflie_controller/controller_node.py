@@ -3,13 +3,14 @@
 from geometry_msgs.msg import PoseStamped, Twist, Vector3
 from std_srvs.srv import Empty, EmptyResponse
 
-from crazyflie_controller.flight import Flight, RefusalError
+from crazyflie_controller.flight import Flight
 from crazyflie_controller.go_to import AXES, GoToController, Pose
 from crazyflie_controller.pid import Gains
-from crazyflie_utils.angles import rpy_from_quaternion
+from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import FINITE, FRAME, Number
 from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.runtime.transforms import TransformError
 from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.vectors import is_finite

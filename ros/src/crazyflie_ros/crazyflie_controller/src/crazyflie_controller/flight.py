@@ -8,8 +8,10 @@ import math
 from enum import Enum
 
 from crazyflie_controller.go_to import GoToController, Pose, Setpoint
-from crazyflie_utils.held import HOLD_LIMIT
-from crazyflie_utils.units import GRAVITY, HOVER_PWM
+from crazyflie_model.limits import OFF_AGE
+from crazyflie_model.units import GRAVITY, HOVER_PWM
+from crazyflie_utils.last_valid import HOLD_LIMIT
+from crazyflie_utils.refusal import RefusalError
 
 TAKEOFF_RATE = 10000.0
 """How fast the thrust of a takeoff grows, PWM/s."""
@@ -44,9 +46,6 @@ TOUCHDOWN_RATE = 20000.0
 TOUCHDOWN_DURATION = 1.0
 """How long it does, s; zero thrust follows."""
 
-OFF_LIMIT = 2.0
-"""The firmware stops its motors when it has had no setpoint for this long, s."""
-
 
 class State(Enum):
     """What the controller is doing."""
@@ -57,16 +56,12 @@ class State(Enum):
     LANDING = "landing"
 
 
-class RefusalError(Exception):
-    """A takeoff or landing makes no sense now; the text says why. Nothing has changed."""
-
-
 class Flight:
     """One vehicle's flights.
 
     Without a pose that is new within `HOLD_LIMIT` the vehicle is blind: in the air it
     is given no setpoints, so that its own watchdog levels it out; when that has
-    lasted for `OFF_LIMIT` its motors are off, and the flight has ended.
+    lasted for `OFF_AGE` its motors are off, and the flight has ended.
 
     Parameters
     ----------
@@ -203,9 +198,9 @@ class Flight:
     }
 
     def _fly_to(self, goal):
-        if self._is_blind(OFF_LIMIT):
+        if self._is_blind(OFF_AGE):
             return self._give_up(
-                f"flight ended: no new pose for {OFF_LIMIT:g} s, so that the vehicle has "
+                f"flight ended: no new pose for {OFF_AGE:g} s, so that the vehicle has "
                 "stopped its motors"
             )
         if self._is_blind(HOLD_LIMIT):

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from crazyflie_controller.pid import Gains, Pid
-from crazyflie_utils.angles import rotate_by_yaw, wrap_to_pi
+from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
 
 AXES = ("X", "Y", "Z", "Yaw")
 """Names of the four controllers."""

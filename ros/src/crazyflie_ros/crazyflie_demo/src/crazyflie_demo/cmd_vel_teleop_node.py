@@ -4,6 +4,7 @@ from geometry_msgs.msg import Twist, Vector3
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.sticks import Sticks
+from crazyflie_model.limits import FULL_PWM, MAX_SETPOINT_PWM
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import TOPIC, Integer, Number
 
@@ -12,7 +13,7 @@ _RANGES = {
     "pitch": (30.0, Number("deg", above=0.0, maximum=60.0)),
     "roll": (30.0, Number("deg", above=0.0, maximum=60.0)),
     "yaw_rate": (200.0, Number("deg/s", above=0.0)),
-    "thrust": (60000.0, Number("PWM", above=0.0, maximum=65535.0)),
+    "thrust": (MAX_SETPOINT_PWM, Number("PWM", above=0.0, maximum=FULL_PWM)),
 }
 
 

@@ -2,6 +2,7 @@
 
 from geometry_msgs.msg import Twist, Vector3
 
+from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import Number
 
@@ -17,7 +18,9 @@ class ConstThrustNode(Node):
 
     def load_parameters(self, handle) -> None:
         """See `Node.load_parameters`."""
-        self._thrust = handle.param("thrust", Number("PWM", minimum=0.0, maximum=60000.0), 12000.0)
+        self._thrust = handle.param(
+            "thrust", Number("PWM", minimum=0.0, maximum=MAX_SETPOINT_PWM), 12000.0
+        )
         self._period = 1.0 / handle.param("rate", Number("Hz", above=0.0, maximum=500.0), 50.0)
 
     def register_callbacks(self, handle) -> None:

@@ -14,7 +14,9 @@ import sys
 
 import numpy as np
 
-from crazyflie_demo.polynomials import Piece, hermite, save
+from crazyflie_demo.trajectory_file import save
+from crazyflie_model.hermite import hermite
+from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
 
 WIDTH, HEIGHT = 0.75, 0.375
 """Amplitudes along x and y, m."""
@@ -56,16 +58,17 @@ def sine(amplitude: float, multiple: int, time: float) -> np.ndarray:
     )
 
 
-def figure8() -> list[Piece]:
+def figure8() -> list[PolynomialPiece]:
     """Return the pieces of the figure eight."""
     knots = np.arange(0.0, DURATION + PIECE / 2.0, PIECE)
     pieces = []
     for begin, end in zip(knots, knots[1:], strict=False):
-        coefficients = np.zeros((4, 8))
-        for axis, amplitude in enumerate((WIDTH, HEIGHT)):
-            ends = (sine(amplitude, axis + 1, time) for time in (begin, end))
-            coefficients[axis] = hermite(*ends, PIECE)
-        pieces.append(Piece(PIECE, coefficients))
+        x, y = (
+            hermite(sine(amplitude, multiple, begin), sine(amplitude, multiple, end), PIECE)
+            for amplitude, multiple in ((WIDTH, 1), (HEIGHT, 2))
+        )
+        zero = (0.0,) * COEFFICIENTS
+        pieces.append(PolynomialPiece(PIECE, x, y, zero, zero))
     return pieces
 
 

@@ -2,7 +2,7 @@
 
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
 
-from crazyflie_utils.angles import quaternion_from_rpy
+from crazyflie_model.angles import quaternion_from_rpy
 
 
 def goal_message(stamp, frame: str, x: float, y: float, z: float, yaw: float) -> PoseStamped:

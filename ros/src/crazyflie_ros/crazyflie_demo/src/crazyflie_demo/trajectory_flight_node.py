@@ -1,7 +1,7 @@
 """ROS interface of a flight along a trajectory."""
 
 from crazyflie_demo.flight_plan_node import FlightPlanNode, Step, seconds
-from crazyflie_demo.polynomials import TrajectoryError, load, summary
+from crazyflie_demo.trajectory_file import TrajectoryError, load, summary
 from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
     StartTrajectory,
@@ -42,7 +42,7 @@ class TrajectoryFlightNode(FlightPlanNode):
     def preparations(self) -> list[Step]:
         """See `FlightPlanNode.preparations`."""
         pieces = [
-            TrajectoryPolynomialPiece(*piece.coefficients.tolist(), seconds(piece.duration))
+            TrajectoryPolynomialPiece(*piece.axes, seconds(piece.duration))
             for piece in self._pieces
         ]
         return [Step("upload_trajectory", UploadTrajectory, UploadTrajectoryRequest(pieces=pieces))]

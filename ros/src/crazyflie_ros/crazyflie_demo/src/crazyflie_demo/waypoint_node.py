@@ -4,7 +4,7 @@ from geometry_msgs.msg import PoseStamped
 
 from crazyflie_demo.goals import goal_message
 from crazyflie_demo.waypoints import Tour, Waypoint, WaypointList
-from crazyflie_utils.angles import rpy_from_quaternion
+from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import FRAME, Number
 from crazyflie_utils.runtime.transforms import TransformError

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from crazyflie_utils.angles import wrap_to_pi
+from crazyflie_model.angles import wrap_to_pi
 from crazyflie_utils.parameter_types import DURATION, FINITE
 
 

@@ -7,7 +7,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_description.flown_path import FlownPath, circle
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.held import Held
+from crazyflie_utils.last_valid import Held
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import FRAME, TOPIC
 from crazyflie_utils.runtime.transforms import TransformError

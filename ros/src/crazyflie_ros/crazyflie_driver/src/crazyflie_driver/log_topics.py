@@ -5,8 +5,8 @@ from std_msgs.msg import Float32, Header
 
 from crazyflie_driver import telemetry
 from crazyflie_driver.msg import GenericLogData, crtpPacket
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.log import LogBlock
-from crazyflie_py.supervisor import SupervisorState
 
 STATUS_PERIOD_MS = 500
 """Period of the log block that the diagnostics rest on, ms."""

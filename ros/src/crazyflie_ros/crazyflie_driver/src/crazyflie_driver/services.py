@@ -3,8 +3,8 @@
 from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
 
 from crazyflie_driver import srv
+from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.errors import CrazyflieError
-from crazyflie_py.trajectory import PolynomialPiece
 from crazyflie_utils import ServiceError
 
 

@@ -6,11 +6,9 @@ from geometry_msgs.msg import PointStamped, PoseStamped, Twist
 from std_msgs.msg import Empty
 
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+from crazyflie_model.limits import MAX_SETPOINT_PWM
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.errors import CrazyflieError
-from crazyflie_py.supervisor import SupervisorState
-
-MOST_PWM = 60000.0
-"""Largest thrust that cmd_vel passes on, PWM."""
 
 _THROTTLE = 1.0
 _RATE_WINDOW = 1.0
@@ -132,7 +130,7 @@ class SetpointTopics:
 
     def _cmd_vel(self, message):
         # In this order a NaN stays one, and is refused.
-        thrust = min(max(message.linear.z, 0.0), MOST_PWM)
+        thrust = min(max(message.linear.z, 0.0), MAX_SETPOINT_PWM)
         state = self._log.supervisor
         if thrust > 0.0 and state is not None:
             if state & (SupervisorState.LOCKED | SupervisorState.CRASHED):

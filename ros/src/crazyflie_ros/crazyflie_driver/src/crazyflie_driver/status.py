@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import LinkState
-from crazyflie_py.supervisor import SupervisorState
 
 LOW_VOLTAGE, CRITICAL_VOLTAGE = 3.2, 3.0
 """Battery voltages at which the firmware warns, and shuts down after 5 s."""

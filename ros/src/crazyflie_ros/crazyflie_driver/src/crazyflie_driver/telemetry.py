@@ -9,8 +9,8 @@ from sensor_msgs.msg import Imu, MagneticField, Temperature
 from std_msgs.msg import Float32
 
 from crazyflie_driver.msg import GenericLogData
+from crazyflie_model.units import GRAVITY
 from crazyflie_py.log import quaternion_from_compressed
-from crazyflie_utils.units import GRAVITY
 
 FAST_MS, SLOW_MS = 10, 100
 """Periods of imu and pose, and of the rest, ms: those of the C++ driver."""

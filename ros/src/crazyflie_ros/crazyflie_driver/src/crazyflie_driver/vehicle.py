@@ -9,9 +9,9 @@ from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import Status
 from crazyflie_driver.worker import Worker
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
 from crazyflie_py.errors import CrazyflieError
-from crazyflie_py.supervisor import SupervisorState
 from crazyflie_utils import ServiceError
 
 _UNABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED

@@ -17,7 +17,6 @@ _HOME = {
     "CrazyflieError": "crazyflie_py.errors",
     "LinkState": "crazyflie_py.crazyflie",
     "LogBlock": "crazyflie_py.log",
-    "PolynomialPiece": "crazyflie_py.trajectory",
     "scan": "crazyflie_py.scanning",
 }
 
@@ -26,7 +25,6 @@ __all__ = [
     "CrazyflieError",
     "LinkState",
     "LogBlock",
-    "PolynomialPiece",
     "scan",
 ]
 

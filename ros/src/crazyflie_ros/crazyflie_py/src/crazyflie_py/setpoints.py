@@ -8,11 +8,9 @@ import math
 import threading
 import time
 
+from crazyflie_model.limits import FULL_PWM
 from crazyflie_py.checks import check_finite
 from crazyflie_py.errors import ValueRangeError
-
-MOST_THRUST = 65535
-"""Largest thrust command (PWM)."""
 
 ZEROS = 100
 """Setpoints of zero thrust after connecting and before leaving."""
@@ -46,8 +44,8 @@ class Setpoints:
         of zero thrust has come.
         """
         check_finite("attitude setpoint", roll, pitch, yaw_rate, thrust)
-        if not 0 <= thrust <= MOST_THRUST:
-            raise ValueRangeError(f"thrust is {thrust}; expected 0 to {MOST_THRUST} PWM")
+        if not 0 <= thrust <= FULL_PWM:
+            raise ValueRangeError(f"thrust is {thrust}; expected 0 to {FULL_PWM:g} PWM")
         self._stream(lambda c: c.send_setpoint(roll, pitch, yaw_rate, int(thrust)))
 
     def full_state(self, position, velocity, acceleration, quaternion, rates) -> None:

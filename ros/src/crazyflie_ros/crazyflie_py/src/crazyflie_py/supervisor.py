@@ -1,9 +1,8 @@
 """The vehicle's supervisor: arming, its state, emergency stop."""
 
-import enum
-
 from cflib.crtp.crtpstack import CRTPPort
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.errors import RefusedError
 
 SUPERVISOR_PROTOCOL = 12
@@ -13,27 +12,6 @@ _EMERGENCY_REPEATS = 5
 _INFO_CHANNEL, _COMMAND_CHANNEL = 0, 1
 _GET_STATE, _ARM, _RECOVER = 0x0C, 0x01, 0x02
 _ANSWER = 0x80
-
-
-class SupervisorState(enum.IntFlag):
-    """What the supervisor says of the vehicle; also the log variable supervisor.info."""
-
-    CAN_BE_ARMED = 1 << 0
-    ARMED = 1 << 1
-    AUTO_ARMED = 1 << 2
-    CAN_FLY = 1 << 3
-    FLYING = 1 << 4
-    TUMBLED = 1 << 5
-    LOCKED = 1 << 6
-    CRASHED = 1 << 7
-    HIGH_LEVEL_ACTIVE = 1 << 8
-    TRAJECTORY_FINISHED = 1 << 9
-    HIGH_LEVEL_DISABLED = 1 << 10
-
-    def words(self) -> str:
-        """Return the state in words, such as "armed, flying"."""
-        names = [flag.name.lower().replace("_", " ") for flag in SupervisorState if flag in self]
-        return ", ".join(names) or "nothing"
 
 
 class Supervisor:

@@ -1,64 +1,16 @@
 """Trajectories of polynomials, kept in the vehicle's memory and flown by its planner."""
 
 import struct
-from dataclasses import dataclass
 
 from cflib.crazyflie.mem.memory_element import MemoryElement
-from cflib.crazyflie.mem.trajectory_memory import Poly4D
 from cflib.crtp.crtpstack import CRTPPort
 
+from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 from crazyflie_py.checks import check_finite, check_positive
 from crazyflie_py.errors import RefusedError, ValueRangeError
 
-COEFFICIENTS = 8
-"""Coefficients of a polynomial of degree 7, the constant first."""
-
-PIECE_SIZE = 132
-"""Bytes of a piece in the vehicle's memory: 4 polynomials and a duration, as floats."""
-
 _WRITE_CHANNEL = 2
 _CHUNK = 24
-
-
-@dataclass(frozen=True)
-class PolynomialPiece:
-    """A piece of a trajectory: four polynomials of time.
-
-    Attributes
-    ----------
-    duration : float
-        s.
-    x, y, z, yaw : tuple of float
-        Up to 8 coefficients, the constant first: m and rad, in powers of s.
-    """
-
-    duration: float
-    x: tuple
-    y: tuple
-    z: tuple
-    yaw: tuple
-
-    def pack(self) -> bytes:
-        """Return the piece as the vehicle's memory holds it.
-
-        Raises
-        ------
-        ValueRangeError
-            Too many coefficients, a number that is not finite, or no duration.
-        """
-        check_positive("duration of a piece", self.duration)
-        polynomials = []
-        for axis in ("x", "y", "z", "yaw"):
-            coefficients = list(getattr(self, axis))
-            if len(coefficients) > COEFFICIENTS:
-                raise ValueRangeError(
-                    f"polynomial of {axis} has {len(coefficients)} coefficients; expected at "
-                    f"most {COEFFICIENTS}"
-                )
-            check_finite(f"polynomial of {axis}", *coefficients)
-            coefficients += [0.0] * (COEFFICIENTS - len(coefficients))
-            polynomials.append(Poly4D.Poly(coefficients))
-        return bytes(Poly4D(self.duration, *polynomials).pack())
 
 
 class Trajectories:
@@ -102,10 +54,22 @@ class Trajectories:
                 f"trajectory {trajectory_id}: {len(pieces)} pieces from piece {piece_offset} on "
                 f"do not fit: the vehicle has room for {memory.size // PIECE_SIZE}"
             )
-        data = b"".join(piece.pack() for piece in pieces)
+        data = b"".join(map(_packed, pieces))
         for start in range(0, len(data), _CHUNK):
             _write(link, memory.id, begin + start, data[start : start + _CHUNK])
         self._high_level.define_trajectory(trajectory_id, begin, len(pieces))
+
+
+def _packed(piece: PolynomialPiece):
+    check_positive("duration of a piece", piece.duration)
+    for name, coefficients in zip(("x", "y", "z", "yaw"), piece.axes, strict=True):
+        if len(coefficients) > COEFFICIENTS:
+            raise ValueRangeError(
+                f"polynomial of {name} has {len(coefficients)} coefficients; expected at "
+                f"most {COEFFICIENTS}"
+            )
+        check_finite(f"polynomial of {name}", *coefficients)
+    return piece.pack()
 
 
 def _memory(link):

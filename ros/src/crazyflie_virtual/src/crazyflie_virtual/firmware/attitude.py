@@ -1,17 +1,20 @@
 """Attitude and rate controllers, 500 Hz.
 
 A cascade: errors of the attitude set body rates, errors of the rates set what
-the mixer adds to and takes from the thrust of the motors. Structure and gains
-are those of the Crazyflie 2.1's firmware (2024, controller PID).
+the mixer adds to and takes from the thrust of the motors. The gains are those of
+`crazyflie_model.inner_loops`, which has the loops without the firmware's
+modes, parameters and log variables.
 """
 
+from crazyflie_model.inner_loops import (
+    HEADING,
+    HEADING_RATE,
+    OUTPUT_LIMIT,
+    PERIOD,
+    TILT,
+    TILT_RATE,
+)
 from crazyflie_virtual.firmware.pid import Pid
-
-DT = 0.002
-"""Time between two updates, s."""
-
-_LARGEST = 32767.0
-"""The outputs are 16 bits wide in the firmware, PWM."""
 
 
 def wrap_degrees(angle: float) -> float:
@@ -34,12 +37,12 @@ class AttitudeController:
     """
 
     def __init__(self):
-        self.roll = Pid(6.0, 3.0, 0.0, DT, integral_limit=20.0)
-        self.pitch = Pid(6.0, 3.0, 0.0, DT, integral_limit=20.0)
-        self.yaw = Pid(6.0, 1.0, 0.35, DT, integral_limit=360.0)
-        self.roll_rate = Pid(250.0, 500.0, 2.5, DT, integral_limit=33.3, output_limit=_LARGEST)
-        self.pitch_rate = Pid(250.0, 500.0, 2.5, DT, integral_limit=33.3, output_limit=_LARGEST)
-        self.yaw_rate = Pid(120.0, 16.7, 0.0, DT, integral_limit=166.7, output_limit=_LARGEST)
+        self.roll = Pid(TILT, PERIOD)
+        self.pitch = Pid(TILT, PERIOD)
+        self.yaw = Pid(HEADING, PERIOD)
+        self.roll_rate = Pid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
+        self.pitch_rate = Pid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
+        self.yaw_rate = Pid(HEADING_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
         self.yaw_max_delta = 0.0
 
     def reset(self) -> None:

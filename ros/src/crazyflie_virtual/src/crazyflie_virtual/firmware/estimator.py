@@ -9,8 +9,8 @@ direction of gravity.
 
 import math
 
-from crazyflie_utils.units import GRAVITY
-from crazyflie_virtual.rotations import rotate
+from crazyflie_model.angles import quaternion_from_zyx, rotate, zyx_from_quaternion
+from crazyflie_model.units import GRAVITY
 
 _ACCELERATION_NOISE = 0.5
 """Process noise, m/s^2, held for one step of the position's filter."""
@@ -144,7 +144,7 @@ class Estimator:
             return
         roll = math.atan2(sensors.acc_y, sensors.acc_z)
         pitch = math.asin(max(-1.0, min(1.0, -sensors.acc_x / norm)))
-        level = _quaternion_zyx(roll, pitch, math.radians(e.yaw))
+        level = quaternion_from_zyx(roll, pitch, math.radians(e.yaw))
         if sum(a * b for a, b in zip(level, (e.qx, e.qy, e.qz, e.qw), strict=True)) < 0.0:
             level = tuple(-part for part in level)
         self._blend(*level, dt / _LEVELLING_TIME)
@@ -165,20 +165,5 @@ class Estimator:
 
     def _update_angles(self):
         e = self._estimate
-        x, y, z, w = e.qx, e.qy, e.qz, e.qw
-        degree = 180.0 / math.pi
-        e.roll = degree * math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-        e.pitch = -degree * math.asin(max(-1.0, min(1.0, 2.0 * (w * y - x * z))))
-        e.yaw = degree * math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-
-
-def _quaternion_zyx(roll, pitch, yaw):
-    sr, cr = math.sin(roll / 2.0), math.cos(roll / 2.0)
-    sp, cp = math.sin(pitch / 2.0), math.cos(pitch / 2.0)
-    sy, cy = math.sin(yaw / 2.0), math.cos(yaw / 2.0)
-    return (
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-        cr * cp * cy + sr * sp * sy,
-    )
+        roll, pitch, yaw = zyx_from_quaternion(e.quaternion)
+        e.roll, e.pitch, e.yaw = math.degrees(roll), -math.degrees(pitch), math.degrees(yaw)

@@ -1,5 +1,6 @@
 """The firmware as a whole: all its parts, and the order in which they have their turn."""
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.firmware.commander import Commander
 from crazyflie_virtual.firmware.console import Console
 from crazyflie_virtual.firmware.estimator import Estimator
@@ -76,14 +77,13 @@ class Firmware:
         return round(1000.0 * self.time)
 
     @property
-    def info(self) -> int:
-        """The supervisor's bits, and: high-level commander flies, has finished, is disabled."""
+    def info(self) -> SupervisorState:
+        """What clients are told of supervisor and high-level commander."""
         phase = self.planner.phase
-        return (
-            self.supervisor.bits
-            | (phase in (Phase.FLYING, Phase.LANDING)) << 8
-            | self.planner.is_finished(self.time) << 9
-            | (phase is Phase.DISABLED) << 10
+        return self.supervisor.flags | SupervisorState.of(
+            high_level_active=phase in (Phase.FLYING, Phase.LANDING),
+            trajectory_finished=self.planner.is_finished(self.time),
+            high_level_disabled=phase is Phase.DISABLED,
         )
 
     def step(self, voltage: float) -> tuple:

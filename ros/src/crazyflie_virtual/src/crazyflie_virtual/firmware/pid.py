@@ -1,4 +1,7 @@
-"""A PID controller as the firmware uses them."""
+"""A PID controller as the firmware uses them: with feed-forward, parameters and log variables."""
+
+from crazyflie_model.elementwise import clip
+from crazyflie_model.pid import Gains, terms
 
 
 class Pid:
@@ -6,35 +9,26 @@ class Pid:
 
     Parameters
     ----------
-    kp, ki, kd : float
-        Output per error, per integral of the error, per rate of the measurement.
-    kff : float
-        Output per desired value.
+    gains : Gains
+        To begin with: a client may change them.
     dt : float
         Time between two updates, s.
-    integral_limit : float
-        Of the integral's magnitude, unit of the error times s.
+    kff : float
+        Output per desired value.
     output_limit : float
         Of the output's magnitude; 0 for none.
 
     Attributes
     ----------
+    kp, ki, kd, kff, limit : float
+        Present gains.
     desired, out_p, out_i, out_d, out_ff : float
         Of the last update, for the log.
     """
 
-    def __init__(
-        self,
-        kp: float,
-        ki: float,
-        kd: float,
-        dt: float,
-        kff: float = 0.0,
-        integral_limit: float = 5000.0,
-        output_limit: float = 0.0,
-    ):
-        self.kp, self.ki, self.kd, self.kff = kp, ki, kd, kff
-        self.integral_limit = integral_limit
+    def __init__(self, gains: Gains, dt: float, kff: float = 0.0, output_limit: float = 0.0):
+        self.kp, self.ki, self.kd, self.kff = gains.kp, gains.ki, gains.kd, kff
+        self.limit = gains.limit
         self.output_limit = output_limit
         self._dt = dt
         self._integral = 0.0
@@ -59,17 +53,12 @@ class Pid:
         self.desired = desired
         if error is None:
             error = desired - measured
-        limit = self.integral_limit
-        integral = self._integral + error * self._dt
-        self._integral = integral = -limit if integral < -limit else min(integral, limit)
         slope = 0.0 if self._last is None else (measured - self._last) / self._dt
         self._last = measured
-        self.out_p = self.kp * error
-        self.out_i = self.ki * integral
-        self.out_d = -self.kd * slope
+        self.out_p, self.out_i, self.out_d, self._integral = terms(
+            self, error, self._integral, slope, self._dt
+        )
         self.out_ff = self.kff * desired
         output = self.out_p + self.out_i + self.out_d + self.out_ff
-        limit = self.output_limit
-        if limit > 0.0:
-            return -limit if output < -limit else min(output, limit)
-        return output
+        most = self.output_limit
+        return clip(output, -most, most) if most > 0.0 else output

@@ -4,15 +4,9 @@ import errno
 import math
 from enum import Enum
 
-from crazyflie_virtual.firmware.polynomials import (
-    PIECE_SIZE,
-    Goal,
-    Piece,
-    Trajectory,
-    smooth_piece,
-    straight_piece,
-)
+from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece
 from crazyflie_virtual.firmware.states import ABSOLUTE, Setpoint
+from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece, straight_piece
 
 MEMORY_SIZE = 4096
 """Bytes of the trajectory memory."""
@@ -185,7 +179,7 @@ class Planner:
         offset, count = self._definitions[trajectory_id]
         chunks = (self.memory[offset + i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
         try:
-            pieces = tuple(Piece.unpack(chunk) for chunk in chunks)
+            pieces = tuple(PolynomialPiece.unpack(chunk) for chunk in chunks)
         except ValueError:
             return errno.EINVAL
         trajectory = Trajectory(pieces, time_scale, backwards)

@@ -7,6 +7,8 @@ Crazyflie 2.1's firmware (2024, controller PID).
 
 import math
 
+from crazyflie_model.limits import FULL_PWM
+from crazyflie_model.pid import Gains
 from crazyflie_virtual.firmware.pid import Pid
 from crazyflie_virtual.firmware.states import ABSOLUTE
 
@@ -18,8 +20,6 @@ _OVERHEAD = 1.1
 
 _THRUST_SCALE = 1000.0
 """PWM per unit of the climb controller's output."""
-
-_FULL_THRUST = 65535.0
 
 
 class PositionController:
@@ -43,12 +43,12 @@ class PositionController:
     """
 
     def __init__(self):
-        self.x = Pid(2.0, 0.0, 0.0, DT)
-        self.y = Pid(2.0, 0.0, 0.0, DT)
-        self.z = Pid(2.0, 0.5, 0.0, DT)
-        self.vx = Pid(25.0, 1.0, 0.0, DT)
-        self.vy = Pid(25.0, 1.0, 0.0, DT)
-        self.vz = Pid(25.0, 15.0, 0.0, DT, output_limit=_FULL_THRUST / 2.0 / _THRUST_SCALE)
+        self.x = Pid(Gains(2.0, 0.0, 0.0), DT)
+        self.y = Pid(Gains(2.0, 0.0, 0.0), DT)
+        self.z = Pid(Gains(2.0, 0.5, 0.0), DT)
+        self.vx = Pid(Gains(25.0, 1.0, 0.0), DT)
+        self.vy = Pid(Gains(25.0, 1.0, 0.0), DT)
+        self.vz = Pid(Gains(25.0, 15.0, 0.0), DT, output_limit=FULL_PWM / 2.0 / _THRUST_SCALE)
         self.roll_limit = self.pitch_limit = 20.0
         self.vx_max = self.vy_max = self.vz_max = 1.0
         self.thrust_base = 36000
@@ -90,5 +90,5 @@ class PositionController:
         return (
             max(-self.roll_limit, min(self.roll_limit, roll)),
             max(-self.pitch_limit, min(self.pitch_limit, pitch)),
-            max(self.thrust_min, min(_FULL_THRUST, thrust)),
+            max(self.thrust_min, min(FULL_PWM, thrust)),
         )

@@ -3,8 +3,8 @@
 import math
 import random
 
-from crazyflie_utils.units import GRAVITY
-from crazyflie_virtual.rotations import rotate_back
+from crazyflie_model.angles import rotate_back
+from crazyflie_model.units import GRAVITY
 
 _GYRO_NOISE = 0.1
 """Standard deviation of a sample, deg/s: the BMI088's noise density, 0.014 deg/s/sqrt(Hz)
@@ -79,10 +79,9 @@ class Sensors:
         start = self._next
         self._next = start + 6 if start + 12 <= _NOISE_SAMPLES else (start + 6) % 7
         n = self._noise[start : start + 6]
-        degree = 180.0 / math.pi
-        self.gyro_x = _clip(rates[0] * degree + _GYRO_NOISE * n[0], _GYRO_RANGE)
-        self.gyro_y = _clip(rates[1] * degree + _GYRO_NOISE * n[1], _GYRO_RANGE)
-        self.gyro_z = _clip(rates[2] * degree + _GYRO_NOISE * n[2], _GYRO_RANGE)
+        self.gyro_x = _clip(math.degrees(rates[0]) + _GYRO_NOISE * n[0], _GYRO_RANGE)
+        self.gyro_y = _clip(math.degrees(rates[1]) + _GYRO_NOISE * n[1], _GYRO_RANGE)
+        self.gyro_z = _clip(math.degrees(rates[2]) + _GYRO_NOISE * n[2], _GYRO_RANGE)
         limit, sigma = _ACCELEROMETER_RANGE, _ACCELEROMETER_NOISE
         self.acc_x = _clip(specific_force[0] / GRAVITY + sigma * n[3], limit)
         self.acc_y = _clip(specific_force[1] / GRAVITY + sigma * n[4], limit)

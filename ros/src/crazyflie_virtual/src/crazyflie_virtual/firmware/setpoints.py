@@ -3,12 +3,13 @@
 import math
 import struct
 
+from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_virtual.firmware.commander import NOBODY
 from crazyflie_virtual.firmware.compressed import decompress_quaternion
 from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Setpoint
 
-_LEAST_THRUST, _MOST_THRUST = 1000, 60000
-"""PWM: below the first is no thrust, the second is the most an attitude setpoint can have."""
+_LEAST_THRUST = 1000
+"""Of an attitude setpoint, PWM: less is none."""
 
 _RATE_MODE = 0
 
@@ -57,7 +58,7 @@ class AttitudeDecoder:
             self.is_locked = True
         if thrust == 0:
             self.is_locked = False
-        used = 0.0 if self.is_locked or thrust < _LEAST_THRUST else min(thrust, _MOST_THRUST)
+        used = 0.0 if self.is_locked or thrust < _LEAST_THRUST else min(thrust, MAX_SETPOINT_PWM)
         setpoint = Setpoint(mode_yaw=VELOCITY, yaw_rate=-yaw_rate, thrust=float(used), time=time)
         _set_tilt(setpoint, "roll", roll, self.roll_mode == _RATE_MODE)
         _set_tilt(setpoint, "pitch", pitch, self.pitch_mode == _RATE_MODE)

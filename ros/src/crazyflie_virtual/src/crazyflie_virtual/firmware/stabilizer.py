@@ -2,7 +2,9 @@
 
 import math
 
-from crazyflie_virtual.firmware import attitude, mixer
+from crazyflie_model.angles import zyx_from_quaternion
+from crazyflie_model.inner_loops import PERIOD
+from crazyflie_model.mixer import limit, mix
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
 from crazyflie_virtual.firmware.position import PositionController
 from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Setpoint
@@ -90,14 +92,15 @@ class Stabilizer:
             self._rest(estimate)
         else:
             self._control_attitude(setpoint, estimate, sensors)
-            self.requested = mixer.mix(
-                self.thrust, self.command_roll, self.command_pitch, self.command_yaw
+            # The mixer's pitch is positive nose down.
+            self.requested = tuple(
+                mix(self.thrust, self.command_roll, -self.command_pitch, self.command_yaw)
             )
         override = self.override.commands()
         if override is not None:
             self.requested = override
         idle = float(self.idle_thrust)
-        self.commands = mixer.limit(self.requested, idle) if may_run else _OFF
+        self.commands = tuple(limit(self.requested, idle)) if may_run else _OFF
         return self.commands
 
     def _reset(self, estimate):
@@ -112,17 +115,16 @@ class Stabilizer:
     def _desire_yaw(self, setpoint, estimate):
         if setpoint.mode_yaw == VELOCITY:
             # A commanded yaw rate moves the heading that is held.
-            yaw = self.yaw + setpoint.yaw_rate * attitude.DT
-            limit = self.attitude.yaw_max_delta
-            if limit > 0.0:
+            yaw = self.yaw + setpoint.yaw_rate * PERIOD
+            most = self.attitude.yaw_max_delta
+            if most > 0.0:
                 ahead = wrap_degrees(yaw - estimate.yaw)
-                yaw = estimate.yaw + max(-limit, min(limit, ahead))
+                yaw = estimate.yaw + max(-most, min(most, ahead))
             self.yaw = wrap_degrees(yaw)
         elif setpoint.mode_yaw == ABSOLUTE:
             self.yaw = wrap_degrees(setpoint.yaw)
         elif setpoint.mode_quaternion == ABSOLUTE:
-            x, y, z, w = setpoint.quaternion
-            self.yaw = math.degrees(math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+            self.yaw = math.degrees(zyx_from_quaternion(setpoint.quaternion)[2])
 
     def _desire_tilt(self, setpoint):
         roll, pitch, thrust = self._automatic

@@ -7,10 +7,9 @@ old: it stands on the ground then, and need not be locked.
 
 from enum import Enum
 
+from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.firmware.states import Setpoint
-
-LEVEL_AGE, OFF_AGE = 0.5, 2.0
-"""Age of the setpoint from which a flying vehicle levels out, and from which it falls, s."""
 
 EMERGENCY_WATCHDOG = 1.0
 """How long one message holds off the emergency stop, s, once there has been one."""
@@ -91,23 +90,18 @@ class Supervisor:
         return self.state in _IN_AIR
 
     @property
-    def bits(self) -> int:
-        """The state in bits.
-
-        From bit 0: can be armed, is armed, arms itself, can fly, is flying, has
-        tumbled, is locked, has crashed.
-        """
-        flags = (
-            self.state is State.CHECKED,
-            self.is_armed,
-            self.auto_arm,
-            self.can_fly,
-            self.is_flying,
-            self.is_tumbled,
-            self.state is State.LOCKED,
-            self.is_crashed,
+    def flags(self) -> SupervisorState:
+        """The state as clients are told."""
+        return SupervisorState.of(
+            can_be_armed=self.state is State.CHECKED,
+            armed=self.is_armed,
+            auto_armed=self.auto_arm,
+            can_fly=self.can_fly,
+            flying=self.is_flying,
+            tumbled=self.is_tumbled,
+            locked=self.state is State.LOCKED,
+            crashed=self.is_crashed,
         )
-        return sum(1 << i for i, flag in enumerate(flags) if flag)
 
     def arm(self, do_arm: bool) -> bool:
         """Arm or disarm; return whether that was possible."""

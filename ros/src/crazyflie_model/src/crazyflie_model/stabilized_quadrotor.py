@@ -1,21 +1,25 @@
 """The full vehicle: airframe and inner loops behind the interface of all models."""
 
-from dataclasses import replace
+from collections.abc import Callable, Sequence
 
-from crazyflie_simulator import inner_loops
-from crazyflie_simulator.dynamics import STEP, Dynamics
-from crazyflie_simulator.elementwise import functions, where
-from crazyflie_simulator.quadrotor import (
+from crazyflie_model import inner_loops
+from crazyflie_model.angles import Quaternion, Triple, zyx_from_quaternion
+from crazyflie_model.dynamics import STEP, Dynamics
+from crazyflie_model.elementwise import Number, Vector, where
+from crazyflie_model.quadrotor import (
     BODY_DIM,
     CRAZYFLIE,
+    STILL_AIR,
     Airframe,
     QuadrotorParameters,
-    euler_angles,
 )
-from crazyflie_simulator.wind import STILL_AIR, Wind
-from crazyflie_utils.units import HOVER_PWM
 
 _STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)
+
+
+def still_air(t: float) -> Triple:
+    """Return the velocity of air that does not move, m/s."""
+    return STILL_AIR
 
 
 class StabilizedQuadrotor(Dynamics):
@@ -37,7 +41,8 @@ class StabilizedQuadrotor(Dynamics):
     mass_error, thrust_error : float
         How much more mass and thrust constant the true vehicle has, as a
         fraction of the nominal ones, > -1.
-    wind : Wind
+    wind : callable
+        ``wind(t)``, velocity of the air (3 components) at time t (s), m/s, fixed frame.
     """
 
     x_dim = BODY_DIM + inner_loops.MEMORY_DIM + 4
@@ -47,46 +52,41 @@ class StabilizedQuadrotor(Dynamics):
         parameters: QuadrotorParameters = CRAZYFLIE,
         mass_error: float = 0.0,
         thrust_error: float = 0.0,
-        wind: Wind = STILL_AIR,
+        wind: Callable[[float], Triple] = still_air,
     ):
-        true = replace(
-            parameters,
-            mass=parameters.mass * (1.0 + mass_error),
-            thrust_constant=parameters.thrust_constant * (1.0 + thrust_error),
-        )
-        self.airframe = Airframe(true)
+        self.airframe = Airframe(parameters.with_errors(mass_error, thrust_error))
+        self._nominal = parameters
         self._wind = wind
-        self._speed_squared_per_pwm = parameters.hover_speed**2 / HOVER_PWM
 
-    def initial_state(self, position) -> list:
+    def initial_state(self, position: Sequence[Number]) -> Vector:
         """See `Dynamics.initial_state`; in the air the rotors carry the vehicle."""
         body = self.airframe.initial_state(position)
         return body + inner_loops.initial_memory(0.0) + body[-4:]
 
-    def rates(self, t: float, x: list, u: list) -> list:
+    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
         """See `Dynamics.rates`: of what is continuous; the rest is constant between samples."""
-        body = self.airframe.rates(t, x[:BODY_DIM], [*x[-4:], *self._wind.velocity(t)])
+        body = self.airframe.rates(t, x[:BODY_DIM], [*x[-4:], *self._wind(t)])
         return body + [0.0] * (self.x_dim - BODY_DIM)
 
-    def on_ground(self, x: list) -> list:
+    def on_ground(self, x: Vector) -> Vector:
         """See `Dynamics.on_ground` and `Airframe.on_ground`."""
         return self.airframe.on_ground(x[:BODY_DIM]) + x[BODY_DIM:]
 
-    def pose(self, x: list, u: list) -> tuple:
+    def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:
         """See `Dynamics.pose`."""
         return tuple(x[:3]), tuple(x[6:10])
 
-    def step(self, count: int, x: list, u: list) -> list:
+    def step(self, count: int, x: Vector, u: Vector) -> Vector:
         """See `Dynamics.step`."""
         body, memory, commands = x[:BODY_DIM], x[BODY_DIM:-4], x[-4:]
         if count % _STEPS_PER_SAMPLE == 0:
             memory, commands = self._sample(body, memory, u)
         t = count * STEP
-        body = self.airframe.step(t, body, commands, self._wind.velocity(t), STEP)
+        body = self.airframe.step(t, body, commands, self._wind(t), STEP)
         return body + memory + commands
 
     def _sample(self, body, memory, u):
-        attitude = euler_angles(body[6:10])
+        attitude = zyx_from_quaternion(body[6:10])
         # A real vehicle rocks on its feet until its loops are content. This one
         # stands upright, so its loops rest, or they would wind up.
         standing = body[2] <= 0.0
@@ -94,8 +94,4 @@ class StabilizedQuadrotor(Dynamics):
         memory = [where(standing, a, b) for a, b in zip(resting, memory, strict=True)]
         setpoint = [where(standing, 0.0, part) for part in u[:3]] + [u[3]]
         memory, pwm = inner_loops.update(memory, setpoint, attitude, body[10:13])
-        return memory, [self._rotor_speed(motor) for motor in pwm]
-
-    def _rotor_speed(self, pwm):
-        # The firmware's thrust is linear in its command, through zero.
-        return functions(pwm).sqrt(self._speed_squared_per_pwm * pwm)
+        return memory, [self._nominal.rotor_speed(motor) for motor in pwm]

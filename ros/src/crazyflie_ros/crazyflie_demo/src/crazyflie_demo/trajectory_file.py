@@ -1,4 +1,4 @@
-"""Trajectories made of polynomials of the 7th degree in x, y, z and yaw."""
+"""Files of trajectories made of polynomials, and what these ask of a vehicle."""
 
 import csv
 import math
@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-COEFFICIENTS = 8
-"""Of a polynomial, the constant first."""
+from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
 
 COLUMNS = 1 + 4 * COEFFICIENTS
 """Of a line in a file: duration, then the coefficients of x, y, z and yaw."""
@@ -21,42 +20,7 @@ class TrajectoryError(Exception):
     """A file holds no trajectory that can be flown; the text says where and why."""
 
 
-class Piece(NamedTuple):
-    """One piece.
-
-    Attributes
-    ----------
-    duration : float
-        s, > 0.
-    coefficients : ndarray, shape (4, 8)
-        Of x, y, z (m) and yaw (rad) as polynomials of the time since the piece began (s), the
-        constant first.
-    """
-
-    duration: float
-    coefficients: np.ndarray
-
-    def evaluate(self, time, order: int = 0) -> np.ndarray:
-        """Return x, y, z, yaw, or a derivative of them.
-
-        Parameters
-        ----------
-        time : float or ndarray
-            s since the piece began.
-        order : int
-            Of the derivative by time.
-
-        Returns
-        -------
-        ndarray, shape (4, *time.shape)
-        """
-        polynomials = self.coefficients.T
-        if order:
-            polynomials = np.polynomial.polynomial.polyder(polynomials, order)
-        return np.polynomial.polynomial.polyval(time, polynomials)
-
-
-def load(path) -> list[Piece]:
+def load(path) -> list[PolynomialPiece]:
     """Return the pieces of a trajectory in a CSV file.
 
     Each line is a piece, with `COLUMNS` numbers; a first line without numbers is a
@@ -84,7 +48,8 @@ def load(path) -> list[Piece]:
     if not pieces:
         raise TrajectoryError(f"{path} holds no pieces")
     for number, (one, two) in enumerate(zip(pieces, pieces[1:], strict=False)):
-        gap = np.abs(two.evaluate(0.0) - one.evaluate(one.duration)).max()
+        end, start = one.evaluate(one.duration), two.evaluate(0.0)
+        gap = np.abs(np.subtract((*start.position, start.yaw), (*end.position, end.yaw))).max()
         if gap > _GAP:
             raise TrajectoryError(
                 f"{path}: piece {number + 1} begins {gap:.3g} (m or rad) from where piece "
@@ -108,7 +73,7 @@ def _piece(cells, where):
     duration, *coefficients = map(float, cells)
     if duration <= 0.0:
         raise TrajectoryError(f"{where}: the duration is {duration:g}; expected more than 0 s")
-    return Piece(duration, np.reshape(coefficients, (4, COEFFICIENTS)))
+    return PolynomialPiece(duration, *np.reshape(coefficients, (4, COEFFICIENTS)).tolist())
 
 
 def _is_number(cell):
@@ -118,12 +83,12 @@ def _is_number(cell):
         return False
 
 
-def save(path, pieces: list[Piece]) -> None:
+def save(path, pieces: list[PolynomialPiece]) -> None:
     """Write pieces to a file that `load` reads."""
     names = [f"{axis}^{power}" for axis in ("x", "y", "z", "yaw") for power in range(COEFFICIENTS)]
     lines = [",".join(["duration", *names])]
     for piece in pieces:
-        numbers = [piece.duration, *piece.coefficients.ravel()]
+        numbers = [piece.duration, *(c for axis in piece.axes for c in axis)]
         lines.append(",".join(f"{number:.9g}" for number in numbers))
     Path(path).write_text("\n".join(lines) + "\n")
 
@@ -136,37 +101,12 @@ class Summary(NamedTuple):
     acceleration: float
 
 
-def summary(pieces: list[Piece]) -> Summary:
+def summary(pieces: list[PolynomialPiece]) -> Summary:
     """Return what a trajectory asks of a vehicle, from 100 points a piece."""
     largest = [0.0, 0.0]
     for piece in pieces:
         times = np.linspace(0.0, piece.duration, 100)
-        for order in (1, 2):
-            norms = np.linalg.norm(piece.evaluate(times, order)[:3], axis=0)
-            largest[order - 1] = max(largest[order - 1], float(norms.max()))
+        goal = piece.evaluate(times)
+        for i, vectors in enumerate((goal.velocity, goal.acceleration)):
+            largest[i] = max(largest[i], float(np.linalg.norm(vectors, axis=0).max()))
     return Summary(sum(piece.duration for piece in pieces), *largest)
-
-
-def hermite(start: np.ndarray, end: np.ndarray, duration: float) -> np.ndarray:
-    """Return the polynomial of the 7th degree with given derivatives at both ends.
-
-    Parameters
-    ----------
-    start, end : ndarray, shape (4,)
-        Value and first three derivatives by time.
-    duration : float
-        Time between them, s.
-
-    Returns
-    -------
-    ndarray, shape (8,)
-        Coefficients, the constant first.
-    """
-    rows = []
-    for time in (0.0, duration):
-        for order in range(4):
-            row = np.zeros(COEFFICIENTS)
-            for power in range(order, COEFFICIENTS):
-                row[power] = math.perm(power, order) * time ** (power - order)
-            rows.append(row)
-    return np.linalg.solve(np.array(rows), np.concatenate([start, end]))

@@ -1,22 +1,15 @@
-"""Polynomials against their conditions, numpy's derivatives and cflib's memory layout."""
+"""What the planner flies, against its conditions."""
 
 import math
 
 import numpy as np
 import pytest
-from cflib.crazyflie.mem import Poly4D
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
-from crazyflie_virtual.firmware.polynomials import (
-    PIECE_SIZE,
-    Goal,
-    Piece,
-    Trajectory,
-    smooth_piece,
-    straight_piece,
-)
+from crazyflie_model.polynomials import Goal
+from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece, straight_piece
 
 ZERO = (0.0, 0.0, 0.0)
 NUMBER = st.floats(-3.0, 3.0)
@@ -57,38 +50,6 @@ def test_straight_piece_has_constant_speed(p, end, duration, s):
 def test_the_turn_is_the_shorter_one():
     start = Goal(ZERO, ZERO, ZERO, 3.0, 0.0)
     assert smooth_piece(start, ZERO, -3.0, 1.0).evaluate(1.0).yaw == pytest.approx(2 * math.pi - 3)
-
-
-def random_piece(seed, duration):
-    axes = np.random.default_rng(seed).uniform(-1.0, 1.0, (4, 8))
-    return Piece(tuple(map(tuple, axes.tolist())), duration)
-
-
-def test_evaluation_agrees_with_numpy():
-    piece = random_piece(1, 2.0)
-    goal = piece.evaluate(0.7)
-    for i in range(3):
-        polynomial = Polynomial(piece.axes[i])
-        assert goal.position[i] == pytest.approx(polynomial(0.7))
-        assert goal.velocity[i] == pytest.approx(polynomial.deriv()(0.7))
-        assert goal.acceleration[i] == pytest.approx(polynomial.deriv(2)(0.7))
-    assert goal.yaw_rate == pytest.approx(Polynomial(piece.axes[3]).deriv()(0.7))
-
-
-def test_memory_layout_is_the_clients():
-    piece = random_piece(2, 1.5)
-    uploaded = Poly4D(1.5, *(Poly4D.Poly(list(axis)) for axis in piece.axes)).pack()
-    assert len(uploaded) == PIECE_SIZE
-    assert piece.pack() == bytes(uploaded)
-    np.testing.assert_allclose(Piece.unpack(bytes(uploaded)).axes, piece.axes, rtol=1e-6)
-
-
-@pytest.mark.parametrize("bad", [math.nan, math.inf])
-def test_pieces_that_are_not_finite_are_refused(bad):
-    data = bytearray(random_piece(3, 1.0).pack())
-    data[:4] = np.float32(bad).tobytes()
-    with pytest.raises(ValueError, match="finite"):
-        Piece.unpack(bytes(data))
 
 
 def line(start, end, duration):

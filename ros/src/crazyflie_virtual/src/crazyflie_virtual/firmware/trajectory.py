@@ -1,82 +1,13 @@
-"""Trajectories made of polynomials of the 7th degree in x, y, z and yaw."""
+"""What the high-level commander flies: smooth and straight pieces, and trajectories of pieces."""
 
 import math
-import struct
 from dataclasses import dataclass
-from typing import NamedTuple
 
-PIECE_SIZE = 132
-"""Bytes of a piece in the trajectory memory: 4 times 8 coefficients and the duration, float32."""
-
-_PIECE = struct.Struct("<33f")
+from crazyflie_model.hermite import hermite
+from crazyflie_model.polynomials import Goal, PolynomialPiece
 
 
-class Goal(NamedTuple):
-    """Where a trajectory is at some moment: position (m), velocity, acceleration, heading (rad)."""
-
-    position: tuple
-    velocity: tuple
-    acceleration: tuple
-    yaw: float
-    yaw_rate: float
-
-
-@dataclass(frozen=True)
-class Piece:
-    """One piece of a trajectory.
-
-    Attributes
-    ----------
-    axes : tuple of tuple
-        Coefficients in x, y, z (m) and yaw (rad), lowest power of the time (s) first.
-    duration : float
-        s.
-    """
-
-    axes: tuple
-    duration: float
-
-    @classmethod
-    def unpack(cls, data: bytes) -> "Piece":
-        """Return the piece in `PIECE_SIZE` bytes of trajectory memory.
-
-        Raises
-        ------
-        ValueError
-            It holds numbers that are not finite, or no positive duration.
-        """
-        numbers = _PIECE.unpack(data)
-        if not all(map(math.isfinite, numbers)) or numbers[-1] <= 0.0:
-            raise ValueError("a piece of a trajectory must be finite and last longer than 0 s")
-        return cls(tuple(numbers[i : i + 8] for i in range(0, 32, 8)), numbers[-1])
-
-    def pack(self) -> bytes:
-        """Return the piece as it is in trajectory memory."""
-        return _PIECE.pack(*(c for axis in self.axes for c in axis), self.duration)
-
-    def evaluate(self, time: float) -> Goal:
-        """Return the goal ``time`` (s) after the beginning, which is not limited."""
-        values = [_evaluate(axis, time) for axis in self.axes]
-        return Goal(
-            tuple(value[0] for value in values[:3]),
-            tuple(value[1] for value in values[:3]),
-            tuple(value[2] for value in values[:3]),
-            values[3][0],
-            values[3][1],
-        )
-
-
-def _evaluate(coefficients, t):
-    # Horner's scheme for the value and its first two derivatives.
-    value = first = second = 0.0
-    for c in reversed(coefficients):
-        second = second * t + first
-        first = first * t + value
-        value = value * t + c
-    return value, first, 2.0 * second
-
-
-def smooth_piece(start: Goal, position: tuple, yaw: float, duration: float) -> Piece:
+def smooth_piece(start: Goal, position: tuple, yaw: float, duration: float) -> PolynomialPiece:
     """Return the piece from a goal to rest at a position (m) and heading (rad).
 
     Each axis is the polynomial of the 7th degree that meets position, velocity,
@@ -94,43 +25,25 @@ def smooth_piece(start: Goal, position: tuple, yaw: float, duration: float) -> P
     """
     turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
     axes = [
-        _between(p, v, a, end, duration)
+        hermite((p, v, a, 0.0), (end, 0.0, 0.0, 0.0), duration)
         for p, v, a, end in zip(
-            start.position, start.velocity, start.acceleration, position, strict=True
+            (*start.position, start.yaw),
+            (*start.velocity, start.yaw_rate),
+            (*start.acceleration, 0.0),
+            (*position, start.yaw + turn),
+            strict=True,
         )
     ]
-    axes.append(_between(start.yaw, start.yaw_rate, 0.0, start.yaw + turn, duration))
-    return Piece(tuple(axes), duration)
+    return PolynomialPiece(duration, *axes)
 
 
-def straight_piece(start: Goal, position: tuple, yaw: float, duration: float) -> Piece:
+def straight_piece(start: Goal, position: tuple, yaw: float, duration: float) -> PolynomialPiece:
     """Return the piece that goes there at constant speed; see `smooth_piece`."""
     turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
     ends = (*position, start.yaw + turn)
     starts = (*start.position, start.yaw)
-    axes = tuple(
-        (a, (b - a) / duration, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        for a, b in zip(starts, ends, strict=True)
-    )
-    return Piece(axes, duration)
-
-
-def _between(p, v, a, end, duration):
-    # In units of the duration: what the four highest powers have to add at the
-    # end to value, slope and curvature (the jerk is zero at both ends).
-    v, a = v * duration, a * duration**2
-    h, hv, ha = end - p - v - a / 2.0, -v - a, -a
-    scaled = (
-        p,
-        v,
-        a / 2.0,
-        0.0,
-        35.0 * h - 15.0 * hv + 2.5 * ha,
-        -84.0 * h + 39.0 * hv - 7.0 * ha,
-        70.0 * h - 34.0 * hv + 6.5 * ha,
-        -20.0 * h + 10.0 * hv - 2.0 * ha,
-    )
-    return tuple(c / duration**power for power, c in enumerate(scaled))
+    axes = ((a, (b - a) / duration) for a, b in zip(starts, ends, strict=True))
+    return PolynomialPiece(duration, *axes)
 
 
 @dataclass(frozen=True)
@@ -139,7 +52,7 @@ class Trajectory:
 
     Attributes
     ----------
-    pieces : tuple of Piece
+    pieces : tuple of PolynomialPiece
         At least one.
     time_scale : float
         > 0; 2 is half as fast.

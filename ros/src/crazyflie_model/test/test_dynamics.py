@@ -6,18 +6,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
-from crazyflie_simulator.dynamics import STEP, Coupled7D, NearHover
-from crazyflie_simulator.elementwise import join, split
-from crazyflie_utils.angles import rpy_from_quaternion
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_model.dynamics import STEP, Coupled7D, NearHover, coupled_acceleration
+from crazyflie_model.elementwise import join, split
+from crazyflie_model.units import GRAVITY
 
 MODELS = pytest.mark.parametrize("dynamics", [NearHover(), Coupled7D()], ids=["near", "coupled"])
 
+TILTS = st.floats(-0.5, 0.5)
 STATES = arrays(float, 7, elements=st.floats(-5.0, 5.0))
-CONTROLS = st.tuples(
-    st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3.0, 3.0), st.floats(0.0, 16.0)
-)
+CONTROLS = st.tuples(TILTS, TILTS, st.floats(-3.0, 3.0), st.floats(0.0, 16.0))
 
 
 def flown(dynamics, x, u, duration):
@@ -122,3 +122,23 @@ def test_the_attitude_is_the_control_s_and_the_state_s(dynamics, u, yaw):
     position, quaternion = dynamics.pose([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, yaw], list(u))
     assert position == (1.0, 2.0, 3.0)
     assert rpy_from_quaternion(*quaternion) == pytest.approx((u[0], u[1], yaw), abs=1e-9)
+
+
+@given(TILTS, st.floats(-3.0, 3.0), st.floats(4.0, 16.0))
+def test_pitch_alone_is_a_rotation_of_the_thrust(pitch, yaw, thrust):
+    thrust_axis = (Rotation.from_euler("z", yaw) * Rotation.from_euler("y", pitch)).apply([0, 0, 1])
+    np.testing.assert_allclose(
+        coupled_acceleration((0.0, pitch, 0.0, thrust), yaw),
+        thrust * thrust_axis - [0.0, 0.0, GRAVITY],
+        atol=1e-12,
+    )
+
+
+@given(TILTS, st.floats(-3.0, 3.0), st.floats(4.0, 16.0))
+def test_roll_alone_is_a_rotation_of_the_thrust(roll, yaw, thrust):
+    thrust_axis = (Rotation.from_euler("z", yaw) * Rotation.from_euler("x", roll)).apply([0, 0, 1])
+    np.testing.assert_allclose(
+        coupled_acceleration((roll, 0.0, 0.0, thrust), yaw),
+        thrust * thrust_axis - [0.0, 0.0, GRAVITY],
+        atol=1e-12,
+    )

@@ -3,18 +3,25 @@
 The workspace writes an attitude as roll, pitch, yaw with
 ``R = Rx(roll) Ry(pitch) Rz(yaw)`` (intrinsic X-Y-Z), where ``R`` takes body
 (forward-left-up) coordinates to the fixed frame. This is not the default order
-of tf's helpers, so nodes convert with this module only.
+of tf's helpers, so nodes convert with this module only. Quaternions are
+(x, y, z, w), from body to fixed frame.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+
+from crazyflie_model.elementwise import Number, clip, functions
+
+Triple = tuple[Number, Number, Number]
+Quaternion = tuple[Number, Number, Number, Number]
 
 _SMALLEST_COSINE = 1e-6
 """Of a pitch from which roll and yaw can still be told apart."""
 
 
-def wrap_to_pi(angle: float) -> float:
+def wrap_to_pi(angle: Number) -> Number:
     """Return the angle in [-pi, pi] that points the same way.
 
     Parameters
@@ -31,7 +38,7 @@ def wrap_to_pi(angle: float) -> float:
     return wrapped if wrapped.ndim else float(wrapped)
 
 
-def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> tuple:
+def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Return the quaternion of ``Rx(roll) Ry(pitch) Rz(yaw)``.
 
     Parameters
@@ -56,7 +63,7 @@ def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> tuple:
     )
 
 
-def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> tuple:
+def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> Triple:
     """Return the (roll, pitch, yaw) of a quaternion of any non-zero norm.
 
     With the rotation matrix ``R`` of the quaternion: roll = atan2(-R12, R22),
@@ -95,7 +102,66 @@ def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> tuple:
     return math.atan2(-r12, r22), pitch, math.atan2(-r01, r00)
 
 
-def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple:
+def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple[float, float]:
     """Return the horizontal vector (x, y) turned counter-clockwise by ``yaw`` (rad)."""
     c, s = math.cos(yaw), math.sin(yaw)
     return c * x - s * y, s * x + c * y
+
+
+def zyx_from_quaternion(quaternion: Sequence[Number]) -> Triple:
+    """Return (roll, pitch, yaw) with ``R = Rz(yaw) Ry(pitch) Rx(roll)``, rad.
+
+    This is the order of the firmware, whose roll and pitch are those in the
+    heading frame; messages use that of `rpy_from_quaternion`.
+
+    Parameters
+    ----------
+    quaternion : sequence, 4 components
+        (x, y, z, w), of norm 1; floats, or arrays for many.
+    """
+    x, y, z, w = quaternion
+    f = functions(x)
+    return (
+        f.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+        f.asin(clip(2.0 * (w * y - x * z), -1.0, 1.0)),
+        f.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
+    )
+
+
+def quaternion_from_zyx(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Return the quaternion of ``Rz(yaw) Ry(pitch) Rx(roll)``; see `zyx_from_quaternion`."""
+    sr, cr = math.sin(roll / 2.0), math.cos(roll / 2.0)
+    sp, cp = math.sin(pitch / 2.0), math.cos(pitch / 2.0)
+    sy, cy = math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+    return (
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+        cr * cp * cy + sr * sp * sy,
+    )
+
+
+def rotate(quaternion: Sequence[Number], vector: Sequence[Number]) -> Triple:
+    """Return a vector given in the body frame in the fixed frame.
+
+    Parameters
+    ----------
+    quaternion : sequence, 4 components
+        (x, y, z, w), of norm 1, from body to fixed frame.
+    vector : sequence, 3 components
+    """
+    x, y, z, w = quaternion
+    a, b, c = vector
+    # R v = v + 2 w (u x v) + 2 u x (u x v), with u the quaternion's vector part.
+    p, q, r = y * c - z * b, z * a - x * c, x * b - y * a
+    return (
+        a + 2.0 * (w * p + y * r - z * q),
+        b + 2.0 * (w * q + z * p - x * r),
+        c + 2.0 * (w * r + x * q - y * p),
+    )
+
+
+def rotate_back(quaternion: Sequence[Number], vector: Sequence[Number]) -> Triple:
+    """Return a vector given in the fixed frame in the body frame; inverse of `rotate`."""
+    x, y, z, w = quaternion
+    return rotate((-x, -y, -z, w), vector)

@@ -1,8 +1,7 @@
 """The airframe of a quadrotor: a rigid body with four rotors, without any control.
 
-Frames: fixed (z up) and body (forward-left-up). The rotors are numbered as on
-the Crazyflie, seen from above: 1 front right, 2 back right, 3 back left, 4
-front left; 1 and 3 turn counter-clockwise, 2 and 4 clockwise.
+Frames: fixed (z up) and body (forward-left-up). The rotors are numbered as in
+`mixer`.
 
 State, 17 components: position (3) in m and velocity (3) in m/s in the fixed
 frame, attitude quaternion (x, y, z, w) from body to fixed frame, body rates (3)
@@ -11,14 +10,21 @@ in rad/s, rotor speeds (4) in rad/s. Input, 7 components: commanded rotor speeds
 """
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
-from crazyflie_simulator.elementwise import clip, functions, where
-from crazyflie_simulator.integrators import rk4_step
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.angles import Triple
+from crazyflie_model.elementwise import Number, Vector, clip, functions, where
+from crazyflie_model.integrators import rk4_step
+from crazyflie_model.limits import FULL_PWM
+from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 BODY_DIM = 17
 """Components of the airframe's state."""
+
+STILL_AIR = (0.0, 0.0, 0.0)
+"""No wind, m/s."""
 
 
 @dataclass(frozen=True)
@@ -66,12 +72,32 @@ class QuadrotorParameters:
     drag_horizontal: float = 9.1785e-7
     drag_vertical: float = 10.311e-7
     motor_time_constant: float = -0.002 / math.log(0.9695404)
-    max_rotor_speed: float = (0.2685 * 65535.0 + 4070.3) * math.pi / 30.0
+    max_rotor_speed: float = (0.2685 * FULL_PWM + 4070.3) * math.pi / 30.0
 
-    @property
+    @cached_property
     def hover_speed(self) -> float:
         """Speed of all four rotors at which they carry the vehicle, rad/s."""
         return math.sqrt(self.mass * GRAVITY / (4.0 * self.thrust_constant))
+
+    @cached_property
+    def _speed_squared_per_pwm(self):
+        return self.hover_speed**2 / HOVER_PWM
+
+    def rotor_speed(self, pwm: Number) -> Number:
+        """Return the speed (rad/s) that a motor command (PWM) asks for.
+
+        Thrust, which goes with the square of the speed, is linear in the
+        command, through zero; `HOVER_PWM` hovers.
+        """
+        return functions(pwm).sqrt(self._speed_squared_per_pwm * pwm)
+
+    def with_errors(self, mass_error: float, thrust_error: float) -> "QuadrotorParameters":
+        """Return a vehicle with more mass and thrust constant, as fractions > -1 of these."""
+        return replace(
+            self,
+            mass=self.mass * (1.0 + mass_error),
+            thrust_constant=self.thrust_constant * (1.0 + thrust_error),
+        )
 
 
 CRAZYFLIE = QuadrotorParameters()
@@ -93,7 +119,7 @@ class Airframe:
     def __init__(self, parameters: QuadrotorParameters):
         self.parameters = parameters
 
-    def initial_state(self, position) -> list:
+    def initial_state(self, position: Sequence[Number]) -> Vector:
         """Return the state at rest and level, heading along x.
 
         On the ground the rotors stand still; in the air they carry the vehicle.
@@ -102,7 +128,7 @@ class Airframe:
         speed = where(z > 0.0, self.parameters.hover_speed, 0.0)
         return [x, y, z] + [0.0] * 6 + [1.0] + [0.0] * 3 + [speed] * 4
 
-    def wrench(self, rotor_speeds) -> tuple:
+    def wrench(self, rotor_speeds: Sequence[Number]) -> tuple[Number, Number, Number, Number]:
         """Return thrust (N) and torque about forward, left and up (N m) of the rotors."""
         parameters = self.parameters
         w1, w2, w3, w4 = rotor_speeds
@@ -116,7 +142,7 @@ class Airframe:
             parameters.torque_per_thrust * (f2 + f4 - f1 - f3),
         )
 
-    def rates(self, t: float, x: list, u: list) -> list:
+    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
         """Return the time derivative of the state; see the module for x and u."""
         parameters = self.parameters
         _, _, _, vx, vy, vz, qx, qy, qz, qw, p, q, r, w1, w2, w3, w4 = x
@@ -157,7 +183,7 @@ class Airframe:
             lag * (c4 - w4),
         ]
 
-    def step(self, t: float, x: list, rotor_speeds: list, wind: tuple, dt: float) -> list:
+    def step(self, t: float, x: Vector, rotor_speeds: Vector, wind: Triple, dt: float) -> Vector:
         """Return the state one step later, with the quaternion of norm 1, on or above ground.
 
         Parameters
@@ -180,7 +206,7 @@ class Airframe:
         x[6:10] = qx / norm, qy / norm, qz / norm, qw / norm
         return self.on_ground(x)
 
-    def on_ground(self, x: list) -> list:
+    def on_ground(self, x: Vector) -> Vector:
         """Return the state with the ground, z = 0, taken into account.
 
         A vehicle that is not above the ground stands on it, upright and still;
@@ -198,23 +224,3 @@ class Airframe:
         climb = where(x[5] > 0.0, x[5], 0.0)
         standing = [x[0], x[1], 0.0, 0.0, 0.0, climb, *upright, 0.0, 0.0, 0.0, *x[13:]]
         return [where(on_ground, after, before) for after, before in zip(standing, x, strict=True)]
-
-
-def euler_angles(quaternion) -> tuple:
-    """Return (roll, pitch, yaw) with ``R = Rz(yaw) Ry(pitch) Rx(roll)``, rad.
-
-    This is the order of the firmware, whose roll and pitch are those in the
-    heading frame; messages use the order of `crazyflie_utils.angles`.
-
-    Parameters
-    ----------
-    quaternion : sequence, 4 components
-        (x, y, z, w), of norm 1.
-    """
-    x, y, z, w = quaternion
-    f = functions(x)
-    return (
-        f.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-        f.asin(clip(2.0 * (w * y - x * z), -1.0, 1.0)),
-        f.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
-    )

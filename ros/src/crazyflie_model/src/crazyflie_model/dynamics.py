@@ -6,13 +6,15 @@ and rad. Control u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from crazyflie_simulator.elementwise import functions, join, split, where
-from crazyflie_simulator.integrators import rk4_step
-from crazyflie_utils.angles import quaternion_from_rpy
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
+from crazyflie_model.elementwise import Number, Vector, functions, join, split, where
+from crazyflie_model.integrators import rk4_step
+from crazyflie_model.units import GRAVITY
 
 STEP = 0.001
 """Integration step of every model, s."""
@@ -29,11 +31,11 @@ class Dynamics(ABC):
     u_dim: int = 4
 
     @abstractmethod
-    def initial_state(self, position) -> list:
+    def initial_state(self, position: Sequence[Number]) -> Vector:
         """Return the state at rest at a position, three components in m."""
 
     @abstractmethod
-    def rates(self, t: float, x: list, u: list) -> list:
+    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
         """Return the time derivative of every component of the state.
 
         Parameters
@@ -45,17 +47,17 @@ class Dynamics(ABC):
         """
 
     @abstractmethod
-    def on_ground(self, x: list) -> list:
+    def on_ground(self, x: Vector) -> Vector:
         """Return the state with the ground, z = 0, taken into account.
 
         A vehicle below the ground is put on it and loses its downward speed.
         """
 
     @abstractmethod
-    def pose(self, x: list, u: list) -> tuple:
+    def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:
         """Return the position, in m, and the quaternion (x, y, z, w) of one vehicle."""
 
-    def step(self, count: int, x: list, u: list) -> list:
+    def step(self, count: int, x: Vector, u: Vector) -> Vector:
         """Return the state one `STEP` later.
 
         Parameters
@@ -67,7 +69,7 @@ class Dynamics(ABC):
         """
         return self.on_ground(rk4_step(self.rates, count * STEP, x, u, STEP))
 
-    def derivative(self, t: float, x, u) -> np.ndarray:
+    def derivative(self, t: float, x: ArrayLike, u: ArrayLike) -> np.ndarray:
         """Return the time derivative of states as arrays.
 
         Parameters
@@ -89,12 +91,12 @@ class SevenDimensional(Dynamics):
 
     x_dim = 7
 
-    def initial_state(self, position) -> list:
+    def initial_state(self, position: Sequence[Number]) -> Vector:
         """See `Dynamics.initial_state`; yaw is 0."""
         x, y, z = position
         return [x, y, z, 0.0, 0.0, 0.0, 0.0]
 
-    def on_ground(self, x: list) -> list:
+    def on_ground(self, x: Vector) -> Vector:
         """See `Dynamics.on_ground`."""
         x, y, z, x_dot, y_dot, z_dot, yaw = x
         below = z <= 0.0
@@ -102,7 +104,7 @@ class SevenDimensional(Dynamics):
         z_dot = where(below & (z_dot < 0.0), 0.0, z_dot)
         return [x, y, z, x_dot, y_dot, z_dot, yaw]
 
-    def pose(self, x: list, u: list) -> tuple:
+    def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:
         """See `Dynamics.pose`: roll and pitch are those of the control, yaw is the state's."""
         return tuple(x[:3]), quaternion_from_rpy(u[0], u[1], x[6])
 
@@ -110,7 +112,7 @@ class SevenDimensional(Dynamics):
 class NearHover(SevenDimensional):
     """Small angles about hover, yaw kept apart: tilt does not cost lift."""
 
-    def rates(self, t: float, x: list, u: list) -> list:
+    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
         """See `Dynamics.rates`.
 
         x_ddot = g tan(pitch), y_ddot = -g tan(roll), z_ddot = thrust - g, and
@@ -129,7 +131,7 @@ class NearHover(SevenDimensional):
             yaw_dot,
         ]
 
-    def step(self, count: int, x: list, u: list) -> list:
+    def step(self, count: int, x: Vector, u: Vector) -> Vector:
         """See `Dynamics.step`: exact, as acceleration and yaw rate are constant, and quick."""
         px, py, pz, _, _, _, yaw = x
         vx, vy, vz, ax, ay, az, yaw_dot = self.rates(count * STEP, x, u)
@@ -150,26 +152,30 @@ class NearHover(SevenDimensional):
 class Coupled7D(SevenDimensional):
     """Tilt in the heading frame, and at the cost of lift: thrust, tilt and yaw are coupled."""
 
-    def rates(self, t: float, x: list, u: list) -> list:
-        """See `Dynamics.rates`.
+    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
+        """See `Dynamics.rates` and `coupled_acceleration`; the yaw rate is commanded."""
+        return [*x[3:6], *coupled_acceleration(u, x[6]), u[2]]
 
-        With T = thrust: x_ddot = T (sin(pitch) cos(yaw) + sin(roll) sin(yaw)),
-        y_ddot = T (-sin(roll) cos(yaw) + sin(pitch) sin(yaw)),
-        z_ddot = T cos(roll) cos(pitch) - g, and the yaw rate is commanded.
-        """
-        _, _, _, x_dot, y_dot, z_dot, yaw = x
-        roll, pitch, yaw_dot, thrust = u
-        trigonometry = functions(roll)
-        forward = thrust * trigonometry.sin(pitch)
-        right = thrust * trigonometry.sin(roll)
-        lift = thrust * trigonometry.cos(roll) * trigonometry.cos(pitch)
-        c, s = functions(yaw).cos(yaw), functions(yaw).sin(yaw)
-        return [
-            x_dot,
-            y_dot,
-            z_dot,
-            forward * c + right * s,
-            forward * s - right * c,
-            lift - GRAVITY,
-            yaw_dot,
-        ]
+
+def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector:
+    """Return the acceleration, m/s^2, fixed frame, of a vehicle that follows a control at once.
+
+    The thrust T, tilted by roll and pitch about the heading, and gravity:
+    x_ddot = T (sin(pitch) cos(yaw) + sin(roll) sin(yaw)),
+    y_ddot = T (-sin(roll) cos(yaw) + sin(pitch) sin(yaw)),
+    z_ddot = T cos(roll) cos(pitch) - g.
+
+    Parameters
+    ----------
+    u : sequence, 4 components
+        Control; the yaw rate is of no consequence.
+    yaw : float or ndarray
+        rad.
+    """
+    roll, pitch, _, thrust = u
+    trigonometry = functions(roll)
+    forward = thrust * trigonometry.sin(pitch)
+    right = thrust * trigonometry.sin(roll)
+    lift = thrust * trigonometry.cos(roll) * trigonometry.cos(pitch)
+    c, s = functions(yaw).cos(yaw), functions(yaw).sin(yaw)
+    return [forward * c + right * s, forward * s - right * c, lift - GRAVITY]

@@ -7,12 +7,20 @@ two is in this module.
 """
 
 import math
-from types import SimpleNamespace
+from collections.abc import Sequence
+from types import ModuleType, SimpleNamespace
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+Number = float | np.ndarray
+"""A component: of one vehicle, or of many."""
+
+Vector = list[Number]
+"""The components of a state, a control or a vector."""
 
 
-def split(vectors) -> list:
+def split(vectors: ArrayLike) -> Vector:
     """Return the components of a vector, or of vectors along the last axis.
 
     Parameters
@@ -28,7 +36,7 @@ def split(vectors) -> list:
     return vectors.tolist() if vectors.ndim == 1 else list(np.moveaxis(vectors, -1, 0))
 
 
-def join(components) -> np.ndarray:
+def join(components: Sequence[Number]) -> np.ndarray:
     """Return components as one array, shape (m,) or (..., m); inverse of `split`."""
     return np.stack(np.broadcast_arrays(*components), axis=-1)
 
@@ -45,19 +53,19 @@ _NUMPY = SimpleNamespace(
 """numpy by math's names, which numpy itself knows since version 2 only."""
 
 
-def functions(value):
+def functions(value: Number) -> ModuleType | SimpleNamespace:
     """Return math, or numpy under the same names, whose sin, cos, ... take ``value``."""
     return math if isinstance(value, float) else _NUMPY
 
 
-def where(condition, value, other):
+def where(condition: bool | np.ndarray, value: Number, other: Number) -> Number:
     """Return ``value`` where a condition, bool or array of bool, holds, else ``other``."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, value, other)
     return value if condition else other
 
 
-def clip(value, low: float, high: float):
+def clip(value: Number, low: float, high: float) -> Number:
     """Return ``value`` limited to [low, high]."""
     if isinstance(value, np.ndarray):
         return np.clip(value, low, high)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
-from crazyflie_simulator.elementwise import clip, functions, join, split, where
+from crazyflie_model.elementwise import clip, functions, join, split, where
 
 NUMBERS = st.floats(-1e6, 1e6)
 

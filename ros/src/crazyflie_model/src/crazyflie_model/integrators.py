@@ -2,8 +2,12 @@
 
 from collections.abc import Callable
 
+from crazyflie_model.elementwise import Vector
 
-def rk4_step(rates: Callable, t: float, x: list, u: list, dt: float) -> list:
+Rates = Callable[[float, Vector, Vector], Vector]
+
+
+def rk4_step(rates: Rates, t: float, x: Vector, u: Vector, dt: float) -> Vector:
     """Return the state one classical Runge-Kutta step (4th order) later.
 
     Parameters

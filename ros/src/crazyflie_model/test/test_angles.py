@@ -4,15 +4,19 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from crazyflie_utils.angles import (
+from crazyflie_model.angles import (
     quaternion_from_rpy,
+    quaternion_from_zyx,
+    rotate,
+    rotate_back,
     rotate_by_yaw,
     rpy_from_quaternion,
     wrap_to_pi,
+    zyx_from_quaternion,
 )
 
 ANGLE = st.floats(-math.pi, math.pi)
@@ -110,3 +114,28 @@ def test_rotation_by_yaw_is_scipys(x, y, yaw):
 @given(FINITE, FINITE, ANGLE)
 def test_rotation_by_yaw_is_undone(x, y, yaw):
     assert rotate_by_yaw(*rotate_by_yaw(x, y, yaw), -yaw) == pytest.approx((x, y), abs=1e-6)
+
+
+UNITS = st.tuples(*[st.floats(-1.0, 1.0)] * 4).map(np.array)
+QUATERNIONS = UNITS.filter(lambda q: np.linalg.norm(q) > 0.1).map(
+    lambda q: (q / np.linalg.norm(q)).tolist()
+)
+
+
+@given(QUATERNIONS)
+def test_the_firmware_s_angles(quaternion):
+    roll, pitch, yaw = zyx_from_quaternion(quaternion)
+    # Nose straight up or down, roll and yaw are not unique.
+    assume(abs(math.sin(pitch)) < 0.999)
+    assert same_rotation(Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_quat(), quaternion)
+    assert same_rotation(quaternion_from_zyx(roll, pitch, yaw), quaternion)
+
+
+@given(QUATERNIONS, st.tuples(*[st.floats(-10.0, 10.0)] * 3))
+def test_rotated_vectors(quaternion, vector):
+    np.testing.assert_allclose(
+        rotate(quaternion, vector), Rotation.from_quat(quaternion).apply(vector), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        rotate_back(quaternion, rotate(quaternion, vector)), vector, atol=1e-12
+    )

@@ -5,14 +5,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from crazyflie_simulator.elementwise import join, split
-from crazyflie_simulator.quadrotor import CRAZYFLIE, Airframe, euler_angles
-from crazyflie_utils.units import GRAVITY
+from crazyflie_model.elementwise import join, split
+from crazyflie_model.quadrotor import CRAZYFLIE, Airframe
+from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 AIRFRAME = Airframe(CRAZYFLIE)
 STILL_AIR = (0.0, 0.0, 0.0)
@@ -208,15 +208,18 @@ def test_batches_fly_like_single_vehicles():
     np.testing.assert_allclose(batch, singly, rtol=1e-12, atol=1e-15)
 
 
-@given(quaternion=QUATERNIONS)
-def test_euler_angles_are_the_firmware_s(quaternion):
-    roll, pitch, yaw = euler_angles(split(quaternion))
-    # Nose straight up or down, roll and yaw are not unique.
-    assume(abs(np.sin(pitch)) < 0.999)
-    again = Rotation.from_euler("ZYX", [yaw, pitch, roll])
-    assert (again.inv() * Rotation.from_quat(quaternion)).magnitude() < 1e-6
-
-
 def test_parameters_cannot_be_changed_by_accident():
     with pytest.raises(dataclasses.FrozenInstanceError):
         CRAZYFLIE.mass = 1.0
+
+
+def test_motor_commands_are_thrust():
+    assert CRAZYFLIE.rotor_speed(HOVER_PWM) == pytest.approx(CRAZYFLIE.hover_speed)
+    speeds = CRAZYFLIE.rotor_speed(np.array([0.0, 0.25 * HOVER_PWM, HOVER_PWM]))
+    np.testing.assert_allclose(speeds, CRAZYFLIE.hover_speed * np.array([0.0, 0.5, 1.0]))
+
+
+def test_a_vehicle_with_errors_hovers_with_other_thrust():
+    other = CRAZYFLIE.with_errors(0.1, -0.05)
+    thrust = 4.0 * other.thrust_constant * CRAZYFLIE.hover_speed**2 / other.mass
+    assert thrust == pytest.approx(GRAVITY * 0.95 / 1.1)

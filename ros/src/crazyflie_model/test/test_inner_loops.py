@@ -1,16 +1,13 @@
-"""The attitude and rate loops, and the mixing."""
+"""The attitude and rate loops."""
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
-from crazyflie_simulator import inner_loops
-from crazyflie_simulator.elementwise import join, split
-from crazyflie_utils.units import GRAVITY, HOVER_PWM
+from crazyflie_model import inner_loops
+from crazyflie_model.elementwise import join, split
+from crazyflie_model.units import GRAVITY, HOVER_PWM
 
 LEVEL = (0.0, 0.0, 0.0)
-OUTPUTS = st.tuples(*[st.floats(-40000.0, 40000.0)] * 3)
 
 
 def commands(setpoint, attitude=LEVEL, rates=LEVEL):
@@ -76,23 +73,6 @@ def test_the_heading_is_held_the_short_way_round():
     _, motors = inner_loops.update(memory, [0.0, 0.0, 0.0, GRAVITY], (0.0, 0.0, -3.1), LEVEL)
     # The vehicle is 0.083 rad past the heading: it turns back, clockwise.
     assert motors[0] > HOVER_PWM > motors[1]
-
-
-@given(thrust=st.floats(0.0, 16.0), outputs=OUTPUTS)
-def test_motors_are_never_asked_for_what_they_cannot_do(thrust, outputs):
-    motors = inner_loops.mix(thrust, *outputs)
-    assert all(0.0 <= motor <= inner_loops.FULL_PWM for motor in motors)
-
-
-@given(thrust=st.floats(9.0, 16.0), outputs=st.tuples(*[st.floats(-5000.0, 5000.0)] * 3))
-def test_attitude_comes_before_height(thrust, outputs):
-    m1, m2, m3, m4 = inner_loops.mix(thrust, *outputs)
-    np.testing.assert_allclose(
-        [m3 + m4 - m1 - m2, m2 + m3 - m1 - m4, m2 + m4 - m1 - m3],
-        [2.0 * outputs[0], 2.0 * outputs[1], 4.0 * outputs[2]],
-        atol=1e-6,
-    )
-    assert (m1 + m2 + m3 + m4) / 4.0 <= HOVER_PWM * thrust / GRAVITY + 1e-6
 
 
 def test_batches_are_like_single_vehicles():

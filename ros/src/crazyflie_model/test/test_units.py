@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils.units import GRAVITY, HOVER_PWM, pwm_from_thrust, thrust_from_pwm
+from crazyflie_model.units import GRAVITY, HOVER_PWM, pwm_from_thrust, thrust_from_pwm
 
 
 def test_hover():

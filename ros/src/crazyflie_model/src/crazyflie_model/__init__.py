@@ -1,0 +1,1 @@
+"""What a Crazyflie is, without ROS: constants, limits, conventions, dynamics, inner loops."""

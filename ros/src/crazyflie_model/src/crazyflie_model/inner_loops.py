@@ -1,0 +1,116 @@
+"""The inner loops of the vehicle: attitude and rates, as the firmware has them.
+
+Cascaded PID controllers at 500 Hz. Structure and gains are those of the
+Crazyflie 2.1's firmware (2022 to 2024, controller "PID"): a controller of the
+attitude sets body rates, one of the rates sets what is added to and subtracted
+from the thrust of the four motors. A commanded yaw rate moves the heading that
+is held.
+
+The gains are in the firmware's degrees; `update` has angles in radians and,
+unlike the firmware, positive pitch is nose down (accelerates forward).
+"""
+
+import math
+from dataclasses import replace
+
+from crazyflie_model.angles import Triple
+from crazyflie_model.elementwise import Number, Vector, clip, functions, where
+from crazyflie_model.mixer import limit, mix
+from crazyflie_model.pid import Gains, terms
+from crazyflie_model.units import pwm_from_thrust
+
+PERIOD = 0.002
+"""Time between two samples, s."""
+
+OUTPUT_LIMIT = 32767.0
+"""Largest output of a rate controller, PWM: 16 bits in the firmware."""
+
+TILT = Gains(6.0, 3.0, 0.0, 20.0)
+"""Roll and pitch, deg, to body rates, deg/s."""
+
+HEADING = Gains(6.0, 1.0, 0.35, 360.0)
+"""Yaw, deg, to body rate, deg/s."""
+
+TILT_RATE = Gains(250.0, 500.0, 2.5, 33.3)
+"""Rates about forward and left, deg/s, to PWM."""
+
+HEADING_RATE = Gains(120.0, 16.7, 0.0, 166.7)
+"""Rate about up, deg/s, to PWM."""
+
+MEMORY_DIM = 9
+"""What the loops remember: integrals of the attitude errors (3), of the rate
+errors (3), last body rates about forward and left (2), heading that is held."""
+
+_DEGREE = math.pi / 180.0
+
+
+def _from_rad_to_rad(gains):
+    return replace(gains, limit=gains.limit * _DEGREE)
+
+
+def _from_rad_to_pwm(gains):
+    kp, ki, kd = (gain / _DEGREE for gain in (gains.kp, gains.ki, gains.kd))
+    return Gains(kp, ki, kd, gains.limit * _DEGREE)
+
+
+_TILT, _HEADING = map(_from_rad_to_rad, (TILT, HEADING))
+_TILT_RATE, _HEADING_RATE = map(_from_rad_to_pwm, (TILT_RATE, HEADING_RATE))
+
+
+def initial_memory(yaw: Number) -> Vector:
+    """Return the memory of loops that begin at a heading ``yaw`` (rad), at rest."""
+    return [0.0] * (MEMORY_DIM - 1) + [yaw]
+
+
+def update(
+    memory: Vector, setpoint: Vector, attitude: Triple, rates: Vector
+) -> tuple[Vector, Vector]:
+    """Return memory and motor commands after one sample.
+
+    Without thrust the motors are off and the loops begin anew.
+
+    Parameters
+    ----------
+    memory : list, 9 components
+        What was returned `PERIOD` ago.
+    setpoint : list, 4 components
+        Roll, pitch in rad, yaw rate in rad/s, thrust in m/s^2.
+    attitude : tuple, 3 components
+        Roll, pitch, yaw of `angles.zyx_from_quaternion`, rad.
+    rates : list, 3 components
+        Body rates, rad/s.
+
+    Returns
+    -------
+    tuple of Vector
+        Memory, 9 components, and the commands of motors 1 to 4, PWM.
+    """
+    roll_i, pitch_i, yaw_i, p_i, q_i, r_i, p_before, q_before, heading = memory
+    roll_set, pitch_set, yaw_dot_set, thrust = setpoint
+    roll, pitch, yaw = attitude
+    p, q, r = rates
+
+    heading = heading + yaw_dot_set * PERIOD
+    ahead = heading - yaw
+    f = functions(ahead)
+    yaw_error = f.atan2(f.sin(ahead), f.cos(ahead))
+
+    p_set, roll_i = _output(_TILT, roll_set - roll, roll_i, p)
+    q_set, pitch_i = _output(_TILT, pitch_set - pitch, pitch_i, q)
+    r_set, yaw_i = _output(_HEADING, yaw_error, yaw_i, r)
+    about_x, p_i = _output(_TILT_RATE, p_set - p, p_i, (p - p_before) / PERIOD)
+    about_y, q_i = _output(_TILT_RATE, q_set - q, q_i, (q - q_before) / PERIOD)
+    about_z, r_i = _output(_HEADING_RATE, r_set - r, r_i, 0.0)
+
+    on = thrust > 0.0
+    outputs = [clip(about, -OUTPUT_LIMIT, OUTPUT_LIMIT) for about in (about_x, about_y, about_z)]
+    motors = limit(mix(pwm_from_thrust(thrust), *outputs))
+    commands = [where(on, motor, 0.0) for motor in motors]
+    running = [roll_i, pitch_i, yaw_i, p_i, q_i, r_i, p, q, heading]
+    reset = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, p, q, yaw]
+    return [where(on, a, b) for a, b in zip(running, reset, strict=True)], commands
+
+
+def _output(gains, error, integral, slope):
+    p, i, d, integral = terms(gains, error, integral, slope, PERIOD)
+    return p + i + d, integral

@@ -1,0 +1,50 @@
+"""The PID controller of which all the firmware's controllers are made."""
+
+from dataclasses import dataclass
+
+from crazyflie_model.elementwise import Number, clip
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains of a PID controller whose derivative is that of the measurement.
+
+    Attributes
+    ----------
+    kp, ki, kd : float
+        Output per error, per integral of the error, per rate of change of the measurement.
+    limit : float
+        Of the integral's magnitude, unit of the error times s. The default is the firmware's.
+    """
+
+    kp: float
+    ki: float
+    kd: float
+    limit: float = 5000.0
+
+
+def terms(
+    gains: Gains, error: Number, integral: Number, slope: Number, dt: float
+) -> tuple[Number, Number, Number, Number]:
+    """Return the proportional, integral and derivative part of the output, and the integral.
+
+    Parameters
+    ----------
+    gains : Gains
+        Or any object with its attributes.
+    error : float or ndarray
+        Desired minus measured value.
+    integral : float or ndarray
+        Of the error, as returned by the last update.
+    slope : float or ndarray
+        Rate of change of the measurement.
+    dt : float
+        Time between two updates, s.
+
+    Returns
+    -------
+    tuple of float or ndarray
+        The output is the sum of the first three.
+    """
+    integral = clip(integral + error * dt, -gains.limit, gains.limit)
+    return gains.kp * error, gains.ki * integral, -gains.kd * slope, integral

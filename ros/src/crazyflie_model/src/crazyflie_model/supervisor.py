@@ -1,0 +1,36 @@
+"""What the firmware's supervisor says of a vehicle."""
+
+import enum
+
+
+class SupervisorState(enum.IntFlag):
+    """State of the vehicle; also the log variable supervisor.info.
+
+    The last three are the high-level commander's (supervisor.c of the firmware).
+    """
+
+    CAN_BE_ARMED = 1 << 0
+    ARMED = 1 << 1
+    AUTO_ARMED = 1 << 2
+    CAN_FLY = 1 << 3
+    FLYING = 1 << 4
+    TUMBLED = 1 << 5
+    LOCKED = 1 << 6
+    CRASHED = 1 << 7
+    HIGH_LEVEL_ACTIVE = 1 << 8
+    TRAJECTORY_FINISHED = 1 << 9
+    HIGH_LEVEL_DISABLED = 1 << 10
+
+    @classmethod
+    def of(cls, **flags: bool) -> "SupervisorState":
+        """Return the state in which the flags hold that are true; names in small letters."""
+        state = cls(0)
+        for name, holds in flags.items():
+            if holds:
+                state |= cls[name.upper()]
+        return state
+
+    def words(self) -> str:
+        """Return the state in words, such as "armed, flying"."""
+        names = [flag.name.lower().replace("_", " ") for flag in SupervisorState if flag in self]
+        return ", ".join(names) or "nothing"

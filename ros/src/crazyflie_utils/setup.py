@@ -3,4 +3,6 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["crazyflie_utils"], package_dir={"": "src"}))
+PACKAGES = ["crazyflie_utils", "crazyflie_utils.testing"]
+
+setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_simulator.dynamics import STEP
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.units import GRAVITY
 from yaw_lag.dynamics import YawLag
 from yaw_lag.gains import TIME_CONSTANT, design, linear_model

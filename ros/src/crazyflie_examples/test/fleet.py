@@ -2,7 +2,7 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.pilot import Pilot
 from crazyflie_utils.runner import ros_process
 
 

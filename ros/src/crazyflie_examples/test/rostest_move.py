@@ -6,8 +6,8 @@ import pytest
 import rospy
 from std_srvs.srv import Empty
 
-from crazyflie_examples.flight_record import GROUND_TOLERANCE
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.flight_record import GROUND_TOLERANCE
+from crazyflie_dev.pilot import Pilot
 from crazyflie_utils.runner import ros_process
 
 POINTS = [(0.4, 0.0, 1.0), (0.4, 0.3, 1.3), (-0.2, 0.0, 0.6)]

@@ -7,7 +7,7 @@ import rosgraph
 import rospy
 import rosservice
 
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.pilot import Pilot
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils.runner import ros_process
 

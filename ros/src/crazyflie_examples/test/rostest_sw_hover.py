@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import rospy
 
-from crazyflie_examples.flight_report import FlightReport
-from crazyflie_examples.pilot import FlightError, Pilot
+from crazyflie_dev.flight_report import FlightReport
+from crazyflie_dev.pilot import FlightError, Pilot
 from crazyflie_utils.runner import ros_process
 from crazyflie_utils.units import GRAVITY
 

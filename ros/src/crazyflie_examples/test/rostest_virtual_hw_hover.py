@@ -2,8 +2,8 @@
 
 import pytest
 
-from crazyflie_examples.flight_report import TOUCHDOWN_LIMIT
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.flight_report import TOUCHDOWN_LIMIT
+from crazyflie_dev.pilot import Pilot
 from crazyflie_utils.runner import ros_process
 
 HOVER = (0.0, 0.0, 1.0)

@@ -7,9 +7,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from crazyflie_examples.flight_report import FlightReport
-from crazyflie_examples.launching import launched
-from crazyflie_examples.pilot import FlightError, Pilot
+from crazyflie_dev.flight_report import FlightReport
+from crazyflie_dev.launching import launched
+from crazyflie_dev.pilot import FlightError, Pilot
 from crazyflie_utils import runner
 
 HOVER = (0.0, 0.0, 1.0)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from crazyflie_examples.flight_report import HOVER_TOLERANCE, FlightReport
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.flight_report import HOVER_TOLERANCE, FlightReport
+from crazyflie_dev.pilot import Pilot
 from crazyflie_utils.runner import ros_process
 from crazyflie_utils.units import GRAVITY
 

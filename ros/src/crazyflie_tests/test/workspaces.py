@@ -6,7 +6,7 @@ from pathlib import Path
 
 from terminal import Terminal
 
-from crazyflie_examples.launching import free_port
+from crazyflie_dev.launching import free_port
 
 TOP = Path(__file__).resolve().parents[4]
 """Top of the repository."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_utils.angles import quaternion_from_rpy
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.transforms import TransformError
 
 

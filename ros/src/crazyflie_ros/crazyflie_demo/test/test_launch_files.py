@@ -9,7 +9,7 @@ import pytest
 import rospkg
 from roslaunch.config import load_config_default
 
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from mocap_optitrack.mocap_node import MocapNode
 
 PACKAGE = Path(__file__).parents[1]

@@ -2,11 +2,11 @@
 
 import pytest
 
+from crazyflie_dev.fake_vehicle import READ_ONLY, FakeVehicle
 from crazyflie_driver.msg import LogBlock
 from crazyflie_driver.server_node import CrazyflieServerNode
 from crazyflie_driver.srv import AddCrazyflieRequest, RemoveCrazyflieRequest
-from crazyflie_py.fake import READ_ONLY, FakeVehicle
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 LIMIT = 5.0
 """Within this, s, a call of the driver is answered, whatever is wrong with a vehicle."""

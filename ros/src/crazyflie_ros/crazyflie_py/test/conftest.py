@@ -2,8 +2,8 @@
 
 import pytest
 
+from crazyflie_dev.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
 from crazyflie_py.crazyflie import Crazyflie
-from crazyflie_py.fake import EXTENDED, READ_ONLY, FakeVehicle
 
 LOG = {
     "stateEstimate.x": ("f", 1.5),

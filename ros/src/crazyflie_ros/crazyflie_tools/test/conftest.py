@@ -4,7 +4,7 @@ import faulthandler
 
 import pytest
 
-from crazyflie_py.fake import READ_ONLY, FakeVehicle
+from crazyflie_dev.fake_vehicle import READ_ONLY, FakeVehicle
 
 LOG = {"stateEstimate.x": ("f", 1.5), "pm.vbat": ("f", 3.75), "radio.rssi": ("B", 47)}
 

@@ -2,11 +2,12 @@
 
 import os
 import shutil
+import socket
 from pathlib import Path
 
 from terminal import Terminal
 
-from crazyflie_dev.launching import free_port
+from crazyflie_dev.programs import free_port
 
 TOP = Path(__file__).resolve().parents[4]
 """Top of the repository."""
@@ -51,7 +52,7 @@ def clean_environment(home: Path) -> dict:
         "LANG": "C.UTF-8",
         "PATH": os.pathsep.join(path),
         "ROS_IP": "127.0.0.1",
-        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
+        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port(socket.SOCK_STREAM)}",
     }
 
 

@@ -8,13 +8,14 @@ from concurrent.futures import Future
 import pytest
 import rosgraph
 import rospy
-from processes import LIMIT, composed, wait_until
+from processes import composed
 from std_msgs.msg import Float64, Int64, String
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from crazyflie_utils import ServiceError
 from crazyflie_utils.parameters import BOOLEAN, FINITE, TEXT, Integer, ParameterError
 from crazyflie_utils.runner import ros_process
+from crazyflie_utils.testing.peer import LIMIT, wait_until
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import contextlib
 import queue
-import threading
 import time
 from collections.abc import Callable, Iterator
 
@@ -13,10 +12,39 @@ LIMIT = 30.0
 """The longest that a test waits for anything, s."""
 
 
+def _anything(message: genpy.Message) -> bool:
+    return True
+
+
+class Heard(queue.Queue):
+    """The messages that have come on a topic, oldest first."""
+
+    def next(self, accept: Callable[[genpy.Message], bool] = _anything) -> genpy.Message:
+        """Return the next message for which ``accept(message)``; those before it are gone.
+
+        Raises
+        ------
+        AssertionError
+            None has come within `LIMIT`.
+        """
+        message = None
+        end = time.monotonic() + LIMIT
+        while (left := end - time.monotonic()) > 0.0:
+            with contextlib.suppress(queue.Empty):
+                message = self.get(timeout=left)
+                if accept(message):
+                    return message
+        raise AssertionError(f"no such message within {LIMIT:g} s; the last one: {message}")
+
+    def drain(self) -> list[genpy.Message]:
+        """Return all that have come so far; they are gone then."""
+        return [self.get() for _ in range(self.qsize())]
+
+
 @contextlib.contextmanager
-def listening(topic: str, message_type: type[genpy.Message]) -> Iterator[queue.Queue]:
-    """Yield a queue of the messages that come on a topic during a with block."""
-    heard = queue.Queue()
+def listening(topic: str, message_type: type[genpy.Message]) -> Iterator[Heard]:
+    """Subscribe to a topic for the time of a with block."""
+    heard = Heard()
     subscriber = rospy.Subscriber(topic, message_type, heard.put, tcp_nodelay=True)
     try:
         yield heard
@@ -32,37 +60,17 @@ def wait_until(condition: Callable[[], bool], what: str, limit: float = LIMIT) -
     AssertionError
         It is not within ``limit`` seconds; the text names ``what`` was waited for.
     """
-    patience = threading.Event()
     end = time.monotonic() + limit
     while not condition():
         assert time.monotonic() < end, f"waited {limit:g} s for {what}"
-        patience.wait(0.01)
-
-
-def wait_for(
-    heard: queue.Queue, accept: Callable[[genpy.Message], bool] = lambda message: True
-) -> genpy.Message:
-    """Return the first message in a queue of `listening` for which ``accept(message)``.
-
-    Raises
-    ------
-    AssertionError
-        None has come within `LIMIT`.
-    """
-    end = time.monotonic() + LIMIT
-    while (left := end - time.monotonic()) > 0.0:
-        with contextlib.suppress(queue.Empty):
-            message = heard.get(timeout=left)
-            if accept(message):
-                return message
-    raise AssertionError(f"no such message within {LIMIT:g} s")
+        time.sleep(0.01)
 
 
 def exchange(
     messages: dict[str, genpy.Message],
     answer_topic: str,
     answer_type: type[genpy.Message],
-    accept: Callable[[genpy.Message], bool] = lambda message: True,
+    accept: Callable[[genpy.Message], bool] = _anything,
 ) -> genpy.Message:
     """Publish messages, by topic, over and over until an answer is accepted; return it.
 

@@ -5,8 +5,6 @@ import sys
 
 import pytest
 
-from crazyflie_dev.count_results import read_results, summary
-
 PYTEST = """<?xml version="1.0" encoding="utf-8"?><testsuites name="pytest tests">
 <testsuite name="pytest" errors="0" failures="1" skipped="1" tests="4">
 <testcase classname="test.test_a" name="test_good" time="0.1" />
@@ -76,7 +74,7 @@ def test_failed_tests_are_named_with_their_file(folder):
 
 def test_rostest_that_died_without_results_failed(folder):
     (folder / "a/rosunit-flight.xml").unlink()
-    assert summary(read_results(folder)) == "2 passed, 1 failed"
+    assert count(folder)[1][-1] == "2 passed, 1 failed"
     complaint = "<failure type='AssertionError'>test [flight] did not generate results</failure>"
     text = ROSTEST.format(failures=1, complaint=complaint)
     write(folder, "a/rostest-test_flight.xml", text)
@@ -92,7 +90,7 @@ def test_rostest_that_died_without_results_failed(folder):
 def test_rostest_that_timed_out_failed_though_there_are_results(folder):
     text = ROSTEST.format(failures=1, complaint="<error type='x'>timeout</error>")
     write(folder, "a/rostest-test_flight.xml", text)
-    assert summary(read_results(folder)) == "4 passed, 1 failed"
+    assert count(folder)[1][-1] == "4 passed, 1 failed"
 
 
 def test_rostest_that_did_not_even_start_failed(folder):
@@ -117,7 +115,7 @@ def test_files_without_a_test_failed(folder, text, reason):
     write(folder, "c/pytest-test.xml", text)
     status, lines = count(folder)
     assert status == 1
-    assert lines[0].startswith(f"FAILED c/pytest-test.xml: pytest-test: {reason}")
+    assert lines[0].startswith(f"FAILED c/pytest-test.xml: {reason}")
     assert lines[-1] == "4 passed, 1 failed"
 
 

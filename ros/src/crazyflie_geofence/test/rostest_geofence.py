@@ -1,6 +1,6 @@
 """The fence and the merger in processes of their own, on a real master."""
 
-import rospy
+import pytest
 
 from crazyflie_msgs.msg import (
     Control,
@@ -13,23 +13,20 @@ from crazyflie_utils.testing.peer import exchange
 REGULAR = Control(roll=0.0, pitch=0.2, yaw_dot=0.3, thrust=9.81)
 
 
-def merged_at(x):
-    """Return what becomes of the regular control of a vehicle at rest at (x, 0, 1)."""
+@pytest.mark.parametrize(
+    ("x", "is_right"),
+    [
+        pytest.param(0.0, lambda control: control == REGULAR, id="in the middle"),
+        pytest.param(2.0, lambda control: control.pitch < 0.0, id="too far in front"),
+        pytest.param(-2.0, lambda control: control.pitch > 0.2, id="too far behind"),
+    ],
+)
+def test_a_vehicle_is_left_alone_or_brought_back(x, is_right):
     state = PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=x, z=1.0))
-    state.header.stamp = rospy.Time(12, 345)
-    regular = ControlStamped(state.header, REGULAR)
-    return exchange(
-        {"/state": state, "/control/lqr": regular},
+    # The merger may answer a control with what the fence has said of the last vehicle.
+    exchange(
+        {"/state": state, "/control/lqr": ControlStamped(control=REGULAR)},
         "/control/merged",
         ControlStamped,
-        lambda message: (message.control == REGULAR) == (x == 0.0),
+        lambda message: is_right(message.control),
     )
-
-
-def test_leaves_a_vehicle_in_the_middle_alone():
-    assert merged_at(0.0).control == REGULAR
-
-
-def test_brings_back_a_vehicle_that_is_outside():
-    assert merged_at(2.0).control.pitch < 0.0
-    assert merged_at(-2.0).control.pitch > 0.2

@@ -22,15 +22,10 @@ def main(arguments: list) -> int:
         log = Path(folder) / "launch.log"
         with launched(arguments, log):
             try:
-                pilot = Pilot(runner.begin("pilot"))
-                pilot.wait_until_ready()
-                pilot.takeoff()
-                pilot.hover(HOVER_DURATION)
-                pilot.land()
+                record = Pilot(runner.begin("pilot")).fly(HOVER_DURATION)
             except FlightError as error:
                 print(f"the flight failed: {error}\n{log.read_text()}")
                 return 1
-    record = pilot.finish()
     report = FlightReport.of(record, HOVER)
     print(report.table())
     state = dict(zip(record.state.fields, record.state.last, strict=True))

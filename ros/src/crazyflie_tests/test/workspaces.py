@@ -15,7 +15,10 @@ TOP = Path(__file__).resolve().parents[4]
 INSTALLATION = TOP / "docs" / "installation.md"
 """The page that tells how a workspace is built and installed."""
 
-FLY = Path(__file__).with_name("fly.py")
+_TOOLS = TOP / "ros" / "src" / "crazyflie_dev" / "src"
+
+FLY = f"PYTHONPATH={_TOOLS}:$PYTHONPATH python3 {Path(__file__).with_name('fly.py')}"
+"""Command that flies a launch file and judges the flight; an install space has no such tool."""
 
 FAST = "rviz:=false sim_time:=true real_time_factor:=0 simulator_dt:=0.01 composed:=true"
 """Arguments of sw_hover.launch that fly it in seconds."""

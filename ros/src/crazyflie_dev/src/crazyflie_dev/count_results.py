@@ -5,7 +5,8 @@ python3 -m crazyflie_dev.count_results build/test_results
 
 import argparse
 import sys
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -14,82 +15,48 @@ _ROSTEST = "rostest.runner.RosTest"
 are in a file of their own, rosunit-NAME.xml, beside rostest's."""
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a test.
+def verdicts(path: Path) -> Iterator[tuple[str, str]]:
+    """Yield "passed", "failed" or "skipped" for each test in a JUnit XML file, and its reason.
 
-    Attributes
-    ----------
-    file : Path
-        Of the results, below the folder of all results.
-    name : str
-    verdict : str
-        "passed", "failed" or "skipped".
-    reason : str
-        First line of what a failed test said.
+    A file that cannot be read or has no test in it is a failed test: its program
+    has died before it could tell.
     """
-
-    file: Path
-    name: str
-    verdict: str
-    reason: str = ""
-
-
-def read_results(folder: Path) -> list[Outcome]:
-    """Return the outcome of every test in the JUnit XML files below a folder.
-
-    A file that cannot be read or has no test in it counts as a failed test: its
-    program has died before it could tell.
-    """
-    outcomes = []
-    for path in sorted(folder.rglob("*.xml")):
-        file = path.relative_to(folder)
-        try:
-            cases = list(ElementTree.parse(path).getroot().iter("testcase"))
-        except ElementTree.ParseError as error:
-            outcomes.append(Outcome(file, path.stem, "failed", f"no XML: {error}"))
-            continue
-        if not cases:
-            outcomes.append(Outcome(file, path.stem, "failed", "no test ran"))
-        for case in cases:
-            outcomes.extend(_outcomes(path, file, case))
-    return outcomes
-
-
-def _outcomes(path, file, case):
-    classname, name = case.get("classname", ""), case.get("name", "")
-    full_name = f"{classname}.{name}" if classname else name
-    for complaint in (*case.iter("failure"), *case.iter("error")):
-        text = complaint.get("message") or complaint.text or ""
-        return [Outcome(file, full_name, "failed", text.strip().partition("\n")[0])]
-    if case.find("skipped") is not None:
-        return [Outcome(file, full_name, "skipped")]
-    if classname != _ROSTEST:
-        return [Outcome(file, full_name, "passed")]
-    results = path.with_name(f"rosunit-{name.removeprefix('test')}.xml")
-    if results.exists():
-        return []
-    return [Outcome(file, full_name, "failed", f"there is no {results.name}")]
-
-
-def summary(outcomes: list[Outcome]) -> str:
-    """Return "N passed, N failed", and how many were skipped if any were."""
-    verdicts = [outcome.verdict for outcome in outcomes]
-    words = ["passed", "failed"] + ["skipped"] * ("skipped" in verdicts)
-    return ", ".join(f"{verdicts.count(word)} {word}" for word in words)
+    try:
+        cases = list(ElementTree.parse(path).getroot().iter("testcase"))
+    except ElementTree.ParseError as error:
+        yield "failed", f"no XML: {error}"
+        return
+    if not cases:
+        yield "failed", "no test ran"
+    for case in cases:
+        classname, name = case.get("classname", ""), case.get("name", "")
+        results = path.with_name(f"rosunit-{name.removeprefix('test')}.xml")
+        complaint = next((e for e in case if e.tag in ("failure", "error")), None)
+        if complaint is not None:
+            text = complaint.get("message") or complaint.text or ""
+            yield "failed", f"{classname}.{name}: {text.strip().partition(chr(10))[0]}"
+        elif case.find("skipped") is not None:
+            yield "skipped", ""
+        elif classname != _ROSTEST:
+            yield "passed", ""
+        elif not results.exists():
+            yield "failed", f"{classname}.{name}: there is no {results.name}"
 
 
 def main() -> int:
     """Print failed tests and sums; return 1 if any failed or none ran."""
     parser = argparse.ArgumentParser(description="Count the tests below a folder of results.")
     parser.add_argument("folder", type=Path)
-    outcomes = read_results(parser.parse_args().folder)
-    for outcome in outcomes:
-        if outcome.verdict == "failed":
-            print(f"FAILED {outcome.file}: {outcome.name}: {outcome.reason}")
-    print(summary(outcomes))
-    verdicts = {outcome.verdict for outcome in outcomes}
-    return 0 if "passed" in verdicts and "failed" not in verdicts else 1
+    folder = parser.parse_args().folder
+    count = Counter()
+    for path in sorted(folder.rglob("*.xml")):
+        for verdict, reason in verdicts(path):
+            count[verdict] += 1
+            if verdict == "failed":
+                print(f"FAILED {path.relative_to(folder)}: {reason}")
+    words = ["passed", "failed"] + ["skipped"] * ("skipped" in count)
+    print(", ".join(f"{count[word]} {word}" for word in words))
+    return 0 if count["passed"] and not count["failed"] else 1
 
 
 if __name__ == "__main__":

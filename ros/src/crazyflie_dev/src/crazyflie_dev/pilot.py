@@ -1,12 +1,16 @@
 """Flies the hover example through its services, and records the flight."""
 
+import contextlib
 import time
+from collections.abc import Iterator
 
 from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_dev.flight_record import FlightRecord
 from crazyflie_dev.flight_recorder_node import FlightRecorderNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_utils.process import Process
+from crazyflie_utils.runner import ros_process
 from crazyflie_utils.transport import ServiceError
 
 
@@ -19,7 +23,7 @@ class Pilot:
 
     Parameters
     ----------
-    process : crazyflie_utils.process.Process
+    process : Process
         Not started yet.
     namespace : str
         Of the vehicle's topics and services: of takeoff, land, state and so on.
@@ -29,7 +33,9 @@ class Pilot:
         Start the process; of several pilots in it, the last one does.
     """
 
-    def __init__(self, process, namespace: str = "/", limit: float = 60.0, start: bool = True):
+    def __init__(
+        self, process: Process, namespace: str = "/", limit: float = 60.0, start: bool = True
+    ):
         self._handle = process.handle(f"{namespace.rstrip('/')}/flight_recorder")
         self._limit = limit
         self._recorder = FlightRecorderNode()
@@ -77,6 +83,14 @@ class Pilot:
         self._call("land", "landed")
         self.hover(0.5)
 
+    def fly(self, hover: float) -> FlightRecord:
+        """Take off, hover for some seconds and land; return the record, which is finished."""
+        self.wait_until_ready()
+        self.takeoff()
+        self.hover(hover)
+        self.land()
+        return self.finish()
+
     def _call(self, service, answered):
         record = self._recorder.record
         called_at = record.state.last_time
@@ -94,3 +108,15 @@ class Pilot:
             while not condition():
                 if not self._recorder.heard.wait(deadline - time.monotonic()):
                     raise FlightError(f"{complaint} for {self._limit:g} s")
+
+
+@contextlib.contextmanager
+def boarded() -> Iterator[Pilot]:
+    """Yield a pilot who is ready to take off, in a rostest's own process."""
+    process = ros_process()
+    pilot = Pilot(process)
+    pilot.wait_until_ready()
+    try:
+        yield pilot
+    finally:
+        process.stop()

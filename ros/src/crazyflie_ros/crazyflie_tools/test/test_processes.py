@@ -78,7 +78,7 @@ def test_a_parameter_is_read_set_and_read(uri):
     assert run("getParam", "--uri", uri, "posCtlPid.xKp") == (0, "1.7\n", "")
 
 
-def test_the_example_of_the_readme(server):
+def test_the_example_of_the_readme(virtual):
     readme = (Path(__file__).parents[1] / "README.md").read_text()
     example = readme.partition("```console\n")[2].partition("```")[0]
     example = example.replace("127.0.0.1", SCANNED_HOST)

@@ -3,6 +3,6 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-PACKAGES = ["crazyflie_utils", "crazyflie_utils.runtime"]
+PACKAGES = ["crazyflie_utils", "crazyflie_utils.runtime", "crazyflie_utils.testing"]
 
 setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

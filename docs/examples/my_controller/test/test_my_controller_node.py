@@ -14,7 +14,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from my_controller.my_controller_node import MyControllerNode
 
 U_REF = "0 0 0 9.81"

@@ -6,7 +6,7 @@ import pytest
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from odometer.odometer import Odometer
 from odometer.odometer_node import OdometerNode
 

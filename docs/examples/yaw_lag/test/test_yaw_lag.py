@@ -11,7 +11,7 @@ from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_model.dynamics import STEP
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from yaw_lag.dynamics import YawLag
 from yaw_lag.gains import TIME_CONSTANT, design, linear_model
 from yaw_lag.yaw_lag_simulator_node import YawLagSimulatorNode

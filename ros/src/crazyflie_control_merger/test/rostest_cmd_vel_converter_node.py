@@ -3,10 +3,10 @@
 import math
 
 import pytest
-from exchange import exchange
 from geometry_msgs.msg import Twist
 
 from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_utils.testing.peer import exchange
 
 
 def test_converts():
@@ -15,7 +15,6 @@ def test_converts():
         {"/control/final": ControlStamped(control=control)},
         "/crazyflie/cmd_vel",
         Twist,
-        lambda message: True,
     )
     assert twist.linear.x == pytest.approx(math.degrees(0.2))
     assert twist.linear.y == pytest.approx(math.degrees(0.1))

@@ -1,9 +1,9 @@
 """The merger in a process of its own, on a real master."""
 
 import pytest
-from exchange import exchange
 
 from crazyflie_msgs.msg import Control, ControlStamped, NoYawControl, NoYawControlStamped
+from crazyflie_utils.testing.peer import exchange
 
 
 def test_merges_all_but_the_yaw_rate():

@@ -2,7 +2,6 @@
 
 import pytest
 import rospy
-from exchange import exchange
 
 from crazyflie_msgs.msg import (
     Control,
@@ -10,6 +9,7 @@ from crazyflie_msgs.msg import (
     PrioritizedControl,
     PrioritizedControlStamped,
 )
+from crazyflie_utils.testing.peer import exchange
 
 
 def test_merges():

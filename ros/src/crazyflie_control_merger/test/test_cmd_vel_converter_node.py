@@ -6,7 +6,7 @@ import pytest
 
 from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
 from crazyflie_msgs.msg import Control, ControlStamped
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 PARAMETERS = {"topics/control": "/control/final", "topics/cmd_vel": "/crazyflie/cmd_vel"}
 

@@ -2,11 +2,12 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.flight_record import FlightRecord
+from crazyflie_dev.pilot import Pilot
 from crazyflie_utils.runtime.runner import ros_process
 
 
-def fly(names: list, hover: float) -> dict:
+def fly(names: list[str], hover: float) -> dict[str, FlightRecord]:
     """Take off, hover and land with all vehicles.
 
     Parameters
@@ -25,15 +26,10 @@ def fly(names: list, hover: float) -> dict:
     pilots = [Pilot(process, f"/{name}", start=False) for name in names]
     process.start()
 
-    def flight(pilot):
-        pilot.wait_until_ready()
-        pilot.takeoff()
-        pilot.hover(hover)
-        pilot.land()
-        return pilot.finish()
-
     try:
         with ThreadPoolExecutor(len(names)) as threads:
-            return dict(zip(names, threads.map(flight, pilots), strict=True))
+            return dict(
+                zip(names, threads.map(lambda pilot: pilot.fly(hover), pilots), strict=True)
+            )
     finally:
         process.stop()

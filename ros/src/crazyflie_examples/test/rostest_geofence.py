@@ -8,9 +8,9 @@ import pytest
 import rospy
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_examples.flight_record import CONTROL_FIELDS, Series
-from crazyflie_examples.geofence import MAX_HORIZONTAL, MAX_VERTICAL_BRAKING
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.flight_record import CONTROL_FIELDS, Series
+from crazyflie_dev.pilot import Pilot
+from crazyflie_geofence.geofence import MAX_HORIZONTAL, MAX_VERTICAL_BRAKING
 from crazyflie_lqr.linear_feedback import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import ControlStamped

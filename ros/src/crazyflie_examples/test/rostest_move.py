@@ -6,9 +6,8 @@ import pytest
 import rospy
 from std_srvs.srv import Empty
 
-from crazyflie_examples.flight_record import GROUND_TOLERANCE
-from crazyflie_examples.pilot import Pilot
-from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_dev.flight_record import GROUND_TOLERANCE
+from crazyflie_dev.pilot import boarded
 
 POINTS = [(0.4, 0.0, 1.0), (0.4, 0.3, 1.3), (-0.2, 0.0, 0.6)]
 TOLERANCE = 0.02
@@ -18,12 +17,9 @@ SERVICE_LIMIT = 10.0
 
 @pytest.fixture(scope="module")
 def pilot():
-    process = ros_process()
-    pilot = Pilot(process)
-    pilot.wait_until_ready()
-    pilot.takeoff()
-    yield pilot
-    process.stop()
+    with boarded() as pilot:
+        pilot.takeoff()
+        yield pilot
 
 
 def distance_after_move(pilot, point):

@@ -7,9 +7,8 @@ import rosgraph
 import rospy
 import rosservice
 
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.pilot import boarded
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.runtime.runner import ros_process
 
 LIMIT = 20.0
 TOPICS = {
@@ -26,12 +25,9 @@ TOPICS = {
 @pytest.fixture(scope="module")
 def pilot():
     """Return a pilot in flight."""
-    process = ros_process()
-    pilot = Pilot(process)
-    pilot.wait_until_ready()
-    pilot.takeoff()
-    yield pilot
-    process.stop()
+    with boarded() as pilot:
+        pilot.takeoff()
+        yield pilot
 
 
 def test_documented_topics_and_services_are_there(pilot):

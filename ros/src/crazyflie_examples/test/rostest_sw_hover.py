@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import rospy
 
-from crazyflie_examples.flight_report import FlightReport
-from crazyflie_examples.pilot import FlightError, Pilot
+from crazyflie_dev.flight_report import FlightReport
+from crazyflie_dev.pilot import FlightError, boarded
 from crazyflie_model.units import GRAVITY
-from crazyflie_utils.runtime.runner import ros_process
 
 HOVER = (0.0, 0.0, 1.0)
 
@@ -17,17 +16,14 @@ HOVER = (0.0, 0.0, 1.0)
 @pytest.fixture(scope="module")
 def flight():
     """Fly once; every test looks at the record and at how calls were refused."""
-    process = ros_process()
-    pilot = Pilot(process)
-    pilot.wait_until_ready()
-    refusals = [refusal(pilot.land)]
-    pilot.takeoff()
-    refusals.append(refusal(pilot.takeoff))
-    pilot.hover(rospy.get_param("/hover_duration", 6.0))
-    pilot.land()
-    refusals.append(refusal(pilot.land))
-    yield pilot.finish(), refusals
-    process.stop()
+    with boarded() as pilot:
+        refusals = [refusal(pilot.land)]
+        pilot.takeoff()
+        refusals.append(refusal(pilot.takeoff))
+        pilot.hover(rospy.get_param("/hover_duration", 6.0))
+        pilot.land()
+        refusals.append(refusal(pilot.land))
+        return pilot.finish(), refusals
 
 
 @pytest.fixture

@@ -2,9 +2,8 @@
 
 import pytest
 
-from crazyflie_examples.flight_report import TOUCHDOWN_LIMIT
-from crazyflie_examples.pilot import Pilot
-from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_dev.flight_report import TOUCHDOWN_LIMIT
+from crazyflie_dev.pilot import boarded
 
 HOVER = (0.0, 0.0, 1.0)
 SETTLING = 10.0
@@ -14,14 +13,8 @@ TOLERANCE = 0.03
 @pytest.fixture(scope="module")
 def record():
     """Fly once; every test looks at the record."""
-    process = ros_process()
-    pilot = Pilot(process)
-    pilot.wait_until_ready()
-    pilot.takeoff()
-    pilot.hover(SETTLING + 5.0)
-    pilot.land()
-    yield pilot.finish()
-    process.stop()
+    with boarded() as pilot:
+        return pilot.fly(SETTLING + 5.0)
 
 
 def test_hovers_within_3_cm_after_10_s(record):

@@ -3,9 +3,10 @@
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-import launch_files
 import pytest
 import rospkg
+
+from crazyflie_dev import launch_files
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"
 

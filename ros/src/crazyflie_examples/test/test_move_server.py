@@ -3,17 +3,17 @@
 import math
 from pathlib import Path
 
-import launch_files
 import pytest
 import rospkg
 from hypothesis import given
 from hypothesis import strategies as st
 from std_srvs.srv import EmptyRequest, EmptyResponse
 
+from crazyflie_dev import launch_files
 from crazyflie_examples.move_server_node import MoveServerNode
 from crazyflie_examples.tour import DEFAULT_POINTS, Points, Tour
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch" / "move.launch"

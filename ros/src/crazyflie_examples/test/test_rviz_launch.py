@@ -3,14 +3,14 @@
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
-import launch_files
 import pytest
 import rospkg
 import yaml
 
 from crazyflie_description.visualizer_node import VisualizerNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_dev import launch_files
 from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.testing import FakeProcess
 
 PACKAGES = rospkg.RosPack()
 FRAGMENT = Path(PACKAGES.get_path("launch_shared")) / "launch" / "rviz.launch"

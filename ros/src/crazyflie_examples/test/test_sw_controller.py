@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-import launch_files
 import pytest
 import rospkg
 from roslaunch.core import RLException
 
+from crazyflie_dev import launch_files
 from crazyflie_examples.reference_converter_node import ReferenceConverterNode
 from crazyflie_lqr.full_state_lqr_node import FullStateLqrNode
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
@@ -14,8 +14,8 @@ from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
 )
 from crazyflie_lqr.position_velocity_yaw_state_lqr_node import PositionVelocityYawStateLqrNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 
 PACKAGES = rospkg.RosPack()

@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
-import launch_files
 import numpy as np
 import pytest
 import rospkg
 from roslaunch.core import RLException
 
+from crazyflie_dev import launch_files
 from crazyflie_lqr.gain_file import load_matrix
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.testing import FakeProcess
 
 PACKAGES = rospkg.RosPack()
 SW_HOVER = Path(PACKAGES.get_path("crazyflie_examples")) / "launch" / "sw_hover.launch"

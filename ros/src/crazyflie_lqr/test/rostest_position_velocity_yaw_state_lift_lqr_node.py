@@ -5,14 +5,15 @@ import subprocess
 import pytest
 import rospkg
 import rospy
-from asking import ask
 
 from crazyflie_msgs.msg import (
+    ControlStamped,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_utils.testing.peer import exchange
 
 CONFIG = rospkg.RosPack().get_path("crazyflie_lqr") + "/config"
 
@@ -21,7 +22,7 @@ def test_answers_a_state():
     reference = PositionVelocityStateStamped(state=PositionVelocityState(z=1.0))
     state = PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=0.2, z=0.8))
     state.header.stamp = rospy.Time(12, 345)
-    control = ask(reference, state)
+    control = exchange({"/ref": reference, "/state": state}, "/control/lqr", ControlStamped)
     assert control.header.stamp == state.header.stamp
     assert control.control.pitch == pytest.approx(-0.05)
     assert control.control.thrust == pytest.approx(9.81 + 0.3)

@@ -15,7 +15,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 
 CONFIG = Path(__file__).parents[1] / "config"

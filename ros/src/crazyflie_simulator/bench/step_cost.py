@@ -18,7 +18,7 @@ from crazyflie_simulator.simulator_node import (
 )
 from crazyflie_simulator.vehicle import Vehicle
 from crazyflie_simulator.wind import Wind
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 CONTROL = [0.01, 0.02, 0.1, GRAVITY]
 VEHICLES = 100

@@ -1,26 +1,22 @@
 """A simulator as the source of simulated time, as fast as it can, on a real master."""
 
-import queue
-
 import numpy as np
 import pytest
 import rospy
 from rosgraph_msgs.msg import Clock
 
-LIMIT = 20.0
+from crazyflie_utils.testing.peer import listening
 
 
 @pytest.fixture
 def clocks():
     """Return a queue of what comes on /clock."""
-    received = queue.Queue()
-    subscriber = rospy.Subscriber("/clock", Clock, received.put)
-    yield received
-    subscriber.unregister()
+    with listening("/clock", Clock) as clocks:
+        yield clocks
 
 
 def test_time_passes_in_time_steps(clocks):
-    times = [clocks.get(timeout=LIMIT).clock.to_sec() for _ in range(500)]
+    times = [clocks.next().clock.to_sec() for _ in range(500)]
     # Messages may be lost on the way, the steps between the others may not.
     steps = np.diff(times) / 0.01
     assert steps.min() > 0.99
@@ -29,6 +25,6 @@ def test_time_passes_in_time_steps(clocks):
 
 
 def test_a_minute_passes_in_seconds(clocks):
-    end = clocks.get(timeout=LIMIT).clock.to_sec() + 60.0
-    while clocks.get(timeout=LIMIT).clock.to_sec() < end:
+    end = clocks.next().clock.to_sec() + 60.0
+    while clocks.next().clock.to_sec() < end:
         pass

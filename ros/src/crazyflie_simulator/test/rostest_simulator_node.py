@@ -1,6 +1,5 @@
 """A simulator in a process of its own, on a real master."""
 
-import queue
 import subprocess
 
 import pytest
@@ -9,25 +8,22 @@ import tf2_ros
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_msgs.msg import Control, ControlStamped
-
-LIMIT = 10.0
+from crazyflie_utils.testing.peer import LIMIT, listening
 
 
 @pytest.fixture
 def transforms():
     """Return a queue of what the simulator broadcasts."""
-    received = queue.Queue()
-    subscriber = rospy.Subscriber("/tf", TFMessage, received.put)
-    yield received
-    subscriber.unregister()
+    with listening("/tf", TFMessage) as transforms:
+        yield transforms
 
 
 def test_climbs_when_it_is_told_to(transforms):
-    assert transforms.get(timeout=LIMIT).transforms[0].transform.translation.z == 0.0
+    assert transforms.next().transforms[0].transform.translation.z == 0.0
     publisher = rospy.Publisher("/control/final", ControlStamped, queue_size=1)
     for _ in range(1000):
         publisher.publish(ControlStamped(control=Control(thrust=12.0)))
-        transform = transforms.get(timeout=LIMIT).transforms[0]
+        transform = transforms.next().transforms[0]
         if transform.transform.translation.z > 0.2:
             break
     assert transform.transform.translation.z > 0.2

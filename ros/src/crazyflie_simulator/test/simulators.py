@@ -8,7 +8,7 @@ from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorCoupled7DNode,
     NearHoverSimulatorNode,
 )
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 PARAMETERS = {
     "time_step": 0.01,

@@ -8,10 +8,10 @@ from simulators import NODES, PARAMETERS, refusal, transforms
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_simulator.simulator_node import NearHoverSimulatorNode
-from crazyflie_utils.fake import FakeProcess, FakeTransport
 from crazyflie_utils.node import Node
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.timers import Timer
+from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
 
 
 class ClockedProcess(FakeProcess):

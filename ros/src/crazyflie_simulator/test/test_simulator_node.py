@@ -12,7 +12,7 @@ from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorCoupled7DNode,
     NearHoverSimulatorNode,
 )
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 
 @NODES

@@ -15,6 +15,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_utils.testing.peer import listening
 from crazyflie_utils.vectors import to_vector
 
 PERIOD = 0.01
@@ -33,10 +34,8 @@ RATE = np.array([0.5, -1.0, 0.25, 0.02, -0.01, 0.3])
 def states():
     """Return a queue of what the estimator publishes."""
     message_type = MESSAGE_TYPES[rospy.get_param("/state_estimator/x_dim")]
-    received = queue.Queue()
-    subscriber = rospy.Subscriber("/state", message_type, received.put)
-    yield received
-    subscriber.unregister()
+    with listening("/state", message_type) as states:
+        yield states
 
 
 def pose(elapsed, stamp):

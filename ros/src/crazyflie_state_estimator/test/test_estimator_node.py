@@ -14,7 +14,7 @@ from crazyflie_state_estimator.estimator_node import (
     PositionVelocityStateEstimatorNode,
     PositionVelocityYawStateEstimatorNode,
 )
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 
 PARAMETERS = {

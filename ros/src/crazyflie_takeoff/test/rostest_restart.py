@@ -1,7 +1,7 @@
 """Server and filter are killed in flight and on the ground, and started again."""
 
+import contextlib
 import os
-import queue
 import signal
 from xmlrpc.client import ServerProxy
 
@@ -12,8 +12,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty as EmptyService
 
 from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_utils.testing.peer import LIMIT, listening
 
-LIMIT = 30.0
 COMMANDED = 9.0
 SERVER, FILTER = "/takeoff_server", "/takeoff_control_filter"
 
@@ -27,14 +27,15 @@ def heard():
         "/control/takeoff": ControlStamped,
         "/control/final": ControlStamped,
     }
-    queues = {topic: queue.Queue() for topic in topics}
-    for topic, message_type in topics.items():
-        rospy.Subscriber(topic, message_type, queues[topic].put)
-    publisher = rospy.Publisher("/control/lqr", ControlStamped, queue_size=10)
-    control = ControlStamped(control=Control(thrust=COMMANDED))
-    timer = rospy.Timer(rospy.Duration(0.02), lambda _: publisher.publish(control))
-    yield queues
-    timer.shutdown()
+    with contextlib.ExitStack() as stack:
+        queues = {
+            topic: stack.enter_context(listening(topic, kind)) for topic, kind in topics.items()
+        }
+        publisher = rospy.Publisher("/control/lqr", ControlStamped, queue_size=10)
+        control = ControlStamped(control=Control(thrust=COMMANDED))
+        timer = rospy.Timer(rospy.Duration(0.02), lambda _: publisher.publish(control))
+        stack.callback(timer.shutdown)
+        yield queues
 
 
 def kill(node, heard):
@@ -46,8 +47,7 @@ def kill(node, heard):
     _, _, pid = ServerProxy(uri).getPid("/rostest_restart")
     os.kill(pid, signal.SIGKILL)
     for messages in heard.values():
-        while not messages.empty():
-            messages.get()
+        messages.drain()
 
 
 def service(name):
@@ -68,8 +68,7 @@ def call_when_there(name):
 
 
 def wait_for(heard, topic, word):
-    while heard[topic].get(timeout=LIMIT).data != word:
-        pass
+    heard[topic].next(lambda message: message.data == word)
 
 
 def wait_for_both(heard, word):
@@ -81,7 +80,7 @@ def wait_for_both(heard, word):
 def thrusts(heard, topic, count):
     """Return the next ``count`` thrusts on a topic, and those that have come before."""
     messages = heard[topic]
-    return [messages.get(timeout=LIMIT).control.thrust for _ in range(messages.qsize() + count)]
+    return [messages.next().control.thrust for _ in range(messages.qsize() + count)]
 
 
 def test_on_the_ground_first(heard):

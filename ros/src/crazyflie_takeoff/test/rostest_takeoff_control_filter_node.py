@@ -1,23 +1,18 @@
 """The takeoff control filter in a process of its own, on a real master."""
 
-import queue
-import time
-
 import pytest
 import rospy
 from std_msgs.msg import Empty, String
 
 from crazyflie_msgs.msg import Control, ControlStamped
-
-LIMIT = 15.0
+from crazyflie_utils.testing.peer import listening, wait_until
 
 
 @pytest.fixture(scope="module")
 def final():
     """Return a queue of what is passed on."""
-    received = queue.Queue()
-    rospy.Subscriber("/control/final", ControlStamped, received.put)
-    return received
+    with listening("/control/final", ControlStamped) as final:
+        yield final
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +26,10 @@ def say():
     publishers = {
         topic: rospy.Publisher(topic, kind, queue_size=10) for topic, kind in types.items()
     }
-    deadline = time.monotonic() + LIMIT
-    while not all(publisher.get_num_connections() for publisher in publishers.values()):
-        assert time.monotonic() < deadline, "the filter does not listen"
-        time.sleep(0.01)
+    wait_until(
+        lambda: all(publisher.get_num_connections() for publisher in publishers.values()),
+        "the filter to listen",
+    )
     return lambda topic, message: publishers[topic].publish(message)
 
 
@@ -42,22 +37,18 @@ def control(thrust):
     return ControlStamped(control=Control(thrust=thrust))
 
 
-def wait_for_thrust(value, final):
-    while final.get(timeout=LIMIT).control.thrust != value:
-        pass
+def has_thrust(value):
+    return lambda message: message.control.thrust == value
 
 
 def say_until_heard(say, topic, value, final):
     """Publish a control again and again until it is passed on."""
-    deadline = time.monotonic() + LIMIT
-    while time.monotonic() < deadline:
+
+    def is_passed_on():
         say(topic, control(value))
-        try:
-            if final.get(timeout=0.1).control.thrust == value:
-                return
-        except queue.Empty:
-            pass
-    raise AssertionError(f"{value} on {topic} was never passed on")
+        return any(map(has_thrust(value), final.drain()))
+
+    wait_until(is_passed_on, f"{value} on {topic} to be passed on")
 
 
 def test_passes_the_right_control(say, final):
@@ -67,14 +58,13 @@ def test_passes_the_right_control(say, final):
     # The takeoff control gets old.
     say_until_heard(say, "/control/lqr", 3.0, final)
 
-    memory = queue.Queue()
-    rospy.Subscriber("/in_flight_filter", String, memory.put)
-    assert memory.get(timeout=LIMIT).data == "commanded"
-    say("/in_flight", Empty())
-    assert memory.get(timeout=LIMIT).data == "flying"
+    with listening("/in_flight_filter", String) as memory:
+        assert memory.next().data == "commanded"
+        say("/in_flight", Empty())
+        assert memory.next().data == "flying"
     # In flight every control is passed on, whatever the age of the other kind.
     for value in range(10, 20):
         say("/control/takeoff", control(value))
-        wait_for_thrust(value, final)
+        final.next(has_thrust(value))
         say("/control/lqr", control(value + 0.5))
-        wait_for_thrust(value + 0.5, final)
+        final.next(has_thrust(value + 0.5))

@@ -1,6 +1,6 @@
 """The takeoff server in a process of its own, on a real master."""
 
-import queue
+import contextlib
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -9,8 +9,7 @@ from std_msgs.msg import Empty, String
 from std_srvs.srv import Empty as EmptyService
 
 from crazyflie_msgs.msg import ControlStamped, PositionVelocityStateStamped
-
-LIMIT = 15.0
+from crazyflie_utils.testing.peer import LIMIT, listening
 
 
 @pytest.fixture(scope="module")
@@ -21,10 +20,8 @@ def heard():
         "/in_flight": Empty,
         "/control/takeoff": ControlStamped,
     }
-    queues = {topic: queue.Queue() for topic in topics}
-    for topic, message_type in topics.items():
-        rospy.Subscriber(topic, message_type, queues[topic].put)
-    return queues
+    with contextlib.ExitStack() as stack:
+        yield {topic: stack.enter_context(listening(topic, kind)) for topic, kind in topics.items()}
 
 
 def service(name):
@@ -39,19 +36,17 @@ def refusal(name):
 
 
 def wait_for_state(heard, state):
-    while heard["/in_flight_state"].get(timeout=LIMIT).data != state:
-        pass
+    heard["/in_flight_state"].next(lambda message: message.data == state)
 
 
 def thrusts(heard):
     """Return what has been said since the last time."""
-    messages = heard["/control/takeoff"]
-    return [messages.get().control.thrust for _ in range(messages.qsize())]
+    return [message.control.thrust for message in heard["/control/takeoff"].drain()]
 
 
 def test_takes_off_and_lands_and_says_why_it_refuses(heard):
     wait_for_state(heard, "on_ground")
-    assert heard["/control/takeoff"].get(timeout=LIMIT).control.thrust == 0.0
+    assert heard["/control/takeoff"].next().control.thrust == 0.0
     assert "/land refused: the vehicle is on the ground" in refusal("/land")
 
     with ThreadPoolExecutor() as threads:
@@ -60,7 +55,7 @@ def test_takes_off_and_lands_and_says_why_it_refuses(heard):
         assert "/takeoff refused: a takeoff is under way" in refusal("/takeoff")
         assert "/land refused: a takeoff is under way" in refusal("/land")
         takeoff.result(timeout=LIMIT)
-    heard["/in_flight"].get(timeout=LIMIT)
+    heard["/in_flight"].next()
     said = thrusts(heard)
     lift_off = said.index(pytest.approx(10.01))
     assert set(said[:lift_off]) <= {0.0}
@@ -72,11 +67,11 @@ def test_takes_off_and_lands_and_says_why_it_refuses(heard):
     assert (message.state.x, message.state.y, message.state.z) == (0.0, 0.5, 1.0)
 
     service("/land")()
-    heard["/in_flight"].get(timeout=LIMIT)
+    heard["/in_flight"].next()
     wait_for_state(heard, "on_ground")
     ramp = []
     while not ramp or ramp[-1] != 0.0:
-        ramp.append(heard["/control/takeoff"].get(timeout=LIMIT).control.thrust)
+        ramp.append(heard["/control/takeoff"].next().control.thrust)
     assert ramp[0] == pytest.approx(9.81)
     assert ramp == sorted(ramp, reverse=True)
     assert len(ramp) > 10

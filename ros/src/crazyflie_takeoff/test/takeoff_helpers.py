@@ -11,8 +11,8 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.node import Node
+from crazyflie_utils.testing import FakeProcess
 
 GRAVITY = 9.81
 

@@ -6,7 +6,7 @@ from takeoff_helpers import BARE, FILTER, SERVER, ControllerNode, VehicleNode
 
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 NODES = ("/server", "/filter", "/controller", "/vehicle")
 

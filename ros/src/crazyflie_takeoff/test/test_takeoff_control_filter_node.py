@@ -7,7 +7,7 @@ from std_msgs.msg import Empty, String
 from takeoff_helpers import FILTER, control
 
 from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 
 def launch():

@@ -10,8 +10,8 @@ from std_srvs.srv import EmptyRequest, EmptyResponse
 from takeoff_helpers import BARE, GRAVITY, SERVER, state
 
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.testing import FakeProcess
 
 
 def launch(parameters=BARE, **changes):

@@ -6,7 +6,7 @@ import pytest
 from takeoff_helpers import BARE, SERVER
 
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 
 @pytest.mark.parametrize("name", BARE)

@@ -7,9 +7,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from crazyflie_examples.flight_report import FlightReport
-from crazyflie_examples.launching import launched
-from crazyflie_examples.pilot import FlightError, Pilot
+from crazyflie_dev.flight_report import FlightReport
+from crazyflie_dev.launching import launched
+from crazyflie_dev.pilot import FlightError, Pilot
 from crazyflie_utils.runtime import runner
 
 HOVER = (0.0, 0.0, 1.0)
@@ -22,15 +22,10 @@ def main(arguments: list) -> int:
         log = Path(folder) / "launch.log"
         with launched(arguments, log):
             try:
-                pilot = Pilot(runner.begin("pilot"))
-                pilot.wait_until_ready()
-                pilot.takeoff()
-                pilot.hover(HOVER_DURATION)
-                pilot.land()
+                record = Pilot(runner.begin("pilot")).fly(HOVER_DURATION)
             except FlightError as error:
                 print(f"the flight failed: {error}\n{log.read_text()}")
                 return 1
-    record = pilot.finish()
     report = FlightReport.of(record, HOVER)
     print(report.table())
     state = dict(zip(record.state.fields, record.state.last, strict=True))

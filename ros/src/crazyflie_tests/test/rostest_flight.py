@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from crazyflie_examples.flight_report import HOVER_TOLERANCE, FlightReport
-from crazyflie_examples.pilot import Pilot
+from crazyflie_dev.flight_report import HOVER_TOLERANCE, FlightReport
+from crazyflie_dev.pilot import boarded
 from crazyflie_model.units import GRAVITY
-from crazyflie_utils.runtime.runner import ros_process
 
 HOVER = (0.0, 0.0, 1.0)
 
@@ -14,14 +13,8 @@ HOVER = (0.0, 0.0, 1.0)
 @pytest.fixture(scope="module")
 def record():
     """Fly once, and return what was recorded."""
-    process = ros_process()
-    pilot = Pilot(process)
-    pilot.wait_until_ready()
-    pilot.takeoff()
-    pilot.hover(6.0)
-    pilot.land()
-    yield pilot.finish()
-    process.stop()
+    with boarded() as pilot:
+        return pilot.fly(6.0)
 
 
 def test_stays_on_the_ground_until_it_is_told_to_take_off(record):

@@ -11,7 +11,7 @@ from workspaces import FAST, FLY, TOP
 PACKAGES = {
     package.name: TOP / "ros" / "src" / path
     for path, package in find_packages(str(TOP / "ros" / "src")).items()
-    if package.name != "crazyflie_tests" and not package.is_metapackage()
+    if package.name not in ("crazyflie_dev", "crazyflie_tests") and not package.is_metapackage()
 }
 INSPECT = Path(__file__).with_name("inspect_install.py")
 
@@ -48,13 +48,17 @@ def terminal(workspace, install_space, shell):
 
 
 def test_flies(terminal):
-    terminal.run(f"python3 {FLY} crazyflie_examples sw_hover.launch {FAST}")
+    terminal.run(f"{FLY} crazyflie_examples sw_hover.launch {FAST}")
 
 
 def test_knows_of_nothing_else(terminal, workspace):
     environment = terminal.run("env")
     for folder in ("devel", "src", "build"):
         assert f"{workspace}/ros/{folder}" not in environment
+
+
+def test_tools_of_developers_are_not_installed(install_space):
+    assert not list(install_space.rglob("crazyflie_dev*"))
 
 
 def test_modules_and_launch_files_are_complete(terminal, install_space):

@@ -49,7 +49,7 @@ def test_controller_of_ones_own_flies(underlay, workspace, my_workspace, shell):
     executable = terminal.run("catkin_find --first-only my_controller my_controller_node")
     assert str(my_workspace) in executable
     assert "crazyflie_msgs/ControlStamped[]" in terminal.run("rosmsg show my_msgs/Plan")
-    flight = terminal.run(f"python3 {FLY} my_controller my_hover.launch heading:=0.5 {FAST}")
+    flight = terminal.run(f"{FLY} my_controller my_hover.launch heading:=0.5 {FAST}")
     # lqr_controller holds the yaw at 0.
     [yaw] = re.findall(r"yaw at the end: (\S+)", flight)
     assert float(yaw) == pytest.approx(0.5, abs=0.01)

@@ -2,11 +2,12 @@
 
 import os
 import shutil
+import socket
 from pathlib import Path
 
 from terminal import Terminal
 
-from crazyflie_examples.launching import free_port
+from crazyflie_dev.programs import free_port
 
 TOP = Path(__file__).resolve().parents[4]
 """Top of the repository."""
@@ -14,7 +15,10 @@ TOP = Path(__file__).resolve().parents[4]
 INSTALLATION = TOP / "docs" / "installation.md"
 """The page that tells how a workspace is built and installed."""
 
-FLY = Path(__file__).with_name("fly.py")
+_TOOLS = TOP / "ros" / "src" / "crazyflie_dev" / "src"
+
+FLY = f"PYTHONPATH={_TOOLS}:$PYTHONPATH python3 {Path(__file__).with_name('fly.py')}"
+"""Command that flies a launch file and judges the flight; an install space has no such tool."""
 
 FAST = "rviz:=false sim_time:=true real_time_factor:=0 simulator_dt:=0.01 composed:=true"
 """Arguments of sw_hover.launch that fly it in seconds."""
@@ -51,7 +55,7 @@ def clean_environment(home: Path) -> dict:
         "LANG": "C.UTF-8",
         "PATH": os.pathsep.join(path),
         "ROS_IP": "127.0.0.1",
-        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port()}",
+        "ROS_MASTER_URI": f"http://127.0.0.1:{free_port(socket.SOCK_STREAM)}",
     }
 
 

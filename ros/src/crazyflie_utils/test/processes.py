@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import queue
 import subprocess
 import sys
 import threading
@@ -11,8 +10,7 @@ from pathlib import Path
 
 import rospy
 
-LIMIT = 30.0
-"""The longest that a test waits for anything, s."""
+from crazyflie_utils.testing.peer import LIMIT
 
 _TEST = Path(__file__).resolve().parent
 
@@ -79,23 +77,3 @@ def composed(name, *arguments, **nodes):
         rospy.set_param(f"/{name}/nodes", {key: f"small_nodes:{nodes[key]}" for key in nodes})
     script = str(_TEST.parent / "exec" / "composed_node")
     return _ended(NodeProcess([sys.executable, script, f"__name:={name}", *arguments]))
-
-
-@contextlib.contextmanager
-def listening(topic, message_type):
-    """Yield a queue of what rospy hears on a topic, as an outsider."""
-    heard = queue.Queue()
-    subscriber = rospy.Subscriber(topic, message_type, heard.put, tcp_nodelay=True)
-    try:
-        yield heard
-    finally:
-        subscriber.unregister()
-
-
-def wait_until(condition, what):
-    """Wait until ``condition()`` is true."""
-    patience = threading.Event()
-    end = time.monotonic() + LIMIT
-    while not condition():
-        assert time.monotonic() < end, f"waited {LIMIT:g} s for {what}"
-        patience.wait(0.01)

@@ -6,9 +6,11 @@ import xmlrpc.client
 import pytest
 import rosgraph
 import rospy
-from processes import LIMIT, composed, listening, wait_until
+from processes import composed
 from std_msgs.msg import Int64
 from std_srvs.srv import Trigger
+
+from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
 COUNT = 100
 

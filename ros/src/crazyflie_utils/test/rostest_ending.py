@@ -5,9 +5,11 @@ import signal
 import pytest
 import rosnode
 import rospy
-from processes import LIMIT, composed, listening, small_node, wait_until
+from processes import composed, small_node
 from small_nodes import SAFE
 from std_msgs.msg import Float64
+
+from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
 
 def interrupt(process, name):

@@ -8,7 +8,7 @@ from concurrent.futures import Future
 import pytest
 import rosgraph
 import rospy
-from processes import LIMIT, composed, wait_until
+from processes import composed
 from std_msgs.msg import Float64, Int64, String
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
@@ -16,6 +16,7 @@ from crazyflie_utils import ServiceError
 from crazyflie_utils.parameter_types import BOOLEAN, FINITE, TEXT, Integer
 from crazyflie_utils.parameters import ParameterError
 from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_utils.testing.peer import LIMIT, wait_until
 
 
 @pytest.fixture(scope="module")

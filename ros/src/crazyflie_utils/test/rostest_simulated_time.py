@@ -2,9 +2,11 @@
 
 import pytest
 import rospy
-from processes import LIMIT, composed, listening, small_node, wait_until
+from processes import composed, small_node
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float64
+
+from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
 PERIOD = 0.5
 

@@ -3,9 +3,9 @@
 import pytest
 from std_msgs.msg import String
 
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import POSITIVE
+from crazyflie_utils.testing import FakeProcess
 
 
 class Echo(Node):

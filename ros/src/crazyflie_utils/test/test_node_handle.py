@@ -8,8 +8,8 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerResponse
 
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.testing import FakeProcess
 
 LIMIT = 20.0
 

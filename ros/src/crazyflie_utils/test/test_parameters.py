@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
     DURATION,
@@ -23,6 +22,7 @@ from crazyflie_utils.parameter_types import (
     Text,
 )
 from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.testing import FakeProcess
 
 NUMBERS = [FINITE, METRES, POSITIVE, DURATION, TIME_STEP, Number(minimum=-1.0, maximum=1.0)]
 NOT_NUMBERS = ["1.0", "", True, False, None, [1.0], {"x": 1.0}, math.nan, math.inf, -math.inf]

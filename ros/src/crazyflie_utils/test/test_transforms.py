@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.runtime.transforms import TransformError
+from crazyflie_utils.testing import FakeProcess
 
 
 def transform(parent, child, time, x=0.0, yaw=0.0):

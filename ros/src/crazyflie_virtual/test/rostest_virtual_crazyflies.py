@@ -6,9 +6,9 @@ import time
 import pytest
 import rospy
 
+from crazyflie_utils.testing.peer import LIMIT, wait_until
 from crazyflie_virtual.observer import decode
 
-LIMIT = 20.0
 FIRST_PORT, OBSERVER_PORT = 17850, 17800
 
 
@@ -24,16 +24,9 @@ def answers(port, timeout=0.2):
             return False
 
 
-def wait_until(condition):
-    end = time.monotonic() + LIMIT
-    while not condition():
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.05)
-
-
 @pytest.mark.parametrize("number", [0, 1, 2])
 def test_each_has_its_port(number):
-    wait_until(lambda: answers(FIRST_PORT + number))
+    wait_until(lambda: answers(FIRST_PORT + number), "an answer")
 
 
 def test_they_stand_side_by_side():
@@ -49,9 +42,9 @@ def test_they_stand_side_by_side():
 
 
 def test_a_switch_is_a_parameter():
-    wait_until(lambda: answers(FIRST_PORT + 1))
+    wait_until(lambda: answers(FIRST_PORT + 1), "an answer")
     rospy.set_param("/virtual_crazyflie_2/fault/silence", 1000)
-    wait_until(lambda: not answers(FIRST_PORT + 1))
+    wait_until(lambda: not answers(FIRST_PORT + 1), "silence")
     assert answers(FIRST_PORT, timeout=LIMIT)
     rospy.set_param("/virtual_crazyflie_2/fault/silence", 0)
-    wait_until(lambda: answers(FIRST_PORT + 1))
+    wait_until(lambda: answers(FIRST_PORT + 1), "an answer")

@@ -10,6 +10,7 @@ import time
 import pytest
 from virtual_client import LIMIT, Client, wait_until
 
+from crazyflie_dev.programs import free_port
 from crazyflie_virtual.firmware.supervisor import State
 
 
@@ -38,14 +39,8 @@ def process():
     process.stdout.close()
 
 
-def closed_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def test_port_closed_is_a_failed_connection(client):
-    someone = client(f"udp://127.0.0.1:{closed_port()}").open()
+    someone = client(f"udp://127.0.0.1:{free_port()}").open()
     someone.wait_for("connection_failed")
     assert "connected" not in someone.events
 

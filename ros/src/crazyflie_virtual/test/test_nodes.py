@@ -5,7 +5,7 @@ import struct
 
 import pytest
 
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
 from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
 

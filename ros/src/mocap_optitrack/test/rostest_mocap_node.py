@@ -1,7 +1,6 @@
 """The node in a process of its own, with a virtual motion capture server."""
 
 import math
-import queue
 import subprocess
 import time
 
@@ -9,8 +8,11 @@ import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Pose2D, PoseStamped
-from studio import LIMIT, Scene, free_port, mocap_launch, virtual_mocap
+from studio import LIMIT, Scene, mocap_launch, virtual_mocap
 from tf2_msgs.msg import TFMessage
+
+from crazyflie_dev.programs import free_port
+from crazyflie_utils.testing.peer import listening
 
 HALF = 0.5**0.5
 
@@ -45,33 +47,9 @@ def config(port):
     }
 
 
-class Listener:
-    """What comes on a topic, from now on."""
-
-    def __init__(self, topic, message_type):
-        self._received = queue.Queue()
-        self._subscriber = rospy.Subscriber(topic, message_type, self._received.put)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *exception):
-        self._subscriber.unregister()
-
-    def next(self, accept=lambda message: True):
-        """Return the next message that is accepted."""
-        end = time.monotonic() + LIMIT
-        while True:
-            message = self._received.get(timeout=max(0.0, end - time.monotonic()))
-            if accept(message):
-                return message
-
-    def latest(self):
-        """Return the last message that has come, and forget those before."""
-        message = self.next()
-        while not self._received.empty():
-            message = self._received.get()
-        return message
+def latest(heard):
+    """Return the last message that has come, and forget those before."""
+    return [heard.next(), *heard.drain()][-1]
 
 
 def wait_for_status(component, level, text=""):
@@ -86,7 +64,7 @@ def wait_for_status(component, level, text=""):
             and text in status.message
         ]
 
-    with Listener("/diagnostics", DiagnosticArray) as diagnostics:
+    with listening("/diagnostics", DiagnosticArray) as diagnostics:
         (status,) = matching(diagnostics.next(matching))
     return {value.key: value.value for value in status.values}
 
@@ -109,7 +87,7 @@ def test_a_server_that_comes_late_is_found(scene):
 
 
 def test_poses_have_the_time_of_the_exposure(scene):
-    with Listener("/mocap_node/Robot_1/pose", PoseStamped) as poses:
+    with listening("/mocap_node/Robot_1/pose", PoseStamped) as poses:
         message = poses.next()
     assert message.header.frame_id == "world"
     moment = message.header.stamp.to_sec() - time.time() + time.monotonic()
@@ -125,9 +103,9 @@ def test_poses_have_the_time_of_the_exposure(scene):
 
 def test_ground_poses_and_tf_agree_with_poses(scene):
     with (
-        Listener("/mocap_node/Robot_1/pose", PoseStamped) as poses,
-        Listener("/mocap_node/Robot_1/ground_pose", Pose2D) as ground_poses,
-        Listener("/tf", TFMessage) as tf,
+        listening("/mocap_node/Robot_1/pose", PoseStamped) as poses,
+        listening("/mocap_node/Robot_1/ground_pose", Pose2D) as ground_poses,
+        listening("/tf", TFMessage) as tf,
     ):
         # Names are known a little later than numbers.
         begin = tf.next(lambda m: len(m.transforms) == 2).transforms[0].header.stamp
@@ -163,27 +141,27 @@ def test_a_body_that_is_nowhere_is_named_with_those_that_are_there(scene):
 
 def test_a_body_that_is_not_tracked_is_not_published(scene):
     with (
-        Listener("/mocap_node/Robot_1/pose", PoseStamped) as lost,
-        Listener("/cf7/pose", PoseStamped) as seen,
+        listening("/mocap_node/Robot_1/pose", PoseStamped) as lost,
+        listening("/cf7/pose", PoseStamped) as seen,
     ):
         lost.next()
         rospy.set_param("/virtual_mocap/fault/invalid", "1")
         wait_for_status("rigid body 1", DiagnosticStatus.ERROR, "not tracked for")
-        first = seen.latest().header.stamp
+        first = latest(seen).header.stamp
         wait_for_status("rigid body 1", DiagnosticStatus.ERROR, "not tracked for")
-        assert seen.latest().header.stamp > first
-        assert lost.latest().header.stamp < first
+        assert latest(seen).header.stamp > first
+        assert latest(lost).header.stamp < first
         rospy.set_param("/virtual_mocap/fault/invalid", "")
         assert lost.next().header.stamp > first
     wait_for_status("rigid body 1", DiagnosticStatus.OK)
 
 
 def test_a_stream_that_pauses_is_reported_and_taken_up_again(scene):
-    with Listener("/cf7/pose", PoseStamped) as poses:
+    with listening("/cf7/pose", PoseStamped) as poses:
         poses.next()
         rospy.set_param("/virtual_mocap/fault/silent", True)
         wait_for_status("stream", DiagnosticStatus.ERROR, "no frames for 1 s")
-        paused_at = poses.latest().header.stamp
+        paused_at = latest(poses).header.stamp
         rospy.set_param("/virtual_mocap/fault/silent", False)
         assert poses.next().header.stamp > paused_at
     wait_for_status("stream", DiagnosticStatus.OK)

@@ -1,45 +1,18 @@
 """A motion capture studio in software: processes, and a scene to look at."""
 
-import contextlib
-import os
-import signal
 import socket
-import subprocess
 import threading
 import time
 
 import yaml
 
+from crazyflie_dev.programs import running
 from crazyflie_virtual.observer import Observation
 
 LIMIT = 20.0
 
 _PERIOD = 0.05
 """From one look at the scene to the next, s."""
-
-
-def free_port():
-    """Return a UDP port that nobody uses."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
-@contextlib.contextmanager
-def process(*command):
-    """Run a program for the length of a block."""
-    child = subprocess.Popen([str(part) for part in command], start_new_session=True)
-    try:
-        yield child
-    finally:
-        # roslaunch and rosrun have children of their own.
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(child.pid, signal.SIGINT)
-        try:
-            child.wait(LIMIT)
-        except subprocess.TimeoutExpired:
-            os.killpg(child.pid, signal.SIGKILL)
-            raise
 
 
 def virtual_mocap(command_port, observer_port, latency):
@@ -50,14 +23,14 @@ def virtual_mocap(command_port, observer_port, latency):
         "_latency": latency,
     }
     arguments = [f"{key}:={value}" for key, value in options.items()]
-    return process("rosrun", "crazyflie_virtual", "virtual_mocap", *arguments)
+    return running("rosrun", "crazyflie_virtual", "virtual_mocap", *arguments)
 
 
 def mocap_launch(folder, config):
     """Run mocap.launch with a configuration."""
     path = folder / "mocap.yaml"
     path.write_text(yaml.safe_dump(config))
-    return process("roslaunch", "mocap_optitrack", "mocap.launch", f"mocap_config_file:={path}")
+    return running("roslaunch", "mocap_optitrack", "mocap.launch", f"mocap_config_file:={path}")
 
 
 class Scene:

@@ -8,7 +8,7 @@ import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Point, Pose2D, Quaternion
 
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.mocap_node import MocapNode

@@ -7,8 +7,8 @@ import threading
 import time
 
 import pytest
-from studio import free_port
 
+from crazyflie_dev.programs import free_port
 from crazyflie_virtual.mocap import natnet
 from crazyflie_virtual.mocap.natnet import VERSIONS
 from crazyflie_virtual.mocap.server import MocapServer

@@ -1,1 +1,1 @@
-"""Flights: what to fly, how to record it and how to judge it."""
+"""Nodes of the examples: moving from point to point, converting references."""

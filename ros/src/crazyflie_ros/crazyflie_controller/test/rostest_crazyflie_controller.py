@@ -1,6 +1,5 @@
 """The controller in a process of its own, with its launch file, on a real master."""
 
-import queue
 import threading
 
 import pytest
@@ -9,7 +8,7 @@ from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Twist, 
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 
-LIMIT = 15.0
+from crazyflie_utils.testing.peer import LIMIT, listening
 
 
 class Vehicle:
@@ -45,17 +44,8 @@ def vehicle():
 
 @pytest.fixture
 def setpoints():
-    received = queue.Queue()
-    subscriber = rospy.Subscriber("/crazyflie/cmd_vel", Twist, received.put)
-    yield received
-    subscriber.unregister()
-
-
-def wait_for(setpoints, is_it):
-    while True:
-        setpoint = setpoints.get(timeout=LIMIT)
-        if is_it(setpoint):
-            return setpoint
+    with listening("/crazyflie/cmd_vel", Twist) as setpoints:
+        yield setpoints
 
 
 def call(name):
@@ -74,19 +64,19 @@ def call(name):
 
 
 def test_takes_off_goes_and_lands(vehicle, setpoints):
-    assert setpoints.get(timeout=LIMIT) == Twist()
+    assert setpoints.next() == Twist()
     goal = PoseStamped()
     goal.pose.position.x, goal.pose.position.z = 0.1, 0.5
     goal.pose.orientation.w = 1.0
     publisher = rospy.Publisher("/crazyflie/goal", PoseStamped, queue_size=1, latch=True)
     publisher.publish(goal)
     call("takeoff")
-    assert wait_for(setpoints, lambda s: s.linear.z > 5000.0).linear.x == 0.0
+    assert setpoints.next(lambda s: s.linear.z > 5000.0).linear.x == 0.0
     vehicle.z = 0.5
     # The same error for long: 40 * 0.1 and a growing integral, at most 2 * 0.1.
-    setpoint = wait_for(setpoints, lambda s: s.linear.x > 4.0)
+    setpoint = setpoints.next(lambda s: s.linear.x > 4.0)
     assert setpoint.linear.x == pytest.approx(4.0, abs=0.21)
     assert setpoint.linear.y == pytest.approx(0.0, abs=1e-6)
     call("land")
     vehicle.z = 0.0
-    wait_for(setpoints, lambda s: s == Twist())
+    setpoints.next(lambda s: s == Twist())

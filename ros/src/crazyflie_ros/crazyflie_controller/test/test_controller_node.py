@@ -20,9 +20,9 @@ from crazyflie_controller.controller_node import ControllerNode
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
-from crazyflie_utils.fake import FakeProcess
 from crazyflie_utils.node import Node
 from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import from_vector
 
 NAN = float("nan")

@@ -2,36 +2,20 @@
 
 import contextlib
 import os
-import signal
 import socket
-import subprocess
 import time
 
 import rospy
 
 from crazyflie_demo.joystick import AXIS, BUTTON, EVENT
+from crazyflie_dev.programs import free_port, running
 from crazyflie_virtual.observer import decode
 
 LIMIT = 30.0
 """How long anything may take to come about, s."""
 
-_END_LIMIT = 20.0
-"""How long a program may take to end, s."""
-
 _SCAN = b"\xff"
 """What cflib asks a port, to see whether there is a vehicle."""
-
-
-def free_ports(count):
-    """Return UDP ports of this machine that nobody uses now."""
-    with contextlib.ExitStack() as stack:
-        sockets = [
-            stack.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
-            for _ in range(count)
-        ]
-        for each in sockets:
-            each.bind(("127.0.0.1", 0))
-        return [each.getsockname()[1] for each in sockets]
 
 
 class Observer:
@@ -68,21 +52,6 @@ class Observer:
             assert time.monotonic() < end, f"in the end: {track[-1:]}"
 
 
-@contextlib.contextmanager
-def running(*command, **options):
-    """Run a program; yield its process."""
-    process = subprocess.Popen(command, **options)
-    try:
-        yield process
-    finally:
-        process.send_signal(signal.SIGINT)
-        try:
-            process.wait(_END_LIMIT)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            raise
-
-
 def launched(package, file, **arguments):
     """Run a launch file; roslaunch ends its nodes when it is interrupted, not when it is killed."""
     given = [f"{name}:={value}" for name, value in arguments.items()]
@@ -98,7 +67,7 @@ def node(package, name, *remappings, **parameters):
 @contextlib.contextmanager
 def virtual_vehicle(number=1, **parameters):
     """Run a virtual vehicle, which motion capture sees as a body; yield its address."""
-    (port,) = free_ports(1)
+    port = free_port()
     name = f"__name:=virtual_crazyflie_{number}"
     parameters = {"observer/id": number, "observer/name": f"cf{number}", **parameters}
     with (

@@ -6,9 +6,10 @@ import pytest
 import rospy
 import tf2_ros
 import yaml
-from flights import LIMIT, Stick, free_ports, launched, node, virtual_vehicle, wait_for_service
+from flights import LIMIT, Stick, launched, node, virtual_vehicle, wait_for_service
 
 from crazyflie_demo.keyboard import LAND, PITCH, TAKEOFF
+from crazyflie_dev.programs import free_port
 
 
 class Eyes:
@@ -64,7 +65,7 @@ def config(path, command_port, bodies):
 
 
 def test_hovers_goes_and_lands(tmp_path):
-    command_port, observer_port = free_ports(2)
+    command_port, observer_port = free_port(), free_port()
     with (
         Stick(tmp_path / "js0") as stick,
         virtual_mocap(command_port, observer_port),

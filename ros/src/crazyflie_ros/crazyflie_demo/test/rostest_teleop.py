@@ -7,11 +7,13 @@ import termios
 import time
 
 import rospy
-from flights import LIMIT, Observer, Stick, launched, running, virtual_vehicle, wait_for_service
+from flights import LIMIT, Observer, Stick, launched, virtual_vehicle, wait_for_service
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.keyboard import EMERGENCY, HEADLIGHT, LIFT, PITCH, ROLL, TAKEOFF, YAW
+from crazyflie_dev.programs import running
 from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_utils.testing.peer import listening, wait_until
 
 CLIMB, HOVER = 0.78, 0.7
 """Of the thrust stick's way; 60000 PWM at the end, and a dead zone at the beginning."""
@@ -19,13 +21,6 @@ CLIMB, HOVER = 0.78, 0.7
 
 def heading(truth):
     return rpy_from_quaternion(*truth.quaternion)[2]
-
-
-def wait_until(is_it):
-    end = time.monotonic() + LIMIT
-    while not is_it():
-        assert time.monotonic() < end
-        time.sleep(0.05)
 
 
 def headlight():
@@ -40,9 +35,9 @@ def test_a_joystick(tmp_path):
         launched("crazyflie_demo", "teleop_xbox360.launch", uri=uri, joy_dev=tmp_path / "js0"),
     ):
         wait_for_service("/crazyflie/emergency")
-        wait_until(lambda: headlight() == 0)
+        wait_until(lambda: headlight() == 0, "the driver")
         stick.press(HEADLIGHT)
-        wait_until(lambda: headlight() == 1)
+        wait_until(lambda: headlight() == 1, "the headlight")
 
         stick.tilt(LIFT, 0.0)
         rospy.wait_for_message("/crazyflie/cmd_vel", rospy.AnyMsg, LIMIT)
@@ -77,13 +72,11 @@ def test_a_keyboard_and_its_terminal():
         first = rospy.wait_for_message("/crazyflie/joy", Joy, LIMIT)
         assert not any(first.buttons)
         assert termios.tcgetattr(terminal) != before
-        heard = []
-        subscriber = rospy.Subscriber("/crazyflie/joy", Joy, heard.append)
-        wait_until(lambda: heard)
-        os.write(keys, b"t\x1b[A")
-        wait_until(lambda: any(message.buttons[TAKEOFF] for message in heard))
-        wait_until(lambda: any(message.axes[PITCH] > 0.0 for message in heard))
-        subscriber.unregister()
+        with listening("/crazyflie/joy", Joy) as heard:
+            heard.next()
+            os.write(keys, b"t\x1b[A")
+            heard.next(lambda message: message.buttons[TAKEOFF])
+            heard.next(lambda message: message.axes[PITCH] > 0.0)
         keyboard.send_signal(signal.SIGINT)
         assert keyboard.wait(LIMIT) == 0
     assert termios.tcgetattr(terminal) == before

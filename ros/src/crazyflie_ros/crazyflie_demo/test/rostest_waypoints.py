@@ -2,18 +2,19 @@
 
 import math
 
-from flights import Stick, free_ports, launched, virtual_vehicle, wait_for_service
+from flights import Stick, launched, virtual_vehicle, wait_for_service
 from rostest_hover import Eyes, config, virtual_mocap
 
 from crazyflie_demo.keyboard import LAND, TAKEOFF
 from crazyflie_demo.waypoint_node import Demo1Node, Demo2Node
+from crazyflie_dev.programs import free_port
 
 VISITED = 3
 """Waypoints of each tour that are waited for."""
 
 
 def test_two_tours(tmp_path):
-    command_port, observer_port = free_ports(2)
+    command_port, observer_port = free_port(), free_port()
     starts = [node.waypoints[0] for node in (Demo1Node, Demo2Node)]
 
     def vehicle(number):

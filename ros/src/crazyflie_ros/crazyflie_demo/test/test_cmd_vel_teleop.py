@@ -4,7 +4,7 @@ import pytest
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.cmd_vel_teleop_node import CmdVelTeleopNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 NAN = float("nan")
 PITCH, ROLL, YAW, THRUST = 4, 3, 0, 1

@@ -8,7 +8,7 @@ from fake_driver import FakeDriver
 
 from crazyflie_demo.high_level_flight_node import HighLevelFlightNode
 from crazyflie_demo.trajectory_flight_node import TrajectoryFlightNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 FIGURE8 = Path(__file__).parents[1] / "data" / "figure8.csv"
 PREPARATION = ["update_params", "update_params"]

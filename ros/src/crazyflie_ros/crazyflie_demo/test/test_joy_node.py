@@ -8,7 +8,7 @@ from sensor_msgs.msg import Joy
 from test_joystick import axis, button
 
 from crazyflie_demo.joy_node import JoyNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 
 @pytest.fixture

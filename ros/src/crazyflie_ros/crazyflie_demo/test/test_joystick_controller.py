@@ -5,7 +5,7 @@ from fake_driver import FakeDriver
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.joystick_controller_node import JoystickControllerNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 
 def launch(has_controller=True, parameters=None):

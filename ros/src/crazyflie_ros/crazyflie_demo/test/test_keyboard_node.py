@@ -8,7 +8,7 @@ import pytest
 
 from crazyflie_demo.keyboard import LAND, PITCH, TAKEOFF
 from crazyflie_demo.keyboard_node import KeyboardNode
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 
 class Terminal:

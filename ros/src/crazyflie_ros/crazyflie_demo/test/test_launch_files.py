@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 import rospkg
-from roslaunch.config import load_config_default
 
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_dev import launch_files
+from crazyflie_utils.testing import FakeProcess
 from mocap_optitrack.mocap_node import MocapNode
 
 PACKAGE = Path(__file__).parents[1]
@@ -24,11 +24,7 @@ JOYSTICK = {"joy": "joy_node"}
 @functools.cache
 def expand(file, **arguments):
     """Return nodes and values of parameters, by full name."""
-    given = [f"{name}:={value}" for name, value in arguments.items()]
-    path = str(PACKAGE / "launch" / file)
-    config = load_config_default([(path, given)], None, verbose=False, assign_machines=False)
-    nodes = {node.namespace.rstrip("/") + "/" + node.name: node for node in config.nodes}
-    return nodes, {name: parameter.value for name, parameter in config.params.items()}
+    return launch_files.expand(PACKAGE / "launch" / file, **arguments)
 
 
 def types(nodes):

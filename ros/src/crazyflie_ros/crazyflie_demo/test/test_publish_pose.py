@@ -9,7 +9,7 @@ from sensor_msgs.msg import Joy
 from crazyflie_demo.const_thrust_node import ConstThrustNode
 from crazyflie_demo.publish_pose_node import PublishPoseNode, PublishPoseTeleopNode
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 PLACE = {"x": 1.0, "y": -2.0, "z": 0.5}
 X, Y, Z, YAW = 4, 3, 1, 0

@@ -6,7 +6,7 @@ from tf2_msgs.msg import TFMessage
 
 from crazyflie_demo.waypoint_node import Demo2Node, DemoNode
 from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 
 def launch(node, **parameters):

@@ -1,25 +1,22 @@
 """The visualizer in a process of its own, on a real master."""
 
-import queue
-
 import rospy
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-
-LIMIT = 10.0
+from crazyflie_utils.testing.peer import LIMIT, listening
 
 
 def test_whoever_comes_late_sees_path_and_reference():
     reference = rospy.Publisher("/ref", PositionVelocityStateStamped, latch=True, queue_size=1)
     reference.publish(PositionVelocityStateStamped(state=PositionVelocityState(z=3.5)))
-    early = queue.Queue()
-    subscriber = rospy.Subscriber("/visualizer/markers", MarkerArray, early.put)
-    while True:
-        markers = {marker.ns: marker for marker in early.get(timeout=LIMIT).markers}
-        if markers["path"].points and markers["reference"].action == Marker.ADD:
-            break
-    subscriber.unregister()
+
+    def is_complete(message):
+        markers = {marker.ns: marker for marker in message.markers}
+        return markers["path"].points and markers["reference"].action == Marker.ADD
+
+    with listening("/visualizer/markers", MarkerArray) as early:
+        early.next(is_complete)
     late = rospy.wait_for_message("/visualizer/markers", MarkerArray, LIMIT)
     markers = {marker.ns: marker for marker in late.markers}
     (point,) = markers["path"].points

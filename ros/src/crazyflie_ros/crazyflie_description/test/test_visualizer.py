@@ -13,7 +13,7 @@ from crazyflie_description import visualizer_node
 from crazyflie_description.flown_path import FlownPath, circle
 from crazyflie_description.visualizer_node import PERIOD, SPACING, VisualizerNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 PARAMETERS = {
     "frames/fixed": "world",

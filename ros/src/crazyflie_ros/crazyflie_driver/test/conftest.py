@@ -2,11 +2,12 @@
 
 import pytest
 
+from crazyflie_dev.fake_vehicle import READ_ONLY, FakeVehicle
+from crazyflie_dev.fixtures import own_cache  # noqa: F401
 from crazyflie_driver.msg import LogBlock
 from crazyflie_driver.server_node import CrazyflieServerNode
 from crazyflie_driver.srv import AddCrazyflieRequest, RemoveCrazyflieRequest
-from crazyflie_py.fake import READ_ONLY, FakeVehicle
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 LIMIT = 5.0
 """Within this, s, a call of the driver is answered, whatever is wrong with a vehicle."""
@@ -82,11 +83,6 @@ class Server:
 
 def result(answer):
     return answer.result(timeout=LIMIT) if hasattr(answer, "result") else answer
-
-
-@pytest.fixture(autouse=True)
-def _own_cache(monkeypatch, tmp_path_factory):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
 
 
 @pytest.fixture

@@ -1,10 +1,8 @@
 """The driver in a process of its own, added to by its launch file, with virtual vehicles."""
 
-import queue
 import signal
 import subprocess
 import threading
-import time
 
 import pytest
 import rosgraph
@@ -22,23 +20,8 @@ from crazyflie_driver.srv import (
     Takeoff,
     UpdateParams,
 )
-from crazyflie_virtual.server import Server
-from crazyflie_virtual.settings import Settings
-
-LIMIT = 20.0
-
-
-@pytest.fixture(scope="module")
-def virtual():
-    """Return a virtual vehicle."""
-    server = Server(Settings(port=0, observer_port=0))
-    server.start()
-    yield server
-    server.stop()
-
-
-def uri(server):
-    return f"udp://127.0.0.1:{server.address[1]}"
+from crazyflie_utils.testing.peer import LIMIT, listening
+from crazyflie_virtual.testing import virtual_vehicle
 
 
 def launch(*arguments):
@@ -59,42 +42,22 @@ def call(name, service_type, *arguments):
     return rospy.ServiceProxy(name, service_type)(*arguments)
 
 
-class Listener:
-    """What comes on a topic, to be waited for."""
-
-    def __init__(self, topic, message_type):
-        self._heard = queue.Queue()
-        self._subscriber = rospy.Subscriber(topic, message_type, self._heard.put, tcp_nodelay=True)
-
-    def wait_until(self, condition):
-        """Return the first message for which ``condition`` holds."""
-        end = time.monotonic() + LIMIT
-        while not condition(message := self._heard.get(timeout=LIMIT)):
-            assert time.monotonic() < end, f"in the end: {message}"
-        return message
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self._subscriber.unregister()
-
-
 @pytest.fixture(scope="module")
-def added(virtual, tmp_path_factory):
-    """Add the virtual vehicle as cf1, with everything."""
+def added(tmp_path_factory):
+    """Add a virtual vehicle as cf1, with everything; return its address."""
     variables = tmp_path_factory.mktemp("log") / "blocks.yaml"
     variables.write_text("genericLogTopic_motors_Variables: [motor.m1, motor.m2]\n")
-    text = launch(
-        f"uri:={uri(virtual)}",
-        "tf_prefix:=cf1",
-        "enable_logging_pose:=True",
-        "genericLogTopics:=[motors]",
-        "genericLogTopicFrequencies:=[20]",
-        f"genericLogTopicVariables_file:={variables}",
-    )
-    assert f"added {uri(virtual)} as cf1" in text
-    return virtual
+    with virtual_vehicle() as (_, uri):
+        text = launch(
+            f"uri:={uri}",
+            "tf_prefix:=cf1",
+            "enable_logging_pose:=True",
+            "genericLogTopics:=[motors]",
+            "genericLogTopicFrequencies:=[20]",
+            f"genericLogTopicVariables_file:={variables}",
+        )
+        assert f"added {uri} as cf1" in text
+        yield uri
 
 
 def test_what_the_vehicle_says_arrives(added):
@@ -123,11 +86,11 @@ def test_parameters_of_the_firmware(added):
 
 
 def test_a_flight(added):
-    with Listener("/cf1/pose", PoseStamped) as poses:
+    with listening("/cf1/pose", PoseStamped) as poses:
         call("/cf1/takeoff", Takeoff, 0, 0.4, Duration(1))
-        poses.wait_until(lambda message: message.pose.position.z > 0.35)
+        poses.next(lambda message: message.pose.position.z > 0.35)
         call("/cf1/land", Land, 0, 0.0, Duration(1))
-        poses.wait_until(lambda message: message.pose.position.z < 0.05)
+        poses.next(lambda message: message.pose.position.z < 0.05)
 
 
 def test_setpoints_and_diagnostics(added):
@@ -142,11 +105,11 @@ def test_setpoints_and_diagnostics(added):
     thread.start()
     try:
         with (
-            Listener("/diagnostics", DiagnosticArray) as diagnostics,
-            Listener("/cf1/motors", GenericLogData) as motors,
+            listening("/diagnostics", DiagnosticArray) as diagnostics,
+            listening("/cf1/motors", GenericLogData) as motors,
         ):
-            status = diagnostics.wait_until(lambda message: rate(message) > 10.0).status[0]
-            motors.wait_until(lambda message: min(message.values) > 10000.0)
+            status = diagnostics.next(lambda message: rate(message) > 10.0).status[0]
+            motors.next(lambda message: min(message.values) > 10000.0)
     finally:
         stop.set()
         thread.join()
@@ -170,10 +133,10 @@ def test_an_emergency_and_a_new_beginning(added):
     call("/cf1/emergency", Empty)
     with pytest.raises(rospy.ServiceException, match="emergency stop"):
         call("/cf1/takeoff", Takeoff, 0, 0.4, Duration(1))
-    call("/remove_crazyflie", RemoveCrazyflie, uri(added))
+    call("/remove_crazyflie", RemoveCrazyflie, added)
     published, subscribed, services = rosgraph.Master("/test").getSystemState()
     names = [name for each in (published, subscribed, services) for name, _ in each]
     assert not [name for name in names if name.startswith("/cf1/")]
-    assert f"added {uri(added)}" in launch(f"uri:={uri(added)}", "tf_prefix:=/cf2/")
+    assert f"added {added}" in launch(f"uri:={added}", "tf_prefix:=/cf2/")
     with pytest.raises(rospy.ServiceException, match="cannot fly, its state is: .*locked"):
         call("/cf2/takeoff", Takeoff, 0, 0.4, Duration(1))

@@ -5,7 +5,7 @@ import pytest
 from crazyflie_driver.add_node import CrazyflieAddNode
 from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieResponse
 from crazyflie_utils import ServiceError
-from crazyflie_utils.fake import FakeProcess
+from crazyflie_utils.testing import FakeProcess
 
 PARAMETERS = {"uri": "udp://127.0.0.1:19850", "tf_prefix": "cf1"}
 

@@ -2,8 +2,9 @@
 
 import pytest
 
+from crazyflie_dev.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
+from crazyflie_dev.fixtures import own_cache  # noqa: F401
 from crazyflie_py.crazyflie import Crazyflie
-from crazyflie_py.fake import EXTENDED, READ_ONLY, FakeVehicle
 
 LOG = {
     "stateEstimate.x": ("f", 1.5),
@@ -23,11 +24,6 @@ PARAMETERS = {
     "sound.freq": ("H", 4000, 0),
     "motor.trim": ("b", -3, 0),
 }
-
-
-@pytest.fixture(autouse=True)
-def _own_cache(monkeypatch, tmp_path_factory):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
 
 
 @pytest.fixture

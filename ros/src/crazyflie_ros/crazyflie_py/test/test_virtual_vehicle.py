@@ -10,30 +10,27 @@ from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
 from crazyflie_py.errors import RefusedError
 from crazyflie_py.log import LogBlock
-from crazyflie_virtual.server import Server
-from crazyflie_virtual.settings import Settings
+from crazyflie_virtual.testing import virtual_vehicle
 
 LIMIT = 20.0
 
 
 @pytest.fixture(scope="module")
-def server():
-    server = Server(Settings(port=0, observer_port=0))
-    server.start()
-    yield server
-    server.stop()
+def virtual():
+    with virtual_vehicle() as virtual:
+        yield virtual
 
 
 class Pilot:
     """A link to the virtual vehicle, and what it logs."""
 
-    def __init__(self, server):
+    def __init__(self, uri):
         self.states = queue.Queue()
         self.lines = queue.Queue()
         self._logged = {}
         self._changed = threading.Condition()
         self.link = Crazyflie(
-            f"udp://127.0.0.1:{server.address[1]}",
+            uri,
             reconnect=True,
             on_state=lambda state, text: self.states.put(state),
             on_console=self.lines.put,
@@ -61,8 +58,8 @@ class Pilot:
 
 
 @pytest.fixture(scope="module")
-def pilot(server):
-    pilot = Pilot(server)
+def pilot(virtual):
+    pilot = Pilot(virtual[1])
     yield pilot
     pilot.link.close()
 
@@ -95,8 +92,8 @@ def test_a_trajectory_that_was_never_defined_is_refused(pilot):
         pilot.link.high_level.start_trajectory(77)
 
 
-def test_silence_is_noticed_and_overcome(server, pilot):
-    server.switches.silence = 1.0
+def test_silence_is_noticed_and_overcome(virtual, pilot):
+    virtual[0].switches.silence = 1.0
     pilot.wait_for_state(LinkState.LOST)
     pilot.wait_for_state(LinkState.CONNECTED)
     with pilot._changed:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from crazyflie_virtual.server import Server
-from crazyflie_virtual.settings import FIRST_PORT, Settings
+from crazyflie_dev.programs import running
+from crazyflie_virtual.settings import FIRST_PORT
+from crazyflie_virtual.testing import virtual_vehicle
 
 LIMIT = 60.0
 
@@ -42,19 +43,17 @@ def run(tool, *arguments, **variables):
 
 
 @pytest.fixture(scope="module")
-def server():
-    server = Server(Settings(host=SCANNED_HOST, port=FIRST_PORT, observer_port=0))
-    server.start()
-    yield server
-    server.stop()
+def virtual():
+    with virtual_vehicle(host=SCANNED_HOST, port=FIRST_PORT) as virtual:
+        yield virtual
 
 
 @pytest.fixture
-def uri(server):
-    return "udp://{}:{}".format(*server.address)
+def uri(virtual):
+    return virtual[1]
 
 
-def test_scan_finds_the_vehicle(server, uri):
+def test_scan_finds_the_vehicle(uri):
     assert run("scan", SCAN_ADDRESS=SCANNED_HOST)[:2] == (0, uri + "\n")
 
 
@@ -79,7 +78,7 @@ def test_a_parameter_is_read_set_and_read(uri):
     assert run("getParam", "--uri", uri, "posCtlPid.xKp") == (0, "1.7\n", "")
 
 
-def test_the_example_of_the_readme(server):
+def test_the_example_of_the_readme(virtual):
     readme = (Path(__file__).parents[1] / "README.md").read_text()
     example = readme.partition("```console\n")[2].partition("```")[0]
     example = example.replace("127.0.0.1", SCANNED_HOST)
@@ -138,22 +137,20 @@ def test_the_time_limit_ends_the_process(silent_uri):
 @pytest.fixture
 def console():
     """Return a virtual vehicle that has just been started, and the process that listens to it."""
-    server = Server(Settings(port=0, observer_port=0))
-    server.start()
-    arguments = command("console", "--uri", "udp://{}:{}".format(*server.address))
-    process = subprocess.Popen(
-        arguments,
-        env=environment(),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    yield server, process
-    if process.poll() is None:
-        process.kill()
-    process.communicate(timeout=LIMIT)
-    server.stop()
+    pipe = subprocess.PIPE
+    with (
+        virtual_vehicle() as (server, uri),
+        running(
+            *command("console", "--uri", uri),
+            env=environment(),
+            stdout=pipe,
+            stderr=pipe,
+            text=True,
+        ) as process,
+    ):
+        yield server, process
+        process.stdout.close()
+        process.stderr.close()
 
 
 def test_console_is_printed_until_it_is_interrupted(console):

@@ -1,0 +1,23 @@
+"""Fixtures that the tests of several packages have: a conftest.py imports what it needs."""
+
+import faulthandler
+from collections.abc import Iterator
+
+import pytest
+
+_LIMIT = 120.0
+"""The longest that a test may take, s."""
+
+
+@pytest.fixture(autouse=True)
+def own_cache(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Let links keep the tables of parameters and log variables in a folder of the test's own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+
+
+@pytest.fixture(autouse=True)
+def time_limit() -> Iterator[None]:
+    """End the tests when one hangs."""
+    faulthandler.dump_traceback_later(_LIMIT, exit=True)
+    yield
+    faulthandler.cancel_dump_traceback_later()

@@ -1,0 +1,24 @@
+"""Expands launch files as roslaunch does, without a master."""
+
+from pathlib import Path
+
+from roslaunch.config import load_config_default
+from roslaunch.core import Node
+
+
+def expand(path: Path, **arguments: object) -> tuple[dict[str, Node], dict[str, object]]:
+    """Return the nodes by full name, and the values of parameters by full name."""
+    given = [f"{name}:={value}" for name, value in arguments.items()]
+    config = load_config_default([(str(path), given)], None, verbose=False, assign_machines=False)
+    nodes = {node.namespace.rstrip("/") + "/" + node.name: node for node in config.nodes}
+    return nodes, {name: parameter.value for name, parameter in config.params.items()}
+
+
+def composed_nodes(parameters: dict[str, object]) -> dict[str, str]:
+    """Return what the parameters list for the composed process: class path by node name."""
+    listed = "/composed/nodes/"
+    return {
+        name.removeprefix(listed): value
+        for name, value in parameters.items()
+        if name.startswith(listed)
+    }

@@ -1,0 +1,67 @@
+"""Launch files for the time of a with block, each on a ROS master of its own."""
+
+import contextlib
+import os
+import re
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import rosgraph
+
+from crazyflie_dev.programs import free_port, running
+
+_START_LIMIT = 30.0
+"""How long roslaunch may take until its master answers, s."""
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_COMPLAINT = re.compile(r"\[(ERROR|FATAL)\]|RLException|process has died")
+
+
+class LaunchError(Exception):
+    """roslaunch has ended before anything ran; the text says what it complained of."""
+
+
+def complaints(log: Path) -> list[str]:
+    """Return the lines of a roslaunch's output that say what is wrong."""
+    lines = [_COLOUR.sub("", line) for line in log.read_text(errors="replace").splitlines()]
+    return [line for line in lines if _COMPLAINT.search(line)]
+
+
+@contextlib.contextmanager
+def launched(arguments: list[str], log: Path) -> Iterator[subprocess.Popen]:
+    """Run roslaunch on a master of its own for the time of a with block.
+
+    Parameters
+    ----------
+    arguments : list of str
+        Package, launch file and its arguments.
+    log : Path
+        Receives what roslaunch and the nodes print.
+
+    Raises
+    ------
+    LaunchError
+        There is no master, because roslaunch refused its arguments for instance.
+    """
+    port = free_port(socket.SOCK_STREAM)
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    os.environ["ROS_IP"] = "127.0.0.1"
+    command = ["roslaunch", "-p", port, *arguments]
+    with (
+        log.open("w") as output,
+        running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
+    ):
+        _wait_for_master(process, log)
+        yield process
+
+
+def _wait_for_master(process, log):
+    deadline = time.monotonic() + _START_LIMIT
+    while not rosgraph.is_master_online():
+        if process.poll() is not None or time.monotonic() > deadline:
+            reasons = complaints(log) or log.read_text(errors="replace").splitlines()[-3:]
+            raise LaunchError("\n".join(["roslaunch has not started anything:", *reasons]))
+        time.sleep(0.1)

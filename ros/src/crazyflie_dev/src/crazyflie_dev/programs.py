@@ -1,0 +1,53 @@
+"""Programs for the time of a with block, and ports for them."""
+
+import contextlib
+import os
+import signal
+import socket
+import subprocess
+from collections.abc import Iterator
+
+_END_LIMIT = 20.0
+"""How long a program may take to end after each signal, s; roslaunch gives its nodes 15."""
+
+
+def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
+    """Return a UDP (or, with SOCK_STREAM, a TCP) port of this machine that nobody uses now."""
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextlib.contextmanager
+def running(*command: object, **options: object) -> Iterator[subprocess.Popen]:
+    """Run a program; Ctrl-C is what ends it, and what it has started.
+
+    Parameters
+    ----------
+    command
+        Program and arguments, of which the text counts.
+    options
+        Of `subprocess.Popen`.
+
+    Raises
+    ------
+    subprocess.TimeoutExpired
+        It did not end, and was killed.
+    """
+    process = subprocess.Popen(list(map(str, command)), start_new_session=True, **options)
+    try:
+        yield process
+    finally:
+        _interrupt(process)
+
+
+def _interrupt(process):
+    if process.poll() is not None:
+        return
+    os.killpg(process.pid, signal.SIGINT)
+    try:
+        process.wait(_END_LIMIT)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+        raise

@@ -1,0 +1,203 @@
+"""Draws the picture of the README: RViz on a virtual display, during a hover."""
+
+import argparse
+import math
+import os
+import sys
+import tempfile
+import time
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import rospkg
+import yaml
+from matplotlib import image
+from numpy.typing import ArrayLike
+
+from crazyflie_description.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
+from crazyflie_dev.demo import HOVER
+from crazyflie_dev.flight_report import HOVER_TOLERANCE
+from crazyflie_dev.launching import launched
+from crazyflie_dev.pilot import FlightError, Pilot
+from crazyflie_dev.virtual_display import DisplayError, screenshot, virtual_display
+from crazyflie_utils.runtime import runner
+
+SCREEN = (1400, 900)
+"""Width and height in pixels of the screen, and of RViz's window in its configuration."""
+
+PICTURE = Path(__file__).resolve().parents[5] / "docs" / "images" / "sw_hover.png"
+"""Where the README expects the picture."""
+
+_DRAW_LIMIT = 90.0
+_FEWEST_PIXELS = 60
+_SMALLEST_SHARE = 0.5
+_LOG_LINES = 40
+
+
+def pixels_of(picture: np.ndarray, colour: ArrayLike) -> int:
+    """Count the pixels of a colour, in light or in shadow.
+
+    Parameters
+    ----------
+    picture : ndarray, shape (height, width, 3)
+        uint8.
+    colour : array_like, shape (3,)
+        Red, green, blue; any scale.
+    """
+    pixels = picture.reshape(-1, 3).astype(float)
+    brightness = np.linalg.norm(pixels, axis=1)
+    colour = np.asarray(colour, dtype=float) / np.linalg.norm(colour)
+    return int(np.count_nonzero((brightness > 60.0) & (pixels @ colour > 0.99 * brightness)))
+
+
+def crop_to_scene(screen: np.ndarray, background: ArrayLike) -> np.ndarray:
+    """Cut RViz's panels away: return the part of a screen that has the background colour.
+
+    Parameters
+    ----------
+    screen : ndarray, shape (height, width, 3)
+        uint8.
+    background : array_like, shape (3,)
+        Colour behind the scene, 0 to 255.
+
+    Returns
+    -------
+    ndarray, shape (h, w, 3)
+        Empty when the colour is nowhere.
+    """
+    is_background = (screen == np.asarray(background)).all(axis=2)
+    rows = np.flatnonzero(is_background.any(axis=1))
+    columns = np.flatnonzero(is_background.any(axis=0))
+    if not rows.size:
+        return screen[:0, :0]
+    return screen[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+
+
+def background_of(configuration: Path) -> list[int]:
+    """Return the background colour of an RViz configuration, three numbers from 0 to 255."""
+    manager = yaml.safe_load(configuration.read_text())["Visualization Manager"]
+    return [int(part) for part in manager["Global Options"]["Background Color"].split(";")]
+
+
+def material_of(model: Path, name: str) -> list[float]:
+    """Return the colour of a URDF's material, three numbers from 0 to 1."""
+    colour = ElementTree.parse(model).find(f"material[@name='{name}']/color")
+    return [float(part) for part in colour.get("rgba").split()[:3]]
+
+
+class Scene:
+    """RViz's picture of the flight, and what should be on it.
+
+    Parameters
+    ----------
+    display : str
+        Name of the display that RViz draws on.
+    description : Path
+        Folder of crazyflie_description, which has the colours.
+    """
+
+    def __init__(self, display: str, description: Path):
+        self._display = display
+        self._background = background_of(description / "launch" / "crazyflie.rviz")
+        self._vehicle = material_of(description / "urdf" / "crazyflie2.urdf", "front")
+
+    def wait_for_vehicle(self) -> None:
+        """Wait until the vehicle is drawn."""
+        self._wait({"vehicle": self._vehicle})
+
+    def wait_for_everything(self) -> np.ndarray:
+        """Return the picture when vehicle, path and reference are on it, shape (h, w, 3)."""
+        markers = {"path": PATH_COLOUR, "reference": REFERENCE_COLOUR}
+        colours = {name: (colour.r, colour.g, colour.b) for name, colour in markers.items()}
+        return self._wait({"vehicle": self._vehicle, **colours})
+
+    def _wait(self, colours):
+        deadline = time.monotonic() + _DRAW_LIMIT
+        while True:
+            screen = screenshot(self._display)
+            picture = crop_to_scene(screen, self._background)
+            missing = [
+                name for name, c in colours.items() if pixels_of(picture, c) < _FEWEST_PIXELS
+            ]
+            if picture.size < _SMALLEST_SHARE * screen.size:
+                missing.insert(0, "window")
+            if not missing:
+                return picture
+            if time.monotonic() > deadline:
+                raise DisplayError(
+                    f"RViz has drawn no {' and no '.join(missing)} within {_DRAW_LIMIT:g} s"
+                )
+            time.sleep(0.5)
+
+
+def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
+    """Fly to the hover, and write what RViz shows of it.
+
+    Parameters
+    ----------
+    output : Path
+        PNG file.
+    log : Path
+        Receives what roslaunch and the nodes print.
+    launch_arguments : list of str
+        Further arguments of sw_hover.launch.
+
+    Raises
+    ------
+    DisplayError
+        RViz has not drawn what it should.
+    FlightError
+        The vehicle does not hover.
+    """
+    description = Path(rospkg.RosPack().get_path("crazyflie_description"))
+    with virtual_display(*SCREEN) as display:
+        os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
+        scene = Scene(display, description)
+        arguments = ["crazyflie_examples", "sw_hover.launch", "rviz:=true", *launch_arguments]
+        say(f"launching {' '.join(arguments)} on display {display}")
+        with launched(arguments, log):
+            pilot = Pilot(runner.begin("render_pilot"))
+            pilot.wait_until_ready()
+            say("waiting for RViz to draw the vehicle")
+            scene.wait_for_vehicle()
+            say("taking off")
+            pilot.takeoff()
+            pilot.hover(1.0)
+            error = math.dist(pilot.position, HOVER)
+            if error > HOVER_TOLERANCE:
+                raise FlightError(f"it hovers {error:.3f} m from where it should")
+            say("waiting for RViz to draw vehicle, path and reference")
+            picture = scene.wait_for_everything()
+    output.parent.mkdir(parents=True, exist_ok=True)
+    image.imsave(output, np.ascontiguousarray(picture))
+    say(f"{output}: {picture.shape[1]} x {picture.shape[0]} pixels")
+
+
+def say(text: str) -> None:
+    """Tell the user what goes on."""
+    print(text, flush=True)
+
+
+def main() -> int:
+    """Render as the command line asks; return the exit status."""
+    parser = argparse.ArgumentParser(prog="run render", description=__doc__)
+    parser.add_argument(
+        "--output", type=Path, default=PICTURE, help=f"PNG file, by default {PICTURE}"
+    )
+    parser.add_argument("launch_arguments", nargs="*", help="such as composed:=true")
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="render-") as folder:
+        log = Path(folder) / "sw_hover.log"
+        try:
+            render(options.output, log, options.launch_arguments)
+        except (DisplayError, FlightError) as error:
+            if log.exists():
+                print(*log.read_text().splitlines()[-_LOG_LINES:], sep="\n", file=sys.stderr)
+            print(f"no picture: {error}", file=sys.stderr)
+            return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""A controller that keeps a vehicle in a box."""

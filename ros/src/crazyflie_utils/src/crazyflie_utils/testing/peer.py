@@ -1,0 +1,99 @@
+"""A peer of the node under test, for rostests: it speaks plain rospy, as nodes of others do."""
+
+import contextlib
+import queue
+import time
+from collections.abc import Callable, Iterator
+
+import genpy
+import rospy
+
+LIMIT = 30.0
+"""The longest that a test waits for anything, s."""
+
+
+def _anything(message: genpy.Message) -> bool:
+    return True
+
+
+class Heard(queue.Queue):
+    """The messages that have come on a topic, oldest first."""
+
+    def next(self, accept: Callable[[genpy.Message], bool] = _anything) -> genpy.Message:
+        """Return the next message for which ``accept(message)``; those before it are gone.
+
+        Raises
+        ------
+        AssertionError
+            None has come within `LIMIT`.
+        """
+        message = None
+        end = time.monotonic() + LIMIT
+        while (left := end - time.monotonic()) > 0.0:
+            with contextlib.suppress(queue.Empty):
+                message = self.get(timeout=left)
+                if accept(message):
+                    return message
+        raise AssertionError(f"no such message within {LIMIT:g} s; the last one: {message}")
+
+    def drain(self) -> list[genpy.Message]:
+        """Return all that have come so far; they are gone then."""
+        return [self.get() for _ in range(self.qsize())]
+
+
+@contextlib.contextmanager
+def listening(topic: str, message_type: type[genpy.Message]) -> Iterator[Heard]:
+    """Subscribe to a topic for the time of a with block."""
+    heard = Heard()
+    subscriber = rospy.Subscriber(topic, message_type, heard.put, tcp_nodelay=True)
+    try:
+        yield heard
+    finally:
+        subscriber.unregister()
+
+
+def wait_until(condition: Callable[[], bool], what: str, limit: float = LIMIT) -> None:
+    """Wait until ``condition()`` is true.
+
+    Raises
+    ------
+    AssertionError
+        It is not within ``limit`` seconds; the text names ``what`` was waited for.
+    """
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, f"waited {limit:g} s for {what}"
+        time.sleep(0.01)
+
+
+def exchange(
+    messages: dict[str, genpy.Message],
+    answer_topic: str,
+    answer_type: type[genpy.Message],
+    accept: Callable[[genpy.Message], bool] = _anything,
+) -> genpy.Message:
+    """Publish messages, by topic, over and over until an answer is accepted; return it.
+
+    The first ones may be lost, because connections take their time, and the node may
+    answer some of them before it has got all.
+
+    Raises
+    ------
+    AssertionError
+        There is no such answer within `LIMIT`.
+    """
+    end = time.monotonic() + LIMIT
+    with contextlib.ExitStack() as stack:
+        answers = stack.enter_context(listening(answer_topic, answer_type))
+        publishers = {}
+        for topic, message in messages.items():
+            publishers[topic] = rospy.Publisher(topic, type(message), queue_size=1)
+            stack.callback(publishers[topic].unregister)
+        while time.monotonic() < end:
+            for topic, message in messages.items():
+                publishers[topic].publish(message)
+            with contextlib.suppress(queue.Empty):
+                answer = answers.get(timeout=0.01)
+                if accept(answer):
+                    return answer
+    raise AssertionError(f"no such answer on {answer_topic} within {LIMIT:g} s")

@@ -4,6 +4,9 @@ import io
 import math
 from concurrent.futures import Future
 
+import genpy
+
+from crazyflie_utils.node import Node
 from crazyflie_utils.process import Process
 from crazyflie_utils.transport import Outlet, ServiceError, Transport
 
@@ -27,7 +30,7 @@ class _Record(Outlet):
 class FakeTransport(Transport):
     """An outside world that remembers everything and does nothing by itself."""
 
-    def __init__(self, parameters: dict):
+    def __init__(self, parameters: dict[str, object]):
         self.parameters = dict(parameters)
         self.outlets = {}
         self.inlets = {}
@@ -96,12 +99,12 @@ class FakeProcess(Process):
         Simulated time at the beginning, s.
     """
 
-    def __init__(self, parameters: dict | None = None, start: float = 100.0):
+    def __init__(self, parameters: dict[str, object] | None = None, start: float = 100.0):
         super().__init__(FakeTransport(parameters or {}), use_sim_time=True)
         self.clock.set(start)
         self.executor.start()
 
-    def launch(self, node, name: str, parameters: dict | None = None) -> bool:
+    def launch(self, node: Node, name: str, parameters: dict[str, object] | None = None) -> bool:
         """Initialize a node with private parameters, as roslaunch would.
 
         Returns
@@ -120,16 +123,16 @@ class FakeProcess(Process):
         """Add a timer; the machine's time, too, is moved by hand here."""
         return super().add_timer(period, work)
 
-    def publish(self, topic: str, message) -> None:
+    def publish(self, topic: str, message: genpy.Message) -> None:
         """Publish from outside the process."""
         for deliver in _named(self.transport.inlets, topic, "subscriber of"):
             deliver(message)
 
-    def published(self, topic: str) -> list:
+    def published(self, topic: str) -> list[genpy.Message]:
         """Return all messages that left the process on a topic, oldest first."""
         return _named(self.transport.outlets, topic, "publisher of").messages
 
-    def call(self, service: str, request):
+    def call(self, service: str, request: genpy.Message) -> genpy.Message | Future:
         """Call a service from outside.
 
         Returns
@@ -145,7 +148,7 @@ class FakeProcess(Process):
         answer = _named(self.transport.services, service, "service")(request)
         return answer.result() if answer.done() else answer
 
-    def logged(self, level: str) -> list:
+    def logged(self, level: str) -> list[str]:
         """Return the texts logged at a level, oldest first."""
         return [text for logged_at, text in self.transport.log_records if logged_at == level]
 

@@ -16,7 +16,7 @@ HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0
 
 
-def main(arguments: list) -> int:
+def main(arguments: list[str]) -> int:
     """Take off, hover, land; return the exit status, 0 for a good flight."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "launch.log"

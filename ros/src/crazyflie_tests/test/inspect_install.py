@@ -14,7 +14,7 @@ from roslaunch.config import load_config_default
 from roslib.packages import find_node
 
 
-def wrong_modules(space: Path, packages: list) -> list:
+def wrong_modules(space: Path, packages: list[str]) -> list[str]:
     """Return what is wrong with the Python modules of the packages: all are imported."""
     complaints = []
     for package in packages:
@@ -36,7 +36,7 @@ def wrong_modules(space: Path, packages: list) -> list:
     return complaints
 
 
-def wrong_launch_files(space: Path, packages: list) -> list:
+def wrong_launch_files(space: Path, packages: list[str]) -> list[str]:
     """Return what is wrong with the launch files: those without required arguments are expanded."""
     complaints = []
     finder = rospkg.RosPack()

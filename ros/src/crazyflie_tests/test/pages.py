@@ -45,7 +45,7 @@ class Block:
         return "\n".join(self.lines)
 
     @property
-    def commands(self) -> list:
+    def commands(self) -> list[str]:
         """Its commands; one may go on in the next line."""
         return [line for line in self.text.replace("\\\n", "").split("\n") if line.strip()]
 
@@ -77,17 +77,17 @@ class Page:
         self._read(path.read_text().splitlines())
 
     @property
-    def blocks(self) -> list:
+    def blocks(self) -> list[Block]:
         """All fenced blocks."""
         return [part for part in self.parts if isinstance(part, Block)]
 
     @property
-    def tables(self) -> list:
+    def tables(self) -> list[Table]:
         """All tables."""
         return [part for part in self.parts if isinstance(part, Table)]
 
     @property
-    def headings(self) -> set:
+    def headings(self) -> set[str]:
         """Anchors of the headings, as Markdown viewers make them."""
         titles = [line.lstrip("#").strip() for line in self.prose if line.startswith("#")]
         return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}

@@ -37,7 +37,7 @@ class Terminal:
         All of its environment variables.
     """
 
-    def __init__(self, folder, environment: dict):
+    def __init__(self, folder: Path, environment: dict[str, str]):
         self._terminal, other_end = pty.openpty()
         self._shell = subprocess.Popen(
             ["bash", "--norc", "--noediting", "-i"],

@@ -36,7 +36,7 @@ def copy(folder: Path) -> Path:
     return folder
 
 
-def clean_environment(home: Path) -> dict:
+def clean_environment(home: Path) -> dict[str, str]:
     """Return the environment of somebody who has sourced nothing and prefers another Python.
 
     The first python3 on the PATH is one that does not work; behind it is the PATH of

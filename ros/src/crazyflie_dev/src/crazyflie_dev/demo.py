@@ -16,7 +16,7 @@ LIMIT = 30.0
 """The longest that a part of the flight may take, s; a takeoff takes six."""
 
 
-def fly(folder: Path, launch_arguments: list) -> int:
+def fly(folder: Path, launch_arguments: list[str]) -> int:
     """Fly, report and return the exit status: 0 for a good flight."""
     folder.mkdir(parents=True, exist_ok=True)
     log = folder / "sw_hover.log"

@@ -8,6 +8,7 @@ import socket
 import struct
 import threading
 import time
+from collections.abc import Callable
 
 LOG_TYPES = {"B": 1, "H": 2, "I": 3, "b": 4, "h": 5, "i": 6, "f": 7, "e": 8}
 PARAMETER_TYPES = {"B": 8, "H": 9, "I": 10, "Q": 11, "b": 0, "h": 1, "i": 2, "f": 6}
@@ -45,7 +46,13 @@ class FakeVehicle:
         Whether it neither hears nor says anything.
     """
 
-    def __init__(self, log=None, parameters=None, protocol=12, port=0):
+    def __init__(
+        self,
+        log: dict[str, tuple[str, float]] | None = None,
+        parameters: dict[str, tuple[str, float, int]] | None = None,
+        protocol: int = 12,
+        port: int = 0,
+    ):
         self.log = log if log is not None else {"pm.vbat": ("f", 3.9)}
         self.parameters = parameters if parameters is not None else {"ring.effect": ("B", 1, 0)}
         self.protocol = protocol
@@ -72,11 +79,11 @@ class FakeVehicle:
         """Address of the vehicle."""
         return f"udp://127.0.0.1:{self.port}"
 
-    def __enter__(self):
+    def __enter__(self) -> "FakeVehicle":
         """Return the vehicle."""
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         """Close the port."""
         self.close()
 
@@ -91,16 +98,18 @@ class FakeVehicle:
         if self._peer is not None and not self.is_frozen:
             self._socket.sendto(bytes([port << 4 | 3 << 2 | channel]) + data, self._peer)
 
-    def packets(self, port: int, channel: int) -> list:
+    def packets(self, port: int, channel: int) -> list[bytes]:
         """Return the data of all packets received on a port and channel, oldest first."""
         return [data for p, c, data in list(self.received) if (p, c) == (port, channel)]
 
-    def wait_for(self, condition, limit: float = 5.0) -> bool:
+    def wait_for(self, condition: Callable[[], bool], limit: float = 5.0) -> bool:
         """Wait until ``condition()`` holds, looking after every packet; tell whether it does."""
         with self._changed:
             return self._changed.wait_for(condition, limit)
 
-    def wait_for_packets(self, port: int, channel: int, count: int = 1, limit: float = 5.0) -> list:
+    def wait_for_packets(
+        self, port: int, channel: int, count: int = 1, limit: float = 5.0
+    ) -> list[bytes]:
         """Wait for so many packets on a port and channel, and return all of them.
 
         Raises

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 from crazyflie_dev.flight_record import FlightRecord
 
 
-def save(record: FlightRecord, point, path: Path) -> None:
+def save(record: FlightRecord, point: ArrayLike, path: Path) -> None:
     """Draw a flight into a file.
 
     Parameters

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 STATE_FIELDS = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
 CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
@@ -22,12 +23,12 @@ class Series:
         Names of the columns.
     """
 
-    def __init__(self, fields: tuple):
+    def __init__(self, fields: tuple[str, ...]):
         self.fields = fields
         self._times = []
         self._rows = []
 
-    def append(self, time: float, row) -> None:
+    def append(self, time: float, row: ArrayLike) -> None:
         """Add a row, shape (len(fields),), at ``time`` (s)."""
         self._times.append(time)
         self._rows.append(row)
@@ -60,7 +61,7 @@ class Series:
         return self._times[-1]
 
     @property
-    def last(self):
+    def last(self) -> np.ndarray:
         """The newest row."""
         return self._rows[-1]
 
@@ -86,15 +87,15 @@ class FlightRecord:
     final_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     takeoff_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     reference: Series = field(default_factory=lambda: Series(STATE_FIELDS[:6]))
-    toggles: list = field(default_factory=list)
-    order: list = field(default_factory=list)
-    events: dict = field(default_factory=dict)
+    toggles: list[float] = field(default_factory=list)
+    order: list[str] = field(default_factory=list)
+    events: dict[str, float] = field(default_factory=dict)
 
-    def position_error(self, point) -> np.ndarray:
+    def position_error(self, point: ArrayLike) -> np.ndarray:
         """Return the distance of every recorded state from a point (m), shape (n,)."""
         return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
 
-    def time_to_hover(self, point, tolerance: float) -> float:
+    def time_to_hover(self, point: ArrayLike, tolerance: float) -> float:
         """Return how long after the call of /takeoff the vehicle was at a point to stay.
 
         Parameters
@@ -120,7 +121,7 @@ class FlightRecord:
         """Return by how much the vehicle rose above the hover height (m), at least 0."""
         return max(0.0, float(self.state.column("z").max()) - height)
 
-    def hover_error(self, point, duration: float) -> tuple:
+    def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
         """Return mean and maximum distance (m) from a point before /land was called.
 
         Parameters

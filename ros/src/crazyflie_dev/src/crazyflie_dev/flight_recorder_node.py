@@ -12,6 +12,7 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.vectors import to_vector
 
 
@@ -33,7 +34,7 @@ class FlightRecorderNode(Node):
         self._topics = {}
         self._stopped = False
 
-    def load_parameters(self, handle) -> None:
+    def load_parameters(self, handle: NodeHandle) -> None:
         """See `Node.load_parameters`."""
         defaults = {
             "state": "state",
@@ -45,7 +46,7 @@ class FlightRecorderNode(Node):
         for name, default in defaults.items():
             self._topics[name] = handle.param(f"topics/{name}", TOPIC, default)
 
-    def register_callbacks(self, handle) -> None:
+    def register_callbacks(self, handle: NodeHandle) -> None:
         """See `Node.register_callbacks`."""
         series = [
             ("state", PositionVelocityYawStateStamped, "state"),

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from numpy.typing import ArrayLike
+
 from crazyflie_dev.flight_record import GROUND_TOLERANCE, FlightRecord
 
 HOVER_TOLERANCE = 0.01
@@ -43,7 +45,7 @@ class FlightReport:
     final_thrust: float
 
     @classmethod
-    def of(cls, record: FlightRecord, point) -> "FlightReport":
+    def of(cls, record: FlightRecord, point: ArrayLike) -> "FlightReport":
         """Judge a record by the point (m) where it should have hovered."""
         mean, largest = record.hover_error(point, HOVER_WINDOW)
         try:
@@ -60,7 +62,7 @@ class FlightReport:
             final_thrust=float(record.final_control.last[3]),
         )
 
-    def complaints(self) -> list:
+    def complaints(self) -> list[str]:
         """Return what was bad about the flight, a sentence each; empty for a good one."""
         checks = [
             (

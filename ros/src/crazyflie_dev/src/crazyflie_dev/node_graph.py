@@ -15,6 +15,9 @@ import rosgraph
 
 from crazyflie_dev.launching import launched
 
+Registrations = list[tuple[str, list[str]]]
+"""Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them."""
+
 HIDDEN_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf_static")
 HIDDEN_NODES = ("/rosout",)
 _LIMIT = 60.0
@@ -24,13 +27,13 @@ _QUIET = 2.0
 topics one by one."""
 
 
-def dot(published: list, subscribed: list) -> str:
+def dot(published: Registrations, subscribed: Registrations) -> str:
     """Return a graph in the language of graphviz.
 
     Parameters
     ----------
-    published, subscribed : list of (topic, list of nodes)
-        As `rosgraph.Master.getSystemState` gives them. Topics that nobody
+    published, subscribed : Registrations
+        Topics that nobody
         publishes, or nobody subscribes to, are left out.
     """
     sources = {topic: nodes for topic, nodes in published if topic not in HIDDEN_TOPICS}
@@ -53,7 +56,7 @@ def dot(published: list, subscribed: list) -> str:
     return "\n".join([*lines, *edges, "}"]) + "\n"
 
 
-def running_graph(expected: set) -> tuple:
+def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
     """Return publications and subscriptions once all ``expected`` nodes have registered theirs.
 
     Raises

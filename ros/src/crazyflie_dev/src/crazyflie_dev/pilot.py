@@ -4,6 +4,8 @@ import contextlib
 import time
 from collections.abc import Iterator
 
+import numpy as np
+from numpy.typing import ArrayLike
 from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_dev.flight_record import FlightRecord
@@ -46,7 +48,7 @@ class Pilot:
             process.start()
 
     @property
-    def position(self):
+    def position(self) -> np.ndarray:
         """Where the vehicle was last, m, shape (3,)."""
         return self._recorder.record.state.last[:3]
 
@@ -71,7 +73,7 @@ class Pilot:
         end = state.last_time + duration
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")
 
-    def refer_to(self, point) -> None:
+    def refer_to(self, point: ArrayLike) -> None:
         """Publish a point (x, y, z), m, as reference, to be at rest there."""
         x, y, z = map(float, point)
         reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=z))

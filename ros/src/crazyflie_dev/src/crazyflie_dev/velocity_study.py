@@ -212,7 +212,9 @@ def _settled():
     return slice(round(1.0 / PERIOD), None)
 
 
-def draw(flight: Flight, velocities: dict, path: str, start: float, end: float) -> None:
+def draw(
+    flight: Flight, velocities: dict[str, np.ndarray], path: str, start: float, end: float
+) -> None:
     """Draw x_dot of a flight, and its errors, between two times (s) into a file.
 
     Parameters

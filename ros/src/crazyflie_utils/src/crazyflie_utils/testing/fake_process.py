@@ -5,6 +5,9 @@ import math
 from concurrent.futures import Future
 from typing import Any
 
+import genpy
+
+from crazyflie_utils.node import Node
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.transport import (
     ExternalPublisher,
@@ -48,7 +51,7 @@ class FakeTransport(Transport):
     Every topic that is subscribed has publishers there, but for those in ``unpublished``.
     """
 
-    def __init__(self, parameters: dict):
+    def __init__(self, parameters: dict[str, object]):
         self.parameters = dict(parameters)
         self.publishers = {}
         self.subscribers = {}
@@ -125,12 +128,12 @@ class FakeProcess(Process):
         Simulated time at the beginning, s.
     """
 
-    def __init__(self, parameters: dict | None = None, start: float = 100.0):
+    def __init__(self, parameters: dict[str, object] | None = None, start: float = 100.0):
         super().__init__(FakeTransport(parameters or {}), use_sim_time=True)
         self.clock.set(start)
         self.executor.start()
 
-    def launch(self, node, name: str, parameters: dict | None = None) -> bool:
+    def launch(self, node: Node, name: str, parameters: dict[str, object] | None = None) -> bool:
         """Initialize a node with private parameters, as roslaunch would.
 
         Returns
@@ -149,16 +152,16 @@ class FakeProcess(Process):
         """Add a timer; the machine's time, too, is moved by hand here."""
         return super().add_timer(period, work)
 
-    def publish(self, topic: str, message) -> None:
+    def publish(self, topic: str, message: genpy.Message) -> None:
         """Publish from outside the process."""
         for deliver in _named(self.transport.subscribers, topic, "subscriber of"):
             deliver(message)
 
-    def published(self, topic: str) -> list:
+    def published(self, topic: str) -> list[genpy.Message]:
         """Return all messages that left the process on a topic, oldest first."""
         return _named(self.transport.publishers, topic, "publisher of").messages
 
-    def call(self, service: str, request):
+    def call(self, service: str, request: genpy.Message) -> genpy.Message | Future:
         """Call a service from outside.
 
         Returns
@@ -174,7 +177,7 @@ class FakeProcess(Process):
         answer = _named(self.transport.services, service, "service")(request)
         return answer.result() if answer.done() else answer
 
-    def logged(self, level: str) -> list:
+    def logged(self, level: str) -> list[str]:
         """Return the texts logged at a level, oldest first."""
         return [text for logged_at, text in self.transport.log_records if logged_at == level]
 

@@ -16,7 +16,7 @@ _OUTPUT = "--gtest_output=xml:"
 _TEXT = "--text"
 
 
-def pytest_arguments(arguments: list) -> list:
+def pytest_arguments(arguments: list[str]) -> list[str]:
     """Return what pytest is told when rostest says ``arguments``.
 
     rostest names a file for the results, in the way of gtest; with ``rostest -t``

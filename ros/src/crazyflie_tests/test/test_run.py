@@ -1,10 +1,11 @@
-"""What ``./run test`` says and returns when tests fail, or are none."""
+"""The script ``run``: its words, and what ``./run test`` says and returns when tests fail."""
 
 import re
 import subprocess
 
 import pytest
-from workspaces import clean_environment
+import yaml
+from workspaces import TOP, clean_environment
 
 LIMIT = 120.0
 
@@ -69,3 +70,14 @@ def test_what_cannot_be_tested_is_said(run_test, argument, complaint):
     status, printed = run_test(argument)
     assert status == 1
     assert complaint in printed
+
+
+def test_words_used_elsewhere_exist():
+    usage = subprocess.run([TOP / "run", "help"], capture_output=True, text=True, check=True).stdout
+    words = set(re.findall(r"^  (\w+) ", usage, re.MULTILINE))
+    workflow = yaml.safe_load((TOP / ".github" / "workflows" / "tests.yml").read_text())
+    for name, job in workflow["jobs"].items():
+        commands = "\n".join(step.get("run", "") for step in job["steps"])
+        used = re.findall(r"\./run (\w+)", commands)
+        assert name in used
+        assert set(used) <= words

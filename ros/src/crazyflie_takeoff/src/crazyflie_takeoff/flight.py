@@ -47,6 +47,9 @@ _REFUSALS = {
 }
 
 
+Position = tuple[float, float, float]
+
+
 class RefusalError(Exception):
     """A takeoff or landing makes no sense now; the text says why. Nothing has changed."""
 
@@ -67,7 +70,7 @@ class Plan:
         Speed of the descent, m/s; 0 for none: a landing is the bare ramp.
     """
 
-    hover: tuple
+    hover: Position
     open_loop: float
     settle: float
     descent_speed: float
@@ -90,7 +93,7 @@ class Output:
 
     state: FlightState
     thrust: float | None = None
-    reference: tuple | None = None
+    reference: tuple[float, ...] | None = None
     toggle: bool = False
 
 
@@ -118,9 +121,9 @@ class Flight:
         self._announced = state.in_flight if announced is None else announced
         self._ground = 0.0
         self._time = -math.inf
-        self._entered = None
+        self._entered: float | None = None
         self._hover_sent = False
-        self._descent = None
+        self._descent: _Descent | None = None
         self._zero_sent = -math.inf
 
     @property
@@ -157,7 +160,7 @@ class Flight:
         if self._state is FlightState.TAKING_OFF:
             self._enter(self._way_down())
 
-    def tick(self, time: float, position: tuple | None = None) -> Output:
+    def tick(self, time: float, position: Position | None = None) -> Output:
         """Go on.
 
         Parameters
@@ -202,12 +205,13 @@ class Flight:
     def _descend(self, time, position):
         if position is not None and self._descent is None:
             self._descent = _Descent(position, self._ground, self._plan.descent_speed)
+        descent = self._descent
         elapsed = time - self._entered
-        if self._is_down(position) or elapsed > self._descent.limit:
+        if descent is None or self._is_down(position) or elapsed > descent.limit:
             self._enter(FlightState.LANDING)
             self._follow_clock(time)
             return self._ramp_down(time, position)
-        return None, self._descent.reference(elapsed)
+        return None, descent.reference(elapsed)
 
     def _ramp_down(self, time, position):
         elapsed = time - self._entered + _ROUNDING
@@ -257,7 +261,7 @@ class Flight:
 class _Descent:
     """A reference that sinks straight down from where the vehicle is."""
 
-    def __init__(self, position, ground, speed):
+    def __init__(self, position: Position, ground: float, speed: float):
         self._x, self._y, self._z = position
         self._speed = speed
         self._lowest = min(ground - PRESS_DEPTH, self._z)

@@ -13,6 +13,7 @@ import math
 import sys
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_demo.polynomials import Piece, hermite, save
 
@@ -26,7 +27,7 @@ _RATE = 2.0 * math.pi / (DURATION - RAMP)
 """Of the phase between the ramps, rad/s."""
 
 
-def phase(time: float) -> np.ndarray:
+def phase(time: float) -> NDArray[np.float64]:
     """Return the phase and its first three derivatives, shape (4,), at a time (s)."""
     if time > DURATION - RAMP:
         # The end is the beginning, backwards.
@@ -42,7 +43,7 @@ def phase(time: float) -> np.ndarray:
     return _RATE * np.array(ramp) + [_RATE * max(time - RAMP, 0.0), 0.0, 0.0, 0.0]
 
 
-def sine(amplitude: float, multiple: int, time: float) -> np.ndarray:
+def sine(amplitude: float, multiple: int, time: float) -> NDArray[np.float64]:
     """Return amplitude sin(multiple phase) and its first three derivatives, shape (4,)."""
     p, v, a, j = multiple * phase(time)
     sin, cos = math.sin(p), math.cos(p)
@@ -63,8 +64,8 @@ def figure8() -> list[Piece]:
     for begin, end in zip(knots, knots[1:], strict=False):
         coefficients = np.zeros((4, 8))
         for axis, amplitude in enumerate((WIDTH, HEIGHT)):
-            ends = (sine(amplitude, axis + 1, time) for time in (begin, end))
-            coefficients[axis] = hermite(*ends, PIECE)
+            at_begin, at_end = (sine(amplitude, axis + 1, time) for time in (begin, end))
+            coefficients[axis] = hermite(at_begin, at_end, PIECE)
         pieces.append(Piece(PIECE, coefficients))
     return pieces
 

@@ -26,13 +26,15 @@ FAST = "rviz:=false sim_time:=true real_time_factor:=0 simulator_dt:=0.01 compos
 BUILD_LIMIT = 300.0
 """The longest that a build may take, s; it takes about 20."""
 
-_NOT_COPIED = (".git", ".venv", "build", "devel", "install", "out", "__pycache__", ".hypothesis")
+_NOT_COPIED = (".git", ".venv*", "build", "devel", "install", "out", "__pycache__", ".hypothesis")
 
 
 def copy(folder: Path) -> Path:
     """Copy the sources of the workspace to a folder and return it; Python packages are shared."""
     shutil.copytree(TOP, folder, symlinks=True, ignore=shutil.ignore_patterns(*_NOT_COPIED))
-    (folder / "ros" / ".venv").symlink_to(TOP / "ros" / ".venv")
+    for name in (".venv", ".venv-lint"):
+        if (TOP / "ros" / name).exists():
+            (folder / "ros" / name).symlink_to(TOP / "ros" / name)
     return folder
 
 

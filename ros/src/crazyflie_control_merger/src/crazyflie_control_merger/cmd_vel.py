@@ -4,8 +4,12 @@ import math
 
 from crazyflie_model.units import pwm_from_thrust
 
+Vector = tuple[float, float, float]
 
-def cmd_vel_from_control(roll: float, pitch: float, yaw_dot: float, thrust: float) -> tuple:
+
+def cmd_vel_from_control(
+    roll: float, pitch: float, yaw_dot: float, thrust: float
+) -> tuple[Vector, Vector]:
     """Return the two vectors of the twist that carries a control.
 
     Parameters

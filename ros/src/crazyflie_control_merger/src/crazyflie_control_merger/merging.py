@@ -4,6 +4,7 @@ Controls are u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2.
 """
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_utils.last_valid import HOLD_LIMIT
 
@@ -32,14 +33,14 @@ class Merger:
         Entries of the control that are mixed; the others stay regular.
     """
 
-    def __init__(self, mode: str, entries: tuple = ALL_ENTRIES):
+    def __init__(self, mode: str, entries: tuple[int, ...] = ALL_ENTRIES):
         self._mode = mode
         self._entries = list(entries)
-        self._prioritized = None
+        self._prioritized: NDArray[np.float64] = np.zeros(len(entries))
         self._priority = 0.0
-        self._time = None
+        self._time: float | None = None
 
-    def prioritize(self, control, priority: float, time: float) -> None:
+    def prioritize(self, control: ArrayLike, priority: float, time: float) -> None:
         """Take a prioritised control.
 
         Parameters
@@ -54,7 +55,7 @@ class Merger:
         self._priority = min(max(priority, 0.0), 1.0)
         self._time = time
 
-    def merged(self, regular: np.ndarray, time: float) -> np.ndarray:
+    def merged(self, regular: NDArray[np.float64], time: float) -> NDArray[np.float64]:
         """Return (1 - p) regular + p prioritised, shape (4,).
 
         Parameters

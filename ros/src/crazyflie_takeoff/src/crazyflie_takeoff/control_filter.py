@@ -1,6 +1,7 @@
 """The choice between the takeoff server's control and the controller's."""
 
 import math
+from typing import Generic, TypeVar
 
 from crazyflie_takeoff.flight_state import FlightState
 
@@ -8,7 +9,10 @@ TAKEOFF_CONTROL_LIMIT = 0.5
 """A takeoff control older than this no longer keeps the controller out, s."""
 
 
-class ControlFilter:
+Control = TypeVar("Control")
+
+
+class ControlFilter(Generic[Control]):
     """Pass takeoff controls always, commanded ones when the vehicle is the controller's.
 
     That is in flight, or when the last takeoff control is older than
@@ -28,13 +32,13 @@ class ControlFilter:
     Controls are passed on as they are; they can be of any type.
     """
 
-    def __init__(self):
-        self._state = None
+    def __init__(self) -> None:
+        self._state: FlightState | None = None
         self._toggled = False
         self._listening = True
-        self._waiting = None
+        self._waiting: Control | None = None
         self._is_commanded = False
-        self._takeoff_control = None
+        self._takeoff_control: Control | None = None
         self._takeoff_thrust = 0.0
         self._takeoff_time = math.inf
 
@@ -67,7 +71,7 @@ class ControlFilter:
         """Take note of the server's flight state."""
         self._state = state
 
-    def takeoff(self, time: float, control, thrust: float):
+    def takeoff(self, time: float, control: Control, thrust: float) -> Control:
         """Return what to pass on when a takeoff control has come.
 
         Parameters
@@ -85,7 +89,7 @@ class ControlFilter:
         self._takeoff_time = time
         return control
 
-    def commanded(self, time: float, control):
+    def commanded(self, time: float, control: Control) -> Control | None:
         """Return what to pass on when a commanded control has come at ``time`` (s), or None."""
         # After a reset of the clock the age counts from there.
         self._takeoff_time = min(self._takeoff_time, time)
@@ -104,7 +108,7 @@ class ControlFilter:
             return control
         return self._takeoff_control
 
-    def stop_listening(self, time: float):
+    def stop_listening(self, time: float) -> Control | None:
         """Return what to pass on of what has waited until now, ``time`` (s), or None."""
         self._listening = False
         return None if self._waiting is None else self.commanded(time, self._waiting)

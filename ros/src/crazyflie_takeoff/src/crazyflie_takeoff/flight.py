@@ -48,6 +48,9 @@ _REFUSALS = {
 }
 
 
+Position = tuple[float, float, float]
+
+
 @dataclass(frozen=True)
 class Plan:
     """How to take off and land.
@@ -64,7 +67,7 @@ class Plan:
         Speed of the descent, m/s; 0 for none: a landing is the bare ramp.
     """
 
-    hover: tuple[float, float, float]
+    hover: Position
     open_loop: float
     settle: float
     descent_speed: float
@@ -159,7 +162,7 @@ class FlightStateMachine:
         if self._state is FlightState.TAKING_OFF:
             self._enter(self._way_down())
 
-    def tick(self, time: float, position: tuple[float, float, float] | None = None) -> Output:
+    def tick(self, time: float, position: Position | None = None) -> Output:
         """Go on.
 
         Parameters
@@ -204,12 +207,13 @@ class FlightStateMachine:
     def _descend(self, time, position):
         if position is not None and self._descent is None:
             self._descent = _Descent(position, self._ground, self.plan.descent_speed)
+        descent = self._descent
         elapsed = time - self._entered
-        if self._is_down(position) or elapsed > self._descent.limit:
+        if descent is None or self._is_down(position) or elapsed > descent.limit:
             self._enter(FlightState.LANDING)
             self._follow_clock(time)
             return self._ramp_down(time, position)
-        return None, self._descent.reference(elapsed)
+        return None, descent.reference(elapsed)
 
     def _ramp_down(self, time, position):
         elapsed = time - self._entered + _ROUNDING
@@ -259,7 +263,7 @@ class FlightStateMachine:
 class _Descent:
     """A reference that sinks straight down from where the vehicle is."""
 
-    def __init__(self, position, ground, speed):
+    def __init__(self, position: Position, ground: float, speed: float):
         self._x, self._y, self._z = position
         self._speed = speed
         self._lowest = min(ground - PRESS_DEPTH, self._z)

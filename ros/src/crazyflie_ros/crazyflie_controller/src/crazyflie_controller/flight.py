@@ -47,6 +47,10 @@ TOUCHDOWN_DURATION = 1.0
 """How long it does, s; zero thrust follows."""
 
 
+_NOWHERE = Pose(0.0, 0.0, 0.0, 0.0)
+"""Stands for a pose that is not known yet; it is not used while the vehicle is blind."""
+
+
 class State(Enum):
     """What the controller is doing."""
 
@@ -71,19 +75,19 @@ class Flight:
     def __init__(self, controller: GoToController):
         self._controller = controller
         self._state = State.IDLE
-        self._remark = None
-        self._goal = None
-        self._hover = None
-        self._pose = None
-        self._stamp = None
+        self._remark: str | None = None
+        self._goal: Pose | None = None
+        self._hover = _NOWHERE
+        self._pose = _NOWHERE
+        self._stamp: float | None = None
         self._seen = -math.inf
         self._time = -math.inf
         self._entered = -math.inf
-        self._interval = None
-        self._setpoint = Setpoint()
+        self._interval: float | None = None
+        self._setpoint: Setpoint | None = Setpoint()
         self._ground = 0.0
-        self._descent_from = None
-        self._touchdown = None
+        self._descent_from = _NOWHERE
+        self._touchdown: tuple[float, float] | None = None
 
     @property
     def state(self) -> State:
@@ -174,7 +178,8 @@ class Flight:
         return self._fly_to(self._hover if self._goal is None else self._goal)
 
     def _land(self):
-        if self._touchdown is None:
+        touchdown = self._touchdown
+        if touchdown is None:
             elapsed = self._time - self._entered
             start = self._descent_from
             lowest = min(self._ground - PRESS_DEPTH, start.z)
@@ -182,8 +187,8 @@ class Flight:
             if self._pose.z > self._ground + LIFT_OFF_HEIGHT and elapsed <= limit:
                 z = max(start.z - DESCENT_SPEED * elapsed, lowest)
                 return self._fly_to(start._replace(z=z))
-            self._touch_down()
-        began, thrust = self._touchdown
+            touchdown = self._touch_down()
+        began, thrust = touchdown
         elapsed = self._time - began
         if elapsed >= TOUCHDOWN_DURATION:
             self._enter(State.IDLE)
@@ -218,6 +223,7 @@ class Flight:
     def _touch_down(self):
         thrust = 0.0 if self._setpoint is None else self._setpoint.thrust
         self._touchdown = (self._time, thrust)
+        return self._touchdown
 
     def _enter(self, state):
         self._state = state

@@ -55,7 +55,7 @@ class GoToController:
 
     def __init__(self, gains: dict[str, Gains]):
         self._pids = [Pid(gains[axis]) for axis in AXES]
-        self._error = None
+        self._error: list[float] | None = None
 
     @property
     def max_thrust(self) -> float:
@@ -93,8 +93,8 @@ class GoToController:
             slope = [c / interval for c in change]
         self._error = error
         outputs = [
-            pid.update(*parts, interval)
-            for pid, *parts in zip(
+            pid.update(seen_error, seen_slope, interval)
+            for pid, seen_error, seen_slope in zip(
                 self._pids, _seen(error, pose.yaw), _seen(slope, pose.yaw), strict=True
             )
         ]

@@ -13,6 +13,7 @@ import math
 import sys
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_demo.trajectory_file import save
 from crazyflie_model.hermite import hermite
@@ -28,7 +29,7 @@ _RATE = 2.0 * math.pi / (DURATION - RAMP)
 """Of the phase between the ramps, rad/s."""
 
 
-def phase(time: float) -> np.ndarray:
+def phase(time: float) -> NDArray[np.float64]:
     """Return the phase and its first three derivatives, shape (4,), at a time (s)."""
     if time > DURATION - RAMP:
         # The end is the beginning, backwards.
@@ -44,7 +45,7 @@ def phase(time: float) -> np.ndarray:
     return _RATE * np.array(ramp) + [_RATE * max(time - RAMP, 0.0), 0.0, 0.0, 0.0]
 
 
-def sine(amplitude: float, multiple: int, time: float) -> np.ndarray:
+def sine(amplitude: float, multiple: int, time: float) -> NDArray[np.float64]:
     """Return amplitude sin(multiple phase) and its first three derivatives, shape (4,)."""
     p, v, a, j = multiple * phase(time)
     sin, cos = math.sin(p), math.cos(p)

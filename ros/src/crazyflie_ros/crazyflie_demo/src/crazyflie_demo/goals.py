@@ -1,11 +1,12 @@
 """Goals for crazyflie_controller, as messages."""
 
+from genpy import Time
 from geometry_msgs.msg import Point, PoseStamped, Quaternion
 
 from crazyflie_model.angles import quaternion_from_rpy
 
 
-def goal_message(stamp, frame: str, x: float, y: float, z: float, yaw: float) -> PoseStamped:
+def goal_message(stamp: Time, frame: str, x: float, y: float, z: float, yaw: float) -> PoseStamped:
     """Return the message of a goal: position in m and heading in rad, in ``frame``."""
     message = PoseStamped()
     message.header.stamp = stamp

@@ -15,6 +15,10 @@ _FULL = 32767
 """Value of an axis at its end."""
 
 
+State = tuple[list[float], list[int]]
+"""Axes and buttons."""
+
+
 class Joystick:
     """Axes and buttons of a joystick, as far as they have been heard of.
 
@@ -32,12 +36,12 @@ class Joystick:
     """
 
     def __init__(self, deadzone: float = 0.0):
-        self.axes = []
-        self.buttons = []
+        self.axes: list[float] = []
+        self.buttons: list[int] = []
         self._deadzone = deadzone
         self._rest = b""
 
-    def feed(self, data: bytes) -> list:
+    def feed(self, data: bytes) -> list[State]:
         """Take what has been read from the device.
 
         Returns
@@ -63,14 +67,14 @@ class Joystick:
                 states.append(self.state())
         return states if is_told else [*states, self.state()]
 
-    def release(self) -> tuple:
+    def release(self) -> State:
         """Let everything go back to zero, as when the joystick has been unplugged; return it."""
         self.axes = [0.0] * len(self.axes)
         self.buttons = [0] * len(self.buttons)
         self._rest = b""
         return self.state()
 
-    def state(self) -> tuple:
+    def state(self) -> State:
         """Return the state (axes, buttons), in new lists."""
         return list(self.axes), list(self.buttons)
 

@@ -64,10 +64,10 @@ class Keyboard:
         self._deflection = deflection
         self._lift_step = lift_step
         self._lift = 0.0
-        self._held = {}
+        self._held: dict[int, _Held] = {}
         self._rest = ""
 
-    def feed(self, text: str, time: float) -> list:
+    def feed(self, text: str, time: float) -> list[int]:
         """Take what was typed until ``time`` (s); return the buttons that were pressed."""
         presses = []
         for key in self._keys(text):
@@ -80,7 +80,7 @@ class Keyboard:
                 self._deflect(*_DEFLECTIONS[key], time)
         return presses
 
-    def axes(self, time: float) -> list:
+    def axes(self, time: float) -> list[float]:
         """Return the axes at ``time`` (s)."""
         axes = [0.0] * AXES
         for axis, held in self._held.items():
@@ -96,9 +96,10 @@ class Keyboard:
             return
         before = self._held.get(axis)
         value = direction * self._deflection
-        is_repeated = before is not None and time < before.until and before.value == value
-        hold = REPEAT_HOLD if is_repeated else FIRST_HOLD
-        until = max(time + hold, before.until if is_repeated else time)
+        if before is not None and time < before.until and before.value == value:
+            until = max(time + REPEAT_HOLD, before.until)
+        else:
+            until = time + FIRST_HOLD
         self._held[axis] = _Held(value, until)
 
     def _keys(self, text):

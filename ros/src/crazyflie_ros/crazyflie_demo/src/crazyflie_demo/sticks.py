@@ -1,6 +1,7 @@
 """What the sticks of a joystick say at present."""
 
 import math
+from collections.abc import Iterable
 
 JOY_LIMIT = 0.5
 """How long, in s, the last message of a joystick counts: joy_node repeats it all the time."""
@@ -9,11 +10,11 @@ JOY_LIMIT = 0.5
 class Sticks:
     """The axes that were heard last, as long as they are fresh."""
 
-    def __init__(self):
-        self._axes = ()
-        self._heard = None
+    def __init__(self) -> None:
+        self._axes: tuple[float, ...] = ()
+        self._heard: float | None = None
 
-    def hear(self, axes, time: float) -> None:
+    def hear(self, axes: Iterable[float], time: float) -> None:
         """Take the axes of a message that has come at ``time`` (s)."""
         self._axes = tuple(axes)
         self._heard = time

@@ -20,7 +20,7 @@ class Waypoint(NamedTuple):
 class WaypointList:
     """Kind of a parameter that is a list of waypoints."""
 
-    def __call__(self, value) -> list[Waypoint]:
+    def __call__(self, value: object) -> list[Waypoint]:
         """Return the waypoints."""
         if not isinstance(value, list) or not value:
             raise ValueError
@@ -33,7 +33,7 @@ class WaypointList:
         )
 
     @staticmethod
-    def _waypoint(number, entry):
+    def _waypoint(number: int, entry: object) -> Waypoint:
         if not isinstance(entry, (list, tuple)) or len(entry) != len(Waypoint._fields):
             raise ValueError(f"waypoint {number} is {entry!r}")
         kinds = [*[FINITE] * 4, DURATION]
@@ -58,11 +58,11 @@ class Tour:
         rad.
     """
 
-    def __init__(self, waypoints: list, position_tolerance: float, yaw_tolerance: float):
+    def __init__(self, waypoints: list[Waypoint], position_tolerance: float, yaw_tolerance: float):
         self._waypoints = waypoints
         self._position_tolerance = position_tolerance
         self._yaw_tolerance = yaw_tolerance
-        self._reached = None
+        self._reached: float | None = None
         self.index = 0
         self.is_finished = False
 
@@ -71,7 +71,7 @@ class Tour:
         """Where to be now."""
         return self._waypoints[self.index]
 
-    def see(self, time: float, position: tuple, yaw: float) -> None:
+    def see(self, time: float, position: tuple[float, float, float], yaw: float) -> None:
         """Go on, knowing where the vehicle is.
 
         Parameters

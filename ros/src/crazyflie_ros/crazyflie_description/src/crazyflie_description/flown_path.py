@@ -3,6 +3,14 @@
 import math
 from collections import deque
 from collections.abc import Sequence
+from typing import Protocol, Self
+
+
+class Stamp(Protocol):
+    """A time that can be compared, such as rospy.Time or a number."""
+
+    def __lt__(self, other: Self, /) -> bool:
+        """Tell whether this is before another."""
 
 
 class FlownPath:
@@ -18,20 +26,20 @@ class FlownPath:
 
     def __init__(self, spacing: float, capacity: int):
         self._spacing = spacing
-        self._positions = deque(maxlen=capacity)
-        self._stamp = None
+        self._positions: deque[tuple[float, ...]] = deque(maxlen=capacity)
+        self._stamp: Stamp | None = None
 
     @property
-    def positions(self) -> list:
+    def positions(self) -> list[tuple[float, ...]]:
         """Positions (x, y, z) in m, oldest first."""
         return list(self._positions)
 
-    def add(self, stamp, position: Sequence[float]) -> bool:
+    def add(self, stamp: Stamp, position: Sequence[float]) -> bool:
         """Take note of where the vehicle was.
 
         Parameters
         ----------
-        stamp : comparable
+        stamp : Stamp
             When. A stamp before the last one means that time has been reset: the path begins anew.
         position : sequence of float, length 3
             Where, m, fixed frame.
@@ -51,7 +59,9 @@ class FlownPath:
         return True
 
 
-def circle(centre: Sequence[float], radius: float, corners: int) -> list:
+def circle(
+    centre: Sequence[float], radius: float, corners: int
+) -> list[tuple[float, float, float]]:
     """Return a closed horizontal polygon: its corners (x, y, z), the first again as the last.
 
     Parameters

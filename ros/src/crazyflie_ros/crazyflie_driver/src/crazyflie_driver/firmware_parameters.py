@@ -1,7 +1,8 @@
 """Firmware parameters as ROS parameters, PREFIX/GROUP/NAME."""
 
+from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.errors import CrazyflieError
-from crazyflie_utils import ParameterError, ServiceError
+from crazyflie_utils import NodeHandle, ParameterError, ServiceError
 
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
@@ -17,14 +18,14 @@ class FirmwareParameters:
     vehicle : crazyflie_py.Crazyflie
     """
 
-    def __init__(self, handle, prefix: str, vehicle):
+    def __init__(self, handle: NodeHandle, prefix: str, vehicle: Crazyflie):
         self._handle = handle
         self._prefix = prefix
         self._vehicle = vehicle
 
     def publish(self) -> int:
         """Set the ROS parameters to the firmware's values; return how many there are."""
-        groups = {}
+        groups: dict[str, dict[str, int | float]] = {}
         values = self._vehicle.parameters.values()
         for name, value in values.items():
             group, _, parameter = name.partition(".")
@@ -34,7 +35,7 @@ class FirmwareParameters:
             self._handle.set_param(f"{self._prefix}/{group}", parameters)
         return len(values)
 
-    def write(self, names: list) -> None:
+    def write(self, names: list[str]) -> None:
         """Write parameters, named GROUP/NAME, with the values of the ROS parameters.
 
         All are tried; the ROS parameters are then what the firmware has confirmed.
@@ -66,12 +67,12 @@ class FirmwareParameters:
 class _Value:
     """A number, or a truth value for a switch."""
 
-    def __call__(self, value):
+    def __call__(self, value: object) -> int | float:
         if not isinstance(value, (bool, int, float)):
             raise ValueError
         return value
 
-    def __str__(self):
+    def __str__(self) -> str:
         return "a number"
 
 

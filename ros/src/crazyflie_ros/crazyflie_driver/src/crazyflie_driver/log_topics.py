@@ -5,8 +5,11 @@ from std_msgs.msg import Float32, Header
 
 from crazyflie_driver import telemetry
 from crazyflie_driver.msg import GenericLogData, crtpPacket
+from crazyflie_driver.options import VehicleOptions
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.log import LogBlock
+from crazyflie_utils import NodeHandle
 
 STATUS_PERIOD_MS = 500
 """Period of the log block that the diagnostics rest on, ms."""
@@ -35,16 +38,17 @@ class LogTopics:
         Latest state.
     """
 
-    def __init__(self, handle, options, vehicle, fixed_frame: str):
-        self.voltage = None
-        self.rssi = None
-        self.supervisor = None
+    def __init__(
+        self, handle: NodeHandle, options: VehicleOptions, vehicle: Crazyflie, fixed_frame: str
+    ):
+        self.voltage: float | None = None
+        self.rssi: float | None = None
+        self.supervisor: SupervisorState | None = None
         self._handle = handle
         self._options = options
         self._vehicle = vehicle
         self._fixed_frame = fixed_frame
         self._packets = None
-        self._rssi_publisher = None
 
     def start(self) -> None:
         """Announce the topics and start the log blocks; blocks.
@@ -57,9 +61,8 @@ class LogTopics:
         options = self._options
         if "packets" in options.topics:
             self._packets = self._publisher("packets", crtpPacket)
-        self._rssi_publisher = self._publisher("rssi", Float32)
         known = self._vehicle.log.variables()
-        self._start_status(known)
+        self._start_status(known, self._publisher("rssi", Float32))
         wanted = [topic for topic in telemetry.STANDARD if topic.name in options.topics]
         groups, missing = telemetry.packed(wanted, known)
         for name, variables in missing.items():
@@ -83,7 +86,7 @@ class LogTopics:
         )
         self._handle.submit(publisher.publish, message)
 
-    def _start_status(self, known):
+    def _start_status(self, known, rssi_publisher):
         wanted = ("pm.vbat", "radio.rssi", "supervisor.info")
         variables = tuple(variable for variable in wanted if variable in known)
         if variables:
@@ -91,10 +94,12 @@ class LogTopics:
                 "status",
                 STATUS_PERIOD_MS,
                 variables,
-                lambda _, values: self._note_status(dict(zip(variables, values, strict=True))),
+                lambda _, values: self._note_status(
+                    dict(zip(variables, values, strict=True)), rssi_publisher
+                ),
             )
 
-    def _note_status(self, latest):
+    def _note_status(self, latest, rssi_publisher):
         self.voltage = latest.get("pm.vbat")
         if "supervisor.info" in latest:
             self.supervisor = SupervisorState(latest["supervisor.info"])
@@ -103,7 +108,7 @@ class LogTopics:
         if self.rssi is None:
             self.rssi = latest.get("radio.rssi")
         if self.rssi is not None:
-            self._rssi_publisher.publish(Float32(self.rssi))
+            rssi_publisher.publish(Float32(self.rssi))
 
     def _start_standard(self, group):
         publishers = [self._publisher(topic.name, topic.message_type) for topic in group]

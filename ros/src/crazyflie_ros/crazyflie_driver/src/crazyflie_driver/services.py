@@ -1,11 +1,19 @@
 """Services of one vehicle."""
 
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
 from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
 
 from crazyflie_driver import srv
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.errors import CrazyflieError
-from crazyflie_utils import ServiceError
+from crazyflie_utils import NodeHandle, ServiceError
+
+if TYPE_CHECKING:
+    from crazyflie_driver.vehicle import Vehicle
 
 
 class VehicleServices:
@@ -23,7 +31,7 @@ class VehicleServices:
     are_advertised : bool
     """
 
-    def __init__(self, handle, vehicle):
+    def __init__(self, handle: NodeHandle, vehicle: Vehicle):
         self.are_advertised = False
         self._handle = handle
         self._vehicle = vehicle
@@ -82,7 +90,7 @@ class VehicleServices:
         return srv.sendPacketResponse()
 
     @staticmethod
-    def _at_once(send):
+    def _at_once(send: Callable[[], None]) -> None:
         try:
             send()
         except CrazyflieError as error:

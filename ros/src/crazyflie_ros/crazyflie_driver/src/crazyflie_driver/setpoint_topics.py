@@ -2,13 +2,17 @@
 
 from collections import deque
 
-from geometry_msgs.msg import PointStamped, PoseStamped, Twist
+from geometry_msgs.msg import Point, PointStamped, PoseStamped, Twist, Vector3
 from std_msgs.msg import Empty
 
+from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+from crazyflie_driver.options import VehicleOptions
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.errors import CrazyflieError
+from crazyflie_utils import NodeHandle
 
 _THROTTLE = 1.0
 _RATE_WINDOW = 1.0
@@ -38,7 +42,9 @@ class SetpointTopics:
         Setpoints that were not sent.
     """
 
-    def __init__(self, handle, options, vehicle, log):
+    def __init__(
+        self, handle: NodeHandle, options: VehicleOptions, vehicle: Crazyflie, log: LogTopics
+    ):
         self.is_blocked = False
         self.is_streaming = False
         self.ignored = 0
@@ -46,8 +52,8 @@ class SetpointTopics:
         self._options = options
         self._vehicle = vehicle
         self._log = log
-        self._times = deque(maxlen=1000)
-        self._high_level_end = None
+        self._times: deque[float] = deque(maxlen=1000)
+        self._high_level_end: float | None = None
 
     def subscribe(self) -> None:
         """Begin to listen."""
@@ -174,5 +180,5 @@ class SetpointTopics:
         )
 
 
-def _xyz(vector):
+def _xyz(vector: Point | Vector3) -> tuple[float, float, float]:
     return vector.x, vector.y, vector.z

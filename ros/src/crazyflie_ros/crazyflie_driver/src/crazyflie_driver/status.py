@@ -54,7 +54,7 @@ class Status:
     setpoint_rate: float = 0.0
     ignored: int = 0
 
-    def findings(self) -> list:
+    def findings(self) -> list[tuple[int, str]]:
         """Return (level, text) of everything that is not as it should be, worst first."""
         found = []
         error, warn = DiagnosticStatus.ERROR, DiagnosticStatus.WARN

@@ -1,12 +1,13 @@
 """Log data of the firmware as messages: which variables, how often, in which units."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Container, Iterable, Sequence
 from typing import NamedTuple
 
+import genpy
 from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
 from sensor_msgs.msg import Imu, MagneticField, Temperature
-from std_msgs.msg import Float32
+from std_msgs.msg import Float32, Header
 
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_model.units import GRAVITY
@@ -39,10 +40,10 @@ class StandardTopic(NamedTuple):
     """
 
     name: str
-    message_type: type
+    message_type: type[genpy.Message]
     period_ms: int
-    variables: tuple
-    convert: Callable
+    variables: tuple[str, ...]
+    convert: Callable[[Header, Sequence[float]], genpy.Message]
     in_world: bool = False
 
 
@@ -99,7 +100,9 @@ STANDARD = (
 )
 
 
-def packed(topics: list, known) -> tuple:
+def packed(
+    topics: list[StandardTopic], known: Container[str]
+) -> tuple[list[list[StandardTopic]], dict[str, list[str]]]:
     """Put the variables of topics that have the same period into common log blocks.
 
     Parameters
@@ -115,7 +118,8 @@ def packed(topics: list, known) -> tuple:
     missing : dict
         Name of a topic that the vehicle cannot fill -> variables that it lacks.
     """
-    missing, groups = {}, []
+    missing: dict[str, list[str]] = {}
+    groups: list[list[StandardTopic]] = []
     for topic in topics:
         lacking = [variable for variable in topic.variables if variable not in known]
         if lacking:
@@ -135,6 +139,6 @@ _MOST_VARIABLES = 6
 """Variables of four bytes that fit in a log packet's 26 bytes."""
 
 
-def generic(header, values) -> GenericLogData:
+def generic(header: Header, values: Iterable[float]) -> GenericLogData:
     """Return the message of a custom log block."""
     return GenericLogData(header=header, values=list(map(float, values)))

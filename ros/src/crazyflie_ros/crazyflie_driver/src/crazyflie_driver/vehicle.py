@@ -1,10 +1,13 @@
 """One vehicle of the server: its link, its topics and services, from adding to removing."""
 
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future
+from typing import TypeVar
 
 from crazyflie_driver.firmware_parameters import FirmwareParameters
 from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.options import VehicleOptions
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import Status
@@ -12,9 +15,13 @@ from crazyflie_driver.worker import Worker
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
 from crazyflie_py.errors import CrazyflieError
-from crazyflie_utils import ServiceError
+from crazyflie_py.high_level import HighLevel
+from crazyflie_utils import NodeHandle, ServiceError
 
 _UNABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
+
+
+Result = TypeVar("Result")
 
 
 class Vehicle:
@@ -36,7 +43,7 @@ class Vehicle:
         The address is malformed.
     """
 
-    def __init__(self, handle, options, fixed_frame: str):
+    def __init__(self, handle: NodeHandle, options: VehicleOptions, fixed_frame: str):
         self.options = options
         self._handle = handle.child()
         self._server = handle
@@ -59,7 +66,7 @@ class Vehicle:
 
     # Life.
 
-    def connect(self) -> Future:
+    def connect(self) -> Future[None]:
         """Connect and announce all topics and services; the result is None.
 
         The future fails with `ServiceError` when that is not possible; then nothing
@@ -67,7 +74,7 @@ class Vehicle:
         """
         return self.do("connecting", self._connect)
 
-    def leave(self) -> Future:
+    def leave(self) -> Future[None]:
         """Stop the motors, end the link, take topics and services down; the result is None.
 
         Also while the vehicle is being connected, or its worker waits for it.
@@ -79,7 +86,7 @@ class Vehicle:
         farewell.close()
         return done
 
-    def do(self, what: str, work) -> Future:
+    def do(self, what: str, work: Callable[[], Result]) -> Future[Result]:
         """Have ``work()`` done by the vehicle's worker; the result is its own.
 
         What goes wrong is logged, and fails the future with `ServiceError`.
@@ -163,7 +170,9 @@ class Vehicle:
         """Tell the vehicle that setpoints stop; does not block."""
         self._setpoints.hand_over(remain_valid_ms)
 
-    def command(self, what: str, send, duration: float = 0.0) -> Future:
+    def command(
+        self, what: str, send: Callable[[HighLevel], Result], duration: float = 0.0
+    ) -> Future[Result]:
         """Have a high-level command sent, after a hand-over if setpoints were streamed.
 
         Parameters
@@ -203,7 +212,7 @@ class Vehicle:
         if SupervisorState.ARMED not in state:
             self.link.supervisor.arm()
 
-    def write_parameters(self, names: list) -> None:
+    def write_parameters(self, names: list[str]) -> None:
         """Write ROS parameters GROUP/NAME to the firmware; blocks."""
         self._parameters.write(names)
 

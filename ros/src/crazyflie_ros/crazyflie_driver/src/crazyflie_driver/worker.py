@@ -2,9 +2,13 @@
 
 import queue
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future
+from typing import Any, TypeVar
 
 from crazyflie_utils import ServiceError
+
+Result = TypeVar("Result")
 
 
 class Worker:
@@ -17,14 +21,16 @@ class Worker:
     """
 
     def __init__(self, name: str):
-        self._jobs = queue.SimpleQueue()
+        self._jobs: queue.SimpleQueue[tuple[Callable[[], Any], Future[Any]] | None] = (
+            queue.SimpleQueue()
+        )
         self._is_closed = False
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
         self._thread.start()
 
-    def submit(self, work) -> Future:
+    def submit(self, work: Callable[[], Result]) -> Future[Result]:
         """Have ``work()`` done after the jobs before it; return the future of its result."""
-        future = Future()
+        future: Future[Result] = Future()
         if self._is_closed:
             future.set_exception(ServiceError("the vehicle has been removed"))
         else:

@@ -7,10 +7,12 @@ import contextlib
 import logging
 import os
 import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import cflib.crtp
 from cflib.crazyflie import Crazyflie as CflibCrazyflie
+from cflib.crtp.crtpdriver import CRTPDriver
 from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
 
 _init_lock = threading.Lock()
@@ -68,7 +70,9 @@ class Backend(CflibCrazyflie):
         driver gives up.
     """
 
-    def __init__(self, cache: str | None, on_error):
+    link: CRTPDriver | None
+
+    def __init__(self, cache: str | None, on_error: Callable[[str], None]):
         super().__init__(rw_cache=cache)
         self._on_error = on_error
         self._setup_begun = False
@@ -81,7 +85,13 @@ class Backend(CflibCrazyflie):
         """Send the first question of the set-up again: nobody else does."""
         self.send_packet(packet(CRTPPort.LINKCTRL, _LINK_SOURCE_CHANNEL, b"\0"))
 
-    def send_packet(self, pk, expected_reply=(), resend=False, timeout=0.2):
+    def send_packet(
+        self,
+        pk: CRTPPacket,
+        expected_reply: tuple[int, ...] = (),
+        resend: bool = False,
+        timeout: float = 0.2,
+    ) -> None:
         """Send a packet; never raises.
 
         An error in a driver, or a link that is closed meanwhile, would leave cflib's

@@ -1,6 +1,7 @@
 """The firmware's console: text that comes in pieces of up to 30 bytes."""
 
 import codecs
+from collections.abc import Callable
 
 
 class Console:
@@ -12,7 +13,7 @@ class Console:
         ``on_line(text)`` for every line, without its end.
     """
 
-    def __init__(self, on_line):
+    def __init__(self, on_line: Callable[[str], None]):
         self._on_line = on_line
         self._decoder = codecs.getincrementaldecoder("utf-8")(errors="replace")
         self._line = ""

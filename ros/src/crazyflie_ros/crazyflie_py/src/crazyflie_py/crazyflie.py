@@ -3,7 +3,9 @@
 import enum
 import threading
 import time
+from collections.abc import Callable
 
+from cflib.crazyflie.log import LogConfig
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_py.address import Address
@@ -11,7 +13,7 @@ from crazyflie_py.backend import table_cache
 from crazyflie_py.console import Console
 from crazyflie_py.errors import CrazyflieError, LinkLostError
 from crazyflie_py.high_level import HighLevel
-from crazyflie_py.link import Limits, Link
+from crazyflie_py.link import Limits, Link, OnPacket
 from crazyflie_py.localization import Localization
 from crazyflie_py.log import Log, LogBlock
 from crazyflie_py.parameters import Parameters
@@ -81,9 +83,9 @@ class Crazyflie:
         self,
         uri: str,
         reconnect: bool = False,
-        on_state=None,
-        on_console=None,
-        on_packet=None,
+        on_state: Callable[[LinkState, str], None] | None = None,
+        on_console: Callable[[str], None] | None = None,
+        on_packet: OnPacket | None = None,
         cache: str | None = None,
         limits: Limits | None = None,
     ):
@@ -100,24 +102,24 @@ class Crazyflie:
         self._on_packet = on_packet
         self._cache = cache
         self._limits = limits
-        self._link = None
+        self._link: Link | None = None
         self._state = LinkState.DISCONNECTED
         self._reason = "not connected yet"
-        self._blocks = {}
+        self._blocks: dict[LogBlock, LogConfig] = {}
         self._blocks_lock = threading.Lock()
         self._closed = threading.Event()
-        self._watcher = None
+        self._watcher: threading.Thread | None = None
         self._console = Console(on_console) if on_console is not None else None
-        self._rssi = None
-        self._announced = None
-        self._opening = None
+        self._rssi: float | None = None
+        self._announced: tuple[LinkState, str] | None = None
+        self._opening: Link | None = None
 
     def __enter__(self) -> "Crazyflie":
         """Connect."""
         self.connect()
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         """Close."""
         self.close()
 

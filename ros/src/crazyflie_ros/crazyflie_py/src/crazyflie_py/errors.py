@@ -124,7 +124,7 @@ def explain(uri: str, text: str) -> CrazyflieError:
     return NoAnswerError(f"{uri}: {first_line}")
 
 
-def unknown_name(kind: str, name: str, known: list) -> UnknownNameError:
+def unknown_name(kind: str, name: str, known: list[str]) -> UnknownNameError:
     """Return the error for a name the vehicle does not know, with the names that are near it."""
     near = [other for other in known if other.lower() == name.lower()]
     near = near or difflib.get_close_matches(name, known, n=3, cutoff=0.6)

@@ -8,6 +8,7 @@ import threading
 import time
 
 from crazyflie_py.errors import LinkLostError, NoReplyError
+from crazyflie_py.outbox import Send
 
 REPLY_LIMIT = 1.0
 """How long to wait for a reply, s."""
@@ -17,20 +18,20 @@ RESEND_PERIOD = 0.2
 
 
 class _Waiter:
-    def __init__(self, port, channel, prefix):
+    def __init__(self, port: int, channel: int, prefix: bytes):
         self.key = (port, channel)
         self.prefix = prefix
-        self.answer = None
+        self.answer: bytes | None = None
         self.done = threading.Event()
 
 
 class Exchange:
     """Pair answers with the questions that wait for them."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiters = []
-        self._closed = None
+        self._waiters: list[_Waiter] = []
+        self._closed: str | None = None
 
     def hear(self, port: int, channel: int, data: bytes) -> None:
         """Give a packet that arrived to whoever has waited for it longest."""
@@ -44,7 +45,7 @@ class Exchange:
 
     def ask(
         self,
-        send,
+        send: Send,
         port: int,
         channel: int,
         prefix: bytes,
@@ -109,6 +110,6 @@ class Exchange:
             waiter.done.set()
 
     @staticmethod
-    def _patience(deadline, resend):
+    def _patience(deadline: float, resend: bool) -> float:
         left = max(0.0, deadline - time.monotonic())
         return min(RESEND_PERIOD, left) if resend else left

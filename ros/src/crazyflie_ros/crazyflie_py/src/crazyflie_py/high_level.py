@@ -1,12 +1,14 @@
 """Commands that the vehicle's own planner carries out."""
 
 import os
+from collections.abc import Sequence
 
 from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_py.checks import check_byte, check_finite, check_positive
 from crazyflie_py.errors import RefusedError
+from crazyflie_py.link import CurrentLink
 
 ALL_GROUPS = 0
 """Group mask that every vehicle obeys."""
@@ -28,7 +30,7 @@ class HighLevel:
         Returns the `Link`, or raises `LinkLostError`.
     """
 
-    def __init__(self, current_link):
+    def __init__(self, current_link: CurrentLink):
         self._current_link = current_link
 
     def set_group_mask(self, group_mask: int) -> None:
@@ -73,7 +75,7 @@ class HighLevel:
 
     def go_to(
         self,
-        position,
+        position: Sequence[float],
         yaw: float,
         duration: float,
         relative: bool = False,

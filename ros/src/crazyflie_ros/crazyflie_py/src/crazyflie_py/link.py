@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from cflib.crtp.crtpstack import CRTPPort
@@ -19,7 +20,7 @@ from crazyflie_py.errors import (
 )
 from crazyflie_py.exchange import REPLY_LIMIT, Exchange
 from crazyflie_py.liveness import LOST_AFTER, Liveness
-from crazyflie_py.outbox import Outbox
+from crazyflie_py.outbox import Outbox, Send
 from crazyflie_py.setup_progress import SetupProgress
 
 OLDEST_PROTOCOL = 4
@@ -30,6 +31,9 @@ _SOURCE_PERIOD = 0.25
 _MOST_DATA = 30
 
 _log = logging.getLogger(__name__)
+
+OnPacket = Callable[[int, int, bytes], None]
+"""Is called with port, channel and data."""
 
 
 @dataclass(frozen=True)
@@ -74,19 +78,19 @@ class Link:
         address: Address,
         limits: Limits | None = None,
         cache: str | None = None,
-        on_packet=None,
-        backend=Backend,
+        on_packet: OnPacket | None = None,
+        backend: Callable[[str | None, Callable[[str], None]], Backend] = Backend,
     ):
         self.address = address
-        self.liveness = None
+        self._liveness: Liveness | None = None
         self._limits = limits or Limits()
         self._on_packet = on_packet
         self._changed = threading.Condition()
-        self._error = None
+        self._error: CrazyflieError | None = None
         self._is_connected = False
         self._is_complete = False
         self._progress = SetupProgress()
-        self._progress_time = None
+        self._progress_time = 0.0
         self._has_answered = False
         self._closing = threading.Lock()
         self._is_closed = False
@@ -166,7 +170,7 @@ class Link:
     def _on_connected(self, _):
         with self._changed:
             self._is_connected = True
-            self.liveness = Liveness(time.monotonic(), self._limits.lost)
+            self._liveness = Liveness(time.monotonic(), self._limits.lost)
             # Without a single parameter cflib never says that it is through.
             if not self.cflib.param.toc.toc:
                 self._is_complete = True
@@ -185,15 +189,28 @@ class Link:
         return self.cflib.platform.get_protocol_version()
 
     @property
+    def liveness(self) -> Liveness:
+        """Signs of life of the vehicle.
+
+        Raises
+        ------
+        LinkLostError
+            The link is not set up.
+        """
+        if self._liveness is None:
+            raise LinkLostError(f"{self.address.uri}: not connected yet")
+        return self._liveness
+
+    @property
     def error(self) -> CrazyflieError | None:
         """Why the link is at its end; None while it lives."""
-        if self._error is None and self.liveness and self.liveness.is_lost(time.monotonic()):
+        if self._error is None and self._liveness and self._liveness.is_lost(time.monotonic()):
             self._error = LinkLostError(
                 f"{self.address.uri}: the vehicle has not been heard for {self._limits.lost:g} s"
             )
         return self._error
 
-    def stream(self, name: str, send) -> None:
+    def stream(self, name: str, send: Send) -> None:
         """Have ``send()`` called soon, in the place of what still waits under this name."""
         self._outbox.latest(name, send)
 
@@ -201,7 +218,7 @@ class Link:
         """Do not send what waits under this name."""
         self._outbox.forget(name)
 
-    def command(self, send, urgent: bool = False) -> None:
+    def command(self, send: Send, urgent: bool = False) -> None:
         """Have ``send()`` called soon, after earlier commands, or before them if urgent."""
         self._outbox.command(send, urgent)
 
@@ -216,7 +233,7 @@ class Link:
 
     def ask(
         self,
-        send,
+        send: Send | bytes,
         port: int,
         channel: int,
         prefix: bytes,
@@ -274,11 +291,11 @@ class Link:
             if is_progress or not self._has_answered:
                 self._progress_time = now
             self._has_answered = True
-        if self.liveness is not None:
+        if self._liveness is not None:
             if (port, channel) == (CRTPPort.LOGGING, _LOG_DATA_CHANNEL):
-                self.liveness.heard(now)
+                self._liveness.heard(now)
             elif (port, channel) == (CRTPPort.LINKCTRL, _PING_CHANNEL):
-                self.liveness.ping_answered(data, now)
+                self._liveness.ping_answered(data, now)
         self._exchange.hear(port, channel, data)
         if self._on_packet is not None:
             try:
@@ -287,8 +304,12 @@ class Link:
                 _log.exception("the callback for packets failed")
 
     def _note_sent(self, sent):
-        if self.liveness is not None and (sent.port, sent.channel) == (
+        if self._liveness is not None and (sent.port, sent.channel) == (
             CRTPPort.LINKCTRL,
             _PING_CHANNEL,
         ):
-            self.liveness.ping_sent(bytes(sent.data))
+            self._liveness.ping_sent(bytes(sent.data))
+
+
+CurrentLink = Callable[[], Link]
+"""Returns the living link, or raises `LinkLostError`."""

@@ -33,7 +33,7 @@ class Liveness:
         self._heard = now
         self._checked = now
         self._lock = threading.Lock()
-        self._pings = {}
+        self._pings: dict[bytes, bool] = {}
 
     def heard(self, now: float) -> None:
         """Take note of a sign of life."""

@@ -1,9 +1,11 @@
 """What an external system, such as motion capture, knows about the vehicle's pose."""
 
 import math
+from collections.abc import Sequence
 
 from crazyflie_py.checks import check_finite
 from crazyflie_py.errors import ValueRangeError
+from crazyflie_py.link import CurrentLink
 
 _STREAM = "localization"
 
@@ -17,7 +19,7 @@ class Localization:
         Returns the `Link`, or raises `LinkLostError`.
     """
 
-    def __init__(self, current_link):
+    def __init__(self, current_link: CurrentLink):
         self._current_link = current_link
 
     def position(self, x: float, y: float, z: float) -> None:
@@ -26,7 +28,7 @@ class Localization:
         link = self._current_link()
         link.stream(_STREAM, lambda: link.cflib.loc.send_extpos((x, y, z)))
 
-    def pose(self, position, quaternion) -> None:
+    def pose(self, position: Sequence[float], quaternion: Sequence[float]) -> None:
         """Send a position (m) and an attitude (x, y, z, w) in the world.
 
         The quaternion is normalised.

@@ -15,6 +15,7 @@ from crazyflie_py.errors import (
     unknown_name,
 )
 from crazyflie_py.exchange import REPLY_LIMIT
+from crazyflie_py.link import CurrentLink
 
 SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS = 10, 2540
 """The firmware counts periods in 10 ms, in one byte of which 255 is not allowed."""
@@ -23,7 +24,7 @@ MOST_BYTES = 26
 """Bytes of values that fit in a log packet."""
 
 
-def quaternion_from_compressed(number: int) -> tuple:
+def quaternion_from_compressed(number: int) -> tuple[float, ...]:
     """Return the unit quaternion (x, y, z, w) of the log variable stateEstimateZ.quat.
 
     It has 32 bits: which component is largest, and the three others with 10 bits each.
@@ -51,8 +52,8 @@ class LogBlock:
 
     name: str
     period_ms: int
-    variables: tuple
-    callback: Callable = field(compare=False)
+    variables: tuple[str, ...]
+    callback: Callable[[int, tuple[float, ...]], None] = field(compare=False)
 
 
 class Log:
@@ -64,10 +65,10 @@ class Log:
         Returns the `Link`, or raises `LinkLostError`.
     """
 
-    def __init__(self, current_link):
+    def __init__(self, current_link: CurrentLink):
         self._current_link = current_link
 
-    def variables(self) -> dict:
+    def variables(self) -> dict[str, str]:
         """Return the vehicle's variables: "group.name" -> C type, sorted by name."""
         toc = self._current_link().cflib.log.toc.toc
         return {
@@ -127,7 +128,7 @@ class Log:
         for variable in block.variables:
             config.add_variable(variable)
         decided = threading.Event()
-        refusals = []
+        refusals: list[str] = []
 
         def refuse(_, text):
             refusals.append(text)

@@ -8,6 +8,7 @@ external positions) only the latest is kept. Commands are all sent, in order.
 import logging
 import threading
 from collections import deque
+from collections.abc import Callable
 
 from crazyflie_py.errors import LinkLostError
 
@@ -15,19 +16,22 @@ _MOST_COMMANDS = 256
 
 _log = logging.getLogger(__name__)
 
+Send = Callable[[], None]
+"""Sends something."""
+
 
 class Outbox:
     """What is to be sent: commands in their order, and the latest of each stream."""
 
-    def __init__(self):
-        self._commands = deque()
-        self._streams = {}
+    def __init__(self) -> None:
+        self._commands: deque[Send] = deque()
+        self._streams: dict[str, Send] = {}
         self._wake = threading.Condition()
         self._closed = False
         self._thread = threading.Thread(target=self._run, name="crazyflie-outbox", daemon=True)
         self._thread.start()
 
-    def command(self, send, urgent: bool = False) -> None:
+    def command(self, send: Send, urgent: bool = False) -> None:
         """Have ``send()`` called after the commands before it.
 
         An urgent one goes first, and what waits on streams is forgotten.
@@ -48,7 +52,7 @@ class Outbox:
                 self._commands.append(send)
             self._wake.notify()
 
-    def latest(self, stream: str, send) -> None:
+    def latest(self, stream: str, send: Send) -> None:
         """Have ``send()`` called, in the place of what still waits on this stream."""
         with self._wake:
             self._check_open()

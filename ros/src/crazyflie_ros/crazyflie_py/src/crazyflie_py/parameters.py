@@ -6,6 +6,7 @@ from cflib.crazyflie.param import ParamTocElement
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_py.errors import RefusedError, ValueRangeError, unknown_name
+from crazyflie_py.link import CurrentLink, Link
 
 _READ_CHANNEL, _WRITE_CHANNEL = 1, 2
 
@@ -19,10 +20,10 @@ class Parameters:
         Returns the `Link`, or raises `LinkLostError`.
     """
 
-    def __init__(self, current_link):
+    def __init__(self, current_link: CurrentLink):
         self._current_link = current_link
 
-    def types(self) -> dict:
+    def types(self) -> dict[str, tuple[str, bool]]:
         """Return the parameters: "group.name" -> (C type, whether it can be written)."""
         toc = self._current_link().cflib.param.toc.toc
         return {
@@ -31,7 +32,7 @@ class Parameters:
             for name, element in sorted(toc[group].items())
         }
 
-    def values(self) -> dict:
+    def values(self) -> dict[str, int | float]:
         """Return the values as last read or written: "group.name" -> int or float."""
         param = self._current_link().cflib.param
         result = {}
@@ -80,7 +81,7 @@ class Parameters:
         return self._keep(link, element, answer[2:])
 
     @staticmethod
-    def _find(link, name):
+    def _find(link: Link, name: str) -> ParamTocElement:
         toc = link.cflib.param.toc.toc
         group, _, rest = name.partition(".")
         try:
@@ -90,7 +91,7 @@ class Parameters:
             raise unknown_name("parameter", name, sorted(known)) from None
 
     @staticmethod
-    def _pack(element, name, value):
+    def _pack(element: ParamTocElement, name: str, value: float) -> bytes:
         is_real = element.pytype[-1] in "efd"
         try:
             number = float(value) if is_real else int(value)
@@ -103,7 +104,7 @@ class Parameters:
             ) from None
 
     @staticmethod
-    def _keep(link, element, data):
+    def _keep(link: Link, element: ParamTocElement, data: bytes) -> int | float:
         (value,) = struct.unpack(element.pytype, data)
         link.cflib.param.values.setdefault(element.group, {})[element.name] = str(value)
         return value

@@ -1,5 +1,7 @@
 """Restarting a vehicle by radio."""
 
+from collections.abc import Callable
+
 from cflib.utils.power_switch import PowerSwitch
 
 from crazyflie_py.address import Address
@@ -7,7 +9,7 @@ from crazyflie_py.backend import init_drivers
 from crazyflie_py.errors import RefusedError, explain
 
 
-def reboot(address: Address, before=lambda: None) -> None:
+def reboot(address: Address, before: Callable[[], None] = lambda: None) -> None:
     """Restart a vehicle's firmware, without a connection; only by radio. Blocks.
 
     Parameters

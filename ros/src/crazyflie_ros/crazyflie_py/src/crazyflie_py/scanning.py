@@ -6,13 +6,13 @@ import io
 import cflib.crtp
 
 from crazyflie_py.backend import init_drivers
-from crazyflie_py.errors import AddressError, explain
+from crazyflie_py.errors import AddressError, CrazyflieError, explain
 
 DEFAULT_ADDRESS = "E7E7E7E7E7"
 """Radio address that vehicles have when they are new."""
 
 
-def scan(address: str = DEFAULT_ADDRESS) -> tuple:
+def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError]]:
     """Look for vehicles on all interfaces; takes some seconds with a radio.
 
     On UDP the ports 19850 to 19859 of 127.0.0.1, or of the environment variable
@@ -42,7 +42,8 @@ def scan(address: str = DEFAULT_ADDRESS) -> tuple:
     if not 0 <= number < 1 << 40:
         raise AddressError(f"{address!r} is no radio address: expected up to 10 hexadecimal digits")
     init_drivers()
-    found, problems = [], []
+    found: list[str] = []
+    problems: list[CrazyflieError] = []
     for driver_class in cflib.crtp.CLASSES:
         # What stops the radio driver it prints, and finds nothing.
         said = io.StringIO()

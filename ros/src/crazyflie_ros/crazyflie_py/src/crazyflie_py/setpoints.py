@@ -7,10 +7,12 @@ their descriptions, since that is what counts.
 import math
 import threading
 import time
+from collections.abc import Sequence
 
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_py.checks import check_finite
 from crazyflie_py.errors import ValueRangeError
+from crazyflie_py.link import CurrentLink
 
 ZEROS = 100
 """Setpoints of zero thrust after connecting and before leaving."""
@@ -32,7 +34,7 @@ class Setpoints:
         Returns the `Link`, or raises `LinkLostError`.
     """
 
-    def __init__(self, current_link):
+    def __init__(self, current_link: CurrentLink):
         self._current_link = current_link
 
     def attitude(self, roll: float, pitch: float, yaw_rate: float, thrust: int) -> None:
@@ -48,7 +50,14 @@ class Setpoints:
             raise ValueRangeError(f"thrust is {thrust}; expected 0 to {FULL_PWM:g} PWM")
         self._stream(lambda c: c.send_setpoint(roll, pitch, yaw_rate, int(thrust)))
 
-    def full_state(self, position, velocity, acceleration, quaternion, rates) -> None:
+    def full_state(
+        self,
+        position: Sequence[float],
+        velocity: Sequence[float],
+        acceleration: Sequence[float],
+        quaternion: Sequence[float],
+        rates: Sequence[float],
+    ) -> None:
         """Position (m), velocity (m/s), acceleration (m/s^2), attitude and body rates (rad/s).
 
         Positions, velocities and accelerations are of the world; the quaternion is

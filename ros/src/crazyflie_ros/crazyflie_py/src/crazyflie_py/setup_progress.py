@@ -12,10 +12,10 @@ _ITEM, _INFO = 2, 3
 class SetupProgress:
     """The present step of a connection's set-up, in words."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._step = "waiting for the first answer"
-        self._sizes = {}
-        self._values = set()
+        self._sizes: dict[int, int] = {}
+        self._values: set[bytes] = set()
 
     def __str__(self) -> str:
         """Return the step, such as "log table, item 17 of 337"."""

@@ -5,6 +5,7 @@ import math
 import os
 import sys
 import threading
+from collections.abc import Callable
 
 from crazyflie_py.address import Address
 from crazyflie_py.errors import AddressError, CrazyflieError
@@ -74,7 +75,7 @@ def _address(text):
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def run(name: str, work, limit: float | None, interrupted: int = FAILED) -> int:
+def run(name: str, work: Callable[[], None], limit: float | None, interrupted: int = FAILED) -> int:
     """Do the work of a tool and return its exit status.
 
     Parameters
@@ -89,7 +90,7 @@ def run(name: str, work, limit: float | None, interrupted: int = FAILED) -> int:
     interrupted : int
         Exit status after Ctrl-C.
     """
-    outcome = []
+    outcome: list[int] = []
     worker = threading.Thread(
         target=lambda: outcome.append(_attempt(name, work)), name=name, daemon=True
     )

@@ -18,7 +18,7 @@ from crazyflie_tools.program import FINE, LIMIT, add_timeout, add_uri, make_pars
 _CHECK_PERIOD = 0.1
 
 
-def scan(arguments: list | None = None) -> int:
+def scan(arguments: list[str] | None = None) -> int:
     """List the vehicles within reach."""
     parser = make_parser(
         "scan",
@@ -47,7 +47,7 @@ def _scan(address):
         )
 
 
-def list_params(arguments: list | None = None) -> int:
+def list_params(arguments: list[str] | None = None) -> int:
     """List the parameters of a vehicle with their values."""
     parser = make_parser("listParams", "List the parameters of a vehicle: name, type, value.")
     return _talk(parser, arguments, _list_params)
@@ -60,7 +60,7 @@ def _list_params(vehicle, _):
         print(f"{name} ({_short(c_type)}{access}) {_text(values[name])}")
 
 
-def list_log_variables(arguments: list | None = None) -> int:
+def list_log_variables(arguments: list[str] | None = None) -> int:
     """List the log variables of a vehicle."""
     parser = make_parser("listLogVariables", "List the log variables of a vehicle: name, type.")
     return _talk(parser, arguments, _list_log_variables)
@@ -71,7 +71,7 @@ def _list_log_variables(vehicle, _):
         print(f"{name} ({_short(c_type)})")
 
 
-def get_param(arguments: list | None = None) -> int:
+def get_param(arguments: list[str] | None = None) -> int:
     """Print parameters of a vehicle."""
     parser = make_parser("getParam", "Print the values of parameters of a vehicle, one a line.")
     parser.add_argument(
@@ -85,7 +85,7 @@ def _get_param(vehicle, options):
     print(*map(_text, values), sep="\n")
 
 
-def set_param(arguments: list | None = None) -> int:
+def set_param(arguments: list[str] | None = None) -> int:
     """Set a parameter of a vehicle."""
     parser = make_parser("setParam", "Set a parameter of a vehicle, and print what it confirms.")
     parser.add_argument("name", type=_name, metavar="GROUP.NAME", help="such as ring.effect")
@@ -99,7 +99,7 @@ def _set_param(vehicle, options):
     print(_text(vehicle.parameters.write(options.name, options.value)))
 
 
-def reboot(arguments: list | None = None) -> int:
+def reboot(arguments: list[str] | None = None) -> int:
     """Restart the firmware of a vehicle."""
     parser = make_parser("reboot", "Restart the firmware of a vehicle; only by radio.")
     add_uri(parser)
@@ -108,7 +108,7 @@ def reboot(arguments: list | None = None) -> int:
     return run(parser.prog, crazyflie_py.Crazyflie(options.uri.uri).reboot, options.timeout)
 
 
-def console(arguments: list | None = None) -> int:
+def console(arguments: list[str] | None = None) -> int:
     """Print what the firmware of a vehicle says."""
     parser = make_parser("console", "Print what the firmware of a vehicle says.")
     parser.add_argument(
@@ -126,7 +126,7 @@ def console(arguments: list | None = None) -> int:
 
 
 def _console(uri, duration):
-    lines = queue.SimpleQueue()
+    lines: queue.SimpleQueue[str] = queue.SimpleQueue()
     with crazyflie_py.Crazyflie(uri, on_console=lines.put) as vehicle:
         end = time.monotonic() + duration
         while time.monotonic() < end:

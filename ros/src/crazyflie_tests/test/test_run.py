@@ -1,0 +1,83 @@
+"""The script ``run``: its words, and what ``./run test`` says and returns when tests fail."""
+
+import re
+import subprocess
+
+import pytest
+import yaml
+from workspaces import TOP, clean_environment
+
+LIMIT = 120.0
+
+
+@pytest.fixture
+def run_test(workspace, home):
+    """Return a function that calls ``./run test`` and returns its status and what it printed."""
+
+    def run(*arguments):
+        result = subprocess.run(
+            ["./run", "test", *arguments],
+            cwd=workspace,
+            env=clean_environment(home),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=LIMIT,
+        )
+        return result.returncode, result.stdout
+
+    return run
+
+
+@pytest.fixture
+def failing(workspace):
+    """Return a package's test folder in which a unit test and a rostest fail."""
+    folder = workspace / "ros" / "src" / "crazyflie_msgs" / "test"
+    files = {
+        "test_failing.py": "def test_fails():\n    assert 2 + 2 == 5\n",
+        "rostest_failing.py": "def test_fails():\n    assert 2 + 2 == 5\n",
+        "failing.test": '<launch><test pkg="crazyflie_utils" type="pytest_node" test-name="failing"'
+        f' args="{folder}/rostest_failing.py" time-limit="30"/></launch>',
+    }
+    for name, text in files.items():
+        (folder / name).write_text(text)
+    yield folder
+    for name in files:
+        (folder / name).unlink()
+
+
+def test_failures_make_the_status(run_test, failing):
+    files = ["failing.test", "test_failing.py", "test_failing.py::test_fails"]
+    passing = "crazyflie_description"
+    for what in ["crazyflie_msgs", *(str(failing / name) for name in files)]:
+        # What passes before and afterwards does not hide it.
+        status, printed = run_test(passing, what, passing)
+        assert status == 1, printed
+        assert "assert (2 + 2) == 5" in printed
+        assert len(re.findall("^[0-9]+ passed", printed, re.MULTILINE)) == 2
+
+
+@pytest.mark.parametrize(
+    ("argument", "complaint"),
+    [
+        ("nonsense", "there is no package, folder or file nonsense"),
+        ("docs/none.test", "there is no package, folder or file docs/none.test"),
+        ("launch_shared", "there are no unit tests"),
+        ("ros/src/crazyflie_tests/test/rostest_flight.py", "name the .test file that starts it"),
+    ],
+)
+def test_what_cannot_be_tested_is_said(run_test, argument, complaint):
+    status, printed = run_test(argument)
+    assert status == 1
+    assert complaint in printed
+
+
+def test_words_used_elsewhere_exist():
+    usage = subprocess.run([TOP / "run", "help"], capture_output=True, text=True, check=True).stdout
+    words = set(re.findall(r"^  (\w+) ", usage, re.MULTILINE))
+    workflow = yaml.safe_load((TOP / ".github" / "workflows" / "tests.yml").read_text())
+    for name, job in workflow["jobs"].items():
+        commands = "\n".join(step.get("run", "") for step in job["steps"])
+        used = re.findall(r"\./run (\w+)", commands)
+        assert name in used
+        assert set(used) <= words

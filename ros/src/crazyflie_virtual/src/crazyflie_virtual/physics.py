@@ -2,7 +2,7 @@
 
 import math
 
-from crazyflie_model.angles import rotate_back
+from crazyflie_model.angles import Quaternion, Triple, rotate_back
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe
 from crazyflie_model.units import GRAVITY
@@ -55,22 +55,22 @@ class Physics:
         self.is_overturned = False
 
     @property
-    def position(self) -> tuple:
+    def position(self) -> Triple:
         """m, fixed frame."""
         return tuple(self._x[0:3])
 
     @property
-    def velocity(self) -> tuple:
+    def velocity(self) -> Triple:
         """m/s, fixed frame."""
         return tuple(self._x[3:6])
 
     @property
-    def quaternion(self) -> tuple:
+    def quaternion(self) -> Quaternion:
         """(x, y, z, w), body to fixed frame."""
         return tuple(self._x[6:10])
 
     @property
-    def rates(self) -> tuple:
+    def rates(self) -> Triple:
         """Body rates, rad/s."""
         return tuple(self._x[10:13])
 

@@ -6,6 +6,7 @@ the mixer adds to and takes from the thrust of the motors. The gains are those o
 modes, parameters and log variables.
 """
 
+from crazyflie_model.angles import Triple
 from crazyflie_model.inner_loops import (
     HEADING,
     HEADING_RATE,
@@ -52,7 +53,7 @@ class AttitudeController:
         for pid in (self.roll_rate, self.pitch_rate, self.yaw_rate):
             pid.reset()
 
-    def desired_rates(self, estimate, roll: float, pitch: float, yaw: float) -> tuple:
+    def desired_rates(self, estimate, roll: float, pitch: float, yaw: float) -> Triple:
         """Return the body rates (deg/s) that lead to an attitude (deg)."""
         yaw_error = wrap_degrees(yaw - estimate.yaw)
         return (
@@ -63,7 +64,7 @@ class AttitudeController:
             self.yaw.update(yaw, yaw - yaw_error, yaw_error),
         )
 
-    def outputs(self, rates: tuple, gyro: tuple) -> tuple:
+    def outputs(self, rates: Triple, gyro: Triple) -> Triple:
         """Return the outputs about roll, pitch and yaw that lead to body rates.
 
         Parameters

@@ -3,11 +3,12 @@
 import math
 from dataclasses import dataclass
 
+from crazyflie_model.angles import Triple
 from crazyflie_model.hermite import hermite
 from crazyflie_model.polynomials import Goal, PolynomialPiece
 
 
-def smooth_piece(start: Goal, position: tuple, yaw: float, duration: float) -> PolynomialPiece:
+def smooth_piece(start: Goal, position: Triple, yaw: float, duration: float) -> PolynomialPiece:
     """Return the piece from a goal to rest at a position (m) and heading (rad).
 
     Each axis is the polynomial of the 7th degree that meets position, velocity,
@@ -37,7 +38,7 @@ def smooth_piece(start: Goal, position: tuple, yaw: float, duration: float) -> P
     return PolynomialPiece(duration, *axes)
 
 
-def straight_piece(start: Goal, position: tuple, yaw: float, duration: float) -> PolynomialPiece:
+def straight_piece(start: Goal, position: Triple, yaw: float, duration: float) -> PolynomialPiece:
     """Return the piece that goes there at constant speed; see `smooth_piece`."""
     turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
     ends = (*position, start.yaw + turn)
@@ -64,10 +65,10 @@ class Trajectory:
         By which all is turned about the first position, rad.
     """
 
-    pieces: tuple
+    pieces: tuple[PolynomialPiece, ...]
     time_scale: float = 1.0
     backwards: bool = False
-    shift: tuple = (0.0, 0.0, 0.0)
+    shift: Triple = (0.0, 0.0, 0.0)
     turn: float = 0.0
 
     @property
@@ -75,7 +76,7 @@ class Trajectory:
         """How long it takes, s."""
         return self.time_scale * sum(piece.duration for piece in self.pieces)
 
-    def moved_to(self, position: tuple, yaw: float | None) -> "Trajectory":
+    def moved_to(self, position: Triple, yaw: float | None) -> "Trajectory":
         """Return the trajectory beginning at a position (m) and, unless None, heading (rad)."""
         start = self._unmoved(0.0)
         shift = tuple(a - b for a, b in zip(position, start.position, strict=True))

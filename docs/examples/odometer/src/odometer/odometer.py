@@ -6,23 +6,25 @@ import math
 class Odometer:
     """Adds up the distances between consecutive positions.
 
-    Parameters
+    Attributes
     ----------
     max_step : float
         Two positions further apart than this (m) are a jump of the motion
         capture, which nobody has flown.
+    distance : float
+        m.
     """
 
     def __init__(self, max_step: float):
-        self._max_step = max_step
-        self._last = None
+        self.max_step = max_step
+        self._last: tuple[float, float, float] | None = None
         self.distance = 0.0
 
-    def add(self, position: tuple) -> None:
+    def add(self, position: tuple[float, float, float]) -> None:
         """Take the next position: x, y, z in m."""
         step = 0.0 if self._last is None else math.dist(self._last, position)
         self._last = position
-        if step <= self._max_step:
+        if step <= self.max_step:
             self.distance += step
 
     def reset(self) -> None:

@@ -18,7 +18,7 @@ CONTROLLER_POLL_PERIOD = 0.1
 
 
 class TakeoffControlFilterParameters(Parameters):
-    """What the filter is told."""
+    """What the filter is parameters."""
 
     takeoff_control_topic: str = parameter(
         TOPIC, "the takeoff server's control", name="topics/takeoff_control"
@@ -57,24 +57,24 @@ class TakeoffControlFilterNode(Node):
 
     def register_callbacks(self, handle: NodeHandle) -> None:
         """See `Node.register_callbacks`."""
-        told = self._parameters
-        in_flight = told.in_flight_topic
-        self._flight_state_topic = told.flight_state_topic or f"{in_flight}_state"
-        self._final = handle.publisher(told.final_control_topic, ControlStamped)
+        parameters = self._parameters
+        in_flight = parameters.in_flight_topic
+        self._flight_state_topic = parameters.flight_state_topic or f"{in_flight}_state"
+        self._final = handle.publisher(parameters.final_control_topic, ControlStamped)
         self._filter_state = handle.publisher(
-            told.filter_state_topic or f"{in_flight}_filter", String, latch=True
+            parameters.filter_state_topic or f"{in_flight}_filter", String, latch=True
         )
         self._controller = handle.publisher(
-            told.controller_topic or f"{in_flight}_controller", Bool, latch=True
+            parameters.controller_topic or f"{in_flight}_controller", Bool, latch=True
         )
         self._publish_state()
         handle.subscribe(self._flight_state_topic, String, self._on_flight_state)
         handle.subscribe(in_flight, Empty, self._on_toggle)
         handle.subscribe(
-            told.takeoff_control_topic, ControlStamped, self._on_takeoff_control, finite="control"
+            parameters.takeoff_control_topic, ControlStamped, self._on_takeoff_control, finite="control"
         )
         self._commands = handle.subscribe(
-            told.commanded_control_topic,
+            parameters.commanded_control_topic,
             ControlStamped,
             self._on_commanded_control,
             finite="control",

@@ -32,7 +32,7 @@ RECOVERY_LIMIT = 1.0
 
 
 class TakeoffServerParameters(Parameters):
-    """What the takeoff server is told."""
+    """What the takeoff server is parameters."""
 
     control_topic: str = parameter(
         TOPIC, "thrust of takeoff and landing goes here", name="topics/control"
@@ -107,26 +107,26 @@ class TakeoffServerNode(Node):
 
     def register_callbacks(self, handle: NodeHandle) -> None:
         """See `Node.register_callbacks`."""
-        told = self._parameters
-        in_flight = told.in_flight_topic
-        self._filter_state_topic = told.filter_state_topic or f"{in_flight}_filter"
-        self._control = handle.publisher(told.control_topic, ControlStamped)
+        parameters = self._parameters
+        in_flight = parameters.in_flight_topic
+        self._filter_state_topic = parameters.filter_state_topic or f"{in_flight}_filter"
+        self._control = handle.publisher(parameters.control_topic, ControlStamped)
         self._reference = handle.publisher(
-            told.reference_topic, PositionVelocityStateStamped, latch=True
+            parameters.reference_topic, PositionVelocityStateStamped, latch=True
         )
         self._in_flight = handle.publisher(in_flight, Empty)
         self._flight_state = handle.publisher(
-            told.flight_state_topic or f"{in_flight}_state", String, latch=True
+            parameters.flight_state_topic or f"{in_flight}_state", String, latch=True
         )
-        handle.advertise_service(told.takeoff_service, EmptyService, self._on_takeoff)
-        handle.advertise_service(told.land_service, EmptyService, self._on_land)
+        handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
+        handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
         handle.subscribe(self._filter_state_topic, String, self._on_filter_state)
         handle.subscribe(
-            told.controller_topic or f"{in_flight}_controller", Bool, self._on_controller
+            parameters.controller_topic or f"{in_flight}_controller", Bool, self._on_controller
         )
-        if told.state_topic is not None:
+        if parameters.state_topic is not None:
             handle.subscribe(
-                told.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
+                parameters.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
             )
         handle.timer(TIME_STEP, self._on_timer)
         # Whether connections come about has nothing to do with simulated time.

@@ -8,7 +8,7 @@ import pytest
 PYTEST = """<?xml version="1.0" encoding="utf-8"?><testsuites name="pytest tests">
 <testsuite name="pytest" errors="0" failures="1" skipped="1" tests="4">
 <testcase classname="test.test_a" name="test_good" time="0.1" />
-<testcase classname="test.test_a" name="test_bad[1]" time="0.1">
+<testcase classname="test.test_a" name="test_bad[1/2]" time="0.1">
 <failure message="AssertionError: assert 1 == 2&#10;  +  where 1">details</failure></testcase>
 <testcase classname="test.test_a" name="test_fixture">
 <error message="no fixture">x</error></testcase>
@@ -65,7 +65,7 @@ def test_failed_tests_are_named_with_their_file(folder):
     assert count(folder) == (
         1,
         [
-            "FAILED c/pytest-test.xml: test.test_a.test_bad[1]: AssertionError: assert 1 == 2",
+            "FAILED c/pytest-test.xml: test.test_a.test_bad[1/2]: AssertionError: assert 1 == 2",
             "FAILED c/pytest-test.xml: test.test_a.test_fixture: no fixture",
             "5 passed, 2 failed, 1 skipped",
         ],

@@ -30,7 +30,7 @@ def verdicts(path: Path) -> Iterator[tuple[str, str]]:
         yield "failed", "no test ran"
     for case in cases:
         classname, name = case.get("classname", ""), case.get("name", "")
-        results = path.with_name(f"rosunit-{name.removeprefix('test')}.xml")
+        results = f"rosunit-{name.removeprefix('test')}.xml"
         complaint = next((e for e in case if e.tag in ("failure", "error")), None)
         if complaint is not None:
             text = complaint.get("message") or complaint.text or ""
@@ -39,8 +39,8 @@ def verdicts(path: Path) -> Iterator[tuple[str, str]]:
             yield "skipped", ""
         elif classname != _ROSTEST:
             yield "passed", ""
-        elif not results.exists():
-            yield "failed", f"{classname}.{name}: there is no {results.name}"
+        elif not path.with_name(results).exists():
+            yield "failed", f"{classname}.{name}: there is no {results}"
 
 
 def main() -> int:

@@ -71,7 +71,10 @@ class TakeoffControlFilterNode(Node):
         handle.subscribe(self._flight_state_topic, String, self._on_flight_state)
         handle.subscribe(in_flight, Empty, self._on_toggle)
         handle.subscribe(
-            parameters.takeoff_control_topic, ControlStamped, self._on_takeoff_control, finite="control"
+            parameters.takeoff_control_topic,
+            ControlStamped,
+            self._on_takeoff_control,
+            finite="control",
         )
         self._commands = handle.subscribe(
             parameters.commanded_control_topic,

@@ -126,7 +126,10 @@ class TakeoffServerNode(Node):
         )
         if parameters.state_topic is not None:
             handle.subscribe(
-                parameters.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
+                parameters.state_topic,
+                PositionVelocityYawStateStamped,
+                self._on_state,
+                finite="state",
             )
         handle.timer(TIME_STEP, self._on_timer)
         # Whether connections come about has nothing to do with simulated time.

@@ -2,6 +2,7 @@
 
 from std_msgs.msg import Float64
 from std_srvs.srv import Empty, EmptyResponse
+from typing_extensions import override
 
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
@@ -26,13 +27,13 @@ class OdometerParameters(Parameters):
 class OdometerNode(Node):
     """Publish the distance a vehicle has flown; the service ~reset begins again at 0."""
 
+    @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        """Make an odometer."""
         self._parameters = handle.load(OdometerParameters, self._reconfigure)
         self._odometer = Odometer(self._parameters.max_step)
 
+    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        """Listen to the state, publish the distance."""
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.distance_topic, Float64)
         handle.advertise_service("~reset", Empty, self._on_reset)

@@ -1,6 +1,7 @@
 """ROS interface of the choice between takeoff control and commanded control."""
 
 from std_msgs.msg import Bool, Empty, String
+from typing_extensions import override
 
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_takeoff.control_filter import ControlFilter
@@ -51,12 +52,12 @@ class TakeoffControlFilterNode(Node):
         self._published_state: str | None = None
         self._published_controller: bool | None = None
 
+    @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        """See `Node.load_parameters`."""
         self._parameters = handle.load(TakeoffControlFilterParameters)
 
+    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        """See `Node.register_callbacks`."""
         parameters = self._parameters
         in_flight = parameters.in_flight_topic
         self._flight_state_topic = parameters.flight_state_topic or f"{in_flight}_state"

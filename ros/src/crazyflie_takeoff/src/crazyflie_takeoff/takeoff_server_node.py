@@ -5,6 +5,7 @@ from concurrent.futures import Future
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
+from typing_extensions import override
 
 from crazyflie_msgs.msg import (
     Control,
@@ -96,8 +97,8 @@ class TakeoffServerNode(Node):
         self._pending: Future | None = None
         self._waiting: list[tuple[str, Future]] = []
 
+    @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        """See `Node.load_parameters`."""
         self._parameters = handle.load(TakeoffServerParameters, self._reconfigure)
 
     def _reconfigure(self, parameters):
@@ -105,8 +106,8 @@ class TakeoffServerNode(Node):
         if self._flight is not None:
             self._flight.plan = parameters.plan()
 
+    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        """See `Node.register_callbacks`."""
         parameters = self._parameters
         in_flight = parameters.in_flight_topic
         self._filter_state_topic = parameters.filter_state_topic or f"{in_flight}_filter"

@@ -48,7 +48,7 @@ class TakeoffControlFilterNode(Node):
     """Pass on takeoff control always, and commanded control in flight."""
 
     def __init__(self):
-        self._filter = ControlFilter()
+        self._filter: ControlFilter[ControlStamped] = ControlFilter()
         self._published_state: str | None = None
         self._published_controller: bool | None = None
 

@@ -94,8 +94,8 @@ class TakeoffServerNode(Node):
         self._position: tuple[float, float, float] | None = None
         self._position_time = 0.0
         self._published_state: FlightState | None = None
-        self._pending: Future | None = None
-        self._waiting: list[tuple[str, Future]] = []
+        self._pending: Future[EmptyResponse] | None = None
+        self._waiting: list[tuple[str, Future[EmptyResponse]]] = []
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -159,20 +159,20 @@ class TakeoffServerNode(Node):
         return self._serve(self._parameters.land_service)
 
     def _serve(self, service):
-        future = Future()
+        future: Future[EmptyResponse] = Future()
         if self._flight is None:
             self._waiting.append((service, future))
         else:
-            self._begin(service, future)
+            self._begin(self._flight, service, future)
         return future.result() if future.done() else future
 
-    def _begin(self, service, future):
+    def _begin(self, flight, service, future):
         try:
             if service == self._parameters.takeoff_service:
                 self._refuse_without_feedback()
-                self._flight.takeoff()
+                flight.takeoff()
             else:
-                self._flight.land()
+                flight.land()
         except RefusalError as reason:
             name = self._handle.resolve(service)
             future.set_exception(ServiceError(f"{name} refused: {reason}"))
@@ -242,7 +242,7 @@ class TakeoffServerNode(Node):
         self._flight = FlightStateMachine(plan, recovered.state, recovered.announced)
         waiting, self._waiting = self._waiting, []
         for service, future in waiting:
-            self._begin(service, future)
+            self._begin(self._flight, service, future)
 
     # The flight.
 

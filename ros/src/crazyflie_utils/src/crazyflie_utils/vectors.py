@@ -6,11 +6,14 @@ functions serves all of them, and a new message needs none.
 """
 
 import math
+from collections.abc import Sequence
 
+import genpy
 import numpy as np
+from numpy.typing import NDArray
 
 
-def to_vector(message) -> np.ndarray:
+def to_vector(message: genpy.Message) -> NDArray[np.float64]:
     """Return the fields of a flat message as a vector.
 
     Parameters
@@ -31,7 +34,9 @@ def to_vector(message) -> np.ndarray:
     return np.array([getattr(message, field) for field in message.__slots__], dtype=float)
 
 
-def from_vector(message_type: type, vector):
+def from_vector(
+    message_type: type[genpy.Message], vector: Sequence[float] | NDArray[np.float64]
+) -> genpy.Message:
     """Return a flat message with the entries of a vector.
 
     Parameters
@@ -55,7 +60,7 @@ def from_vector(message_type: type, vector):
     return message_type(*map(float, vector))
 
 
-def is_finite(message) -> bool:
+def is_finite(message: genpy.Message) -> bool:
     """Tell whether every number of a message, of nested ones and of lists, is finite."""
     return all(_is_finite(getattr(message, field)) for field in message.__slots__)
 

@@ -5,6 +5,7 @@ simulation is reset. ``stamp(time)`` is for message headers.
 """
 
 import time
+from collections.abc import Callable
 
 import genpy
 
@@ -47,7 +48,7 @@ class SimulatedClock:
 
     def __init__(self):
         self._time = 0.0
-        self._listeners = []
+        self._listeners: list[Callable[[float, bool], None]] = []
 
     def time(self) -> float:
         """Return simulated seconds; 0 before the first `set`."""
@@ -58,7 +59,7 @@ class SimulatedClock:
         moment = self._time if moment is None else moment
         return genpy.Time(*divmod(round(moment * 1e9), 1_000_000_000))
 
-    def on_change(self, listener) -> None:
+    def on_change(self, listener: Callable[[float, bool], None]) -> None:
         """Have ``listener(time, is_reset)`` called after every `set`."""
         self._listeners.append(listener)
 

@@ -26,7 +26,7 @@ class _FairLock:
     def __init__(self):
         self._guard = threading.Lock()
         self._held = False
-        self._waiting = deque()
+        self._waiting: deque[threading.Lock] = deque()
 
     def __enter__(self):
         with self._guard:
@@ -53,9 +53,9 @@ class Executor:
     """
 
     def __init__(self):
-        self._queue = deque()
+        self._queue: deque[Callable[[], None]] = deque()
         self._running = _FairLock()
-        self._runner = None
+        self._runner: int | None = None
         self._started = False
 
     def start(self) -> None:

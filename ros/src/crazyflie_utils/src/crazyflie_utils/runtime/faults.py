@@ -2,6 +2,7 @@
 
 import traceback
 from collections.abc import Callable
+from typing import Any
 
 
 class Faults:
@@ -18,9 +19,9 @@ class Faults:
     def __init__(self, log):
         self.make_safe: Callable[[], None] | None = None
         self._log = log
-        self._counts = {}
+        self._counts: dict[tuple[type, str, int | None], int] = {}
 
-    def report(self, callback, error: Exception) -> None:
+    def report(self, callback: Callable[..., Any], error: Exception) -> None:
         """Log that ``callback`` has raised ``error``, and make the node safe."""
         where = traceback.extract_tb(error.__traceback__)[-1]
         fault = (type(error), where.filename, where.lineno)

@@ -2,13 +2,14 @@
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future
 from functools import partial
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import genpy
 import rosgraph.names
+from geometry_msgs.msg import TransformStamped
 from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.parameter_types import ParameterType
@@ -18,6 +19,9 @@ from crazyflie_utils.runtime.services import pass_on, serve
 from crazyflie_utils.runtime.timers import Timer
 from crazyflie_utils.runtime.topics import Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite
+
+if TYPE_CHECKING:
+    from crazyflie_utils.runtime.process import Process
 
 P = TypeVar("P", bound=Parameters)
 M = TypeVar("M", bound=genpy.Message)
@@ -39,12 +43,12 @@ class NodeHandle:
         Absolute name of the node, such as /simulator.
     """
 
-    def __init__(self, process, name: str):
+    def __init__(self, process: "Process", name: str):
         self._process = process
         self._name = name
         self._faults = Faults(self)
-        self._throttled = {}
-        self._undo = []
+        self._throttled: dict[Hashable, float] = {}
+        self._undo: list[Callable[[], None]] = []
         self._is_closed = False
 
     def child(self) -> "NodeHandle":
@@ -160,7 +164,7 @@ class NodeHandle:
         declaration = Declaration(self.resolve(name), type, "", default, live=False)
         return read_parameter(declaration, self._process.transport.get_param)
 
-    def set_param(self, name: str, value) -> None:
+    def set_param(self, name: str, value: Any) -> None:
         """Set a parameter that others may read; blocks for a few milliseconds.
 
         Parameters
@@ -239,7 +243,7 @@ class NodeHandle:
         """
 
         def begin(request):
-            answer = Future()
+            answer: Future[Any] = Future()
             self._process.executor.submit(partial(serve, callback, request, answer, self))
             return answer
 
@@ -248,7 +252,9 @@ class NodeHandle:
         )
         self._undo.append(end)
 
-    def call_service(self, name: str, service_type: type, request, limit: float) -> Future:
+    def call_service(
+        self, name: str, service_type: type, request: Any, limit: float
+    ) -> Future[Any]:
         """Call a service of any process, without waiting for it.
 
         Returns
@@ -259,7 +265,7 @@ class NodeHandle:
             machine's clock. What is added to it with ``add_done_callback`` runs
             like any callback; none may wait for it.
         """
-        outcome = Future()
+        outcome: Future[Any] = Future()
         reply = self._process.transport.call_service(
             self.resolve(name), service_type, request, limit
         )
@@ -282,7 +288,7 @@ class NodeHandle:
         """Return the ROS time of a moment of `time`, by default now."""
         return self._process.clock.stamp(moment)
 
-    def timer(self, period: float, callback, steady: bool = False) -> Timer:
+    def timer(self, period: float, callback: Callable[[], None], steady: bool = False) -> Timer:
         """Have ``callback()`` called every ``period`` seconds of `time`.
 
         With ``steady`` the period is of the machine's clock also when time is
@@ -299,7 +305,7 @@ class NodeHandle:
         """
         self._process.executor.submit(partial(self.guard(callback), *arguments))
 
-    def clock_publisher(self):
+    def clock_publisher(self) -> Callable[[float], None]:
         """Return a function that moves simulated time to a moment (s) for everybody.
 
         In this process time moves after the present callback; then the timers
@@ -316,12 +322,12 @@ class NodeHandle:
 
     # tf.
 
-    def broadcast_transforms(self):
+    def broadcast_transforms(self) -> Callable[[list[TransformStamped]], None]:
         """Announce to tf and return ``broadcast(list of TransformStamped)``."""
         self._process.transforms.advertise()
         return self._process.transforms.broadcast
 
-    def listen_to_transforms(self):
+    def listen_to_transforms(self) -> Callable[[str, str], TransformStamped]:
         """Begin to listen to tf and return ``lookup(target, source)``.
 
         See `Transforms.lookup` for its result and its error.
@@ -335,7 +341,7 @@ class NodeHandle:
         """Log what an operator may want to know."""
         self._process.transport.log("info", f"{self._name}: {text}")
 
-    def warn(self, text: str, throttle: float = 0.0, key=None) -> None:
+    def warn(self, text: str, throttle: float = 0.0, key: Hashable = None) -> None:
         """Log a warning; the same ``key`` (the text) at most once in ``throttle`` seconds.
 
         The seconds are those of the machine's clock, so that a simulation that
@@ -361,7 +367,7 @@ class NodeHandle:
         """Have ``make_safe()`` called after a callback of this node has raised."""
         self._faults.make_safe = make_safe
 
-    def guard(self, callback):
+    def guard(self, callback: Callable[..., Any]) -> Callable[..., None]:
         """Return ``callback`` such that what it raises is reported and goes no further."""
 
         def guarded(*args):

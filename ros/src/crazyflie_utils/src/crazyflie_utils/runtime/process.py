@@ -1,15 +1,18 @@
 """What the nodes of one process share, and the node handles into it."""
 
+from collections.abc import Callable
 from functools import partial
 
 from rosgraph_msgs.msg import Clock
 
+from crazyflie_utils.node import Node
 from crazyflie_utils.runtime.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.runtime.executor import Executor
 from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.runtime.timers import SteadyTimers, Timer, TimerQueue
 from crazyflie_utils.runtime.topics import Topics
 from crazyflie_utils.runtime.transforms import Transforms
+from crazyflie_utils.runtime.transport import Transport
 
 
 class Process:
@@ -23,20 +26,22 @@ class Process:
         Live by simulated time, which stands still until it is set.
     """
 
-    def __init__(self, transport, use_sim_time: bool):
+    def __init__(self, transport: Transport, use_sim_time: bool):
         self.transport = transport
         self.executor = Executor()
         self.topics = Topics(transport)
-        self.clock = SimulatedClock() if use_sim_time else SteadyClock()
+        self.clock: SimulatedClock | SteadyClock = (
+            SimulatedClock() if use_sim_time else SteadyClock()
+        )
         self.transforms = Transforms(self.topics, self._warn_about_transform)
         self._log = NodeHandle(self, "/tf")
         self._steady_clock = SteadyClock()
         self._steady = SteadyTimers(TimerQueue(self.executor), self._steady_clock)
         self._simulated = TimerQueue(self.executor)
-        self.exit_status = None
-        if use_sim_time:
+        self.exit_status: int | None = None
+        if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)
-            self.topics.subscribe("/clock", Clock, self._on_clock)
+            self.topics.subscribe("/clock", Clock, partial(self._on_clock, self.clock))
 
     def end(self, status: int) -> None:
         """Have the process shut down and exit with ``status``."""
@@ -51,7 +56,7 @@ class Process:
         """Return the handle of the node with this absolute name."""
         return NodeHandle(self, name)
 
-    def add_timer(self, period: float, work, steady: bool = False) -> Timer:
+    def add_timer(self, period: float, work: Callable[[], None], steady: bool = False) -> Timer:
         """Add a timer by this process's clock, or by the machine's if ``steady``.
 
         Raises
@@ -80,7 +85,7 @@ class Process:
         self._steady.stop()
         self._simulated.stop()
 
-    def shut_down(self, nodes: dict) -> None:
+    def shut_down(self, nodes: dict[str, Node]) -> None:
         """Let no timer fire again, and every node leave its vehicle safe.
 
         Parameters
@@ -92,10 +97,10 @@ class Process:
         for name, node in nodes.items():
             self.executor.submit(self.handle(name).guard(node.shutdown))
 
-    def _on_clock(self, message):
+    def _on_clock(self, clock, message):
         # As work among the other work: time does not move within a callback, and
         # a reset is not overtaken by what the last simulation still said.
-        self.executor.submit(partial(self.clock.set, message.clock.to_sec()))
+        self.executor.submit(partial(clock.set, message.clock.to_sec()))
 
     def _run_simulated(self, now, is_reset):
         if is_reset:

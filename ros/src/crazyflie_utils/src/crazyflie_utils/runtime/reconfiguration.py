@@ -7,7 +7,7 @@ for many nodes in one process. What goes over the wire is encoded by the library
 
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dynamic_reconfigure import encoding
 from dynamic_reconfigure.msg import Config, ConfigDescription
@@ -17,6 +17,9 @@ from crazyflie_utils.parameter_types import Boolean, Integer, Number, Text
 from crazyflie_utils.parameters import REQUIRED, Declaration, ParameterError, Parameters
 from crazyflie_utils.runtime.transport import ServiceError
 
+if TYPE_CHECKING:
+    from crazyflie_utils.runtime.handle import NodeHandle
+
 
 class Reconfiguration:
     """Offer the live parameters of a node.
@@ -24,6 +27,7 @@ class Reconfiguration:
     Parameters
     ----------
     handle : NodeHandle
+        Of the node.
     parameters : Parameters
         As they are now.
     get : callable
@@ -34,7 +38,7 @@ class Reconfiguration:
 
     def __init__(
         self,
-        handle,
+        handle: "NodeHandle",
         parameters: Parameters,
         get: Callable[[str], Any],
         on_change: Callable[[Any], None],

@@ -96,7 +96,7 @@ class RosTransport(Transport):
 
     def call_service(self, name, service_type, request, limit):
         """Call in a thread of its own, and give up on it after ``limit``."""
-        future = Future()
+        future: Future[Any] = Future()
         threading.Thread(
             target=_call, args=(name, service_type, request, limit, future), daemon=True
         ).start()
@@ -126,7 +126,7 @@ _LOGGERS = {
 }
 
 
-def wait_for_answer(answer: Future, name: str, time: Callable[[], float]) -> Any:
+def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -> Any:
     """Return the outcome of ``answer``, for the caller of the service ``name``.
 
     Raises

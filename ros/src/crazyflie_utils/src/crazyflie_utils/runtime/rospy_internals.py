@@ -6,6 +6,7 @@ not provide for. The rostests of this package notice when a rospy differs.
 
 import functools
 
+import genpy
 import rospy
 from rospy import rostime
 
@@ -27,7 +28,7 @@ def never_connect_to_oneself() -> None:
 
 
 @functools.cache
-def take_over_remappings() -> dict:
+def take_over_remappings() -> dict[str, str]:
     """Return the launch file's remappings, absolute name to absolute name.
 
     rospy no longer applies them: it would remap a name that has been remapped
@@ -39,6 +40,6 @@ def take_over_remappings() -> dict:
     return remappings
 
 
-def set_time(stamp) -> None:
+def set_time(stamp: genpy.Time) -> None:
     """Set rospy's simulated clock, which stamps the log."""
     rostime._set_rostime(stamp)

@@ -1,6 +1,7 @@
 """Main programs: one node in a process, or many."""
 
 import importlib
+import io
 import logging
 import os
 import signal
@@ -110,7 +111,8 @@ def begin(default_name: str) -> Process:
     Exits with status 1 when there is no ROS master.
     """
     # rospy's log does not flush: what a node said before it died would be lost in a pipe.
-    sys.stdout.reconfigure(line_buffering=True)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
     _wait_for_master()
     rospy.init_node(default_name)
     return ros_process()

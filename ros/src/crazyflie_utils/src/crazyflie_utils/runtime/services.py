@@ -3,12 +3,17 @@
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from crazyflie_utils.runtime.transport import ServiceError
 
+if TYPE_CHECKING:
+    from crazyflie_utils.runtime.handle import NodeHandle
 
-def serve(callback: Callable[[Any], Any], request: Any, answer: Future, handle) -> None:
+
+def serve(
+    callback: Callable[[Any], Any], request: Any, answer: Future[Any], handle: "NodeHandle"
+) -> None:
     """Answer a request of a service.
 
     Parameters
@@ -39,7 +44,7 @@ def serve(callback: Callable[[Any], Any], request: Any, answer: Future, handle) 
             answer.set_result(response)
 
 
-def pass_on(done: Future, to: Future, handle) -> None:
+def pass_on(done: Future[Any], to: Future[Any], handle: "NodeHandle") -> None:
     """Let one future have the outcome of another, any error as a `ServiceError`."""
     if not to.set_running_or_notify_cancel():
         return

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable
 from functools import partial
 
+from crazyflie_utils.runtime.clock import SteadyClock
 from crazyflie_utils.runtime.executor import Executor
 
 _TOLERANCE = 1e-6
@@ -62,7 +63,7 @@ class TimerQueue:
     def __init__(self, executor: Executor):
         self._executor = executor
         self._lock = threading.Lock()
-        self._heap = []
+        self._heap: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
         self._stopped = False
 
@@ -134,10 +135,12 @@ class SteadyTimers:
     Parameters
     ----------
     queue : TimerQueue
+        Whose timers are run.
     clock : SteadyClock
+        By which they are due.
     """
 
-    def __init__(self, queue: TimerQueue, clock):
+    def __init__(self, queue: TimerQueue, clock: SteadyClock):
         self._queue = queue
         self._clock = clock
         self._wake = threading.Condition()

@@ -18,7 +18,7 @@ Receiver = Callable[[Any], None]
 class Topic:
     """One topic as this process sees it."""
 
-    def __init__(self, name: str, message_type: type):
+    def __init__(self, name: str, message_type: type[genpy.Message]):
         self.name = name
         self.message_type = message_type
         self.publishers: list[Publisher] = []
@@ -113,7 +113,7 @@ class Topics:
         self._transport = transport
         self._topics: dict[str, Topic] = {}
 
-    def publisher(self, name: str, message_type: type, latch: bool) -> Publisher:
+    def publisher(self, name: str, message_type: type[genpy.Message], latch: bool) -> Publisher:
         """Return a publisher; a latched one repeats its last message to late subscribers.
 
         Raises
@@ -124,7 +124,9 @@ class Topics:
         topic = self._topic(name, message_type)
         return Publisher(topic, self._transport.advertise(name, message_type, latch), latch)
 
-    def subscribe(self, name: str, message_type: type, receiver: Receiver) -> Subscriber:
+    def subscribe(
+        self, name: str, message_type: type[genpy.Message], receiver: Receiver
+    ) -> Subscriber:
         """Have ``receiver(message)`` called for every message on a topic.
 
         Raises

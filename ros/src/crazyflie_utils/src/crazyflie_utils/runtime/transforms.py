@@ -1,11 +1,15 @@
 """tf for a process: one tf2 buffer and one broadcaster, however many nodes."""
 
 import threading
+from collections.abc import Callable
+from typing import Any
 
 import genpy
 import tf2_ros
+from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
+from crazyflie_utils.runtime.topics import Topics
 from crazyflie_utils.vectors import is_finite
 
 _LATEST = genpy.Time()
@@ -34,21 +38,22 @@ class Transforms:
     Parameters
     ----------
     topics : Topics
+        Of the process; /tf and /tf_static are among them.
     warn : callable
         Called with a text about every transform that is dropped.
     """
 
-    def __init__(self, topics, warn):
+    def __init__(self, topics: Topics, warn: Callable[[str], None]):
         self._topics = topics
         self._warn = warn
-        self._buffer = None
-        self._broadcaster = None
+        self._buffer: Any = None
+        self._broadcaster: Any = None
         # tf2's Python buffer keeps stamps as floats, to 0.1 us; this gives them back
         # as they came.
-        self._stamps = {}
+        self._stamps: dict[float, genpy.Time] = {}
         self._lock = threading.Lock()
 
-    def broadcast(self, transforms: list) -> None:
+    def broadcast(self, transforms: list[TransformStamped]) -> None:
         """Publish a list of geometry_msgs/TransformStamped on /tf."""
         self._broadcaster.sendTransform(transforms)
 
@@ -71,7 +76,7 @@ class Transforms:
             self._buffer.clear()
             self._stamps.clear()
 
-    def lookup(self, target: str, source: str):
+    def lookup(self, target: str, source: str) -> TransformStamped:
         """Return the latest transform from ``source`` to ``target`` coordinates.
 
         Returns

@@ -77,7 +77,7 @@ class Transport(ABC):
         self,
         name: str,
         service_type: type,
-        serve: Callable[[Any], Future],
+        serve: Callable[[Any], Future[Any]],
         time: Callable[[], float],
     ) -> Callable[[], None]:
         """Answer calls of a service with the outcome of the future ``serve(request)``.
@@ -88,7 +88,9 @@ class Transport(ABC):
         """
 
     @abstractmethod
-    def call_service(self, name: str, service_type: type, request: Any, limit: float) -> Future:
+    def call_service(
+        self, name: str, service_type: type, request: Any, limit: float
+    ) -> Future[Any]:
         """Call a service and return at once; see `NodeHandle.call_service`."""
 
     @abstractmethod

@@ -2,13 +2,16 @@
 
 import io
 import math
+from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
 
 import genpy
 
 from crazyflie_utils.node import Node
+from crazyflie_utils.runtime.clock import SimulatedClock
 from crazyflie_utils.runtime.process import Process
+from crazyflie_utils.runtime.timers import Timer
 from crazyflie_utils.runtime.transport import (
     ExternalPublisher,
     ExternalSubscriber,
@@ -19,7 +22,7 @@ from crazyflie_utils.runtime.transport import (
 
 class _Record(ExternalPublisher):
     def __init__(self):
-        self.messages = []
+        self.messages: list[genpy.Message] = []
 
     def has_subscribers(self):
         return True
@@ -53,11 +56,11 @@ class FakeTransport(Transport):
 
     def __init__(self, parameters: dict[str, object]):
         self.parameters = dict(parameters)
-        self.publishers = {}
-        self.subscribers = {}
-        self.unpublished = set()
-        self.services = {}
-        self.log_records = []
+        self.publishers: dict[str, _Record] = {}
+        self.subscribers: dict[str, list[Callable[[Any], None]]] = {}
+        self.unpublished: set[str] = set()
+        self.services: dict[str, Callable[[Any], Future[Any]]] = {}
+        self.log_records: list[tuple[str, str]] = []
 
     def remap(self, name):
         """Return ``name``: nothing is remapped."""
@@ -105,7 +108,7 @@ class FakeTransport(Transport):
         """Call a service of this process; fail when there is none."""
         if name in self.services:
             return self.services[name](request)
-        future = Future()
+        future: Future[Any] = Future()
         future.set_exception(ServiceError(f"there is no service {name}"))
         return future
 
@@ -128,6 +131,9 @@ class FakeProcess(Process):
         Simulated time at the beginning, s.
     """
 
+    transport: FakeTransport
+    clock: SimulatedClock
+
     def __init__(self, parameters: dict[str, object] | None = None, start: float = 100.0):
         super().__init__(FakeTransport(parameters or {}), use_sim_time=True)
         self.clock.set(start)
@@ -143,12 +149,12 @@ class FakeProcess(Process):
         """
         for key, value in (parameters or {}).items():
             self.transport.parameters[f"{name}/{key}"] = value
-        outcome = []
+        outcome: list[bool] = []
         # As work: a latched message must wait until the node is complete.
         self.executor.submit(lambda: outcome.append(node.initialize(self.handle(name))))
         return outcome[0]
 
-    def add_timer(self, period: float, work, steady: bool = False):
+    def add_timer(self, period: float, work: Callable[[], None], steady: bool = False) -> Timer:
         """Add a timer; the machine's time, too, is moved by hand here."""
         return super().add_timer(period, work)
 
@@ -161,7 +167,7 @@ class FakeProcess(Process):
         """Return all messages that left the process on a topic, oldest first."""
         return _named(self.transport.publishers, topic, "publisher of").messages
 
-    def call(self, service: str, request: genpy.Message) -> genpy.Message | Future:
+    def call(self, service: str, request: genpy.Message) -> genpy.Message | Future[genpy.Message]:
         """Call a service from outside.
 
         Returns

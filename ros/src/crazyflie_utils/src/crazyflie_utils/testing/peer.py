@@ -16,7 +16,7 @@ def _anything(message: genpy.Message) -> bool:
     return True
 
 
-class Heard(queue.Queue):
+class Heard(queue.Queue[genpy.Message]):
     """The messages that have come on a topic, oldest first."""
 
     def next(self, accept: Callable[[genpy.Message], bool] = _anything) -> genpy.Message:

@@ -9,7 +9,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import override
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
 from crazyflie_model.elementwise import Number, Vector, functions, join, split, where
@@ -54,7 +55,7 @@ class Dynamics(ABC):
         """
 
     @abstractmethod
-    def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:
+    def pose(self, x: Sequence[float], u: Sequence[float]) -> tuple[Triple, Quaternion]:
         """Return the position, in m, and the quaternion (x, y, z, w) of one vehicle."""
 
     def step(self, count: int, x: Vector, u: Vector) -> Vector:
@@ -69,7 +70,7 @@ class Dynamics(ABC):
         """
         return self.on_ground(rk4_step(self.rates, count * STEP, x, u, STEP))
 
-    def derivative(self, t: float, x: ArrayLike, u: ArrayLike) -> np.ndarray:
+    def derivative(self, t: float, x: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
         """Return the time derivative of states as arrays.
 
         Parameters
@@ -96,17 +97,16 @@ class SevenDimensional(Dynamics):
         x, y, z = position
         return [x, y, z, 0.0, 0.0, 0.0, 0.0]
 
+    @override
     def on_ground(self, x: Vector) -> Vector:
-        """See `Dynamics.on_ground`."""
-        x, y, z, x_dot, y_dot, z_dot, yaw = x
+        z, z_dot = x[2], x[5]
         below = z <= 0.0
-        z = where(below, 0.0, z)
         z_dot = where(below & (z_dot < 0.0), 0.0, z_dot)
-        return [x, y, z, x_dot, y_dot, z_dot, yaw]
+        return [*x[:2], where(below, 0.0, z), *x[3:5], z_dot, x[6]]
 
-    def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:
+    def pose(self, x: Sequence[float], u: Sequence[float]) -> tuple[Triple, Quaternion]:
         """See `Dynamics.pose`: roll and pitch are those of the control, yaw is the state's."""
-        return tuple(x[:3]), quaternion_from_rpy(u[0], u[1], x[6])
+        return (x[0], x[1], x[2]), quaternion_from_rpy(u[0], u[1], x[6])
 
 
 class NearHover(SevenDimensional):

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from types import ModuleType, SimpleNamespace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-Number = float | np.ndarray
+Number = float | NDArray[np.float64]
 """A component: of one vehicle, or of many."""
 
 Vector = list[Number]
@@ -36,7 +36,7 @@ def split(vectors: ArrayLike) -> Vector:
     return vectors.tolist() if vectors.ndim == 1 else list(np.moveaxis(vectors, -1, 0))
 
 
-def join(components: Sequence[Number]) -> np.ndarray:
+def join(components: Sequence[Number]) -> NDArray[np.float64]:
     """Return components as one array, shape (m,) or (..., m); inverse of `split`."""
     return np.stack(np.broadcast_arrays(*components), axis=-1)
 
@@ -58,7 +58,7 @@ def functions(value: Number) -> ModuleType | SimpleNamespace:
     return math if isinstance(value, float) else _NUMPY
 
 
-def where(condition: bool | np.ndarray, value: Number, other: Number) -> Number:
+def where(condition: bool | NDArray[np.bool_], value: Number, other: Number) -> Number:
     """Return ``value`` where a condition, bool or array of bool, holds, else ``other``."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, value, other)

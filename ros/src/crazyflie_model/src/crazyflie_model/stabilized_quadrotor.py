@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 
+from typing_extensions import override
+
 from crazyflie_model import inner_loops
 from crazyflie_model.angles import Quaternion, Triple, zyx_from_quaternion
 from crazyflie_model.dynamics import STEP, Dynamics
@@ -72,12 +74,12 @@ class StabilizedQuadrotor(Dynamics):
         """See `Dynamics.on_ground` and `Airframe.on_ground`."""
         return self.airframe.on_ground(x[:BODY_DIM]) + x[BODY_DIM:]
 
-    def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:
-        """See `Dynamics.pose`."""
-        return tuple(x[:3]), tuple(x[6:10])
+    @override
+    def pose(self, x: Sequence[float], u: Sequence[float]) -> tuple[Triple, Quaternion]:
+        return (x[0], x[1], x[2]), (x[6], x[7], x[8], x[9])
 
+    @override
     def step(self, count: int, x: Vector, u: Vector) -> Vector:
-        """See `Dynamics.step`."""
         body, memory, commands = x[:BODY_DIM], x[BODY_DIM:-4], x[-4:]
         if count % _STEPS_PER_SAMPLE == 0:
             memory, commands = self._sample(body, memory, u)

@@ -32,5 +32,9 @@ class SupervisorState(enum.IntFlag):
 
     def words(self) -> str:
         """Return the state in words, such as "armed, flying"."""
-        names = [flag.name.lower().replace("_", " ") for flag in SupervisorState if flag in self]
+        names = [
+            name.lower().replace("_", " ")
+            for name, flag in SupervisorState.__members__.items()
+            if flag in self
+        ]
         return ", ".join(names) or "nothing"

@@ -5,6 +5,15 @@ import `crazyflie_utils.parameters` and the like without ROS.
 """
 
 import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from crazyflie_utils.node import Node
+    from crazyflie_utils.parameters import ParameterError, Parameters, parameter
+    from crazyflie_utils.runtime.handle import NodeHandle
+    from crazyflie_utils.runtime.runner import run, run_composed
+    from crazyflie_utils.runtime.transforms import TransformError
+    from crazyflie_utils.runtime.transport import ServiceError
 
 _HOME = {
     "Node": "crazyflie_utils.node",

@@ -1,0 +1,71 @@
+"""Dependencies between the packages point one way, and ROS stays behind the node handle."""
+
+import ast
+
+import pytest
+from workspaces import TOP
+
+SOURCES = TOP / "ros" / "src"
+PACKAGES = {
+    path.parents[1].name: path
+    for pattern in ("*/src/*/__init__.py", "crazyflie_ros/*/src/*/__init__.py")
+    for path in (init.parent for init in SOURCES.glob(pattern))
+}
+
+LAYERS = [
+    {"crazyflie_msgs", "crazyflie_model"},
+    {"crazyflie_utils"},
+    {
+        "crazyflie_simulator",
+        "crazyflie_state_estimator",
+        "crazyflie_lqr",
+        "crazyflie_control_merger",
+        "crazyflie_geofence",
+        "crazyflie_takeoff",
+        "crazyflie_description",
+        "crazyflie_controller",
+        "crazyflie_py",
+        "mocap_optitrack",
+    },
+    {"crazyflie_driver", "crazyflie_tools", "crazyflie_virtual"},
+    {"crazyflie_demo", "crazyflie_examples"},
+    {"crazyflie_dev"},
+]
+"""From the bottom: a package imports from lower layers only."""
+
+
+def imported(package):
+    """Return the top-level modules that the files of a package import."""
+    names = set()
+    for path in PACKAGES[package].rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                names |= {name.name.partition(".")[0] for name in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                names.add(node.module.partition(".")[0])
+    return names
+
+
+def layer_of(package):
+    """Return the number of a package's layer, from the bottom."""
+    return next(k for k, layer in enumerate(LAYERS) if package in layer)
+
+
+def test_every_package_has_a_layer():
+    assert set(PACKAGES) <= set().union(*LAYERS)
+
+
+@pytest.mark.parametrize("package", sorted(PACKAGES))
+def test_imports_come_from_lower_layers(package):
+    own = imported(package) & set().union(*LAYERS) - {package}
+    assert {name for name in own if layer_of(name) >= layer_of(package)} == set()
+
+
+@pytest.mark.parametrize("package", sorted(set(PACKAGES) - {"crazyflie_utils"}))
+def test_only_the_node_handle_speaks_to_rospy(package):
+    assert "rospy" not in imported(package)
+
+
+def test_the_model_knows_nothing_of_ros():
+    ros = {"rospy", "genpy", "rosgraph", "std_msgs", "geometry_msgs", "crazyflie_msgs", "tf2_ros"}
+    assert imported("crazyflie_model") & ros == set()

@@ -6,7 +6,8 @@ from typing_extensions import override
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_takeoff.control_filter import ControlFilter
 from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_takeoff.flight_topics import FlightTopicParameters
+from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameter_types import TOPIC
 
 LISTENING_TIME = 0.4
@@ -18,8 +19,8 @@ CONTROLLER_POLL_PERIOD = 0.1
 """How often it is looked whether there is a controller, s."""
 
 
-class TakeoffControlFilterParameters(Parameters):
-    """What the filter is parameters."""
+class TakeoffControlFilterParameters(FlightTopicParameters):
+    """Parameters of `TakeoffControlFilterNode`."""
 
     takeoff_control_topic: str = parameter(
         TOPIC, "the takeoff server's control", name="topics/takeoff_control"
@@ -29,18 +30,6 @@ class TakeoffControlFilterParameters(Parameters):
     )
     final_control_topic: str = parameter(
         TOPIC, "the one that is passed on", name="topics/final_control"
-    )
-    in_flight_topic: str = parameter(
-        TOPIC, "toggles between ground and flight", name="topics/in_flight"
-    )
-    flight_state_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_state`", None, "topics/flight_state"
-    )
-    filter_state_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_filter`", None, "topics/filter_state"
-    )
-    controller_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_controller`", None, "topics/controller"
     )
 
 
@@ -59,18 +48,12 @@ class TakeoffControlFilterNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        in_flight = parameters.in_flight_topic
-        self._flight_state_topic = parameters.flight_state_topic or f"{in_flight}_state"
         self._final = handle.publisher(parameters.final_control_topic, ControlStamped)
-        self._filter_state = handle.publisher(
-            parameters.filter_state_topic or f"{in_flight}_filter", String, latch=True
-        )
-        self._controller = handle.publisher(
-            parameters.controller_topic or f"{in_flight}_controller", Bool, latch=True
-        )
+        self._filter_state = handle.publisher(parameters.filter_state_topic, String, latch=True)
+        self._controller = handle.publisher(parameters.controller_topic, Bool, latch=True)
         self._publish_state()
-        handle.subscribe(self._flight_state_topic, String, self._on_flight_state)
-        handle.subscribe(in_flight, Empty, self._on_toggle)
+        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(parameters.in_flight_topic, Empty, self._on_toggle)
         handle.subscribe(
             parameters.takeoff_control_topic,
             ControlStamped,
@@ -92,7 +75,8 @@ class TakeoffControlFilterNode(Node):
             self._filter.set_state(FlightState(message.data))
         except ValueError:
             self._handle.warn(
-                f"ignoring {message.data!r} on {self._flight_state_topic}: no flight state",
+                f"ignoring {message.data!r}, which is no flight state, on "
+                f"{self._parameters.flight_state_topic}",
                 throttle=1.0,
                 key="flight state",
             )

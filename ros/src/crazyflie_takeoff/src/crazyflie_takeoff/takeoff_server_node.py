@@ -16,8 +16,9 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_takeoff.flight import FlightStateMachine, Plan
 from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
+from crazyflie_takeoff.flight_topics import FlightTopicParameters
 from crazyflie_takeoff.recovery import FLYING_HEIGHT, recover_state
-from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
+from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector
@@ -32,8 +33,8 @@ RECOVERY_LIMIT = 1.0
 """How long a server that has started looks for the state of the flight, s."""
 
 
-class TakeoffServerParameters(Parameters):
-    """What the takeoff server is parameters."""
+class TakeoffServerParameters(FlightTopicParameters):
+    """Parameters of `TakeoffServerNode`."""
 
     control_topic: str = parameter(
         TOPIC, "thrust of takeoff and landing goes here", name="topics/control"
@@ -41,20 +42,8 @@ class TakeoffServerParameters(Parameters):
     reference_topic: str = parameter(
         TOPIC, "hover point and descent go here", name="topics/reference"
     )
-    in_flight_topic: str = parameter(
-        TOPIC, "toggles between ground and flight", name="topics/in_flight"
-    )
     state_topic: str | None = parameter(
         TOPIC, "where the vehicle is; without it nothing is known", None, "topics/state"
-    )
-    flight_state_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_state`", None, "topics/flight_state"
-    )
-    filter_state_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_filter`", None, "topics/filter_state"
-    )
-    controller_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_controller`", None, "topics/controller"
     )
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
@@ -109,22 +98,16 @@ class TakeoffServerNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        in_flight = parameters.in_flight_topic
-        self._filter_state_topic = parameters.filter_state_topic or f"{in_flight}_filter"
         self._control = handle.publisher(parameters.control_topic, ControlStamped)
         self._reference = handle.publisher(
             parameters.reference_topic, PositionVelocityStateStamped, latch=True
         )
-        self._in_flight = handle.publisher(in_flight, Empty)
-        self._flight_state = handle.publisher(
-            parameters.flight_state_topic or f"{in_flight}_state", String, latch=True
-        )
+        self._in_flight = handle.publisher(parameters.in_flight_topic, Empty)
+        self._flight_state = handle.publisher(parameters.flight_state_topic, String, latch=True)
         handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
-        handle.subscribe(self._filter_state_topic, String, self._on_filter_state)
-        handle.subscribe(
-            parameters.controller_topic or f"{in_flight}_controller", Bool, self._on_controller
-        )
+        handle.subscribe(parameters.filter_state_topic, String, self._on_filter_state)
+        handle.subscribe(parameters.controller_topic, Bool, self._on_controller)
         if parameters.state_topic is not None:
             handle.subscribe(
                 parameters.state_topic,
@@ -197,7 +180,8 @@ class TakeoffServerNode(Node):
             self._remembered = None if knows_nothing else FlightState(message.data)
         except ValueError:
             self._handle.warn(
-                f"ignoring {message.data!r} on {self._filter_state_topic}: no flight state",
+                f"ignoring {message.data!r}, which is no flight state, on "
+                f"{self._parameters.filter_state_topic}",
                 throttle=1.0,
                 key="flight state",
             )

@@ -1,5 +1,6 @@
 """Somebody who does what a page of the manual says."""
 
+import subprocess
 import time
 from pathlib import Path
 
@@ -25,14 +26,17 @@ class Reader:
     def __init__(self, top: Path, home: Path):
         self._top = top
         self._environment = clean_environment(home)
-        self._opening = None
-        self._terminals = []
+        self._opening: str | None = None
+        self._terminals: list[Terminal] = []
+        self._applied: list[str] = []
 
     def follow(self, page: Page) -> None:
         """Do all that the page says, and end what goes on then."""
         for part in page.parts:
             if isinstance(part, Block) and part.comment.startswith("run"):
                 self._type(part.commands, part.comment.partition("until ")[2])
+            elif isinstance(part, Block) and part.comment == "apply":
+                self._apply(part.text)
             elif part == "end":
                 self.end()
             elif isinstance(part, str) and part.startswith("every shell: "):
@@ -46,9 +50,26 @@ class Reader:
                 terminal.interrupt()
 
     def close(self) -> None:
-        """Close all terminals."""
+        """Close all terminals, and take back the changes that the page has applied."""
         for terminal in reversed(self._terminals):
             terminal.close()
+        while self._applied:
+            self._git_apply(self._applied.pop(), "--reverse")
+
+    def _apply(self, change):
+        self._git_apply(change)
+        self._applied.append(change)
+
+    def _git_apply(self, change, *options):
+        result = subprocess.run(
+            ["git", "apply", *options],
+            cwd=self._top,
+            input=change + "\n",
+            capture_output=True,
+            text=True,
+            timeout=START_LIMIT,
+        )
+        assert result.returncode == 0, f"{result.stderr}\n{change}"
 
     def _type(self, commands, awaited):
         terminal = next((t for t in self._terminals if not t.is_busy), None) or self._open()

@@ -5,8 +5,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TypeVar
 
-from crazyflie_driver.firmware_parameters import FirmwareParameters
 from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import NOT_FLYABLE, Status
@@ -67,7 +67,7 @@ class DriverVehicle:
         self._announcing = threading.Lock()
         self._log = LogTopics(self._handle, parameters, self.crazyflie, fixed_frame)
         self._setpoints = SetpointTopics(self._handle, parameters, self.crazyflie, self._log)
-        self._firmware = FirmwareParameters(self._handle, parameters.prefix, self.crazyflie)
+        self._mirror = ParameterMirror(self._handle, parameters.prefix, self.crazyflie)
         self._services = VehicleServices(self._handle, self)
 
     # Life.
@@ -115,7 +115,7 @@ class DriverVehicle:
                     raise ServiceError("removed while connecting")
                 self._log.start()
                 if self.parameters.enable_parameters:
-                    self._firmware.publish()
+                    self._mirror.publish()
                 self._open_thrust_lock(is_new=True)
                 self._services.advertise()
                 self._setpoints.subscribe()
@@ -220,7 +220,7 @@ class DriverVehicle:
 
     def write_parameters(self, names: list[str]) -> None:
         """Write ROS parameters GROUP/NAME to the firmware; blocks."""
-        self._firmware.write(names)
+        self._mirror.write(names)
 
     def refuse_in_emergency(self) -> None:
         """Raise `ServiceError` after an emergency stop."""
@@ -275,7 +275,7 @@ class DriverVehicle:
             self.crazyflie.supervisor.emergency_stop()
             return
         if self.parameters.enable_parameters:
-            self._firmware.publish()
+            self._mirror.publish()
         self._open_thrust_lock(is_new=False)
 
     def _on_packet(self, port, channel, data):

@@ -5,22 +5,13 @@ from collections.abc import Sequence
 
 from crazyflie_py.checks import check_finite
 from crazyflie_py.errors import ValueRangeError
-from crazyflie_py.link import CurrentLink
+from crazyflie_py.subsystem import Subsystem
 
 _STREAM = "localization"
 
 
-class Localization:
-    """Tell the vehicle where it is; nothing here blocks.
-
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link`, or raises `LinkLostError`.
-    """
-
-    def __init__(self, current_link: CurrentLink):
-        self._current_link = current_link
+class Localization(Subsystem):
+    """Tell the vehicle where it is; nothing here blocks."""
 
     def position(self, x: float, y: float, z: float) -> None:
         """Send a position in the world, m."""

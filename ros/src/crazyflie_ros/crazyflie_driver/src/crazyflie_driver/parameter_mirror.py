@@ -10,8 +10,8 @@ from crazyflie_utils.parameter_types import ParameterType
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
 
-class FirmwareParameters:
-    """Copy parameters from the vehicle to ROS, and back on demand; all methods block.
+class ParameterMirror:
+    """Copy the firmware's parameters to ROS, and back on demand; all methods block.
 
     Parameters
     ----------

@@ -1,25 +1,17 @@
 """What the vehicle sends by itself, as messages."""
 
-import threading
-import time
-
 import pytest
 
 from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS
 from crazyflie_utils import ServiceError
-
-LIMIT = 20.0
+from crazyflie_utils.testing.peer import wait_until
 
 ALL = {f"enable_logging_{name}": True for name in STANDARD_TOPICS}
 
 
 def published(server, topic, count=1):
     """Wait for messages on a topic and return them."""
-    end = time.monotonic() + LIMIT
-    patience = threading.Event()
-    while len(server.process.published(topic)) < count:
-        assert time.monotonic() < end, f"nothing on {topic}"
-        patience.wait(0.01)
+    wait_until(lambda: len(server.process.published(topic)) >= count, f"messages on {topic}")
     return server.process.published(topic)
 
 

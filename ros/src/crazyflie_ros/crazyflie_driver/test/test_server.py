@@ -1,8 +1,6 @@
-"""Adding, removing, losing and finding vehicles again."""
+"""Adding and removing vehicles, and loss of the link."""
 
 import struct
-import threading
-import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -11,17 +9,10 @@ from geometry_msgs.msg import Twist, Vector3
 
 from crazyflie_driver.srv import TakeoffRequest
 from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.peer import wait_until
 
 LIMIT = 20.0
 ZERO = struct.pack("<fffH", 0, 0, 0, 0)
-
-
-def wait_until(condition, what):
-    end = time.monotonic() + LIMIT
-    patience = threading.Event()
-    while not condition():
-        assert time.monotonic() < end, f"waited {LIMIT} s for {what}"
-        patience.wait(0.01)
 
 
 def status(server, name="cf1"):

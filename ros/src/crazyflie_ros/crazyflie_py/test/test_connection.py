@@ -287,19 +287,19 @@ def test_console_lines(vehicle, make_link):
 
 
 def test_all_packets_can_be_received_and_a_bad_callback_ends_nothing(vehicle, make_link, caplog):
-    heard = queue.Queue()
+    received = queue.Queue()
 
-    def listen(*packet):
-        heard.put(packet)
-        raise RuntimeError("a bad listener")
+    def on_packet(*packet):
+        received.put(packet)
+        raise RuntimeError("a bad callback")
 
-    link = make_link(vehicle.uri, on_packet=listen)
+    link = make_link(vehicle.uri, on_packet=on_packet)
     link.connect()
     vehicle.say(13, 2, b"app")
-    while heard.get(timeout=LIMIT) != (13, 2, b"app"):
+    while received.get(timeout=LIMIT) != (13, 2, b"app"):
         pass
     assert link.parameters.read("ring.effect") == 6
-    assert "a bad listener" in caplog.text
+    assert "a bad callback" in caplog.text
 
 
 def test_link_figures(vehicle, link):

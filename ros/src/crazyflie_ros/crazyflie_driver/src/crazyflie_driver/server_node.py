@@ -1,6 +1,7 @@
 """The driver: a server that vehicles are added to and removed from."""
 
 from concurrent.futures import Future, wait
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Header
@@ -93,13 +94,13 @@ class CrazyflieServerNode(Node):
         self._handle.info(f"{vehicle.parameters.tf_prefix}: removed")
         return RemoveCrazyflieResponse()
 
-    def _forget(self, vehicle):
+    def _forget(self, vehicle: DriverVehicle) -> None:
         if self._vehicles.get(vehicle.parameters.uri) is vehicle:
             del self._vehicles[vehicle.parameters.uri]
 
     def _when_done(self, done, finish, vehicle):
         # ``finish`` runs in its turn with the other callbacks, before the answer goes out.
-        answer = Future()
+        answer: Future[Any] = Future()
 
         def finish_answer():
             error = done.exception()

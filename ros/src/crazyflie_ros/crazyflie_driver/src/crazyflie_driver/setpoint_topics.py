@@ -84,13 +84,13 @@ class SetpointTopics:
     def zeros(self) -> None:
         """Send zero thrust a hundred times; blocks.
 
-        They, too, keep the vehicle from hearing high-level commands.
+        They, too, keep the vehicle from accepting high-level commands.
         """
         self.is_streaming = True
         self._crazyflie.setpoints.zeros()
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
-        """Tell the vehicle that setpoints stop, so that it hears high-level commands."""
+        """Announce that setpoints end, so that the vehicle accepts high-level commands."""
         self._crazyflie.setpoints.hand_over(remain_valid_ms)
         self.is_streaming = False
 

@@ -173,7 +173,7 @@ class DriverVehicle:
         self.crazyflie.supervisor.emergency_stop()
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
-        """Tell the vehicle that setpoints stop; does not block."""
+        """Announce to the vehicle that setpoints end; does not block."""
         self._setpoints.hand_over(remain_valid_ms)
 
     def command(

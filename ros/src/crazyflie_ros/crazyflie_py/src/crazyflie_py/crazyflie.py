@@ -44,7 +44,7 @@ class Crazyflie:
     """A vehicle: connect, use, close; or use it in a ``with`` statement.
 
     The first `connect` succeeds or raises. After that the link is watched: when
-    the vehicle has not been heard for 0.5 s it is lost, and, if so wished, tried
+    no sign of life has come for 0.5 s it is lost, and, with ``reconnect``, tried
     again with growing pauses until `close`; its log blocks are started anew.
 
     All callbacks come from threads of this object or of cflib, and must be quick.
@@ -190,7 +190,7 @@ class Crazyflie:
         return self._rssi
 
     def age(self) -> float:
-        """Return how long ago the vehicle was heard, s."""
+        """Return the age of the last sign of life, s."""
         return self.link().liveness.age(time.monotonic())
 
     def reboot(self) -> None:

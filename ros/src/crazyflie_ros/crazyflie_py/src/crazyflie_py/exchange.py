@@ -66,7 +66,7 @@ class Exchange:
         self._closed: str | None = None
 
     def receive(self, port: int, channel: int, data: bytes) -> None:
-        """Give a packet that arrived to whoever has waited for it longest."""
+        """Give a packet that arrived to the request that has waited for it longest."""
         with self._lock:
             for waiter in self._waiters:
                 if waiter.takes(port, channel, data):

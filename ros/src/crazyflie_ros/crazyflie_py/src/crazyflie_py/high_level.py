@@ -27,7 +27,7 @@ class HighLevel(Subsystem):
     """
 
     def set_group_mask(self, group_mask: int) -> None:
-        """Say which groups (bits) the vehicle belongs to."""
+        """Set the groups (bits) that the vehicle belongs to."""
         check_byte("group mask", group_mask)
         self._command(
             "the group mask",
@@ -129,7 +129,7 @@ class HighLevel(Subsystem):
         )
 
     def define_trajectory(self, trajectory_id: int, offset: int, pieces: int) -> None:
-        """Say where in the trajectory memory (bytes) a trajectory of so many pieces is."""
+        """Define a trajectory: pieces in the trajectory memory, from an offset (bytes) on."""
         check_byte("trajectory number", trajectory_id)
         check_byte("number of pieces", pieces)
         self._command(

@@ -171,7 +171,7 @@ class Link:
         with self._changed:
             self._is_connected = True
             self._liveness = Liveness(time.monotonic(), self._limits.lost)
-            # Without a single parameter cflib never says that it is through.
+            # Without a single parameter cflib never reports that it is complete.
             if not self.cflib.param.toc.toc:
                 self._is_complete = True
             self._changed.notify_all()

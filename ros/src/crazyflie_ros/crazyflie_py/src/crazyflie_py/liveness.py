@@ -67,7 +67,7 @@ class Liveness:
         return sum(pings) / len(pings) if pings else 1.0
 
     def is_lost(self, now: float) -> bool:
-        """Tell whether the link is lost; to be asked several times within the limit.
+        """Return whether the link is lost; to be called several times within the limit.
 
         When this call itself comes late, the machine was busy, and packets of the
         vehicle may wait to be read: it gets a new period.

@@ -1,4 +1,4 @@
-"""What an external system, such as motion capture, knows about the vehicle's pose."""
+"""Poses measured by an external system, such as motion capture."""
 
 import math
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ _STREAM = "localization"
 
 
 class Localization(Subsystem):
-    """Tell the vehicle where it is; nothing here blocks."""
+    """Measured poses for the vehicle's estimator; nothing here blocks."""
 
     def position(self, x: float, y: float, z: float) -> None:
         """Send a position in the world, m."""

@@ -106,7 +106,7 @@ class Setpoints(Subsystem):
         sent.wait(_SENT_LIMIT)
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
-        """Say that no more setpoints follow: high-level commands are heard again.
+        """Announce that no more setpoints follow: high-level commands are accepted again.
 
         Without it the firmware ignores them after a streamed setpoint.
 

@@ -22,7 +22,7 @@ class SetupProgress:
         return self._step
 
     def receive(self, port: int, channel: int, data: bytes) -> bool:
-        """Take note of a packet; tell whether it brings the set-up forward."""
+        """Take note of a packet; return whether it advances the set-up."""
         if channel == _TABLE_CHANNEL and port in _NAMES and data:
             return self._receive_table(port, data)
         if port == _MEMORY:

@@ -21,7 +21,7 @@ class Supervisor(Subsystem):
     """The supervisor: the part of the firmware that arms and stops the motors."""
 
     def read(self) -> SupervisorState | None:
-        """Ask for the state; blocks. None when the firmware is too old to say.
+        """Ask for the state; blocks. None when the firmware is too old to report it.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""A server with a vehicle that answers as it is told to, and keeps what it is sent."""
+"""A server with a vehicle with scripted answers, and keeps what it is sent."""
 
 import pytest
 

@@ -78,11 +78,8 @@ def test_a_refusal_ends_the_process_with_status_1():
         ({"roll_trim": "left"}, "roll_trim"),
         ({"enable_logging_imu": 1}, "enable_logging_imu"),
         ({"genericLogTopics": "a"}, "genericLogTopics"),
-        ({"genericLogTopics": ["a"]}, "genericLogTopicFrequencies"),
-        (
-            {"genericLogTopics": ["a"], "genericLogTopicFrequencies": [5]},
-            "genericLogTopicFrequencies",
-        ),
+        ({"genericLogTopics": ["imu"]}, "genericLogTopics"),
+        ({"genericLogTopicFrequencies": [5]}, "genericLogTopicFrequencies"),
         (
             {"genericLogTopics": ["a"], "genericLogTopicFrequencies": [10]},
             "genericLogTopic_a_Variables",
@@ -93,5 +90,19 @@ def test_bad_parameters_are_named(changes, name):
     parameters = {k: v for k, v in {**PARAMETERS, **changes}.items() if v is not None}
     launch = Launch(parameters)
     assert not launch.has_begun
-    assert f"parameter /add/{name}" in launch.process.logged("error")[0]
+    assert f"parameter /add/{name} " in launch.process.logged("error")[0]
     assert "expected" in launch.process.logged("error")[0]
+
+
+def test_every_log_block_has_a_period():
+    blocks = {"genericLogTopics": ["a"], "genericLogTopic_a_Variables": ["pm.vbat"]}
+    launch = Launch({**PARAMETERS, **blocks})
+    assert not launch.has_begun
+    assert "genericLogTopicFrequencies has 0 entries" in launch.process.logged("error")[0]
+
+
+def test_all_that_is_wrong_is_named_at_once():
+    wrong = {"roll_trim": "left", "genericLogTopics": ["a", "b"], "genericLogTopicFrequencies": [5]}
+    (text,) = Launch({**PARAMETERS, **wrong}).process.logged("error")
+    for name in ("roll_trim", "genericLogTopicFrequencies", "genericLogTopic_a_Variables"):
+        assert f"parameter /add/{name} " in text

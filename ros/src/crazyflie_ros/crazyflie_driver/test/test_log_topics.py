@@ -1,35 +1,17 @@
 """What the vehicle sends by itself, as messages."""
 
-import threading
-import time
-
 import pytest
 
+from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS
 from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.peer import wait_until
 
-LIMIT = 20.0
-
-ALL = {
-    f"enable_logging_{name}": True
-    for name in (
-        "imu",
-        "temperature",
-        "magnetic_field",
-        "pressure",
-        "battery",
-        "pose",
-        "packets",
-    )
-}
+ALL = {f"enable_logging_{name}": True for name in STANDARD_TOPICS}
 
 
 def published(server, topic, count=1):
     """Wait for messages on a topic and return them."""
-    end = time.monotonic() + LIMIT
-    patience = threading.Event()
-    while len(server.process.published(topic)) < count:
-        assert time.monotonic() < end, f"nothing on {topic}"
-        patience.wait(0.01)
+    wait_until(lambda: len(server.process.published(topic)) >= count, f"messages on {topic}")
     return server.process.published(topic)
 
 
@@ -112,14 +94,14 @@ def test_without_logging_there_is_only_the_status(server, log_block):
     vehicle = server.make_vehicle()
     server.add(vehicle.uri, log_blocks=[log_block("test", 10, "mag.x")], **ALL)
     assert len([data for data in vehicle.packets(5, 1) if data[0] == 6]) == 1
-    assert set(server.process.transport.outlets) == {"/diagnostics", "/cf1/rssi"}
+    assert set(server.process.transport.publishers) == {"/diagnostics", "/cf1/rssi"}
 
 
 def test_topics_that_the_firmware_cannot_fill_are_left_out(server):
     vehicle = server.make_vehicle()
     del vehicle.log["baro.temp"]
     server.add(vehicle.uri, enable_logging=True, **ALL)
-    assert "/cf1/temperature" not in server.process.transport.outlets
+    assert "/cf1/temperature" not in server.process.transport.publishers
     assert published(server, "/cf1/pressure")[0].data == 1013.25
     assert "no topic temperature: the firmware has no baro.temp" in server.process.logged("warn")[0]
 
@@ -128,11 +110,14 @@ def test_topics_that_the_firmware_cannot_fill_are_left_out(server):
     ("blocks", "text"),
     [
         ([("test", 10, "mag.X")], "did you mean mag.x"),
-        ([("test", 5, "mag.x")], "its period is 5 ms"),
+        (
+            [("test", 5, "mag.x")],
+            "log_blocks/frequency is .5.; expected a list, each entry an integer from 10",
+        ),
         ([("test", 100)], "no variables"),
         ([("test", 100, "mag.x"), ("test", 10, "mag.x")], "two log blocks are called 'test'"),
-        ([("imu", 100, "mag.x")], "cannot be called 'imu'"),
-        ([("my log", 100, "mag.x")], "'my log'; expected a topic's name"),
+        ([("imu", 100, "mag.x")], "log_blocks/topic_name is .*the driver itself has a topic 'imu'"),
+        ([("my log", 100, "mag.x")], "'my log'.; expected a list, each entry the name of a topic"),
     ],
 )
 def test_custom_blocks_that_are_not_possible(server, log_block, blocks, text):

@@ -1,8 +1,6 @@
-"""Adding, removing, losing and finding vehicles again."""
+"""Adding and removing vehicles, and loss of the link."""
 
 import struct
-import threading
-import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -11,17 +9,10 @@ from geometry_msgs.msg import Twist, Vector3
 
 from crazyflie_driver.srv import TakeoffRequest
 from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.peer import wait_until
 
 LIMIT = 20.0
 ZERO = struct.pack("<fffH", 0, 0, 0, 0)
-
-
-def wait_until(condition, what):
-    end = time.monotonic() + LIMIT
-    patience = threading.Event()
-    while not condition():
-        assert time.monotonic() < end, f"waited {LIMIT} s for {what}"
-        patience.wait(0.01)
 
 
 def status(server, name="cf1"):
@@ -97,6 +88,7 @@ def test_a_silent_port(server):
         ({"prefix": ""}, "tf_prefix is ''"),
         ({"prefix": "my vehicle"}, "tf_prefix is 'my vehicle'"),
         ({"roll_trim": float("nan")}, "roll_trim is nan"),
+        ({"prefix": "", "pitch_trim": float("inf")}, "tf_prefix is .*pitch_trim is inf"),
     ],
 )
 def test_requests_that_make_no_sense(server, changes, text):
@@ -116,10 +108,10 @@ def test_nothing_is_added_twice(server, vehicle):
 def test_a_vehicle_that_is_removed_leaves_nothing_and_can_come_again(server, vehicle):
     transport = server.process.transport
     services = set(transport.services)
-    assert all(transport.inlets.values())
+    assert all(transport.subscribers.values())
     server.remove(vehicle.uri)
     assert set(transport.services) == {"/add_crazyflie", "/remove_crazyflie"}
-    assert [topic for topic, listeners in transport.inlets.items() if listeners] == ["/clock"]
+    assert [topic for topic, listeners in transport.subscribers.items() if listeners] == ["/clock"]
     with pytest.raises(ServiceError, match="known: none"):
         server.remove(vehicle.uri)
     server.add(vehicle.uri)

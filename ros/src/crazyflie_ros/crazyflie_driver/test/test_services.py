@@ -1,8 +1,6 @@
 """Services of a vehicle, down to the bytes on the link."""
 
 import struct
-import threading
-import time
 
 import pytest
 from genpy import Duration
@@ -23,8 +21,8 @@ from crazyflie_driver.srv import (
     sendPacketRequest,
 )
 from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.peer import wait_until
 
-LIMIT = 20.0
 SETPOINTS_STOP = struct.pack("<BI", 0, 0)
 TAKEOFF = TakeoffRequest(1, 1.5, Duration(2, 500_000_000))
 
@@ -236,11 +234,3 @@ def test_without_parameters_there_are_none(flying):
 def test_only_a_radio_can_reboot(flying):
     server, vehicle = flying
     assert "/cf1/reboot" not in server.process.transport.services
-
-
-def wait_until(condition, what):
-    end = time.monotonic() + LIMIT
-    patience = threading.Event()
-    while not condition():
-        assert time.monotonic() < end, f"waited {LIMIT} s for {what}"
-        patience.wait(0.01)

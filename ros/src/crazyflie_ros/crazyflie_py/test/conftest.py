@@ -1,4 +1,4 @@
-"""Fixtures of the tests: a vehicle that answers as it is told to."""
+"""Fixtures of the tests: a vehicle with scripted answers."""
 
 import pytest
 

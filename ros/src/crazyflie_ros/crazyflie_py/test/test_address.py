@@ -1,4 +1,4 @@
-"""Addresses that are good and bad, and what the errors say."""
+"""Addresses that are good and bad, and the texts of the errors."""
 
 import pytest
 

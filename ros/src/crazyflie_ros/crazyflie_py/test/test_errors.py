@@ -1,4 +1,4 @@
-"""What cflib's drivers say, in the operator's words."""
+"""Texts of cflib's drivers, explained to the operator."""
 
 import pytest
 
@@ -14,7 +14,7 @@ URI = "radio://0/25/2M/E7E7E7E701"
 
 
 @pytest.mark.parametrize(
-    ("text", "kind", "advice"),
+    ("text", "error_type", "advice"),
     [
         (
             "Couldn't load link driver: Cannot find a Crazyradio Dongle\n\nTrace",
@@ -35,9 +35,9 @@ URI = "radio://0/25/2M/E7E7E7E701"
         ("No driver found or malformed URI: usb://7", NoAnswerError, "plugged in"),
     ],
 )
-def test_known_texts(text, kind, advice):
+def test_known_texts(text, error_type, advice):
     error = explain(URI, text)
-    assert type(error) is kind
+    assert type(error) is error_type
     assert str(error).startswith(URI + ": ")
     assert advice in str(error)
     assert "Trace" not in str(error)

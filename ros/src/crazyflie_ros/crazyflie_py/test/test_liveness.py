@@ -24,7 +24,7 @@ def test_silence_is_noticed_after_half_a_second():
 def test_a_packet_now_and_then_is_enough():
     liveness = Liveness(0.0)
     for k in range(1, 100):
-        liveness.heard(0.4 * k)
+        liveness.received(0.4 * k)
         assert watch(liveness, 0.4 * k, 0.4 * k + 0.4) is None
 
 
@@ -68,7 +68,7 @@ def test_an_answer_under_way_is_not_lost():
     assert liveness.quality() == 1.0
 
 
-def test_an_answer_may_be_heard_before_the_ping_is_noted():
+def test_an_answer_may_be_received_before_the_ping_is_noted():
     liveness = Liveness(0.0)
     for content in (b"1", b"2", b"3"):
         liveness.ping_answered(content, 0.0)

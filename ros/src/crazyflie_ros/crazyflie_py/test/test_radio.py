@@ -75,7 +75,7 @@ def test_a_dongle_that_hangs_does_not_hang_us(mock):
     assert dropped.wait(5.0)
 
 
-def test_the_first_question_is_repeated(mock):
+def test_the_first_request_is_repeated(mock):
     link = Link(Address.parse(URI), Limits(first_answer=1.0), backend=mock)
     with pytest.raises(NoAnswerError):
         link.open()

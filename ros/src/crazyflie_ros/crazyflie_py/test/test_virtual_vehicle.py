@@ -21,7 +21,7 @@ def virtual():
         yield virtual
 
 
-class Pilot:
+class Client:
     """A link to the virtual vehicle, and what it logs."""
 
     def __init__(self, uri):
@@ -37,7 +37,7 @@ class Pilot:
         )
         self.link.connect()
         variables = ("stateEstimate.x", "stateEstimate.z", "supervisor.info", "pm.vbat")
-        self.link.add_log_block(LogBlock("pilot", 20, variables, self._note))
+        self.link.add_log_block(LogBlock("client", 20, variables, self._note))
 
     def wait_until(self, condition):
         """Wait until ``condition(x, z, state, voltage)`` holds."""
@@ -58,51 +58,51 @@ class Pilot:
 
 
 @pytest.fixture(scope="module")
-def pilot(virtual):
-    pilot = Pilot(virtual[1])
-    yield pilot
-    pilot.link.close()
+def client(virtual):
+    client = Client(virtual[1])
+    yield client
+    client.link.close()
 
 
-def test_the_real_tables(pilot):
-    assert pilot.link.log.variables()["stateEstimateZ.quat"] == "uint32_t"
-    assert pilot.link.parameters.types()["ring.effect"] == ("uint8_t", True)
-    assert len(pilot.link.parameters.values()) == len(pilot.link.parameters.types()) > 100
-    assert pilot.link.parameters.write("ring.effect", 5) == 5
-    assert pilot.link.parameters.read("ring.effect") == 5
-    assert pilot.lines.get(timeout=LIMIT)
-    pilot.wait_until(lambda x, z, state, voltage: 3.0 < voltage < 4.3)
+def test_the_real_tables(client):
+    assert client.link.log.variables()["stateEstimateZ.quat"] == "uint32_t"
+    assert client.link.parameters.types()["ring.effect"] == ("uint8_t", True)
+    assert len(client.link.parameters.values()) == len(client.link.parameters.types()) > 100
+    assert client.link.parameters.write("ring.effect", 5) == 5
+    assert client.link.parameters.read("ring.effect") == 5
+    assert client.lines.get(timeout=LIMIT)
+    client.wait_until(lambda x, z, state, voltage: 3.0 < voltage < 4.3)
 
 
-def test_a_flight_by_commands_after_setpoints(pilot):
-    link = pilot.link
+def test_a_flight_by_commands_after_setpoints(client):
+    link = client.link
     link.setpoints.zeros()
     link.setpoints.hand_over()
     link.high_level.take_off(0.4, 1.0)
-    pilot.wait_until(lambda x, z, state, _: z > 0.35 and SupervisorState.FLYING in state)
+    client.wait_until(lambda x, z, state, _: z > 0.35 and SupervisorState.FLYING in state)
     link.trajectories.upload(1, 3, [PolynomialPiece(1.0, (0.0, 0.3), (), (), ())])
     link.high_level.start_trajectory(1, relative=True)
-    pilot.wait_until(lambda x, z, *_: x > 0.2 and z > 0.3)
+    client.wait_until(lambda x, z, *_: x > 0.2 and z > 0.3)
     link.high_level.land(0.0, 1.0)
-    pilot.wait_until(lambda x, z, *_: z < 0.05)
+    client.wait_until(lambda x, z, *_: z < 0.05)
 
 
-def test_a_trajectory_that_was_never_defined_is_refused(pilot):
+def test_a_trajectory_that_was_never_defined_is_refused(client):
     with pytest.raises(RefusedError, match="start of the trajectory"):
-        pilot.link.high_level.start_trajectory(77)
+        client.link.high_level.start_trajectory(77)
 
 
-def test_silence_is_noticed_and_overcome(virtual, pilot):
+def test_silence_is_noticed_and_overcome(virtual, client):
     virtual[0].switches.silence = 1.0
-    pilot.wait_for_state(LinkState.LOST)
-    pilot.wait_for_state(LinkState.CONNECTED)
-    with pilot._changed:
-        pilot._logged = {}
-    pilot.wait_until(lambda *_: True)
+    client.wait_for_state(LinkState.LOST)
+    client.wait_for_state(LinkState.CONNECTED)
+    with client._changed:
+        client._logged = {}
+    client.wait_until(lambda *_: True)
 
 
-def test_after_an_emergency_stop_nothing_flies(pilot):
-    pilot.link.supervisor.emergency_stop()
-    pilot.wait_until(lambda x, z, state, _: SupervisorState.LOCKED in state)
+def test_after_an_emergency_stop_nothing_flies(client):
+    client.link.supervisor.emergency_stop()
+    client.wait_until(lambda x, z, state, _: SupervisorState.LOCKED in state)
     with pytest.raises(RefusedError, match="arming.*locked"):
-        pilot.link.supervisor.arm()
+        client.link.supervisor.arm()

@@ -40,8 +40,8 @@ def test_attitude_setpoint_has_its_pitch_negated(vehicle, flying):
 
 
 @pytest.mark.filterwarnings("ignore:Using legacy:DeprecationWarning")
-@pytest.mark.parametrize(("protocol", "kinds"), [(12, (8, 9, 10)), (8, (1, 2, 5))])
-def test_generic_setpoints(make_vehicle, make_link, protocol, kinds):
+@pytest.mark.parametrize(("protocol", "velocity_type", "hover_type"), [(12, 8, 10), (8, 1, 5)])
+def test_generic_setpoints(make_vehicle, make_link, protocol, velocity_type, hover_type):
     vehicle = make_vehicle(protocol=protocol)
     link = make_link(vehicle.uri)
     link.connect()
@@ -52,17 +52,12 @@ def test_generic_setpoints(make_vehicle, make_link, protocol, kinds):
         (
             link.setpoints.velocity_world,
             numbers,
-            struct.pack("<Bffff", kinds[0], 0.5, -0.25, 0.125, sign * 30.0),
+            struct.pack("<Bffff", velocity_type, 0.5, -0.25, 0.125, sign * 30.0),
         ),
         (
             link.setpoints.hover,
             (0.5, -0.25, 30.0, 1.5),
-            struct.pack("<Bffff", kinds[2], 0.5, -0.25, sign * 30.0, 1.5),
-        ),
-        (
-            link.setpoints.height,
-            (1.0, -2.0, 30.0, 1.5),
-            struct.pack("<Bffff", kinds[1], 1.0, -2.0, sign * 30.0, 1.5),
+            struct.pack("<Bffff", hover_type, 0.5, -0.25, sign * 30.0, 1.5),
         ),
         (
             link.setpoints.position,
@@ -125,7 +120,6 @@ IMPOSSIBLE_SETPOINTS = [
     lambda s: s.attitude(0, 0, 0, 65536),
     lambda s: s.velocity_world(0, 0, float("inf"), 0),
     lambda s: s.hover(0, 0, 0, NAN),
-    lambda s: s.height(0, 0, 0, NAN),
     lambda s: s.position(0, NAN, 0, 0),
     lambda s: s.full_state((40, 0, 0), (0,) * 3, (0,) * 3, (0, 0, 0, 1), (0,) * 3),
     lambda s: s.full_state((NAN, 0, 0), (0,) * 3, (0,) * 3, (0, 0, 0, 1), (0,) * 3),

@@ -1,4 +1,4 @@
-"""Fixtures of the tests: a vehicle that answers as it is told to, and a cache of one's own."""
+"""Fixtures of the tests: a vehicle with scripted answers, and a cache of one's own."""
 
 import pytest
 

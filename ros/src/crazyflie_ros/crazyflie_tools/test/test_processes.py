@@ -15,7 +15,7 @@ from crazyflie_virtual.testing import virtual_vehicle
 LIMIT = 60.0
 
 SCANNED_HOST = "127.77.0.5"
-"""An address of this machine whose ports nobody else uses."""
+"""An address of this machine whose ports nothing else uses."""
 
 NOBODY = "127.77.0.6"
 
@@ -25,7 +25,7 @@ def command(tool, *arguments):
 
 
 def environment(**variables):
-    # Port 1: nobody is there, least of all a ROS master.
+    # Nothing listens on port 1: there is no ROS master.
     return {**os.environ, "ROS_MASTER_URI": "http://127.0.0.1:1", **variables}
 
 
@@ -109,7 +109,7 @@ def test_wrong_usage(uri):
     assert run("setParam", "--help")[0] == 0
 
 
-def test_a_closed_port_is_told():
+def test_a_closed_port_is_reported():
     status, out, err = run("listParams", "--uri", f"udp://{NOBODY}:{FIRST_PORT}")
     assert (status, out) == (1, "")
     assert "nothing listens on this port" in err
@@ -117,13 +117,13 @@ def test_a_closed_port_is_told():
 
 @pytest.fixture
 def silent_uri():
-    """Return the address of somebody who never answers."""
+    """Return the address of a port that never answers."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as silent:
         silent.bind(("127.0.0.1", 0))
         yield "udp://{}:{}".format(*silent.getsockname())
 
 
-def test_a_silent_port_is_told(silent_uri):
+def test_a_silent_port_is_reported(silent_uri):
     status, out, err = run("listParams", "--uri", silent_uri)
     assert (status, out) == (1, "")
     assert "nobody has answered within 2 s" in err

@@ -1,4 +1,4 @@
-"""The tools in this process, on a vehicle that answers as it is told to."""
+"""The tools in this process, on a vehicle with scripted answers."""
 
 import threading
 
@@ -21,7 +21,7 @@ def answer(vehicle, capsys):
 
 
 def usage_error(tool, capsys, *arguments):
-    """Return what a tool says about arguments that are wrong."""
+    """Return the message of a tool about arguments that are wrong."""
     with pytest.raises(SystemExit) as exit_:
         tool(list(arguments))
     printed = capsys.readouterr()
@@ -116,7 +116,7 @@ def test_a_value_that_cannot_be_set_is_an_error(answer, vehicle, name, text, rea
         (tools.reboot, ("--uri", "udp://localhost"), "no address of a vehicle"),
     ],
 )
-def test_wrong_usage_is_told_before_anything_is_sent(capsys, tool, arguments, reason):
+def test_wrong_usage_is_reported_before_anything_is_sent(capsys, tool, arguments, reason):
     assert reason in usage_error(tool, capsys, *arguments)
 
 
@@ -148,23 +148,23 @@ def test_only_a_radio_can_restart_a_vehicle(answer, vehicle):
     assert not vehicle.received
 
 
-def test_the_radio_is_told_to_restart(monkeypatch, capsys):
-    told = []
+def test_the_radio_restarts_the_vehicle(monkeypatch, capsys):
+    calls = []
 
     class Switch:
         def __init__(self, uri):
-            told.append(uri)
+            calls.append(uri)
 
         def reboot_to_fw(self):
-            told.append("reboot")
+            calls.append("reboot")
 
         def close(self):
-            told.append("close")
+            calls.append("close")
 
     monkeypatch.setattr("crazyflie_py.reboot.PowerSwitch", Switch)
     uri = "radio://0/25/2M/E7E7E7E701"
     assert tools.reboot(["--uri", uri]) == 0
-    assert told == [uri, "reboot", "close"]
+    assert calls == [uri, "reboot", "close"]
 
 
 @pytest.fixture
@@ -198,7 +198,7 @@ def test_vehicles_are_searched_by_address(capsys, searched, arguments, address):
     assert capsys.readouterr().out.splitlines() == searched.result[0]
 
 
-def test_where_no_vehicle_is_found_the_reasons_are_told(capsys, searched):
+def test_where_no_vehicle_is_found_the_reasons_are_printed(capsys, searched):
     searched.result = ([], [NoDongleError("RadioDriver: no Crazyradio dongle found")])
     assert tools.scan([]) == 1
     printed = capsys.readouterr()

@@ -5,11 +5,12 @@ from std_msgs.msg import Float32, Header
 
 from crazyflie_driver import telemetry
 from crazyflie_driver.msg import GenericLogData, crtpPacket
-from crazyflie_driver.options import VehicleOptions
+from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.log import LogBlock
 from crazyflie_utils import NodeHandle
+from crazyflie_utils.runtime.topics import Publisher
 
 STATUS_PERIOD_MS = 500
 """Period of the log block that the diagnostics rest on, ms."""
@@ -25,8 +26,8 @@ class LogTopics:
     Parameters
     ----------
     handle : NodeHandle
-    options : VehicleOptions
-    vehicle : crazyflie_py.Crazyflie
+    parameters : VehicleParameters
+    crazyflie : crazyflie_py.Crazyflie
     fixed_frame : str
         Frame of the pose.
 
@@ -39,16 +40,20 @@ class LogTopics:
     """
 
     def __init__(
-        self, handle: NodeHandle, options: VehicleOptions, vehicle: Crazyflie, fixed_frame: str
+        self,
+        handle: NodeHandle,
+        parameters: VehicleParameters,
+        crazyflie: Crazyflie,
+        fixed_frame: str,
     ):
         self.voltage: float | None = None
         self.rssi: float | None = None
         self.supervisor: SupervisorState | None = None
         self._handle = handle
-        self._options = options
-        self._vehicle = vehicle
+        self._parameters = parameters
+        self._crazyflie = crazyflie
         self._fixed_frame = fixed_frame
-        self._packets = None
+        self._packets: Publisher | None = None
 
     def start(self) -> None:
         """Announce the topics and start the log blocks; blocks.
@@ -58,23 +63,25 @@ class LogTopics:
         CrazyflieError
             A custom block is not possible, or the vehicle does not reply.
         """
-        options = self._options
-        if "packets" in options.topics:
+        parameters = self._parameters
+        if "packets" in parameters.topics:
             self._packets = self._publisher("packets", crtpPacket)
-        known = self._vehicle.log.variables()
+        known = self._crazyflie.log.variables()
         self._start_status(known, self._publisher("rssi", Float32))
-        wanted = [topic for topic in telemetry.STANDARD if topic.name in options.topics]
+        wanted = [topic for topic in telemetry.STANDARD if topic.name in parameters.topics]
         groups, missing = telemetry.packed(wanted, known)
         for name, variables in missing.items():
             self._handle.warn(
-                f"{options.name}: no topic {name}: the firmware has no {', '.join(variables)}"
+                f"{parameters.tf_prefix}: no topic {name}: the firmware has no "
+                + ", ".join(variables)
             )
         for group in groups:
             self._start_standard(group)
-        for block in options.custom_blocks:
-            self._start_custom(block)
+        if parameters.enable_logging:
+            for block in parameters.log_blocks:
+                self._start_custom(block)
 
-    def hear_packet(self, port: int, channel: int, data: bytes) -> None:
+    def publish_packet(self, port: int, channel: int, data: bytes) -> None:
         """Publish a packet from the vehicle, if it is not one of the driver's own."""
         publisher = self._packets
         if publisher is None or (port, channel) in _OWN_PORTS:
@@ -104,7 +111,7 @@ class LogTopics:
         if "supervisor.info" in latest:
             self.supervisor = SupervisorState(latest["supervisor.info"])
         # The Crazyradio's figure is the same, and comes without the firmware's help.
-        self.rssi = self._vehicle.rssi
+        self.rssi = self._crazyflie.rssi
         if self.rssi is None:
             self.rssi = latest.get("radio.rssi")
         if self.rssi is not None:
@@ -126,12 +133,13 @@ class LogTopics:
         self._add(name, group[0].period_ms, variables, publish)
 
     def _start_custom(self, block):
-        publisher = self._publisher(block.topic, GenericLogData)
+        publisher = self._publisher(block.topic_name, GenericLogData)
 
         def publish(stamp, values):
             publisher.publish(telemetry.generic(self._header(stamp, False), values))
 
-        self._add(block.topic, block.period_ms, block.variables, publish)
+        # The field is called frequency, and is a period.
+        self._add(block.topic_name, block.frequency, tuple(block.variables), publish)
 
     def _add(self, name, period_ms, variables, receive):
         handle = self._handle
@@ -139,16 +147,16 @@ class LogTopics:
         def hand_over(time_ms, values):
             handle.submit(receive, self._stamp(time_ms), values)
 
-        self._vehicle.add_log_block(LogBlock(name, period_ms, variables, hand_over))
+        self._crazyflie.add_log_block(LogBlock(name, period_ms, variables, hand_over))
 
     def _publisher(self, name, message_type):
-        return self._handle.publisher(f"{self._options.prefix}/{name}", message_type)
+        return self._handle.publisher(f"{self._parameters.prefix}/{name}", message_type)
 
     def _stamp(self, time_ms):
-        if self._options.use_ros_time:
+        if self._parameters.use_ros_time:
             return self._handle.stamp()
         return genpy.Time(*divmod(time_ms * 1_000_000, 1_000_000_000))
 
     def _header(self, stamp, in_world):
-        frame = self._fixed_frame if in_world else f"{self._options.name}/base_link"
+        frame = self._fixed_frame if in_world else f"{self._parameters.tf_prefix}/base_link"
         return Header(stamp=stamp, frame_id=frame)

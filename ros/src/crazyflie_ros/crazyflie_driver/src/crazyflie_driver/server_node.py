@@ -1,20 +1,22 @@
 """The driver: a server that vehicles are added to and removed from."""
 
 from concurrent.futures import Future, wait
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Header
+from typing_extensions import override
 
-from crazyflie_driver.options import VehicleOptions
 from crazyflie_driver.srv import (
     AddCrazyflie,
     AddCrazyflieResponse,
     RemoveCrazyflie,
     RemoveCrazyflieResponse,
 )
-from crazyflie_driver.vehicle import Vehicle
+from crazyflie_driver.vehicle import DriverVehicle
+from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_py.errors import CrazyflieError
-from crazyflie_utils import Node, ServiceError
+from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameter_types import FRAME
 
 ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"
@@ -25,21 +27,27 @@ _LEAVE_LIMIT = 1.5
 """How long, in s, the end of the server waits for its vehicles to be stopped."""
 
 
+class CrazyflieServerParameters(Parameters):
+    """Parameters of `CrazyflieServerNode`."""
+
+    fixed_frame: str = parameter(
+        FRAME, "frame of the pose that vehicles estimate", "world", "frames/fixed"
+    )
+
+
 class CrazyflieServerNode(Node):
     """Connect to vehicles side by side, and serve each until it is removed."""
 
-    def __init__(self):
-        super().__init__()
-        self._fixed_frame = None
-        self._diagnostics = None
-        self._vehicles = {}
+    def __init__(self) -> None:
+        # By URI.
+        self._vehicles: dict[str, DriverVehicle] = {}
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._fixed_frame = handle.param("frames/fixed", FRAME, "world")
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(CrazyflieServerParameters)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         handle.advertise_service(ADD, AddCrazyflie, self._on_add)
         handle.advertise_service(REMOVE, RemoveCrazyflie, self._on_remove)
@@ -50,21 +58,21 @@ class CrazyflieServerNode(Node):
         wait([vehicle.leave() for vehicle in self._vehicles.values()], _LEAVE_LIMIT)
 
     def _on_add(self, request):
-        options = VehicleOptions.from_request(request)
-        for other in self._vehicles.values():
-            if other.options.uri == options.uri:
-                raise ServiceError(f"{options.uri} has been added already, as {other.options.name}")
-            if other.options.prefix == options.prefix:
+        wanted = VehicleParameters.from_request(request)
+        for other in (vehicle.parameters for vehicle in self._vehicles.values()):
+            if other.uri == wanted.uri:
+                raise ServiceError(f"{other.uri} has been added already, as {other.tf_prefix}")
+            if other.tf_prefix == wanted.tf_prefix:
                 raise ServiceError(
-                    f"tf_prefix {options.name} is in use by {other.options.uri}; choose another"
+                    f"tf_prefix {other.tf_prefix} is in use by {other.uri}; choose another"
                 )
         try:
-            vehicle = Vehicle(self._handle, options, self._fixed_frame)
+            vehicle = DriverVehicle(self._handle, wanted, self._parameters.fixed_frame)
         except CrazyflieError as error:
-            self._handle.error(f"{options.name}: {error}")
+            self._handle.error(f"{wanted.tf_prefix}: {error}")
             raise ServiceError(str(error)) from None
-        self._vehicles[options.uri] = vehicle
-        self._handle.info(f"{options.name}: connecting to {options.uri}")
+        self._vehicles[wanted.uri] = vehicle
+        self._handle.info(f"{wanted.tf_prefix}: connecting to {wanted.uri}")
         return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
 
     def _finish_adding(self, vehicle, error):
@@ -83,18 +91,18 @@ class CrazyflieServerNode(Node):
 
     def _finish_removing(self, vehicle, error):
         self._forget(vehicle)
-        self._handle.info(f"{vehicle.options.name}: removed")
+        self._handle.info(f"{vehicle.parameters.tf_prefix}: removed")
         return RemoveCrazyflieResponse()
 
-    def _forget(self, vehicle):
-        if self._vehicles.get(vehicle.options.uri) is vehicle:
-            del self._vehicles[vehicle.options.uri]
+    def _forget(self, vehicle: DriverVehicle) -> None:
+        if self._vehicles.get(vehicle.parameters.uri) is vehicle:
+            del self._vehicles[vehicle.parameters.uri]
 
     def _when_done(self, done, finish, vehicle):
         # ``finish`` runs in its turn with the other callbacks, before the answer goes out.
-        answer = Future()
+        answer: Future[Any] = Future()
 
-        def settle():
+        def finish_answer():
             error = done.exception()
             response = finish(vehicle, error)
             if error is None:
@@ -102,7 +110,7 @@ class CrazyflieServerNode(Node):
             else:
                 answer.set_exception(error)
 
-        done.add_done_callback(lambda _: self._handle.submit(settle))
+        done.add_done_callback(lambda _: self._handle.submit(finish_answer))
         return answer
 
     def _publish_diagnostics(self):
@@ -113,7 +121,7 @@ class CrazyflieServerNode(Node):
                 header=Header(stamp=self._handle.stamp()),
                 status=[
                     vehicle.status(now).message(
-                        f"{component}: {vehicle.options.name}", vehicle.options.uri
+                        f"{component}: {vehicle.parameters.tf_prefix}", vehicle.parameters.uri
                     )
                     for vehicle in self._vehicles.values()
                 ],

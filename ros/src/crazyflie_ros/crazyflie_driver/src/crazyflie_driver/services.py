@@ -13,7 +13,7 @@ from crazyflie_py.errors import CrazyflieError
 from crazyflie_utils import NodeHandle, ServiceError
 
 if TYPE_CHECKING:
-    from crazyflie_driver.vehicle import Vehicle
+    from crazyflie_driver.vehicle import DriverVehicle
 
 
 class VehicleServices:
@@ -24,14 +24,14 @@ class VehicleServices:
     Parameters
     ----------
     handle : NodeHandle
-    vehicle : Vehicle
+    vehicle : DriverVehicle
 
     Attributes
     ----------
     are_advertised : bool
     """
 
-    def __init__(self, handle: NodeHandle, vehicle: Vehicle):
+    def __init__(self, handle: NodeHandle, vehicle: DriverVehicle):
         self.are_advertised = False
         self._handle = handle
         self._vehicle = vehicle
@@ -53,11 +53,11 @@ class VehicleServices:
             ("notify_setpoints_stop", srv.NotifySetpointsStop, self._notify_setpoints_stop),
             ("send_packet", srv.sendPacket, self._send_packet),
         ]
-        if vehicle.link.address.is_radio:
+        if vehicle.crazyflie.address.is_radio:
             offered.append(("reboot", Empty, self._reboot))
         for name, service_type, callback in offered:
             self._handle.advertise_service(
-                f"{vehicle.options.prefix}/{name}", service_type, callback
+                f"{vehicle.parameters.prefix}/{name}", service_type, callback
             )
         self.are_advertised = True
 
@@ -68,9 +68,9 @@ class VehicleServices:
             self._vehicle.stop_in_emergency()
         except CrazyflieError as error:
             text = f"emergency stop not sent, it will be once the link is back: {error}"
-            self._handle.error(f"{self._vehicle.options.name}: {text}")
+            self._handle.error(f"{self._vehicle.parameters.tf_prefix}: {text}")
             raise ServiceError(text) from None
-        self._handle.error(f"{self._vehicle.options.name}: emergency stop")
+        self._handle.error(f"{self._vehicle.parameters.tf_prefix}: emergency stop")
         return EmptyResponse()
 
     def _notify_setpoints_stop(self, request):
@@ -83,7 +83,7 @@ class VehicleServices:
         if packet.size > len(data):
             raise ServiceError(f"size is {packet.size}; a packet has at most {len(data)} bytes")
         self._at_once(
-            lambda: self._vehicle.link.send_packet(
+            lambda: self._vehicle.crazyflie.send_packet(
                 packet.header >> 4, packet.header & 3, data[: packet.size]
             )
         )
@@ -105,7 +105,7 @@ class VehicleServices:
             try:
                 if request.data:
                     vehicle.refuse_in_emergency()
-                vehicle.link.supervisor.arm(request.data)
+                vehicle.crazyflie.supervisor.arm(request.data)
             except (CrazyflieError, ServiceError) as error:
                 return SetBoolResponse(False, str(error))
             return SetBoolResponse(True, "armed" if request.data else "disarmed")
@@ -121,14 +121,14 @@ class VehicleServices:
 
     def _reboot(self, _):
         def work():
-            self._vehicle.link.reboot()
+            self._vehicle.crazyflie.reboot()
             return EmptyResponse()
 
         return self._vehicle.do("reboot", work)
 
     def _set_group_mask(self, request):
         def work():
-            self._vehicle.link.high_level.set_group_mask(request.groupMask)
+            self._vehicle.crazyflie.high_level.set_group_mask(request.groupMask)
             return srv.SetGroupMaskResponse()
 
         return self._vehicle.do("set_group_mask", work)
@@ -142,7 +142,7 @@ class VehicleServices:
         ]
 
         def work():
-            self._vehicle.link.trajectories.upload(
+            self._vehicle.crazyflie.trajectories.upload(
                 request.trajectoryId, request.pieceOffset, pieces
             )
             return srv.UploadTrajectoryResponse()

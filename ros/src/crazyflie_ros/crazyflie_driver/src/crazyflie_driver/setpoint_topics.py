@@ -7,7 +7,7 @@ from std_msgs.msg import Empty
 
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
-from crazyflie_driver.options import VehicleOptions
+from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie
@@ -27,8 +27,8 @@ class SetpointTopics:
     Parameters
     ----------
     handle : NodeHandle
-    options : VehicleOptions
-    vehicle : crazyflie_py.Crazyflie
+    parameters : VehicleParameters
+    crazyflie : crazyflie_py.Crazyflie
     log : LogTopics
         Knows whether the vehicle is armed.
 
@@ -43,21 +43,25 @@ class SetpointTopics:
     """
 
     def __init__(
-        self, handle: NodeHandle, options: VehicleOptions, vehicle: Crazyflie, log: LogTopics
+        self,
+        handle: NodeHandle,
+        parameters: VehicleParameters,
+        crazyflie: Crazyflie,
+        log: LogTopics,
     ):
         self.is_blocked = False
         self.is_streaming = False
         self.ignored = 0
         self._handle = handle
-        self._options = options
-        self._vehicle = vehicle
+        self._parameters = parameters
+        self._crazyflie = crazyflie
         self._log = log
         self._times: deque[float] = deque(maxlen=1000)
         self._high_level_end: float | None = None
 
     def subscribe(self) -> None:
         """Begin to listen."""
-        setpoints = self._vehicle.setpoints
+        setpoints = self._crazyflie.setpoints
         for name, message_type, send in (
             ("cmd_vel", Twist, self._cmd_vel),
             ("cmd_full_state", FullState, self._full_state),
@@ -80,14 +84,14 @@ class SetpointTopics:
     def zeros(self) -> None:
         """Send zero thrust a hundred times; blocks.
 
-        They, too, keep the vehicle from hearing high-level commands.
+        They, too, keep the vehicle from accepting high-level commands.
         """
         self.is_streaming = True
-        self._vehicle.setpoints.zeros()
+        self._crazyflie.setpoints.zeros()
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
-        """Tell the vehicle that setpoints stop, so that it hears high-level commands."""
-        self._vehicle.setpoints.hand_over(remain_valid_ms)
+        """Announce that setpoints end, so that the vehicle accepts high-level commands."""
+        self._crazyflie.setpoints.hand_over(remain_valid_ms)
         self.is_streaming = False
 
     def high_level_until(self, moment: float) -> None:
@@ -95,7 +99,7 @@ class SetpointTopics:
         self._high_level_end = moment
 
     def _subscribe(self, name, message_type, callback):
-        self._handle.subscribe(f"{self._options.prefix}/{name}", message_type, callback)
+        self._handle.subscribe(f"{self._parameters.prefix}/{name}", message_type, callback)
 
     def _guarded(self, name, send):
         def callback(message):
@@ -128,7 +132,7 @@ class SetpointTopics:
         return callback
 
     def _warn(self, text, key):
-        name = self._options.name
+        name = self._parameters.tf_prefix
         self._handle.warn(f"{name}: {text}", throttle=_THROTTLE, key=(name, key))
 
     # One message each. Signs: the link's pitch is the negative of cmd_vel's, and
@@ -142,17 +146,17 @@ class SetpointTopics:
             if state & (SupervisorState.LOCKED | SupervisorState.CRASHED):
                 self._warn(f"cannot fly ({state.words()}): restart the vehicle", key="locked")
             elif SupervisorState.ARMED not in state:
-                self._warn(f"not armed, call {self._options.prefix}/arm", key="armed")
-        self._vehicle.setpoints.attitude(
-            message.linear.y + self._options.roll_trim,
-            message.linear.x + self._options.pitch_trim,
+                self._warn(f"not armed, call {self._parameters.prefix}/arm", key="armed")
+        self._crazyflie.setpoints.attitude(
+            message.linear.y + self._parameters.roll_trim,
+            message.linear.x + self._parameters.pitch_trim,
             message.angular.z,
             thrust,
         )
 
     def _full_state(self, message):
         orientation, rates = message.pose.orientation, message.twist.angular
-        self._vehicle.setpoints.full_state(
+        self._crazyflie.setpoints.full_state(
             _xyz(message.pose.position),
             _xyz(message.twist.linear),
             _xyz(message.acc),
@@ -161,20 +165,20 @@ class SetpointTopics:
         )
 
     def _velocity_world(self, message):
-        self._vehicle.setpoints.velocity_world(*_xyz(message.vel), message.yawRate)
+        self._crazyflie.setpoints.velocity_world(*_xyz(message.vel), message.yawRate)
 
     def _hover(self, message):
-        self._vehicle.setpoints.hover(message.vx, message.vy, message.yawrate, message.zDistance)
+        self._crazyflie.setpoints.hover(message.vx, message.vy, message.yawrate, message.zDistance)
 
     def _position(self, message):
-        self._vehicle.setpoints.position(message.x, message.y, message.z, message.yaw)
+        self._crazyflie.setpoints.position(message.x, message.y, message.z, message.yaw)
 
     def _external_position(self, message):
-        self._vehicle.localization.position(*_xyz(message.point))
+        self._crazyflie.localization.position(*_xyz(message.point))
 
     def _external_pose(self, message):
         orientation = message.pose.orientation
-        self._vehicle.localization.pose(
+        self._crazyflie.localization.pose(
             _xyz(message.pose.position),
             (orientation.x, orientation.y, orientation.z, orientation.w),
         )

@@ -1,4 +1,4 @@
-"""The state of a vehicle and its link, judged for an operator."""
+"""The state of a vehicle and its link, as diagnostics."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,8 @@ LOW_VOLTAGE, CRITICAL_VOLTAGE = 3.2, 3.0
 LOW_QUALITY = 0.8
 """Share of answered pings below which the link is poor."""
 
-_NOT_FLYABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
+NOT_FLYABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
+"""States in which a vehicle cannot take off."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +65,8 @@ class Status:
             found.append((error, self.text))
         elif self.link is LinkState.CONNECTING:
             found.append((warn, self.text))
-        if self.supervisor is not None and self.supervisor & _NOT_FLYABLE:
-            found.append((error, f"cannot fly: {(self.supervisor & _NOT_FLYABLE).words()}"))
+        if self.supervisor is not None and self.supervisor & NOT_FLYABLE:
+            found.append((error, f"cannot fly: {(self.supervisor & NOT_FLYABLE).words()}"))
         if self.voltage is not None and self.voltage < CRITICAL_VOLTAGE:
             found.append((error, f"battery critical: {self.voltage:.2f} V"))
         elif self.voltage is not None and self.voltage < LOW_VOLTAGE:

@@ -20,8 +20,7 @@ TESLA = 1e-4
 """Tesla in a gauss, in which the firmware measures the magnetic field."""
 
 _UNKNOWN = -1.0
-"""First element of a covariance that says: there is no such measurement
-(sensor_msgs/Imu)."""
+"""First element of a covariance: there is no such measurement (sensor_msgs/Imu)."""
 
 
 class StandardTopic(NamedTuple):

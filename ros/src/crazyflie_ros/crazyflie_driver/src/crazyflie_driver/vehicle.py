@@ -1,16 +1,16 @@
-"""One vehicle of the server: its link, its topics and services, from adding to removing."""
+"""One vehicle of the server: its link, topics and services, from adding to removing."""
 
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TypeVar
 
-from crazyflie_driver.firmware_parameters import FirmwareParameters
 from crazyflie_driver.log_topics import LogTopics
-from crazyflie_driver.options import VehicleOptions
+from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_driver.status import Status
+from crazyflie_driver.status import NOT_FLYABLE, Status
+from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_driver.worker import Worker
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
@@ -18,13 +18,10 @@ from crazyflie_py.errors import CrazyflieError
 from crazyflie_py.high_level import HighLevel
 from crazyflie_utils import NodeHandle, ServiceError
 
-_UNABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
-
-
 Result = TypeVar("Result")
 
 
-class Vehicle:
+class DriverVehicle:
     """A vehicle that is being connected, is connected, or has lost its link.
 
     What takes time is done by the vehicle's own worker, so that no vehicle waits for
@@ -33,9 +30,18 @@ class Vehicle:
     Parameters
     ----------
     handle : NodeHandle
-        Of the server; the vehicle takes a part of it.
-    options : VehicleOptions
+        Of the server.
+    parameters : VehicleParameters
+        How to connect it.
     fixed_frame : str
+        Frame of the pose.
+
+    Attributes
+    ----------
+    crazyflie : crazyflie_py.Crazyflie
+        The vehicle at the other end of the link.
+    is_leaving : bool
+        Whether the vehicle is being removed.
 
     Raises
     ------
@@ -43,25 +49,25 @@ class Vehicle:
         The address is malformed.
     """
 
-    def __init__(self, handle: NodeHandle, options: VehicleOptions, fixed_frame: str):
-        self.options = options
+    def __init__(self, handle: NodeHandle, parameters: VehicleParameters, fixed_frame: str):
+        self.parameters = parameters
         self._handle = handle.child()
         self._server = handle
-        self._link_text = f"connecting to {options.uri}"
+        self._link_text = f"connecting to {parameters.uri}"
         self._is_emergency = False
         self.is_leaving = False
-        self.link = Crazyflie(
-            options.uri,
+        self.crazyflie = Crazyflie(
+            parameters.uri,
             reconnect=True,
-            on_state=self._hear_state,
-            on_console=lambda line: self._handle.info(f"{options.name}: {line}"),
+            on_state=self._on_link_state,
+            on_console=lambda line: self._handle.info(f"{parameters.tf_prefix}: {line}"),
             on_packet=self._on_packet,
         )
-        self._worker = Worker(options.name)
+        self._worker = Worker(parameters.tf_prefix)
         self._announcing = threading.Lock()
-        self._log = LogTopics(self._handle, options, self.link, fixed_frame)
-        self._setpoints = SetpointTopics(self._handle, options, self.link, self._log)
-        self._parameters = FirmwareParameters(self._handle, options.prefix, self.link)
+        self._log = LogTopics(self._handle, parameters, self.crazyflie, fixed_frame)
+        self._setpoints = SetpointTopics(self._handle, parameters, self.crazyflie, self._log)
+        self._mirror = ParameterMirror(self._handle, parameters.prefix, self.crazyflie)
         self._services = VehicleServices(self._handle, self)
 
     # Life.
@@ -81,9 +87,9 @@ class Vehicle:
         """
         self.is_leaving = True
         self._setpoints.is_blocked = True
-        farewell = Worker(f"{self.options.name}-farewell")
-        done = farewell.submit(self._leave)
-        farewell.close()
+        worker = Worker(f"{self.parameters.tf_prefix}-leave")
+        done = worker.submit(self._leave)
+        worker.close()
         return done
 
     def do(self, what: str, work: Callable[[], Result]) -> Future[Result]:
@@ -96,20 +102,20 @@ class Vehicle:
             try:
                 return work()
             except (CrazyflieError, ServiceError) as error:
-                self._server.error(f"{self.options.name}: {what} failed: {error}")
+                self._server.error(f"{self.parameters.tf_prefix}: {what} failed: {error}")
                 raise ServiceError(str(error)) from None
 
         return self._worker.submit(job)
 
     def _connect(self):
         try:
-            self.link.connect()
+            self.crazyflie.connect()
             with self._announcing:
                 if self.is_leaving:
                     raise ServiceError("removed while connecting")
                 self._log.start()
-                if self.options.enable_parameters:
-                    self._parameters.publish()
+                if self.parameters.enable_parameters:
+                    self._mirror.publish()
                 self._open_thrust_lock(is_new=True)
                 self._services.advertise()
                 self._setpoints.subscribe()
@@ -117,19 +123,19 @@ class Vehicle:
             self.is_leaving = True
             self._end()
             raise
-        self._server.info(f"{self.options.name}: connected to {self.options.uri}")
+        self._server.info(f"{self.parameters.tf_prefix}: connected to {self.parameters.uri}")
 
     def _leave(self):
         try:
-            if self.link.state is LinkState.CONNECTED:
+            if self.crazyflie.state is LinkState.CONNECTED:
                 self._setpoints.zeros()
         except CrazyflieError as error:
-            self._server.warn(f"{self.options.name}: cannot stop the motors: {error}")
+            self._server.warn(f"{self.parameters.tf_prefix}: cannot stop the motors: {error}")
         self._end()
 
     def _end(self):
-        # First the link, so that whoever waits for an answer lets go.
-        self.link.close()
+        # First the link: that ends the wait for answers in `_connect`.
+        self.crazyflie.close()
         with self._announcing:
             self._handle.close()
         self._worker.close()
@@ -137,12 +143,12 @@ class Vehicle:
     def _open_thrust_lock(self, is_new):
         # Zero thrust would take a vehicle out of the air that flies by itself,
         # or that was flying when the link was lost.
-        state = self.link.supervisor.read()
+        state = self.crazyflie.supervisor.read()
         is_flying = not is_new if state is None else SupervisorState.FLYING in state
         if is_flying:
             self._server.warn(
-                f"{self.options.name}: the vehicle may be flying: its thrust stays locked until a "
-                "setpoint of zero thrust comes"
+                f"{self.parameters.tf_prefix}: the vehicle may be flying: its thrust stays locked "
+                "until a setpoint of zero thrust comes"
             )
         else:
             self._setpoints.zeros()
@@ -164,10 +170,10 @@ class Vehicle:
         """
         self._is_emergency = True
         self._setpoints.is_blocked = True
-        self.link.supervisor.emergency_stop()
+        self.crazyflie.supervisor.emergency_stop()
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
-        """Tell the vehicle that setpoints stop; does not block."""
+        """Announce to the vehicle that setpoints end; does not block."""
         self._setpoints.hand_over(remain_valid_ms)
 
     def command(
@@ -188,7 +194,7 @@ class Vehicle:
             self.refuse_in_emergency()
             if self._setpoints.is_streaming:
                 self._setpoints.hand_over()
-            response = send(self.link.high_level)
+            response = send(self.crazyflie.high_level)
             self._setpoints.high_level_until(self._handle.time() + duration)
             return response
 
@@ -204,23 +210,24 @@ class Vehicle:
         CrazyflieError
             It refuses, or does not reply.
         """
-        state = self.link.supervisor.read()
+        state = self.crazyflie.supervisor.read()
         if state is None:
             return
-        if state & _UNABLE:
+        if state & NOT_FLYABLE:
             raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
         if SupervisorState.ARMED not in state:
-            self.link.supervisor.arm()
+            self.crazyflie.supervisor.arm()
 
     def write_parameters(self, names: list[str]) -> None:
         """Write ROS parameters GROUP/NAME to the firmware; blocks."""
-        self._parameters.write(names)
+        self._mirror.write(names)
 
     def refuse_in_emergency(self) -> None:
         """Raise `ServiceError` after an emergency stop."""
         if self._is_emergency:
             raise ServiceError(
-                f"emergency stop: remove {self.options.uri}, restart the vehicle and add it again"
+                f"emergency stop: remove {self.parameters.uri}, restart the vehicle and add it "
+                "again"
             )
 
     # What comes from the vehicle.
@@ -230,15 +237,15 @@ class Vehicle:
         figures = {}
         try:
             figures = {
-                "quality": self.link.quality(),
-                "latency": self.link.latency(),
-                "age": self.link.age(),
+                "quality": self.crazyflie.quality(),
+                "latency": self.crazyflie.latency(),
+                "age": self.crazyflie.age(),
             }
         except CrazyflieError:
             # Without a link there are none.
             pass
         return Status(
-            self.link.state,
+            self.crazyflie.state,
             self._link_text,
             self._is_emergency,
             voltage=self._log.voltage,
@@ -249,28 +256,28 @@ class Vehicle:
             **figures,
         )
 
-    def _hear_state(self, state, text):
-        # From the link's own thread. At the end nobody must wait for the callbacks'
+    def _on_link_state(self, state, text):
+        # From the link's own thread. At the end nothing may wait for the callbacks'
         # turn, since the node waits for the end.
         self._link_text = text
         if not self.is_leaving:
-            self._handle.submit(self._on_state, state, text)
+            self._handle.submit(self._report_state, state, text)
 
-    def _on_state(self, state, text):
+    def _report_state(self, state, text):
         if state is LinkState.LOST:
-            self._handle.error(f"{self.options.name}: {text}; trying to connect again")
+            self._handle.error(f"{self.parameters.tf_prefix}: {text}; trying to connect again")
         elif state is LinkState.CONNECTED and self._services.are_advertised:
-            self._handle.warn(f"{self.options.name}: {text}")
+            self._handle.warn(f"{self.parameters.tf_prefix}: {text}")
             self.do("taking up the link again", self._resume)
 
     def _resume(self):
         if self._is_emergency:
-            self.link.supervisor.emergency_stop()
+            self.crazyflie.supervisor.emergency_stop()
             return
-        if self.options.enable_parameters:
-            self._parameters.publish()
+        if self.parameters.enable_parameters:
+            self._mirror.publish()
         self._open_thrust_lock(is_new=False)
 
     def _on_packet(self, port, channel, data):
         if not self.is_leaving:
-            self._log.hear_packet(port, channel, data)
+            self._log.publish_packet(port, channel, data)

@@ -1,4 +1,4 @@
-"""cflib's Crazyflie, with the edges taken off that a process with many vehicles cuts itself on.
+"""cflib's Crazyflie, safe to use from many threads and for many vehicles in one process.
 
 cflib is licensed under the GPL, version 3; nothing of it is copied here.
 """
@@ -82,7 +82,7 @@ class Backend(CflibCrazyflie):
         self.link_established.add_callback(self._tune_udp)
 
     def ask_for_source(self) -> None:
-        """Send the first question of the set-up again: nobody else does."""
+        """Send the first request of the set-up again: cflib does not."""
         self.send_packet(packet(CRTPPort.LINKCTRL, _LINK_SOURCE_CHANNEL, b"\0"))
 
     def send_packet(
@@ -95,7 +95,7 @@ class Backend(CflibCrazyflie):
         """Send a packet; never raises.
 
         An error in a driver, or a link that is closed meanwhile, would leave cflib's
-        lock taken, and everybody who sends later would wait for ever.
+        lock taken, and every later call would wait for ever.
         """
         try:
             super().send_packet(pk, expected_reply, resend, timeout)
@@ -130,7 +130,7 @@ class Backend(CflibCrazyflie):
         self._on_error(errmsg)
 
     def _platform_info_fetched(self):
-        # Where the first question is sent twice, its answer may come twice.
+        # Where the first request is sent twice, its answer may come twice.
         if not self._setup_begun:
             self._setup_begun = True
             super()._platform_info_fetched()

@@ -18,7 +18,7 @@ class Console:
         self._decoder = codecs.getincrementaldecoder("utf-8")(errors="replace")
         self._line = ""
 
-    def hear(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
         """Take a piece; a character may begin in one and end in the next."""
         *lines, self._line = (self._line + self._decoder.decode(data)).split("\n")
         for line in lines:

@@ -5,7 +5,6 @@ import threading
 import time
 from collections.abc import Callable
 
-from cflib.crazyflie.log import LogConfig
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_py.address import Address
@@ -16,7 +15,7 @@ from crazyflie_py.high_level import HighLevel
 from crazyflie_py.link import Limits, Link, OnPacket
 from crazyflie_py.localization import Localization
 from crazyflie_py.log import Log, LogBlock
-from crazyflie_py.parameters import Parameters
+from crazyflie_py.parameters import FirmwareParameters
 from crazyflie_py.reboot import reboot
 from crazyflie_py.setpoints import Setpoints
 from crazyflie_py.supervisor import Supervisor
@@ -45,7 +44,7 @@ class Crazyflie:
     """A vehicle: connect, use, close; or use it in a ``with`` statement.
 
     The first `connect` succeeds or raises. After that the link is watched: when
-    the vehicle has not been heard for 0.5 s it is lost, and, if so wished, tried
+    no sign of life has come for 0.5 s it is lost, and, with ``reconnect``, tried
     again with growing pauses until `close`; its log blocks are started anew.
 
     All callbacks come from threads of this object or of cflib, and must be quick.
@@ -92,9 +91,9 @@ class Crazyflie:
         self.address = Address.parse(uri)
         self.setpoints = Setpoints(self.link)
         self.high_level = HighLevel(self.link)
-        self.trajectories = Trajectories(self.link, self.high_level)
+        self.trajectories = Trajectories(self.link)
         self.localization = Localization(self.link)
-        self.parameters = Parameters(self.link)
+        self.parameters = FirmwareParameters(self.link)
         self.log = Log(self.link)
         self.supervisor = Supervisor(self.link)
         self._reconnect = reconnect
@@ -105,7 +104,7 @@ class Crazyflie:
         self._link: Link | None = None
         self._state = LinkState.DISCONNECTED
         self._reason = "not connected yet"
-        self._blocks: dict[LogBlock, LogConfig] = {}
+        self._blocks: list[LogBlock] = []
         self._blocks_lock = threading.Lock()
         self._closed = threading.Event()
         self._watcher: threading.Thread | None = None
@@ -169,16 +168,9 @@ class Crazyflie:
         CrazyflieError
             The block is not possible.
         """
-        config = self.log.start(block)
+        self.log.start(block)
         with self._blocks_lock:
-            self._blocks[block] = config
-
-    def remove_log_block(self, block: LogBlock) -> None:
-        """Have the vehicle no longer send a block."""
-        with self._blocks_lock:
-            config = self._blocks.pop(block, None)
-        if config is not None:
-            self.log.stop(config)
+            self._blocks.append(block)
 
     def send_packet(self, port: int, channel: int, data: bytes) -> None:
         """Send a CRTP packet of one's own, with at most 30 bytes of data."""
@@ -198,7 +190,7 @@ class Crazyflie:
         return self._rssi
 
     def age(self) -> float:
-        """Return how long ago the vehicle was heard, s."""
+        """Return the age of the last sign of life, s."""
         return self.link().liveness.age(time.monotonic())
 
     def reboot(self) -> None:
@@ -229,8 +221,8 @@ class Crazyflie:
 
     def _open_link(self):
         cache = table_cache() if self._cache is None else self._cache
-        link = Link(self.address, self._limits, cache, self._hear)
-        link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._note_rssi)
+        link = Link(self.address, self._limits, cache, self._on_received)
+        link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._on_rssi)
         self._opening = link
         try:
             link.open()
@@ -253,7 +245,7 @@ class Crazyflie:
             error = link.error if link is not None else LinkLostError(self._reason)
             if error is None:
                 continue
-            # First say it: to close the link takes a moment.
+            # First announce it: to close the link takes a moment.
             self._link = None
             if self._closed.is_set():
                 return
@@ -271,7 +263,7 @@ class Crazyflie:
                 self._open_link()
                 with self._blocks_lock:
                     for block in self._blocks:
-                        self._blocks[block] = self.log.start(block)
+                        self.log.start(block)
             except CrazyflieError as error:
                 self._drop(str(error))
                 if not self._closed.is_set():
@@ -292,11 +284,11 @@ class Crazyflie:
 
     # What arrives, in cflib's thread.
 
-    def _hear(self, port, channel, data):
+    def _on_received(self, port, channel, data):
         if port == CRTPPort.CONSOLE and channel == 0 and self._console is not None:
-            self._console.hear(data)
+            self._console.receive(data)
         if self._on_packet is not None:
             self._on_packet(port, channel, data)
 
-    def _note_rssi(self, rssi):
+    def _on_rssi(self, rssi):
         self._rssi = rssi

@@ -16,7 +16,7 @@ class NoDongleError(CrazyflieError):
 
 
 class NoAnswerError(CrazyflieError):
-    """Nobody answers at the address."""
+    """No answer comes from the address."""
 
 
 class SetupError(CrazyflieError):
@@ -115,22 +115,22 @@ def explain(uri: str, text: str) -> CrazyflieError:
         With the address and the cause; not raised.
     """
     lower = text.lower()
-    for patterns, kind, advice in _CAUSES:
+    for patterns, error_type, advice in _CAUSES:
         if any(pattern in lower for pattern in patterns):
-            return kind(f"{uri}: {advice}")
+            return error_type(f"{uri}: {advice}")
     first_line = next(
         (line.strip() for line in text.splitlines() if line.strip()), "no reason given"
     )
     return NoAnswerError(f"{uri}: {first_line}")
 
 
-def unknown_name(kind: str, name: str, known: list[str]) -> UnknownNameError:
-    """Return the error for a name the vehicle does not know, with the names that are near it."""
+def unknown_name(what: str, name: str, known: list[str]) -> UnknownNameError:
+    """Return the error for a name that is not in a table, with the names that are near it."""
     near = [other for other in known if other.lower() == name.lower()]
     near = near or difflib.get_close_matches(name, known, n=3, cutoff=0.6)
     group = [other for other in known if other.split(".")[0] == name.split(".")[0]]
     hint = near or group[:3]
     suggestion = f"; did you mean {' or '.join(hint)}?" if hint else ""
     return UnknownNameError(
-        f"the vehicle has no {kind} {name!r} among its {len(known)}{suggestion}"
+        f"the vehicle has no {what} {name!r} among its {len(known)}{suggestion}"
     )

@@ -1,4 +1,4 @@
-"""Questions to the vehicle and its answers, with a time limit.
+"""Requests to the vehicle and its answers, with a time limit.
 
 CRTP has no request numbers: an answer is known by its port, its channel and its
 first bytes.
@@ -6,6 +6,7 @@ first bytes.
 
 import threading
 import time
+from dataclasses import dataclass
 
 from crazyflie_py.errors import LinkLostError, NoReplyError
 from crazyflie_py.outbox import Send
@@ -17,59 +18,65 @@ RESEND_PERIOD = 0.2
 """How long to wait before a request is sent again, s; as cflib does."""
 
 
+@dataclass(frozen=True)
+class Request:
+    """A request to the vehicle, and how its answer is recognised.
+
+    Attributes
+    ----------
+    port, channel : int
+        Where the answer comes from.
+    prefix : bytes
+        What the answer's data begin with.
+    what : str
+        For the error, such as "the takeoff command".
+    resend : bool
+        Whether the request may be sent again when no answer comes: not when
+        doing it twice is different from doing it once.
+    limit : float
+        How long to wait for the answer, s.
+    """
+
+    port: int
+    channel: int
+    prefix: bytes
+    what: str
+    resend: bool = True
+    limit: float = REPLY_LIMIT
+
+
 class _Waiter:
-    def __init__(self, port: int, channel: int, prefix: bytes):
-        self.key = (port, channel)
-        self.prefix = prefix
+    def __init__(self, request: Request):
+        self.request = request
         self.answer: bytes | None = None
         self.done = threading.Event()
 
+    def takes(self, port: int, channel: int, data: bytes) -> bool:
+        expected = self.request
+        is_same = (port, channel) == (expected.port, expected.channel)
+        return is_same and data.startswith(expected.prefix)
+
 
 class Exchange:
-    """Pair answers with the questions that wait for them."""
+    """Pair answers with the requests that wait for them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._waiters: list[_Waiter] = []
         self._closed: str | None = None
 
-    def hear(self, port: int, channel: int, data: bytes) -> None:
-        """Give a packet that arrived to whoever has waited for it longest."""
+    def receive(self, port: int, channel: int, data: bytes) -> None:
+        """Give a packet that arrived to the request that has waited for it longest."""
         with self._lock:
             for waiter in self._waiters:
-                if waiter.key == (port, channel) and data.startswith(waiter.prefix):
+                if waiter.takes(port, channel, data):
                     self._waiters.remove(waiter)
                     waiter.answer = data
                     waiter.done.set()
                     return
 
-    def ask(
-        self,
-        send: Send,
-        port: int,
-        channel: int,
-        prefix: bytes,
-        what: str,
-        resend: bool = True,
-        limit: float = REPLY_LIMIT,
-    ) -> bytes:
+    def ask(self, send: Send, request: Request) -> bytes:
         """Send a request and return the data of the answer; blocks.
-
-        Parameters
-        ----------
-        send : callable
-            Sends the request.
-        port, channel : int
-            Where the answer comes from.
-        prefix : bytes
-            What the answer's data begin with.
-        what : str
-            For the error, such as "the takeoff command".
-        resend : bool
-            Whether the request may be sent again when no answer comes: not when
-            doing it twice is different from doing it once.
-        limit : float
-            s.
 
         Raises
         ------
@@ -78,19 +85,20 @@ class Exchange:
         LinkLostError
             The link ended meanwhile.
         """
-        waiter = _Waiter(port, channel, prefix)
+        what = request.what
+        waiter = _Waiter(request)
         with self._lock:
             if self._closed is not None:
                 raise LinkLostError(f"{what}: {self._closed}")
             self._waiters.append(waiter)
-        deadline = time.monotonic() + limit
+        deadline = time.monotonic() + request.limit
         try:
             send()
-            while not waiter.done.wait(self._patience(deadline, resend)):
+            while not waiter.done.wait(self._wait_time(deadline, request.resend)):
                 if time.monotonic() >= deadline:
                     raise NoReplyError(
-                        f"{what}: the vehicle has not replied within {limit:g} s"
-                        + ("" if resend else "; it may or may not have been carried out")
+                        f"{what}: the vehicle has not replied within {request.limit:g} s"
+                        + ("" if request.resend else "; it may or may not have been carried out")
                     )
                 send()
         finally:
@@ -102,7 +110,7 @@ class Exchange:
         return waiter.answer
 
     def close(self, reason: str) -> None:
-        """Let everybody who waits, and who asks later, fail with `LinkLostError`."""
+        """Have all requests that wait, and later ones, fail with `LinkLostError`."""
         with self._lock:
             self._closed = reason
             waiters, self._waiters = self._waiters, []
@@ -110,6 +118,6 @@ class Exchange:
             waiter.done.set()
 
     @staticmethod
-    def _patience(deadline: float, resend: bool) -> float:
+    def _wait_time(deadline: float, resend: bool) -> float:
         left = max(0.0, deadline - time.monotonic())
         return min(RESEND_PERIOD, left) if resend else left

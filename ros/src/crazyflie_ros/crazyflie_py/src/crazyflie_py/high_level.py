@@ -8,7 +8,8 @@ from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_py.checks import check_byte, check_finite, check_positive
 from crazyflie_py.errors import RefusedError
-from crazyflie_py.link import CurrentLink
+from crazyflie_py.exchange import Request
+from crazyflie_py.subsystem import Subsystem
 
 ALL_GROUPS = 0
 """Group mask that every vehicle obeys."""
@@ -18,23 +19,15 @@ _GO_TO_2_PROTOCOL = 8
 _START_2_PROTOCOL = 10
 
 
-class HighLevel:
+class HighLevel(Subsystem):
     """High-level commands; each blocks until the vehicle has replied.
 
     All raise `CrazyflieError`: `RefusedError` with the vehicle's reason,
     `NoReplyError`, `LinkLostError`, or `ValueRangeError` before anything is sent.
-
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link`, or raises `LinkLostError`.
     """
 
-    def __init__(self, current_link: CurrentLink):
-        self._current_link = current_link
-
     def set_group_mask(self, group_mask: int) -> None:
-        """Say which groups (bits) the vehicle belongs to."""
+        """Set the groups (bits) that the vehicle belongs to."""
         check_byte("group mask", group_mask)
         self._command(
             "the group mask",
@@ -136,7 +129,7 @@ class HighLevel:
         )
 
     def define_trajectory(self, trajectory_id: int, offset: int, pieces: int) -> None:
-        """Say where in the trajectory memory (bytes) a trajectory of so many pieces is."""
+        """Define a trajectory: pieces in the trajectory memory, from an offset (bytes) on."""
         check_byte("trajectory number", trajectory_id)
         check_byte("number of pieces", pieces)
         self._command(
@@ -148,9 +141,8 @@ class HighLevel:
     def _command(self, what, number, send, resend=True):
         link = self._current_link()
         commander = link.cflib.high_level_commander
-        answer = link.ask(
-            lambda: send(commander), CRTPPort.SETPOINT_HL, 0, bytes([number]), what, resend
-        )
+        request = Request(CRTPPort.SETPOINT_HL, 0, bytes([number]), what, resend)
+        answer = link.ask(lambda: send(commander), request)
         # The first three bytes of the request, then the firmware's errno.
         code = answer[3] if len(answer) > 3 else 0
         if code:

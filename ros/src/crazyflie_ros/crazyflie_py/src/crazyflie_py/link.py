@@ -18,7 +18,7 @@ from crazyflie_py.errors import (
     ValueRangeError,
     explain,
 )
-from crazyflie_py.exchange import REPLY_LIMIT, Exchange
+from crazyflie_py.exchange import Exchange, Request
 from crazyflie_py.liveness import LOST_AFTER, Liveness
 from crazyflie_py.outbox import Outbox, Send
 from crazyflie_py.setup_progress import SetupProgress
@@ -97,8 +97,8 @@ class Link:
         self._exchange = Exchange()
         self._outbox = Outbox()
         self.cflib = backend(cache, self._fail)
-        self.cflib.packet_received.add_callback(self._hear)
-        self.cflib.packet_sent.add_callback(self._note_sent)
+        self.cflib.packet_received.add_callback(self._on_received)
+        self.cflib.packet_sent.add_callback(self._on_sent)
         self.cflib.connected.add_callback(self._on_connected)
         self.cflib.fully_connected.add_callback(self._on_complete)
         self.cflib.connection_failed.add_callback(lambda _, text: self._fail(text))
@@ -136,7 +136,7 @@ class Link:
 
     def _open_cflib(self):
         self.cflib.open_link(self.address.uri)
-        # Too late: nobody waits any more.
+        # `open` may have given up meanwhile.
         if self._is_closed:
             self.cflib.drop()
 
@@ -171,7 +171,7 @@ class Link:
         with self._changed:
             self._is_connected = True
             self._liveness = Liveness(time.monotonic(), self._limits.lost)
-            # Without a single parameter cflib never says that it is through.
+            # Without a single parameter cflib never reports that it is complete.
             if not self.cflib.param.toc.toc:
                 self._is_complete = True
             self._changed.notify_all()
@@ -231,36 +231,27 @@ class Link:
             )
         self.command(lambda: self.cflib.send_packet(packet(port, channel, data)))
 
-    def ask(
-        self,
-        send: Send | bytes,
-        port: int,
-        channel: int,
-        prefix: bytes,
-        what: str,
-        resend: bool = True,
-        limit: float = REPLY_LIMIT,
-    ) -> bytes:
+    def ask(self, send: Send | bytes, request: Request) -> bytes:
         """Send a request and return the data of its answer; see `Exchange.ask`.
 
         Parameters
         ----------
         send : callable or bytes
             Sends the request; or its data, for the same port and channel.
+        request : Request
+            What answer is expected.
         """
         if isinstance(send, bytes):
-            request = packet(port, channel, send)
-            transmit = lambda: self.cflib.send_packet(request)  # noqa: E731
+            data = packet(request.port, request.channel, send)
+            transmit = lambda: self.cflib.send_packet(data)  # noqa: E731
         else:
             transmit = send
-        return self._exchange.ask(
-            lambda: self.command(transmit), port, channel, prefix, what, resend, limit
-        )
+        return self._exchange.ask(lambda: self.command(transmit), request)
 
     # End.
 
     def close(self, reason: str = "the link was closed") -> None:
-        """End the connection, once; everybody who waits for an answer is told the reason."""
+        """End the connection, once; requests that wait fail with the reason."""
         with self._closing:
             if self._is_closed:
                 return
@@ -281,35 +272,31 @@ class Link:
                 self._error = cause
             self._changed.notify_all()
 
-    # cflib's receiver dies with an exception in here.
+    # An exception in here would end cflib's receiving thread.
 
-    def _hear(self, received):
+    def _on_received(self, received):
         port, channel, data = received.port, received.channel, bytes(received.data)
         now = time.monotonic()
         if not self._is_complete:
-            is_progress = self._progress.hear(port, channel, data)
+            is_progress = self._progress.receive(port, channel, data)
             if is_progress or not self._has_answered:
                 self._progress_time = now
             self._has_answered = True
         if self._liveness is not None:
             if (port, channel) == (CRTPPort.LOGGING, _LOG_DATA_CHANNEL):
-                self._liveness.heard(now)
+                self._liveness.received(now)
             elif (port, channel) == (CRTPPort.LINKCTRL, _PING_CHANNEL):
                 self._liveness.ping_answered(data, now)
-        self._exchange.hear(port, channel, data)
+        self._exchange.receive(port, channel, data)
         if self._on_packet is not None:
             try:
                 self._on_packet(port, channel, data)
             except Exception:
                 _log.exception("the callback for packets failed")
 
-    def _note_sent(self, sent):
+    def _on_sent(self, sent):
         if self._liveness is not None and (sent.port, sent.channel) == (
             CRTPPort.LINKCTRL,
             _PING_CHANNEL,
         ):
             self._liveness.ping_sent(bytes(sent.data))
-
-
-CurrentLink = Callable[[], Link]
-"""Returns the living link, or raises `LinkLostError`."""

@@ -1,4 +1,4 @@
-"""Is the vehicle still there? Its own words are the only witness.
+"""Whether the vehicle is still there, which only its own packets show.
 
 cflib never notices a vehicle that is frozen: a UDP socket stays open, and a
 radio's acknowledgements come from a second processor. So a link counts as lost
@@ -30,32 +30,32 @@ class Liveness:
 
     def __init__(self, now: float, limit: float = LOST_AFTER):
         self._limit = limit
-        self._heard = now
+        self._received = now
         self._checked = now
         self._lock = threading.Lock()
         self._pings: dict[bytes, bool] = {}
 
-    def heard(self, now: float) -> None:
+    def received(self, now: float) -> None:
         """Take note of a sign of life."""
-        self._heard = now
+        self._received = now
 
     def ping_sent(self, content: bytes) -> None:
         """Take note of a ping that was sent."""
         with self._lock:
-            # The thread that hears answers may be faster than the one that has sent.
+            # The thread that receives answers may be faster than the one that has sent.
             self._pings.setdefault(content, False)
             while len(self._pings) > _WINDOW:
                 del self._pings[next(iter(self._pings))]
 
     def ping_answered(self, content: bytes, now: float) -> None:
         """Take note of the answer to a ping, which is its echo."""
-        self.heard(now)
+        self.received(now)
         with self._lock:
             self._pings[content] = True
 
     def age(self, now: float) -> float:
         """Return the age of the last sign of life, s."""
-        return max(0.0, now - self._heard)
+        return max(0.0, now - self._received)
 
     def quality(self) -> float:
         """Return the share of the latest pings that were answered, 0 to 1.
@@ -67,13 +67,13 @@ class Liveness:
         return sum(pings) / len(pings) if pings else 1.0
 
     def is_lost(self, now: float) -> bool:
-        """Tell whether the link is lost; to be asked several times within the limit.
+        """Return whether the link is lost; to be called several times within the limit.
 
-        When this question itself comes late, it is the machine that was busy,
-        and what the vehicle said may wait to be read: it gets a new period.
+        When this call itself comes late, the machine was busy, and packets of the
+        vehicle may wait to be read: it gets a new period.
         """
         late = now - self._checked > 0.5 * self._limit
         self._checked = now
         if late:
-            self._heard = max(self._heard, now - 0.5 * self._limit)
+            self._received = max(self._received, now - 0.5 * self._limit)
         return self.age(now) > self._limit

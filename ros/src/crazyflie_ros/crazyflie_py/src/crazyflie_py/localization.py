@@ -1,26 +1,17 @@
-"""What an external system, such as motion capture, knows about the vehicle's pose."""
+"""Poses measured by an external system, such as motion capture."""
 
 import math
 from collections.abc import Sequence
 
 from crazyflie_py.checks import check_finite
 from crazyflie_py.errors import ValueRangeError
-from crazyflie_py.link import CurrentLink
+from crazyflie_py.subsystem import Subsystem
 
 _STREAM = "localization"
 
 
-class Localization:
-    """Tell the vehicle where it is; nothing here blocks.
-
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link`, or raises `LinkLostError`.
-    """
-
-    def __init__(self, current_link: CurrentLink):
-        self._current_link = current_link
+class Localization(Subsystem):
+    """Measured poses for the vehicle's estimator; nothing here blocks."""
 
     def position(self, x: float, y: float, z: float) -> None:
         """Send a position in the world, m."""

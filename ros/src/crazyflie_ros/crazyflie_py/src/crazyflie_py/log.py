@@ -8,14 +8,13 @@ from cflib.crazyflie.log import LogConfig, LogTocElement
 from cflib.utils.encoding import decompress_quaternion
 
 from crazyflie_py.errors import (
-    CrazyflieError,
     NoReplyError,
     RefusedError,
     ValueRangeError,
     unknown_name,
 )
 from crazyflie_py.exchange import REPLY_LIMIT
-from crazyflie_py.link import CurrentLink
+from crazyflie_py.subsystem import Subsystem, elements
 
 SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS = 10, 2540
 """The firmware counts periods in 10 ms, in one byte of which 255 is not allowed."""
@@ -56,26 +55,13 @@ class LogBlock:
     callback: Callable[[int, tuple[float, ...]], None] = field(compare=False)
 
 
-class Log:
-    """The log variables of a vehicle.
-
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link`, or raises `LinkLostError`.
-    """
-
-    def __init__(self, current_link: CurrentLink):
-        self._current_link = current_link
+class Log(Subsystem):
+    """The log variables of a vehicle."""
 
     def variables(self) -> dict[str, str]:
         """Return the vehicle's variables: "group.name" -> C type, sorted by name."""
-        toc = self._current_link().cflib.log.toc.toc
-        return {
-            f"{group}.{name}": element.ctype
-            for group in sorted(toc)
-            for name, element in sorted(toc[group].items())
-        }
+        table = self._current_link().cflib.log.toc.toc
+        return {name: element.ctype for name, element in elements(table).items()}
 
     def check(self, block: LogBlock) -> None:
         """Check that the vehicle can send a block.
@@ -108,13 +94,8 @@ class Log:
                 f"bytes; at most {MOST_BYTES} fit in a packet: make it two blocks"
             )
 
-    def start(self, block: LogBlock) -> LogConfig:
+    def start(self, block: LogBlock) -> None:
         """Have the vehicle send a block; blocks until it has agreed.
-
-        Returns
-        -------
-        LogConfig
-            For `stop`.
 
         Raises
         ------
@@ -152,12 +133,3 @@ class Log:
             )
         if refusals:
             raise RefusedError(f"log block {block.name!r}: the vehicle says: {refusals[0]}")
-        return config
-
-    def stop(self, config: LogConfig) -> None:
-        """Have the vehicle no longer send a block, and forget it."""
-        try:
-            self._current_link().command(config.delete)
-        except CrazyflieError:
-            # Without a link nothing is sent any more.
-            return

@@ -1,4 +1,4 @@
-"""One thread per link that sends, so that nobody else ever waits for a radio.
+"""One thread per link that sends, so that no caller ever waits for a radio.
 
 cflib's radio driver blocks a sender for up to 2 s when the vehicle is out of
 range. A setpoint that is that old is worse than none; so of setpoints (and of

@@ -6,42 +6,32 @@ from cflib.crazyflie.param import ParamTocElement
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_py.errors import RefusedError, ValueRangeError, unknown_name
-from crazyflie_py.link import CurrentLink, Link
+from crazyflie_py.exchange import Request
+from crazyflie_py.link import Link
+from crazyflie_py.subsystem import Subsystem, elements
 
 _READ_CHANNEL, _WRITE_CHANNEL = 1, 2
 
 
-class Parameters:
-    """The parameters of a vehicle; all were read when the link was set up.
-
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link`, or raises `LinkLostError`.
-    """
-
-    def __init__(self, current_link: CurrentLink):
-        self._current_link = current_link
+class FirmwareParameters(Subsystem):
+    """The parameters of a vehicle; all were read when the link was set up."""
 
     def types(self) -> dict[str, tuple[str, bool]]:
         """Return the parameters: "group.name" -> (C type, whether it can be written)."""
-        toc = self._current_link().cflib.param.toc.toc
+        table = self._current_link().cflib.param.toc.toc
         return {
-            f"{group}.{name}": (element.ctype, element.access == ParamTocElement.RW_ACCESS)
-            for group in sorted(toc)
-            for name, element in sorted(toc[group].items())
+            name: (element.ctype, element.access == ParamTocElement.RW_ACCESS)
+            for name, element in elements(table).items()
         }
 
     def values(self) -> dict[str, int | float]:
         """Return the values as last read or written: "group.name" -> int or float."""
         param = self._current_link().cflib.param
-        result = {}
-        for group, names in sorted(param.toc.toc.items()):
-            for name, element in sorted(names.items()):
-                text = param.values.get(group, {}).get(name)
-                if text is not None:
-                    result[f"{group}.{name}"] = _number(element, text)
-        return result
+        return {
+            name: _number(element, param.values[element.group][element.name])
+            for name, element in elements(param.toc.toc).items()
+            if element.name in param.values.get(element.group, {})
+        }
 
     def read(self, name: str) -> int | float:
         """Ask the vehicle for a parameter, such as "ring.effect"; blocks.
@@ -53,8 +43,9 @@ class Parameters:
         """
         link = self._current_link()
         element = self._find(link, name)
-        request = struct.pack("<H", element.ident)
-        answer = link.ask(request, CRTPPort.PARAM, _READ_CHANNEL, request, f"reading {name}")
+        ident = struct.pack("<H", element.ident)
+        request = Request(CRTPPort.PARAM, _READ_CHANNEL, ident, f"reading {name}")
+        answer = link.ask(ident, request)
         # Identifier, status, value.
         if len(answer) < 3 or answer[2] != 0:
             raise RefusedError(f"reading {name}: the vehicle says {answer[2:].hex() or 'nothing'}")
@@ -74,27 +65,24 @@ class Parameters:
         if element.access != ParamTocElement.RW_ACCESS:
             raise RefusedError(f"parameter {name} can only be read")
         ident = struct.pack("<H", element.ident)
-        request = ident + self._pack(element, name, value)
-        answer = link.ask(request, CRTPPort.PARAM, _WRITE_CHANNEL, ident, f"writing {name}")
-        if len(answer) != len(request):
+        data = ident + self._pack(element, name, value)
+        request = Request(CRTPPort.PARAM, _WRITE_CHANNEL, ident, f"writing {name}")
+        answer = link.ask(data, request)
+        if len(answer) != len(data):
             raise RefusedError(f"writing {name}: the vehicle says {answer[2:].hex() or 'nothing'}")
         return self._keep(link, element, answer[2:])
 
     @staticmethod
     def _find(link: Link, name: str) -> ParamTocElement:
-        toc = link.cflib.param.toc.toc
-        group, _, rest = name.partition(".")
-        try:
-            return toc[group][rest]
-        except KeyError:
-            known = [f"{g}.{n}" for g, names in toc.items() for n in names]
-            raise unknown_name("parameter", name, sorted(known)) from None
+        known = elements(link.cflib.param.toc.toc)
+        if name not in known:
+            raise unknown_name("parameter", name, list(known))
+        return known[name]
 
     @staticmethod
     def _pack(element: ParamTocElement, name: str, value: float) -> bytes:
-        is_real = element.pytype[-1] in "efd"
         try:
-            number = float(value) if is_real else int(value)
+            number = float(value) if _is_real(element) else int(value)
             if number != float(value):
                 raise ValueError
             return struct.pack(element.pytype, number)
@@ -111,4 +99,9 @@ class Parameters:
 
 
 def _number(element, text):
-    return float(text) if element.pytype[-1] in "efd" else int(text)
+    return float(text) if _is_real(element) else int(text)
+
+
+def _is_real(element):
+    # The last letter of a format of the module struct: half, single, double precision.
+    return element.pytype[-1] in "efd"

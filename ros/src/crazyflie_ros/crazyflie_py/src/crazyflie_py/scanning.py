@@ -46,12 +46,12 @@ def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError
     problems: list[CrazyflieError] = []
     for driver_class in cflib.crtp.CLASSES:
         # What stops the radio driver it prints, and finds nothing.
-        said = io.StringIO()
+        printed = io.StringIO()
         try:
-            with contextlib.redirect_stdout(said):
+            with contextlib.redirect_stdout(printed):
                 found += [uri for uri, *_ in driver_class().scan_interface(number)]
         except Exception as error:
-            said.write(str(error))
-        if said.getvalue().strip():
-            problems.append(explain(driver_class.__name__, said.getvalue()))
+            printed.write(str(error))
+        if printed.getvalue().strip():
+            problems.append(explain(driver_class.__name__, printed.getvalue()))
     return found, problems

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_py.checks import check_finite
 from crazyflie_py.errors import ValueRangeError
-from crazyflie_py.link import CurrentLink
+from crazyflie_py.subsystem import Subsystem
 
 ZEROS = 100
 """Setpoints of zero thrust after connecting and before leaving."""
@@ -22,20 +22,12 @@ _STREAM = "setpoint"
 _MOST_MILLI = 32.767
 
 
-class Setpoints:
+class Setpoints(Subsystem):
     """Stream setpoints to a vehicle; nothing here blocks.
 
     All methods raise `LinkLostError` without a link, and `ValueRangeError` for
     numbers that cannot be sent.
-
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link`, or raises `LinkLostError`.
     """
-
-    def __init__(self, current_link: CurrentLink):
-        self._current_link = current_link
 
     def attitude(self, roll: float, pitch: float, yaw_rate: float, thrust: int) -> None:
         """Roll, pitch (degrees), yaw rate (degrees/s) and thrust (PWM, 0 to 65535).
@@ -90,11 +82,6 @@ class Setpoints:
         check_finite("hover setpoint", vx, vy, yaw_rate, height)
         self._stream(lambda c: c.send_hover_setpoint(vx, vy, yaw_rate, height))
 
-    def height(self, roll: float, pitch: float, yaw_rate: float, height: float) -> None:
-        """Roll, pitch (degrees, as the link has them), yaw rate (degrees/s, ccw) and height (m)."""
-        check_finite("height setpoint", roll, pitch, yaw_rate, height)
-        self._stream(lambda c: c.send_zdistance_setpoint(roll, pitch, yaw_rate, height))
-
     def position(self, x: float, y: float, z: float, yaw: float) -> None:
         """Position in the world (m) and yaw (degrees)."""
         check_finite("position setpoint", x, y, z, yaw)
@@ -119,7 +106,7 @@ class Setpoints:
         sent.wait(_SENT_LIMIT)
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
-        """Say that no more setpoints follow: high-level commands are heard again.
+        """Announce that no more setpoints follow: high-level commands are accepted again.
 
         Without it the firmware ignores them after a streamed setpoint.
 

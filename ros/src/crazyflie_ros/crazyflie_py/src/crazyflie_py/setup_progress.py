@@ -1,4 +1,4 @@
-"""How far the set-up of a connection has come, told from the packets that arrive."""
+"""How far the set-up of a connection has come, as the packets that arrive show."""
 
 import struct
 
@@ -21,10 +21,10 @@ class SetupProgress:
         """Return the step, such as "log table, item 17 of 337"."""
         return self._step
 
-    def hear(self, port: int, channel: int, data: bytes) -> bool:
-        """Take note of a packet; tell whether it brings the set-up forward."""
+    def receive(self, port: int, channel: int, data: bytes) -> bool:
+        """Take note of a packet; return whether it advances the set-up."""
         if channel == _TABLE_CHANNEL and port in _NAMES and data:
-            return self._hear_table(port, data)
+            return self._receive_table(port, data)
         if port == _MEMORY:
             self._step = "list of memories"
             return True
@@ -40,7 +40,7 @@ class SetupProgress:
             return True
         return False
 
-    def _hear_table(self, port, data):
+    def _receive_table(self, port, data):
         name = _NAMES[port]
         if data[0] == _INFO and len(data) >= 3:
             (self._sizes[port],) = struct.unpack_from("<H", data, 1)

@@ -4,6 +4,9 @@ from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.errors import RefusedError
+from crazyflie_py.exchange import Request
+from crazyflie_py.link import Link
+from crazyflie_py.subsystem import Subsystem
 
 SUPERVISOR_PROTOCOL = 12
 """The first protocol version in which the supervisor has a port of its own."""
@@ -14,20 +17,11 @@ _GET_STATE, _ARM, _RECOVER = 0x0C, 0x01, 0x02
 _ANSWER = 0x80
 
 
-class Supervisor:
-    """Talk to the vehicle's supervisor.
-
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link`, or raises `LinkLostError`.
-    """
-
-    def __init__(self, current_link):
-        self._current_link = current_link
+class Supervisor(Subsystem):
+    """The supervisor: the part of the firmware that arms and stops the motors."""
 
     def read(self) -> SupervisorState | None:
-        """Ask for the state; blocks. None when the firmware is too old to say.
+        """Ask for the state; blocks. None when the firmware is too old to report it.
 
         Raises
         ------
@@ -37,13 +31,7 @@ class Supervisor:
         link = self._current_link()
         if link.protocol < SUPERVISOR_PROTOCOL:
             return None
-        answer = link.ask(
-            bytes([_GET_STATE]),
-            CRTPPort.SUPERVISOR,
-            _INFO_CHANNEL,
-            bytes([_ANSWER | _GET_STATE]),
-            "the supervisor's state",
-        )
+        answer = self._ask(link, _INFO_CHANNEL, bytes([_GET_STATE]), "the supervisor's state")
         return SupervisorState(int.from_bytes(answer[1:3], "little"))
 
     def arm(self, do_arm: bool = True) -> None:
@@ -63,7 +51,7 @@ class Supervisor:
             link.command(lambda: link.cflib.supervisor.send_arming_request(do_arm))
             return
         verb = "arming" if do_arm else "disarming"
-        self._confirm(link, bytes([_ARM, do_arm]), verb)
+        self._command(link, bytes([_ARM, do_arm]), verb)
 
     def recover(self) -> None:
         """Let a vehicle that has crashed be armed again; blocks until it has confirmed it.
@@ -77,7 +65,7 @@ class Supervisor:
         if link.protocol < SUPERVISOR_PROTOCOL:
             link.command(link.cflib.supervisor.send_crash_recovery_request)
             return
-        self._confirm(link, bytes([_RECOVER]), "recovering from a crash")
+        self._command(link, bytes([_RECOVER]), "recovering from a crash")
 
     def emergency_stop(self) -> None:
         """Stop the motors at once, before anything else that waits to be sent; does not block.
@@ -99,14 +87,14 @@ class Supervisor:
         for _ in range(_EMERGENCY_REPEATS):
             link.command(send, urgent=True)
 
-    def _confirm(self, link, request, what):
-        answer = link.ask(
-            request,
-            CRTPPort.SUPERVISOR,
-            _COMMAND_CHANNEL,
-            bytes([_ANSWER | request[0]]),
-            what,
-        )
+    def _command(self, link: Link, data: bytes, what: str) -> None:
+        answer = self._ask(link, _COMMAND_CHANNEL, data, what)
         if len(answer) > 1 and not answer[1]:
             state = self.read()
-            raise RefusedError(f"{what}: the vehicle refuses it; its state is: {state.words()}")
+            words = "unknown" if state is None else state.words()
+            raise RefusedError(f"{what}: the vehicle refuses it; its state is: {words}")
+
+    @staticmethod
+    def _ask(link: Link, channel: int, data: bytes, what: str) -> bytes:
+        prefix = bytes([_ANSWER | data[0]])
+        return link.ask(data, Request(CRTPPort.SUPERVISOR, channel, prefix, what))

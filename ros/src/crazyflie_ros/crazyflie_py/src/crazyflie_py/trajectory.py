@@ -1,6 +1,7 @@
 """Trajectories of polynomials, kept in the vehicle's memory and flown by its planner."""
 
 import struct
+from collections.abc import Sequence
 
 from cflib.crazyflie.mem.memory_element import MemoryElement
 from cflib.crtp.crtpstack import CRTPPort
@@ -8,26 +9,21 @@ from cflib.crtp.crtpstack import CRTPPort
 from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 from crazyflie_py.checks import check_finite, check_positive
 from crazyflie_py.errors import RefusedError, ValueRangeError
+from crazyflie_py.exchange import Request
+from crazyflie_py.high_level import HighLevel
+from crazyflie_py.link import Link
+from crazyflie_py.subsystem import Subsystem
 
 _WRITE_CHANNEL = 2
 _CHUNK = 24
 
 
-class Trajectories:
-    """The vehicle's memory of trajectories.
+class Trajectories(Subsystem):
+    """The vehicle's memory of trajectories."""
 
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link`, or raises `LinkLostError`.
-    high_level : HighLevel
-    """
-
-    def __init__(self, current_link, high_level):
-        self._current_link = current_link
-        self._high_level = high_level
-
-    def upload(self, trajectory_id: int, piece_offset: int, pieces: list) -> None:
+    def upload(
+        self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
+    ) -> None:
         """Write pieces to the vehicle's memory and define a trajectory of them; blocks.
 
         Parameters
@@ -36,7 +32,8 @@ class Trajectories:
             0 to 255.
         piece_offset : int
             Where in the memory it begins, counted in pieces.
-        pieces : list of PolynomialPiece
+        pieces : sequence of PolynomialPiece
+            At least one.
 
         Raises
         ------
@@ -57,10 +54,10 @@ class Trajectories:
         data = b"".join(map(_packed, pieces))
         for start in range(0, len(data), _CHUNK):
             _write(link, memory.id, begin + start, data[start : start + _CHUNK])
-        self._high_level.define_trajectory(trajectory_id, begin, len(pieces))
+        HighLevel(self._current_link).define_trajectory(trajectory_id, begin, len(pieces))
 
 
-def _packed(piece: PolynomialPiece):
+def _packed(piece: PolynomialPiece) -> bytes:
     check_positive("duration of a piece", piece.duration)
     for name, coefficients in zip(("x", "y", "z", "yaw"), piece.axes, strict=True):
         if len(coefficients) > COEFFICIENTS:
@@ -79,11 +76,11 @@ def _memory(link):
     return memories[0]
 
 
-def _write(link, memory_id, address, data):
-    # cflib's own writer is left for dead when a reply comes twice.
+def _write(link: Link, memory_id: int, address: int, data: bytes) -> None:
+    # cflib's own writer never ends when a reply comes twice.
     where = struct.pack("<BI", memory_id, address)
     what = f"writing the trajectory, byte {address}"
-    answer = link.ask(where + data, CRTPPort.MEM, _WRITE_CHANNEL, where, what)
+    answer = link.ask(where + data, Request(CRTPPort.MEM, _WRITE_CHANNEL, where, what))
     status = answer[5] if len(answer) > 5 else 0
     if status:
         raise RefusedError(f"{what}: the vehicle refuses it (error {status})")

@@ -101,11 +101,11 @@ def run(name: str, work: Callable[[], None], limit: float | None, interrupted: i
             # Nothing: a mistake in the tool, whose traceback is on stderr.
             return outcome[0] if outcome else FAILED
         status = FAILED
-        _complain(name, f"not done within {limit:g} s: gave up")
+        _print_error(name, f"not done within {limit:g} s: gave up")
     except KeyboardInterrupt:
         status = interrupted
         if interrupted != FINE:
-            _complain(name, "interrupted")
+            _print_error(name, "interrupted")
     os._exit(status)
 
 
@@ -114,13 +114,13 @@ def _attempt(name, work):
         work()
         sys.stdout.flush()
     except CrazyflieError as error:
-        _complain(name, str(error))
+        _print_error(name, str(error))
         return FAILED
     except BrokenPipeError:
-        # Whoever reads has read enough; Python must not flush to nobody at its end.
+        # The reader has closed the pipe, and Python would still flush into it at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return FINE
 
 
-def _complain(name, text):
+def _print_error(name, text):
     print(f"{name}: {text}", file=sys.stderr, flush=True)

@@ -1,32 +1,35 @@
 """Firmware parameters as ROS parameters, PREFIX/GROUP/NAME."""
 
+from typing_extensions import override
+
 from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.errors import CrazyflieError
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
+from crazyflie_utils.parameter_types import ParameterType
 
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
 
-class FirmwareParameters:
-    """Copy parameters from the vehicle to ROS, and back on demand; all methods block.
+class ParameterMirror:
+    """Copy the firmware's parameters to ROS, and back on demand; all methods block.
 
     Parameters
     ----------
     handle : NodeHandle
     prefix : str
         Namespace of the vehicle.
-    vehicle : crazyflie_py.Crazyflie
+    crazyflie : crazyflie_py.Crazyflie
     """
 
-    def __init__(self, handle: NodeHandle, prefix: str, vehicle: Crazyflie):
+    def __init__(self, handle: NodeHandle, prefix: str, crazyflie: Crazyflie):
         self._handle = handle
         self._prefix = prefix
-        self._vehicle = vehicle
+        self._crazyflie = crazyflie
 
     def publish(self) -> int:
         """Set the ROS parameters to the firmware's values; return how many there are."""
         groups: dict[str, dict[str, int | float]] = {}
-        values = self._vehicle.parameters.values()
+        values = self._crazyflie.parameters.values()
         for name, value in values.items():
             group, _, parameter = name.partition(".")
             groups.setdefault(group, {})[parameter] = _portable(value)
@@ -59,20 +62,24 @@ class FirmwareParameters:
         if not group or not parameter:
             raise ParameterError(f"{name!r} is no firmware parameter; expected GROUP/NAME")
         full_name = f"{self._prefix}/{group}/{parameter}"
-        value = self._handle.param(full_name, _Value())
-        confirmed = self._vehicle.parameters.write(f"{group}.{parameter}", value)
+        value = self._handle.get_param(full_name, _FirmwareValue())
+        confirmed = self._crazyflie.parameters.write(f"{group}.{parameter}", value)
         self._handle.set_param(full_name, _portable(confirmed))
 
 
-class _Value:
+class _FirmwareValue(ParameterType):
     """A number, or a truth value for a switch."""
 
+    label = "float"
+
+    @override
     def __call__(self, value: object) -> int | float:
         if not isinstance(value, (bool, int, float)):
             raise ValueError
         return value
 
     def __str__(self) -> str:
+        """Return what is expected."""
         return "a number"
 
 

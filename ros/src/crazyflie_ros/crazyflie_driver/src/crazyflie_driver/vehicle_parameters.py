@@ -1,0 +1,240 @@
+"""How a vehicle is connected, as parameters of crazyflie_add and as fields of AddCrazyflie."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Self
+
+import rosgraph.names
+from typing_extensions import override
+
+from crazyflie_driver.msg import LogBlock
+from crazyflie_driver.srv import AddCrazyflieRequest
+from crazyflie_py.log import LONGEST_PERIOD_MS, SHORTEST_PERIOD_MS
+from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
+from crazyflie_utils.parameter_types import BOOLEAN, TEXT, Integer, Number, ParameterType
+from crazyflie_utils.parameters import REQUIRED, Declaration, read_parameter
+
+
+@dataclass(frozen=True)
+class ListOf(ParameterType):
+    """A list whose entries are all of one type; as a value, a tuple."""
+
+    entry: ParameterType
+
+    @property
+    @override
+    def label(self) -> str:  # type: ignore[override]
+        return f"list of {self.entry.label}"
+
+    @property
+    @override
+    def unit(self) -> str:  # type: ignore[override]
+        return self.entry.unit
+
+    @property
+    @override
+    def range(self) -> str:  # type: ignore[override]
+        return self.entry.range
+
+    @override
+    def __call__(self, value: object) -> tuple[Any, ...]:
+        if not isinstance(value, (list, tuple)):
+            raise ValueError
+        return tuple(map(self.entry, value))
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return f"a list, each entry {self.entry}"
+
+
+class EachLogBlock(ListOf):
+    """A value for each log block; on the parameter server, a parameter for each."""
+
+    @property
+    @override
+    def label(self) -> str:  # type: ignore[override]
+        return self.entry.label
+
+
+class Namespace(ParameterType):
+    """The name of a namespace; slashes around it are dropped."""
+
+    label = "string"
+
+    @override
+    def __call__(self, value: object) -> str:
+        name = value.strip("/ ") if isinstance(value, str) else ""
+        if not name or not rosgraph.names.is_legal_name("/" + name):
+            raise ValueError
+        return name
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "the name of a namespace, such as crazyflie1"
+
+
+class LogTopic(Namespace):
+    """The name of a topic for a custom log block, which the driver itself does not use."""
+
+    @override
+    def __call__(self, value: object) -> str:
+        name = super().__call__(value)
+        if name in (*STANDARD_TOPICS, "rssi"):
+            raise ValueError(f"the driver itself has a topic {name!r}")
+        return name
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "the name of a topic, such as motors"
+
+
+_TOPICS = ListOf(LogTopic())
+_VARIABLES = ListOf(TEXT)
+
+_VARIABLES_NAME = "genericLogTopic_NAME_Variables"
+
+_LOG_BLOCK_FIELDS = {
+    "genericLogTopics": "topic_name",
+    "genericLogTopicFrequencies": "frequency",
+    _VARIABLES_NAME: "variables",
+}
+"""Parameter -> field of LogBlock in which a request has it."""
+
+
+class VehicleParameters(Parameters):
+    """How a vehicle is connected, and what is published of it.
+
+    Fields have the names that they have in a crazyflie_driver/AddCrazyflieRequest,
+    except for those of `log_blocks`.
+    """
+
+    uri: str = parameter(
+        TEXT, "`radio://DONGLE/CHANNEL/RATE/ADDRESS`, `udp://HOST:PORT` or `usb://NUMBER`"
+    )
+    tf_prefix: str = parameter(
+        Namespace(), "namespace of the vehicle's topics, services and parameters"
+    )
+    roll_trim: float = parameter(Number("degrees"), "added to cmd_vel", 0.0)
+    pitch_trim: float = parameter(Number("degrees"), "added to cmd_vel", 0.0)
+    enable_parameters: bool = parameter(BOOLEAN, "firmware parameters as ROS parameters", True)
+    use_ros_time: bool = parameter(
+        BOOLEAN, "stamps are ROS time, or else the time since the vehicle was switched on", True
+    )
+    enable_logging: bool = parameter(BOOLEAN, "publish log data at all, except rssi", True)
+    enable_logging_imu: bool = parameter(BOOLEAN, "publish this standard topic", True)
+    enable_logging_temperature: bool = parameter(BOOLEAN, "publish this standard topic", True)
+    enable_logging_magnetic_field: bool = parameter(BOOLEAN, "publish this standard topic", True)
+    enable_logging_pressure: bool = parameter(BOOLEAN, "publish this standard topic", True)
+    enable_logging_battery: bool = parameter(BOOLEAN, "publish this standard topic", True)
+    enable_logging_packets: bool = parameter(BOOLEAN, "publish this standard topic", True)
+    enable_logging_pose: bool = parameter(BOOLEAN, "publish this standard topic", False)
+    log_topics: tuple[str, ...] = parameter(
+        _TOPICS, "topics of custom log blocks, below the prefix", (), "genericLogTopics"
+    )
+    log_periods: tuple[int, ...] = parameter(
+        ListOf(Integer(SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS, "ms")),
+        "periods of these log blocks, in spite of the name",
+        (),
+        "genericLogTopicFrequencies",
+    )
+    log_variables: tuple[tuple[str, ...], ...] = parameter(
+        EachLogBlock(_VARIABLES),
+        "for each NAME in genericLogTopics: its variables",
+        name=_VARIABLES_NAME,
+    )
+
+    @override
+    def complaints(self) -> list[str]:
+        found = [
+            f"two log blocks are called {name!r}"
+            for name in sorted(set(self.log_topics))
+            if self.log_topics.count(name) > 1
+        ]
+        if len(self.log_topics) != len(self.log_periods):
+            found.append(
+                f"genericLogTopicFrequencies has {len(self.log_periods)} entries, "
+                f"genericLogTopics {len(self.log_topics)}; expected as many"
+            )
+        return found
+
+    @property
+    def prefix(self) -> str:
+        """Absolute namespace of the vehicle, such as /crazyflie1."""
+        return "/" + self.tf_prefix
+
+    @property
+    def topics(self) -> frozenset[str]:
+        """Standard topics that are published."""
+        return frozenset(
+            name
+            for name in STANDARD_TOPICS
+            if self.enable_logging and getattr(self, _SWITCH + name)
+        )
+
+    @property
+    def log_blocks(self) -> list[LogBlock]:
+        """Custom log blocks; the field ``frequency`` is a period in ms."""
+        columns = (self.log_topics, self.log_periods, map(list, self.log_variables))
+        return [LogBlock(*row) for row in zip(*columns, strict=True)]
+
+    def request(self) -> AddCrazyflieRequest:
+        """Return the request that has the server add the vehicle."""
+        return AddCrazyflieRequest(*(getattr(self, n) for n in AddCrazyflieRequest.__slots__))
+
+    @classmethod
+    def from_request(cls, request: AddCrazyflieRequest) -> Self:
+        """Return the parameters in a request.
+
+        Raises
+        ------
+        ServiceError
+            With a text about everything in it that makes no sense.
+        """
+
+        def get(name: str) -> Any:
+            if name in _LOG_BLOCK_FIELDS:
+                field = _LOG_BLOCK_FIELDS[name]
+                return [getattr(block, field) for block in request.log_blocks]
+            value = getattr(request, name)
+            return value.strip() if isinstance(value, str) else value
+
+        def full_name(name: str) -> str:
+            return f"log_blocks/{_LOG_BLOCK_FIELDS[name]}" if name in _LOG_BLOCK_FIELDS else name
+
+        try:
+            return cls.read(get, full_name)
+        except ParameterError as error:
+            raise ServiceError("; ".join(error.complaints)) from None
+
+
+_SWITCH = "enable_logging_"
+
+STANDARD_TOPICS = tuple(
+    declaration.name.removeprefix(_SWITCH)
+    for declaration in VehicleParameters.declarations()
+    if declaration.name.startswith(_SWITCH)
+)
+"""Topics that are switched by ``enable_logging_NAME``."""
+
+
+class CrazyflieAddParameters(VehicleParameters):
+    """The same on the parameter server, where the variables of each log block are a parameter."""
+
+    @classmethod
+    @override
+    def read(cls, get: Callable[[str], Any], full_name: Callable[[str], str] = str) -> Self:
+        def get_or_collect(name: str) -> Any:
+            if name != _VARIABLES_NAME:
+                return get(name)
+            try:
+                topics = _TOPICS(get("genericLogTopics"))
+            except (KeyError, ValueError):
+                return ()
+            return [read_parameter(_variables_of(topic), get, full_name) for topic in topics]
+
+        return super().read(get_or_collect, full_name)
+
+
+def _variables_of(topic):
+    name = _VARIABLES_NAME.replace("NAME", topic)
+    return Declaration(name, _VARIABLES, "", REQUIRED, live=False)

@@ -53,7 +53,7 @@ def _default(value):
         return str(value).lower()
     if isinstance(value, float):
         return f"{value:g}"
-    return f"`{value}`" if value != "" else "empty"
+    return f"`{value}`" if value not in ("", (), [], {}) else "empty"
 
 
 def with_tables(page: str) -> str:

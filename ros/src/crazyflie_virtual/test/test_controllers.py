@@ -5,16 +5,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_model.pid import Gains
+from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
-from crazyflie_virtual.firmware.pid import Pid
+from crazyflie_virtual.firmware.pid import FirmwarePid
 from crazyflie_virtual.firmware.position import PositionController
-from crazyflie_virtual.firmware.sensors import Sensors
 from crazyflie_virtual.firmware.stabilizer import Stabilizer
 from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Setpoint
 
 
 def test_pid_parts():
-    pid = Pid(Gains(2.0, 3.0, 0.5), 0.1, kff=0.25)
+    pid = FirmwarePid(Gains(2.0, 3.0, 0.5), 0.1, kff=0.25)
     assert pid.update(1.0, 0.0) == pytest.approx(2.0 + 3.0 * 0.1 + 0.25)
     # The derivative is of the measurement: a jump of what is desired does not kick.
     output = pid.update(4.0, 0.2)
@@ -24,7 +24,7 @@ def test_pid_parts():
 
 
 def test_pid_limits_and_reset():
-    pid = Pid(Gains(0.0, 1.0, 0.0, limit=2.0), 1.0, output_limit=1.5)
+    pid = FirmwarePid(Gains(0.0, 1.0, 0.0, limit=2.0), 1.0, output_limit=1.5)
     assert [pid.update(1.0, 0.0) for _ in range(4)] == [1.0, 1.5, 1.5, 1.5]
     assert pid.out_i == 2.0
     pid.reset()

@@ -6,10 +6,10 @@ import threading
 import pytest
 from natnet import NatNetClient
 
+from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.mocap.server import MocapServer
 from crazyflie_virtual.mocap.settings import MocapSettings
-from crazyflie_virtual.server import Server
-from crazyflie_virtual.settings import Settings
+from crazyflie_virtual.settings import VehicleSettings
 
 LIMIT = 10.0
 
@@ -82,8 +82,8 @@ def vehicle():
     with contextlib.ExitStack() as stack:
 
         def vehicle(server, **options):
-            settings = Settings(port=0, observer_port=server.observer_port, **options)
-            virtual = Server(settings)
+            settings = VehicleSettings(port=0, observer_port=server.observer_port, **options)
+            virtual = VehicleServer(settings)
             stack.callback(virtual.stop)
             virtual.start()
             return virtual

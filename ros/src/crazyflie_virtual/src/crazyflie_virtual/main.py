@@ -2,8 +2,11 @@
 
 import signal
 import sys
+from collections.abc import Callable
+from typing import Any, NoReturn
 
-from crazyflie_virtual.options import parse_arguments
+from crazyflie_utils.command_line import parse_arguments
+from crazyflie_utils.parameters import Parameters
 
 _DESCRIPTION = (
     "A Crazyflie in software that speaks CRTP over UDP: connect with any cflib program to "
@@ -22,10 +25,10 @@ def virtual_crazyflie() -> None:
         from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
 
         _run_node(VirtualCrazyflieNode, "virtual_crazyflie")
-    from crazyflie_virtual.server import Server
-    from crazyflie_virtual.settings import Settings
+    from crazyflie_virtual.link.server import VehicleServer
+    from crazyflie_virtual.settings import VehicleSettings
 
-    _run("virtual_crazyflie", _DESCRIPTION, Settings, Server)
+    _run("virtual_crazyflie", _DESCRIPTION, VehicleSettings, VehicleServer)
 
 
 def virtual_mocap() -> None:
@@ -45,16 +48,21 @@ def _is_ros_node():
     return any(":=" in argument for argument in sys.argv[1:])
 
 
-def _run_node(node_class, name):
+def _run_node(node_type: type, name: str) -> NoReturn:
     from crazyflie_utils import run
 
-    run(node_class, name)
+    run(node_type, name)
 
 
-def _run(program, description, options_class, server_class):
-    options = parse_arguments(options_class, sys.argv[1:], program, description)
+def _run(
+    program: str,
+    description: str,
+    settings_type: type[Parameters],
+    server_type: Callable[..., Any],
+) -> None:
+    settings = parse_arguments(settings_type, sys.argv[1:], program, description)
     try:
-        server = server_class(options, lambda text: print(text, file=sys.stderr, flush=True))
+        server = server_type(settings, lambda text: print(text, file=sys.stderr, flush=True))
     except OSError as error:
         sys.exit(f"{program}: cannot listen: {error}")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))

@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from crazyflie_virtual.crtp import MAX_DATA
+from crazyflie_virtual.link.crtp import MAX_DATA
 
 _KEPT = 100
 """Pieces kept until a client reads them."""

@@ -1,20 +1,20 @@
 """The firmware as a whole: all its parts, and the order in which they have their turn."""
 
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_virtual.body.physics import STEP
+from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.commander import Commander
 from crazyflie_virtual.firmware.console import Console
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.firmware.localization import DECK, Localization
 from crazyflie_virtual.firmware.planner import Phase, Planner
 from crazyflie_virtual.firmware.power import PowerMonitor
-from crazyflie_virtual.firmware.sensors import Sensors
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
 from crazyflie_virtual.firmware.stabilizer import Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
 from crazyflie_virtual.firmware.supervisor import Supervisor
-from crazyflie_virtual.link_statistics import LinkStatistics
-from crazyflie_virtual.memories import MemoryTester
-from crazyflie_virtual.physics import STEP
+from crazyflie_virtual.link.statistics import LinkStatistics
+from crazyflie_virtual.tables.memories import MemoryTester
 
 POSITION_STEPS = 5
 """Steps from one turn of position controller and high-level commander to the next: 100 Hz."""
@@ -31,9 +31,9 @@ class Firmware:
     ----------
     physics : Physics
         What the sensors measure.
-    faults : Faults
+    faults : FaultSwitches
         Switches, which are parameters of the virtual vehicle too.
-    settings : Settings
+    settings : VehicleSettings
 
     Attributes
     ----------

@@ -4,7 +4,7 @@ from crazyflie_model.elementwise import clip
 from crazyflie_model.pid import Gains, terms
 
 
-class Pid:
+class FirmwarePid:
     """PID with feed-forward; the derivative is that of the measurement.
 
     Parameters

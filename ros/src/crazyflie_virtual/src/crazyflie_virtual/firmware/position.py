@@ -9,7 +9,7 @@ import math
 
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.pid import Gains
-from crazyflie_virtual.firmware.pid import Pid
+from crazyflie_virtual.firmware.pid import FirmwarePid
 from crazyflie_virtual.firmware.states import ABSOLUTE
 
 DT = 0.01
@@ -27,9 +27,9 @@ class PositionController:
 
     Attributes
     ----------
-    x, y, z : Pid
+    x, y, z : FirmwarePid
         m to m/s.
-    vx, vy, vz : Pid
+    vx, vy, vz : FirmwarePid
         m/s to deg, deg and thousands of PWM.
     roll_limit, pitch_limit : float
         deg.
@@ -43,12 +43,14 @@ class PositionController:
     """
 
     def __init__(self):
-        self.x = Pid(Gains(2.0, 0.0, 0.0), DT)
-        self.y = Pid(Gains(2.0, 0.0, 0.0), DT)
-        self.z = Pid(Gains(2.0, 0.5, 0.0), DT)
-        self.vx = Pid(Gains(25.0, 1.0, 0.0), DT)
-        self.vy = Pid(Gains(25.0, 1.0, 0.0), DT)
-        self.vz = Pid(Gains(25.0, 15.0, 0.0), DT, output_limit=FULL_PWM / 2.0 / _THRUST_SCALE)
+        self.x = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)
+        self.y = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)
+        self.z = FirmwarePid(Gains(2.0, 0.5, 0.0), DT)
+        self.vx = FirmwarePid(Gains(25.0, 1.0, 0.0), DT)
+        self.vy = FirmwarePid(Gains(25.0, 1.0, 0.0), DT)
+        self.vz = FirmwarePid(
+            Gains(25.0, 15.0, 0.0), DT, output_limit=FULL_PWM / 2.0 / _THRUST_SCALE
+        )
         self.roll_limit = self.pitch_limit = 20.0
         self.vx_max = self.vy_max = self.vz_max = 1.0
         self.thrust_base = 36000

@@ -10,7 +10,7 @@ _STALE = 0.5
 """How long after the last observation a body counts as gone, s."""
 
 
-class Switches:
+class MocapSwitches:
     """What can be made to go wrong, at any time.
 
     Parameters
@@ -39,7 +39,7 @@ class Scene:
 
     Parameters
     ----------
-    switches : Switches
+    switches : MocapSwitches
     position_noise, attitude_noise : float
         Standard deviations along and about each axis, m and rad.
     seed : int
@@ -47,7 +47,7 @@ class Scene:
 
     def __init__(
         self,
-        switches: Switches,
+        switches: MocapSwitches,
         position_noise: float = 0.0,
         attitude_noise: float = 0.0,
         seed: int = 0,

@@ -6,11 +6,11 @@ import threading
 import time
 from collections import deque
 
+from crazyflie_virtual.link.sockets import open_socket, received, send
 from crazyflie_virtual.mocap import natnet
 from crazyflie_virtual.mocap.natnet import Encoder, Stamps
 from crazyflie_virtual.mocap.scene import Scene
 from crazyflie_virtual.observer import decode
-from crazyflie_virtual.sockets import open_socket, received, send
 
 _CLIENT_LIMIT = 5.0
 """How long after its last word a client is sent frames, s."""
@@ -34,7 +34,7 @@ class MocapServer:
         Host and port for commands.
     observer_port : int
         Where the vehicles tell their poses.
-    switches : Switches
+    switches : MocapSwitches
 
     Raises
     ------

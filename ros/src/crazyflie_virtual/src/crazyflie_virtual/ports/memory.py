@@ -3,7 +3,7 @@
 import errno
 import struct
 
-from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.link.crtp import Packet, Port
 
 _INFO, _READ, _WRITE = 0, 1, 2
 _COUNT, _DETAILS = 1, 2
@@ -12,7 +12,7 @@ _MOST = 24
 """Bytes read or written at once."""
 
 
-class MemoryService:
+class MemoryPort:
     """Reads and writes memories.
 
     Parameters

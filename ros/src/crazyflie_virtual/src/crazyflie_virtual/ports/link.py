@@ -1,13 +1,13 @@
 """Port 15: the link itself."""
 
-from crazyflie_virtual.crtp import MAX_DATA, Packet, Port
+from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
 
 _ECHO, _SOURCE, _SINK = 0, 1, 2
 
 _IDENTITY = b"Bitcraze Crazyflie"
 
 
-class LinkService:
+class LinkPort:
     """Echo, and who is there.
 
     Parameters

@@ -9,7 +9,7 @@ class Channel:
 
     Parameters
     ----------
-    faults : Faults
+    faults : FaultSwitches
     random : random.Random
         Decides what is lost.
     """

@@ -2,7 +2,7 @@
 
 import struct
 
-from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.link.crtp import Packet, Port
 
 _COMMAND, _VERSION = 0, 1
 _CONTINUOUS_WAVE, _ARM, _RECOVER, _NOTIFY = 0, 1, 2, 3
@@ -12,14 +12,14 @@ DEVICE = "CF21"
 FIRMWARE = "virtual"
 
 
-class PlatformService:
+class PlatformPort:
     """Versions and platform commands.
 
     Parameters
     ----------
     protocol : int
         Version of the protocol to report.
-    supervisor : SupervisorService
+    supervisor : SupervisorPort
         Which arms and recovers.
     """
 

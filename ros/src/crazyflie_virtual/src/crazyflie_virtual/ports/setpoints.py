@@ -1,13 +1,13 @@
 """Ports 3 and 7: streamed setpoints."""
 
-from crazyflie_virtual.crtp import Packet, Port
 from crazyflie_virtual.firmware.setpoints import decode_generic
+from crazyflie_virtual.link.crtp import Packet, Port
 
 _SETPOINT, _META = 0, 1
 _SETPOINTS_STOP = 0
 
 
-class AttitudeSetpointService:
+class AttitudeSetpointPort:
     """Attitude setpoints.
 
     Parameters
@@ -30,7 +30,7 @@ class AttitudeSetpointService:
         return []
 
 
-class GenericSetpointService:
+class GenericSetpointPort:
     """Setpoints of all other types, and the end of streaming.
 
     Parameters

@@ -3,13 +3,13 @@
 import errno
 import struct
 
-from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.link.crtp import Packet, Port
 
 _ALL_GROUPS = 0
 _LOCATION_MEMORY, _TYPE_POLYNOMIALS = 1, 0
 
 
-class HighLevelService:
+class HighLevelPort:
     """Commands to the planner.
 
     Parameters
@@ -109,25 +109,25 @@ class HighLevelService:
     def _start_1(self, group, relative, backwards, trajectory_id, time_scale):
         return self._start(group, relative, False, backwards, trajectory_id, time_scale)
 
-    def _define(self, trajectory_id, location, kind, offset, pieces):
-        if (location, kind) != (_LOCATION_MEMORY, _TYPE_POLYNOMIALS):
+    def _define(self, trajectory_id, location, trajectory_type, offset, pieces):
+        if (location, trajectory_type) != (_LOCATION_MEMORY, _TYPE_POLYNOMIALS):
             return errno.ENOEXEC
         return self._planner.define(trajectory_id, offset, pieces)
 
 
 _COMMANDS = {
-    0: ("B", HighLevelService._set_groups),
-    1: ("Bff", HighLevelService._take_off_1),
-    2: ("Bff", HighLevelService._land_1),
-    3: ("B", HighLevelService._stop),
-    4: ("2B5f", HighLevelService._go_to_1),
-    5: ("4Bf", HighLevelService._start_1),
-    6: ("3BIB", HighLevelService._define),
-    7: ("Bff?f", HighLevelService._take_off),
-    8: ("Bff?f", HighLevelService._land),
-    9: ("Bf?f?f", HighLevelService._take_off_at_speed),
-    10: ("Bf?f?f", HighLevelService._land_at_speed),
-    12: ("3B5f", HighLevelService._go_to),
-    13: ("5Bf", HighLevelService._start),
+    0: ("B", HighLevelPort._set_groups),
+    1: ("Bff", HighLevelPort._take_off_1),
+    2: ("Bff", HighLevelPort._land_1),
+    3: ("B", HighLevelPort._stop),
+    4: ("2B5f", HighLevelPort._go_to_1),
+    5: ("4Bf", HighLevelPort._start_1),
+    6: ("3BIB", HighLevelPort._define),
+    7: ("Bff?f", HighLevelPort._take_off),
+    8: ("Bff?f", HighLevelPort._land),
+    9: ("Bf?f?f", HighLevelPort._take_off_at_speed),
+    10: ("Bf?f?f", HighLevelPort._land_at_speed),
+    12: ("3B5f", HighLevelPort._go_to),
+    13: ("5Bf", HighLevelPort._start),
 }
 """Command -> (fields, handler). 1, 2, 4 and 5 are those of older clients."""

@@ -3,10 +3,10 @@
 import errno
 import struct
 
-from crazyflie_virtual.crtp import Packet, Port
-from crazyflie_virtual.kinds import LOG_KINDS
-from crazyflie_virtual.log_table import log_variables
-from crazyflie_virtual.toc import Entry, Table
+from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.tables.log_table import log_variables
+from crazyflie_virtual.tables.number_types import LOG_TYPES
+from crazyflie_virtual.tables.toc import Entry, Table
 
 MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
 """Blocks at one time, variables in all of them, bytes of values in one."""
@@ -25,12 +25,12 @@ class _Block:
         self.period = 0
         self.due = None
 
-    def add(self, variable, kind):
-        self.variables.append((variable.read, kind))
-        self.size += kind.size
+    def add(self, variable, number_type):
+        self.variables.append((variable.read, number_type))
+        self.size += number_type.size
 
 
-class LogService:
+class LogPort:
     """Sends the values of variables that the client asks for, periodically.
 
     Parameters
@@ -44,7 +44,7 @@ class LogService:
     def __init__(self, firmware):
         self._firmware = firmware
         self._variables = log_variables()
-        entries = [Entry(v.group, v.name, v.kind.log_code) for v in self._variables]
+        entries = [Entry(v.group, v.name, v.number_type.log_code) for v in self._variables]
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
         self._blocks = {}
         self._due = None
@@ -116,14 +116,16 @@ class LogService:
                 return errno.ENOENT
             variable = self._variables[index]
             # The low half of the code is the type to send; 0 is the variable's own.
-            kind = LOG_KINDS.get(code & 0xF, variable.kind if code & 0xF == 0 else None)
-            if kind is None:
+            number_type = LOG_TYPES.get(
+                code & 0xF, variable.number_type if code & 0xF == 0 else None
+            )
+            if number_type is None:
                 return errno.ENOENT
-            if block.size + kind.size > MAX_BYTES:
+            if block.size + number_type.size > MAX_BYTES:
                 return errno.E2BIG
             if sum(len(b.variables) for b in self._blocks.values()) >= MAX_VARIABLES:
                 return errno.ENOMEM
-            block.add(variable, kind)
+            block.add(variable, number_type)
         return 0
 
     def _schedule(self):
@@ -132,6 +134,6 @@ class LogService:
 
     def _data_packet(self, block_id, block, now):
         firmware = self._firmware
-        values = b"".join(kind.pack(read(firmware)) for read, kind in block.variables)
+        values = b"".join(number_type.pack(read(firmware)) for read, number_type in block.variables)
         stamp = (now & 0xFFFFFF).to_bytes(3, "little")
         return Packet(Port.LOG, _DATA, bytes([block_id]) + stamp + values)

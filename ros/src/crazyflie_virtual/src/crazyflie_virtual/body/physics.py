@@ -6,7 +6,7 @@ from crazyflie_model.angles import Quaternion, Triple, rotate_back
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe
 from crazyflie_model.units import GRAVITY
-from crazyflie_virtual.battery import FULL_VOLTAGE
+from crazyflie_virtual.body.battery import FULL_VOLTAGE
 
 STEP = PERIOD
 """Step of the integration, s: that of the firmware's attitude controller."""

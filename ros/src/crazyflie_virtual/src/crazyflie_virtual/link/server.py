@@ -5,11 +5,11 @@ import select
 import threading
 import time
 
-from crazyflie_virtual.channel import Channel
+from crazyflie_virtual.link.channel import Channel
+from crazyflie_virtual.link.sockets import open_socket, received, send
 from crazyflie_virtual.observer import Observation
 from crazyflie_virtual.settings import FIRST_PORT
-from crazyflie_virtual.sockets import open_socket, received, send
-from crazyflie_virtual.vehicle import Vehicle
+from crazyflie_virtual.vehicle import VirtualVehicle
 
 _TICK = 0.005
 """How long the vehicle may be behind the clock when nothing happens, s."""
@@ -21,18 +21,18 @@ _NULL = b"\xff"
 """What a scanner sends: it is no client."""
 
 
-class Server:
+class VehicleServer:
     """A vehicle behind a socket.
 
     Parameters
     ----------
-    settings : Settings
+    settings : VehicleSettings
     warn : callable
         ``warn(text)`` is called when the vehicle cannot keep up with the clock.
 
     Attributes
     ----------
-    vehicle : Vehicle
+    vehicle : VirtualVehicle
     address : tuple
         Host and port.
 
@@ -46,7 +46,7 @@ class Server:
         self._socket = open_socket(settings.host, settings.port)
         self.address = self._socket.getsockname()
         self._warn = warn
-        self.vehicle = Vehicle(settings)
+        self.vehicle = VirtualVehicle(settings)
         source = random.Random(settings.seed)
         self._up = Channel(self.vehicle.faults, source)
         self._down = Channel(self.vehicle.faults, source)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from operator import attrgetter
 from typing import NamedTuple
 
-from crazyflie_virtual.kinds import FLOAT, I8, I16, I32, U8, U16, U32, Kind
+from crazyflie_virtual.tables.number_types import FLOAT, I8, I16, I32, U8, U16, U32, NumberType
 
 _XYZ = ("x", "y", "z")
 
@@ -20,23 +20,23 @@ class LogVariable(NamedTuple):
     Attributes
     ----------
     group, name : str
-    kind : Kind
+    number_type : NumberType
     read : callable
         ``read(firmware)`` returns the value.
     """
 
     group: str
     name: str
-    kind: Kind
+    number_type: NumberType
     read: Callable
 
 
 def log_variables() -> list:
     """Return all log variables, in the order of their numbers."""
     return [
-        LogVariable(group, name, kind, _reader(source))
+        LogVariable(group, name, number_type, _reader(source))
         for group, variables in _GROUPS.items()
-        for name, kind, source in variables
+        for name, number_type, source in variables
     ]
 
 
@@ -55,12 +55,12 @@ def _reader(source) -> Callable:
     return lambda firmware: factor * get(firmware)
 
 
-def _fields(kind, names, path, scale=""):
+def _fields(number_type, names, path, scale=""):
     # "x vx" of "estimate" are estimate.x and estimate.vx; "yaw:yaw_rate" renames.
     rows = []
     for name in names.split():
         shown, _, field = name.partition(":")
-        rows.append((shown, kind, f"{path}.{field or shown}{scale}"))
+        rows.append((shown, number_type, f"{path}.{field or shown}{scale}"))
     return rows
 
 
@@ -187,4 +187,4 @@ _GROUPS = {
         ("txRate", U16, "link_statistics.sent_rate"),
     ],
 }
-"""Group -> (name, kind, value)."""
+"""Group -> (name, number_type, value)."""

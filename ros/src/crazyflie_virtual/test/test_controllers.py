@@ -10,7 +10,7 @@ from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
 from crazyflie_virtual.firmware.pid import FirmwarePid
 from crazyflie_virtual.firmware.position import PositionController
 from crazyflie_virtual.firmware.stabilizer import Stabilizer
-from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Setpoint
+from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Modes, Setpoint
 
 
 def test_pid_parts():
@@ -40,7 +40,7 @@ def test_wrapped_angles_point_the_same_way(angle):
 
 
 def setpoint_at(**position):
-    return Setpoint(mode_x=ABSOLUTE, mode_y=ABSOLUTE, mode_z=ABSOLUTE, **position)
+    return Setpoint(mode=Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE), **position)
 
 
 def test_position_errors_tilt_the_vehicle_there():
@@ -65,10 +65,10 @@ def test_position_controller_limits():
 
 def test_velocity_setpoints_in_both_frames():
     east = Estimate(yaw=90.0)
-    ahead = Setpoint(mode_x=VELOCITY, mode_y=VELOCITY, vx=0.5, velocity_body=True)
+    ahead = Setpoint(mode=Modes(x=VELOCITY, y=VELOCITY), vx=0.5, velocity_body=True)
     _, pitch, _ = PositionController().update(ahead, east)
     assert pitch < -5.0
-    world = Setpoint(mode_x=VELOCITY, mode_y=VELOCITY, vy=0.5)
+    world = Setpoint(mode=Modes(x=VELOCITY, y=VELOCITY), vy=0.5)
     assert PositionController().update(world, east)[1] == pytest.approx(pitch)
 
 
@@ -91,13 +91,13 @@ def test_the_cascade_turns_the_vehicle_to_its_setpoint():
     # Positive pitch is nose up in the firmware.
     pitched = commands(pitch=5.0)
     assert pitched[front_left] == pitched[front_right] > pitched[back_left] == pitched[back_right]
-    turned = commands(mode_yaw=ABSOLUTE, yaw=5.0)
+    turned = commands(mode=Modes(yaw=ABSOLUTE), yaw=5.0)
     assert turned[back_right] == turned[front_left] > turned[front_right] == turned[back_left]
 
 
 def test_yaw_rate_moves_the_heading_that_is_held():
     stabilizer = Stabilizer()
-    setpoint = Setpoint(mode_yaw=VELOCITY, yaw_rate=50.0, thrust=30000.0)
+    setpoint = Setpoint(mode=Modes(yaw=VELOCITY), yaw_rate=50.0, thrust=30000.0)
     for _ in range(100):
         stabilizer.update(setpoint, Estimate(), Sensors(noise=False), False, True)
     assert stabilizer.yaw == pytest.approx(10.0)

@@ -5,7 +5,7 @@ import math
 from enum import Enum
 
 from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece
-from crazyflie_virtual.firmware.states import ABSOLUTE, Setpoint
+from crazyflie_virtual.firmware.states import ABSOLUTE, Modes, Setpoint
 from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece, straight_piece
 
 MEMORY_SIZE = 4096
@@ -19,6 +19,8 @@ REFUSED = 1
 
 _SHORTEST = 0.01
 """Least duration of a plan, s."""
+
+_TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 
 
 class Phase(Enum):
@@ -70,27 +72,12 @@ class Planner:
             self.tell_state(estimate)
             return Setpoint(time=time) if self.phase is Phase.STOPPED else None
         goal = self._last = self._trajectory.evaluate(time - self._begin)
-        x, y, z = goal.position
-        vx, vy, vz = goal.velocity
-        ax, ay, az = goal.acceleration
         return Setpoint(
-            mode_x=ABSOLUTE,
-            mode_y=ABSOLUTE,
-            mode_z=ABSOLUTE,
-            mode_yaw=ABSOLUTE,
-            x=x,
-            y=y,
-            z=z,
-            vx=vx,
-            vy=vy,
-            vz=vz,
-            ax=ax,
-            ay=ay,
-            az=az,
+            mode=_TRACKING,
             yaw=math.degrees(goal.yaw),
             yaw_rate=math.degrees(goal.yaw_rate),
             time=time,
-        )
+        ).with_motion(goal.position, goal.velocity, goal.acceleration)
 
     def tell_state(self, estimate) -> None:
         """Begin the next plan at the vehicle's state and not at the last setpoint."""

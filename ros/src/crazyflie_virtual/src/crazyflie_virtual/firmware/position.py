@@ -74,13 +74,13 @@ class PositionController:
         vx, vy, vz = setpoint.vx, setpoint.vy, setpoint.vz
         if not setpoint.velocity_body:
             vx, vy = vx * c + vy * s, vy * c - vx * s
-        if setpoint.mode_x == ABSOLUTE:
+        if setpoint.mode.x == ABSOLUTE:
             self.x.output_limit = self.vx_max * _OVERHEAD
             vx = self.x.update(setpoint.x * c + setpoint.y * s, self.body_x)
-        if setpoint.mode_y == ABSOLUTE:
+        if setpoint.mode.y == ABSOLUTE:
             self.y.output_limit = self.vy_max * _OVERHEAD
             vy = self.y.update(setpoint.y * c - setpoint.x * s, self.body_y)
-        if setpoint.mode_z == ABSOLUTE:
+        if setpoint.mode.z == ABSOLUTE:
             self.z.output_limit = max(self.vz_max, 0.5) * _OVERHEAD
             vz = self.z.update(setpoint.z, estimate.z)
 

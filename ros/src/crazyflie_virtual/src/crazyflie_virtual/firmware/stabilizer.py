@@ -7,7 +7,13 @@ from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.mixer import limit, mix
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
 from crazyflie_virtual.firmware.position import PositionController
-from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Setpoint
+from crazyflie_virtual.firmware.states import (
+    ABSOLUTE,
+    DISABLED,
+    VELOCITY,
+    Modes,
+    Setpoint,
+)
 
 _OFF = (0.0,) * 4
 
@@ -64,7 +70,7 @@ class Stabilizer:
         self.thrust = self.command_roll = self.command_pitch = self.command_yaw = 0.0
         self.requested = self.commands = _OFF
         self._automatic = (0.0, 0.0, 0.0)
-        self._modes = Setpoint().modes
+        self._mode = Modes()
 
     def update(
         self, setpoint: Setpoint, estimate, sensors, with_position: bool, may_run: bool
@@ -81,8 +87,8 @@ class Stabilizer:
         may_run : bool
             Whether the supervisor lets motors run.
         """
-        if setpoint.modes != self._modes:
-            self._modes = setpoint.modes
+        if setpoint.mode != self._mode:
+            self._mode = setpoint.mode
             self._reset(estimate)
         if with_position:
             self._control_position(setpoint, estimate)
@@ -109,11 +115,11 @@ class Stabilizer:
         self._automatic = (estimate.roll, estimate.pitch, 0.0)
 
     def _control_position(self, setpoint, estimate):
-        if (setpoint.mode_x, setpoint.mode_y, setpoint.mode_z) != (DISABLED,) * 3:
+        if (setpoint.mode.x, setpoint.mode.y, setpoint.mode.z) != (DISABLED,) * 3:
             self._automatic = self.position.update(setpoint, estimate)
 
     def _desire_yaw(self, setpoint, estimate):
-        if setpoint.mode_yaw == VELOCITY:
+        if setpoint.mode.yaw == VELOCITY:
             # A commanded yaw rate moves the heading that is held.
             yaw = self.yaw + setpoint.yaw_rate * PERIOD
             most = self.attitude.yaw_max_delta
@@ -121,24 +127,24 @@ class Stabilizer:
                 ahead = wrap_degrees(yaw - estimate.yaw)
                 yaw = estimate.yaw + max(-most, min(most, ahead))
             self.yaw = wrap_degrees(yaw)
-        elif setpoint.mode_yaw == ABSOLUTE:
+        elif setpoint.mode.yaw == ABSOLUTE:
             self.yaw = wrap_degrees(setpoint.yaw)
-        elif setpoint.mode_quaternion == ABSOLUTE:
+        elif setpoint.mode.quaternion == ABSOLUTE:
             self.yaw = math.degrees(zyx_from_quaternion(setpoint.quaternion)[2])
 
     def _desire_tilt(self, setpoint):
         roll, pitch, thrust = self._automatic
-        self.thrust = setpoint.thrust if setpoint.mode_z == DISABLED else thrust
-        if DISABLED in (setpoint.mode_x, setpoint.mode_y):
+        self.thrust = setpoint.thrust if setpoint.mode.z == DISABLED else thrust
+        if DISABLED in (setpoint.mode.x, setpoint.mode.y):
             roll, pitch = setpoint.roll, setpoint.pitch
         self.roll, self.pitch = roll, pitch
 
     def _control_attitude(self, setpoint, estimate, sensors):
         rates = self.attitude.desired_rates(estimate, self.roll, self.pitch, self.yaw)
         roll_rate, pitch_rate, yaw_rate = rates
-        if setpoint.mode_roll == VELOCITY:
+        if setpoint.mode.roll == VELOCITY:
             roll_rate = setpoint.roll_rate
-        if setpoint.mode_pitch == VELOCITY:
+        if setpoint.mode.pitch == VELOCITY:
             pitch_rate = setpoint.pitch_rate
         self.roll_rate, self.pitch_rate, self.yaw_rate = roll_rate, pitch_rate, yaw_rate
         gyro = (sensors.gyro_x, -sensors.gyro_y, sensors.gyro_z)

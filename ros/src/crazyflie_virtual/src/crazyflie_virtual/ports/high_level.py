@@ -39,10 +39,11 @@ class HighLevelPort:
         if len(data) < struct.calcsize("<" + form):
             return errno.EINVAL
         values = struct.unpack_from("<" + form, data)
-        return handler(self, *values)
-
-    def _is_meant(self, group):
-        return group == _ALL_GROUPS or group & self._groups
+        if command in _FOR_ALL:
+            return handler(self, *values)
+        group, *values = values
+        is_meant = group == _ALL_GROUPS or group & self._groups
+        return handler(self, *values) if is_meant else 0
 
     @property
     def _time(self):
@@ -52,62 +53,45 @@ class HighLevelPort:
         self._groups = groups
         return 0
 
-    def _stop(self, group):
-        return self._planner.stop() if self._is_meant(group) else 0
+    def _stop(self):
+        return self._planner.stop()
 
-    def _take_off(self, group, height, yaw, keep_yaw, duration):
-        if not self._is_meant(group):
-            return 0
-        yaw = None if keep_yaw else yaw
-        return self._planner.take_off(self._time, height, yaw, duration)
+    def _take_off(self, height, yaw, keep_yaw, duration):
+        return self._planner.take_off(self._time, height, None if keep_yaw else yaw, duration)
 
-    def _land(self, group, height, yaw, keep_yaw, duration):
-        if not self._is_meant(group):
-            return 0
-        yaw = None if keep_yaw else yaw
-        return self._planner.land(self._time, height, yaw, duration)
+    def _land(self, height, yaw, keep_yaw, duration):
+        return self._planner.land(self._time, height, None if keep_yaw else yaw, duration)
 
-    def _take_off_1(self, group, height, duration):
-        return self._take_off(group, height, 0.0, False, duration)
+    def _take_off_1(self, height, duration):
+        return self._take_off(height, 0.0, False, duration)
 
-    def _land_1(self, group, height, duration):
-        return self._land(group, height, 0.0, False, duration)
+    def _land_1(self, height, duration):
+        return self._land(height, 0.0, False, duration)
 
-    def _take_off_at_speed(self, group, height, relative, yaw, keep_yaw, speed):
+    def _take_off_at_speed(self, height, relative, yaw, keep_yaw, speed):
         speed = speed if speed > 0.0 else self._planner.takeoff_speed
         height, duration = self._planner.climb_time(height, relative, speed)
-        return self._take_off(group, height, yaw, keep_yaw, duration)
+        return self._take_off(height, yaw, keep_yaw, duration)
 
-    def _land_at_speed(self, group, height, relative, yaw, keep_yaw, speed):
+    def _land_at_speed(self, height, relative, yaw, keep_yaw, speed):
         speed = speed if speed > 0.0 else self._planner.landing_speed
         height = -height if relative else height
         height, duration = self._planner.climb_time(height, relative, speed)
-        return self._land(group, height, yaw, keep_yaw, duration)
+        return self._land(height, yaw, keep_yaw, duration)
 
-    def _go_to(self, group, relative, linear, x, y, z, yaw, duration):
-        if not self._is_meant(group):
-            return 0
-        return self._planner.go_to(
-            self._time, (x, y, z), yaw, duration, bool(relative), bool(linear)
-        )
+    def _go_to(self, relative, linear, x, y, z, yaw, duration):
+        return self._planner.go_to(self._time, (x, y, z), yaw, duration, relative, linear)
 
-    def _go_to_1(self, group, relative, x, y, z, yaw, duration):
-        return self._go_to(group, relative, False, x, y, z, yaw, duration)
+    def _go_to_1(self, relative, x, y, z, yaw, duration):
+        return self._go_to(relative, False, x, y, z, yaw, duration)
 
-    def _start(self, group, relative, relative_yaw, backwards, trajectory_id, time_scale):
-        if not self._is_meant(group):
-            return 0
+    def _start(self, relative, relative_yaw, backwards, trajectory_id, time_scale):
         return self._planner.start(
-            self._time,
-            trajectory_id,
-            time_scale,
-            bool(backwards),
-            bool(relative),
-            bool(relative_yaw),
+            self._time, trajectory_id, time_scale, backwards, relative, relative_yaw
         )
 
-    def _start_1(self, group, relative, backwards, trajectory_id, time_scale):
-        return self._start(group, relative, False, backwards, trajectory_id, time_scale)
+    def _start_1(self, relative, backwards, trajectory_id, time_scale):
+        return self._start(relative, False, backwards, trajectory_id, time_scale)
 
     def _define(self, trajectory_id, location, trajectory_type, offset, pieces):
         if (location, trajectory_type) != (_LOCATION_MEMORY, _TYPE_POLYNOMIALS):
@@ -120,14 +104,17 @@ _COMMANDS = {
     1: ("Bff", HighLevelPort._take_off_1),
     2: ("Bff", HighLevelPort._land_1),
     3: ("B", HighLevelPort._stop),
-    4: ("2B5f", HighLevelPort._go_to_1),
-    5: ("4Bf", HighLevelPort._start_1),
+    4: ("B?5f", HighLevelPort._go_to_1),
+    5: ("B??Bf", HighLevelPort._start_1),
     6: ("3BIB", HighLevelPort._define),
     7: ("Bff?f", HighLevelPort._take_off),
     8: ("Bff?f", HighLevelPort._land),
     9: ("Bf?f?f", HighLevelPort._take_off_at_speed),
     10: ("Bf?f?f", HighLevelPort._land_at_speed),
-    12: ("3B5f", HighLevelPort._go_to),
-    13: ("5Bf", HighLevelPort._start),
+    12: ("B??5f", HighLevelPort._go_to),
+    13: ("B???Bf", HighLevelPort._start),
 }
 """Command -> (fields, handler). 1, 2, 4 and 5 are those of older clients."""
+
+_FOR_ALL = (0, 6)
+"""Commands that do not begin with the group of vehicles that they are for."""

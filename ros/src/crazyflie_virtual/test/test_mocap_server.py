@@ -21,24 +21,24 @@ class Watcher:
         self.client = client
         self.frames = []
         self.model = None
-        self._heard = threading.Condition()
+        self._received = threading.Condition()
         client.on_data_frame_received_event.handlers.append(self._on_frame)
         client.on_data_description_received_event.handlers.append(self._on_model)
 
     def _on_frame(self, frame):
-        with self._heard:
+        with self._received:
             self.frames.append(frame)
-            self._heard.notify()
+            self._received.notify()
 
     def _on_model(self, model):
-        with self._heard:
+        with self._received:
             self.model = model
-            self._heard.notify()
+            self._received.notify()
 
     def wait(self, condition):
         """Wait until ``condition()`` holds."""
-        with self._heard:
-            assert self._heard.wait_for(condition, LIMIT)
+        with self._received:
+            assert self._received.wait_for(condition, LIMIT)
 
     def wait_for_body(self, condition):
         """Return a body of a later frame for which ``condition(body)`` holds."""

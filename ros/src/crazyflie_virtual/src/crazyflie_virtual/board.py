@@ -1,5 +1,7 @@
 """The microcontroller: firmware and ports, from power-up on."""
 
+from crazyflie_virtual.body.physics import MotorCommands, Physics
+from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.ports.high_level import HighLevelPort
@@ -11,6 +13,7 @@ from crazyflie_virtual.ports.parameters import ParameterPort
 from crazyflie_virtual.ports.platform import PlatformPort
 from crazyflie_virtual.ports.setpoints import AttitudeSetpointPort, GenericSetpointPort
 from crazyflie_virtual.ports.supervisor import SupervisorPort
+from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables import memories
 from crazyflie_virtual.tables.memories import Memory
 
@@ -28,7 +31,7 @@ class Storage:
 
     def __init__(self, address: int):
         self.eeprom = memories.eeprom(_ADDRESS_PREFIX | address)
-        self.parameters = {}
+        self.parameters: dict[str, float] = {}
 
 
 class Board:
@@ -42,7 +45,9 @@ class Board:
     storage : Storage
     """
 
-    def __init__(self, physics, faults, settings, storage: Storage):
+    def __init__(
+        self, physics: Physics, faults: FaultSwitches, settings: VehicleSettings, storage: Storage
+    ):
         firmware = self.firmware = Firmware(physics, faults, settings)
         supervisor = SupervisorPort(firmware)
         self._log = LogPort(firmware)
@@ -66,7 +71,7 @@ class Board:
         )
         self._ports = {port.port: port for port in ports}
 
-    def receive(self, packet: Packet) -> list:
+    def receive(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         self.firmware.link_statistics.count_received(self.firmware.time)
         port = self._ports.get(packet.port)
@@ -74,11 +79,11 @@ class Board:
         self.firmware.link_statistics.count_sent(len(answers))
         return answers
 
-    def step(self, voltage: float) -> tuple:
+    def step(self, voltage: float) -> MotorCommands:
         """Take a step and return the motor commands; see `Firmware.step`."""
         return self.firmware.step(voltage)
 
-    def unsolicited(self) -> list:
+    def unsolicited(self) -> list[Packet]:
         """Return the packets that are sent without being asked for: log and console."""
         packets = self._log.collect()
         firmware = self.firmware

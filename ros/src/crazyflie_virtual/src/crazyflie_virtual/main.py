@@ -3,7 +3,7 @@
 import signal
 import sys
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any
 
 from crazyflie_utils.command_line import parse_arguments
 from crazyflie_utils.parameters import Parameters
@@ -25,6 +25,7 @@ def virtual_crazyflie() -> None:
         from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
 
         _run_node(VirtualCrazyflieNode, "virtual_crazyflie")
+        return
     from crazyflie_virtual.link.server import VehicleServer
     from crazyflie_virtual.settings import VehicleSettings
 
@@ -37,6 +38,7 @@ def virtual_mocap() -> None:
         from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
 
         _run_node(VirtualMocapNode, "virtual_mocap")
+        return
     from crazyflie_virtual.mocap.server import MocapServer
     from crazyflie_virtual.mocap.settings import MocapSettings
 
@@ -48,7 +50,7 @@ def _is_ros_node():
     return any(":=" in argument for argument in sys.argv[1:])
 
 
-def _run_node(node_type: type, name: str) -> NoReturn:
+def _run_node(node_type: type, name: str) -> None:
     from crazyflie_utils import run
 
     run(node_type, name)

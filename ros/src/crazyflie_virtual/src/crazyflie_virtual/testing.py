@@ -9,7 +9,7 @@ from crazyflie_virtual.settings import VehicleSettings
 
 @contextlib.contextmanager
 def virtual_vehicle(**settings: object) -> Iterator[tuple[VehicleServer, str]]:
-    """Run a vehicle, on a free port unless told otherwise; yield its server and its address.
+    """Run a vehicle, on a free port unless given; yield its server and its address.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ import math
 
 from crazyflie_virtual.board import Board, Storage
 from crazyflie_virtual.body.battery import LOW_CHARGE, Battery
-from crazyflie_virtual.body.physics import STEP, Physics
+from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
 from crazyflie_virtual.link import crtp
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings
@@ -18,7 +18,7 @@ _ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
 
 _BATTERY_STEPS = 10
 
-_STOPPED = (0.0,) * 4
+_STOPPED: MotorCommands = (0.0, 0.0, 0.0, 0.0)
 
 
 class VirtualVehicle:

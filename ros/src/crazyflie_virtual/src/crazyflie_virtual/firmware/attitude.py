@@ -16,6 +16,7 @@ from crazyflie_model.inner_loops import (
     TILT_RATE,
 )
 from crazyflie_virtual.firmware.pid import FirmwarePid
+from crazyflie_virtual.firmware.states import Estimate
 
 
 def wrap_degrees(angle: float) -> float:
@@ -47,13 +48,13 @@ class AttitudeController:
         self.yaw_max_delta = 0.0
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Forget integrals and last measurements."""
         for pid in (self.roll, self.pitch, self.yaw):
             pid.reset()
         for pid in (self.roll_rate, self.pitch_rate, self.yaw_rate):
             pid.reset()
 
-    def desired_rates(self, estimate, roll: float, pitch: float, yaw: float) -> Triple:
+    def desired_rates(self, estimate: Estimate, roll: float, pitch: float, yaw: float) -> Triple:
         """Return the body rates (deg/s) that lead to an attitude (deg)."""
         yaw_error = wrap_degrees(yaw - estimate.yaw)
         return (

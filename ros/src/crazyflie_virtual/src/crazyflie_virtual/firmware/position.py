@@ -7,10 +7,11 @@ Crazyflie 2.1's firmware (2024, controller PID).
 
 import math
 
+from crazyflie_model.angles import Triple
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.pid import Gains
 from crazyflie_virtual.firmware.pid import FirmwarePid
-from crazyflie_virtual.firmware.states import ABSOLUTE
+from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Setpoint
 
 DT = 0.01
 """Time between two updates, s."""
@@ -58,11 +59,11 @@ class PositionController:
         self.body_x = self.body_y = self.body_vx = self.body_vy = 0.0
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Forget integrals and last measurements."""
         for pid in (self.x, self.y, self.z, self.vx, self.vy, self.vz):
             pid.reset()
 
-    def update(self, setpoint, estimate) -> tuple:
+    def update(self, setpoint: Setpoint, estimate: Estimate) -> Triple:
         """Return roll (deg), pitch (deg, the firmware's sign) and thrust (PWM)."""
         yaw = math.radians(estimate.yaw)
         c, s = math.cos(yaw), math.sin(yaw)

@@ -2,7 +2,9 @@
 
 import errno
 import struct
+from collections.abc import Callable
 
+from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 
 _ALL_GROUPS = 0
@@ -19,12 +21,12 @@ class HighLevelPort:
 
     port = Port.HIGH_LEVEL
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
         self._planner = firmware.planner
         self._groups = 0
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answer to a command: four bytes, the last an error number."""
         if not packet.data:
             return []
@@ -41,9 +43,9 @@ class HighLevelPort:
         values = struct.unpack_from("<" + form, data)
         if command in _FOR_ALL:
             return handler(self, *values)
-        group, *values = values
+        group, *arguments = values
         is_meant = group == _ALL_GROUPS or group & self._groups
-        return handler(self, *values) if is_meant else 0
+        return handler(self, *arguments) if is_meant else 0
 
     @property
     def _time(self):
@@ -99,7 +101,7 @@ class HighLevelPort:
         return self._planner.define(trajectory_id, offset, pieces)
 
 
-_COMMANDS = {
+_COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
     0: ("B", HighLevelPort._set_groups),
     1: ("Bff", HighLevelPort._take_off_1),
     2: ("Bff", HighLevelPort._land_1),

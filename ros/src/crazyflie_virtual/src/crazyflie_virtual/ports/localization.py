@@ -4,6 +4,7 @@ import math
 import struct
 
 from crazyflie_virtual.firmware.compressed import decompress_quaternion
+from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 
 _POSITION, _GENERIC, _PACKED_POSITIONS = 0, 1, 2
@@ -26,11 +27,11 @@ class LocalizationPort:
 
     port = Port.LOCALIZATION
 
-    def __init__(self, firmware, address: int):
+    def __init__(self, firmware: Firmware, address: int):
         self._firmware = firmware
         self._address = address
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Take a measurement; there is no answer."""
         data = packet.data
         if packet.channel == _POSITION:

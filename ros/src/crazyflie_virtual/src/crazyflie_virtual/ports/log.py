@@ -2,10 +2,12 @@
 
 import errno
 import struct
+from collections.abc import Callable
 
+from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.tables.log_table import log_variables
-from crazyflie_virtual.tables.number_types import LOG_TYPES
+from crazyflie_virtual.tables.number_types import LOG_TYPES, NumberType
 from crazyflie_virtual.tables.toc import Entry, Table
 
 MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
@@ -20,10 +22,10 @@ _PERIOD_UNIT = 10
 
 class _Block:
     def __init__(self):
-        self.variables = []
+        self.variables: list[tuple[Callable[[Firmware], float], NumberType]] = []
         self.size = 0
         self.period = 0
-        self.due = None
+        self.due: int | None = None
 
     def add(self, variable, number_type):
         self.variables.append((variable.read, number_type))
@@ -41,15 +43,15 @@ class LogPort:
 
     port = Port.LOG
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
         self._variables = log_variables()
         entries = [Entry(v.group, v.name, v.number_type.log_code) for v in self._variables]
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
-        self._blocks = {}
-        self._due = None
+        self._blocks: dict[int, _Block] = {}
+        self._due: int | None = None
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         if packet.channel == _TABLE:
             answer = self.table.answer(packet.data)
@@ -61,7 +63,7 @@ class LogPort:
             return [Packet(Port.LOG, _CONTROL, bytes([command, block_id, error]))]
         return []
 
-    def collect(self) -> list:
+    def collect(self) -> list[Packet]:
         """Return the packets with values that are due."""
         now = self._firmware.milliseconds
         if self._due is None or now < self._due:

@@ -5,9 +5,10 @@ import math
 import struct
 from operator import attrgetter
 
+from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
 from crazyflie_virtual.tables.number_types import PARAMETER_TYPES
-from crazyflie_virtual.tables.parameter_table import parameter_specs
+from crazyflie_virtual.tables.parameter_table import ParameterSpec, parameter_specs
 from crazyflie_virtual.tables.toc import Entry, Table
 
 _TABLE, _READ, _WRITE, _MISC = 0, 1, 2, 3
@@ -28,7 +29,7 @@ class Parameter:
     firmware : Firmware
     """
 
-    def __init__(self, spec, firmware):
+    def __init__(self, spec: ParameterSpec, firmware: Firmware):
         self.spec = spec
         self.full_name = f"{spec.group}.{spec.name}"
         self._owner = None
@@ -40,11 +41,11 @@ class Parameter:
         self.default = self.value
 
     @property
-    def value(self):
+    def value(self) -> float:
         """The present value."""
         return self._value if self._owner is None else getattr(self._owner, self._attribute)
 
-    def set(self, value) -> None:
+    def set(self, value: float) -> None:
         """Change the value, unless it is read-only or the new one is no number."""
         if self.spec.read_only or not math.isfinite(value):
             return
@@ -75,7 +76,7 @@ class ParameterPort:
 
     port = Port.PARAMETERS
 
-    def __init__(self, firmware, stored: dict):
+    def __init__(self, firmware: Firmware, stored: dict[str, float]):
         self._parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
         self._stored = stored
         for parameter in self._parameters:
@@ -83,7 +84,7 @@ class ParameterPort:
                 parameter.set(stored[parameter.full_name])
         self.table = Table([Entry(p.spec.group, p.spec.name, p.code) for p in self._parameters])
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         data = packet.data
         if packet.channel == _TABLE:

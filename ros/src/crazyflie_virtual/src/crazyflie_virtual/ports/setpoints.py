@@ -1,5 +1,6 @@
 """Ports 3 and 7: streamed setpoints."""
 
+from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.firmware.setpoints import decode_generic
 from crazyflie_virtual.link.crtp import Packet, Port
 
@@ -17,10 +18,10 @@ class AttitudeSetpointPort:
 
     port = Port.SETPOINT
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Take a setpoint; there is no answer."""
         f = self._firmware
         if packet.channel == _SETPOINT:
@@ -40,10 +41,10 @@ class GenericSetpointPort:
 
     port = Port.GENERIC_SETPOINT
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Take a setpoint or a command; there is no answer."""
         f = self._firmware
         if packet.channel == _SETPOINT:

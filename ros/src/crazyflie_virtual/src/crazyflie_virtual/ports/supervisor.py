@@ -2,6 +2,7 @@
 
 import struct
 
+from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 
 _INFO, _COMMAND = 0, 1
@@ -20,10 +21,10 @@ class SupervisorPort:
 
     port = Port.SUPERVISOR
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         if not packet.data:
             return []

@@ -28,8 +28,8 @@ class Memory:
 
     type: int
     size: int
-    read: Callable
-    write: Callable
+    read: Callable[[int, int], bytes]
+    write: Callable[[int, bytes], None]
 
     @classmethod
     def over(cls, memory_type: int, buffer: bytearray) -> "Memory":

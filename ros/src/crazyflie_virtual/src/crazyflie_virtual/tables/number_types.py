@@ -34,11 +34,11 @@ class NumberType:
         """Return the bytes of a value; whole numbers are limited to the type's range."""
         return struct.pack("<" + self.format, self.convert(value))
 
-    def unpack(self, data: bytes):
+    def unpack(self, data: bytes) -> float:
         """Return the value of `size` bytes."""
         return struct.unpack("<" + self.format, data)[0]
 
-    def convert(self, value: float):
+    def convert(self, value: float) -> float:
         """Return the value that is packed: limited, and whole where the type is whole."""
         if self.format in "fde":
             largest = _LARGEST.get(self.format, math.inf)

@@ -27,12 +27,12 @@ class ParameterSpec(NamedTuple):
     group: str
     name: str
     number_type: NumberType
-    source: object
+    source: str | float
     persistent: bool = False
     read_only: bool = False
 
 
-def parameter_specs() -> list:
+def parameter_specs() -> list[ParameterSpec]:
     """Return all parameters, in the order of their numbers."""
     return [
         ParameterSpec(group, *row) for group, parameters in _GROUPS.items() for row in parameters

@@ -5,9 +5,12 @@ from setuptools import setup
 
 PACKAGES = [
     "crazyflie_virtual",
+    "crazyflie_virtual.body",
     "crazyflie_virtual.firmware",
+    "crazyflie_virtual.link",
     "crazyflie_virtual.mocap",
-    "crazyflie_virtual.services",
+    "crazyflie_virtual.ports",
+    "crazyflie_virtual.tables",
 ]
 
 setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

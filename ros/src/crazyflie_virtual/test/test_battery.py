@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_virtual.battery import LOW_CHARGE, Battery, open_circuit_voltage
+from crazyflie_virtual.body.battery import LOW_CHARGE, Battery, open_circuit_voltage
 from crazyflie_virtual.firmware.power import LOW, ON_BATTERY, PowerMonitor
 
 

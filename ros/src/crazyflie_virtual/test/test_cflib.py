@@ -9,10 +9,10 @@ from cflib.utils.power_switch import PowerSwitch
 from virtual_client import LIMIT, Client, wait_until
 
 from crazyflie_virtual.firmware.supervisor import State
-from crazyflie_virtual.log_table import log_variables
-from crazyflie_virtual.parameter_table import parameter_specs
-from crazyflie_virtual.server import Server
-from crazyflie_virtual.settings import FIRST_PORT, Settings
+from crazyflie_virtual.link.server import VehicleServer
+from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
+from crazyflie_virtual.tables.log_table import log_variables
+from crazyflie_virtual.tables.parameter_table import parameter_specs
 
 
 @pytest.fixture
@@ -35,7 +35,7 @@ def connect(serve):
 @pytest.fixture(scope="module")
 def connected():
     """Return a vehicle and a client for all tests that do not fly: connections take time."""
-    server = Server(Settings(port=0, observer_port=0))
+    server = VehicleServer(VehicleSettings(port=0, observer_port=0))
     server.start()
     client = Client("udp://{}:{}".format(*server.address))
     client.open().wait_for("fully_connected")

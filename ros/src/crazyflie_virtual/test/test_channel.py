@@ -5,12 +5,12 @@ import random
 
 import pytest
 
-from crazyflie_virtual.channel import Channel
-from crazyflie_virtual.faults import Faults
+from crazyflie_virtual.faults import FaultSwitches
+from crazyflie_virtual.link.channel import Channel
 
 
 def channel(**faults):
-    switches = Faults(**faults)
+    switches = FaultSwitches(**faults)
     return switches, Channel(switches, random.Random(1))
 
 

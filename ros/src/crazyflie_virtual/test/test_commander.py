@@ -4,9 +4,9 @@ import struct
 
 from virtual_bench import SETPOINTS_STOP, Bench, attitude, generic
 
-from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.firmware.commander import HIGH_LEVEL, NOBODY, STREAMED
 from crazyflie_virtual.firmware.planner import Phase
+from crazyflie_virtual.link.crtp import Port
 
 HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)
 LAND = struct.pack("<BBff?f", 8, 0, 0.0, 0.0, False, 2.0)

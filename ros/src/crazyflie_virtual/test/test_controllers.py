@@ -5,16 +5,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_model.pid import Gains
+from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
-from crazyflie_virtual.firmware.pid import Pid
+from crazyflie_virtual.firmware.pid import FirmwarePid
 from crazyflie_virtual.firmware.position import PositionController
-from crazyflie_virtual.firmware.sensors import Sensors
 from crazyflie_virtual.firmware.stabilizer import Stabilizer
-from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Setpoint
+from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Modes, Setpoint
 
 
 def test_pid_parts():
-    pid = Pid(Gains(2.0, 3.0, 0.5), 0.1, kff=0.25)
+    pid = FirmwarePid(Gains(2.0, 3.0, 0.5), 0.1, kff=0.25)
     assert pid.update(1.0, 0.0) == pytest.approx(2.0 + 3.0 * 0.1 + 0.25)
     # The derivative is of the measurement: a jump of what is desired does not kick.
     output = pid.update(4.0, 0.2)
@@ -24,7 +24,7 @@ def test_pid_parts():
 
 
 def test_pid_limits_and_reset():
-    pid = Pid(Gains(0.0, 1.0, 0.0, limit=2.0), 1.0, output_limit=1.5)
+    pid = FirmwarePid(Gains(0.0, 1.0, 0.0, limit=2.0), 1.0, output_limit=1.5)
     assert [pid.update(1.0, 0.0) for _ in range(4)] == [1.0, 1.5, 1.5, 1.5]
     assert pid.out_i == 2.0
     pid.reset()
@@ -40,7 +40,7 @@ def test_wrapped_angles_point_the_same_way(angle):
 
 
 def setpoint_at(**position):
-    return Setpoint(mode_x=ABSOLUTE, mode_y=ABSOLUTE, mode_z=ABSOLUTE, **position)
+    return Setpoint(mode=Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE), **position)
 
 
 def test_position_errors_tilt_the_vehicle_there():
@@ -65,10 +65,10 @@ def test_position_controller_limits():
 
 def test_velocity_setpoints_in_both_frames():
     east = Estimate(yaw=90.0)
-    ahead = Setpoint(mode_x=VELOCITY, mode_y=VELOCITY, vx=0.5, velocity_body=True)
+    ahead = Setpoint(mode=Modes(x=VELOCITY, y=VELOCITY), vx=0.5, velocity_body=True)
     _, pitch, _ = PositionController().update(ahead, east)
     assert pitch < -5.0
-    world = Setpoint(mode_x=VELOCITY, mode_y=VELOCITY, vy=0.5)
+    world = Setpoint(mode=Modes(x=VELOCITY, y=VELOCITY), vy=0.5)
     assert PositionController().update(world, east)[1] == pytest.approx(pitch)
 
 
@@ -91,13 +91,13 @@ def test_the_cascade_turns_the_vehicle_to_its_setpoint():
     # Positive pitch is nose up in the firmware.
     pitched = commands(pitch=5.0)
     assert pitched[front_left] == pitched[front_right] > pitched[back_left] == pitched[back_right]
-    turned = commands(mode_yaw=ABSOLUTE, yaw=5.0)
+    turned = commands(mode=Modes(yaw=ABSOLUTE), yaw=5.0)
     assert turned[back_right] == turned[front_left] > turned[front_right] == turned[back_left]
 
 
 def test_yaw_rate_moves_the_heading_that_is_held():
     stabilizer = Stabilizer()
-    setpoint = Setpoint(mode_yaw=VELOCITY, yaw_rate=50.0, thrust=30000.0)
+    setpoint = Setpoint(mode=Modes(yaw=VELOCITY), yaw_rate=50.0, thrust=30000.0)
     for _ in range(100):
         stabilizer.update(setpoint, Estimate(), Sensors(noise=False), False, True)
     assert stabilizer.yaw == pytest.approx(10.0)

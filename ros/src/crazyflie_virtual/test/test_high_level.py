@@ -8,8 +8,8 @@ import pytest
 from cflib.crazyflie.mem import Poly4D
 from virtual_bench import Bench, cflib_client
 
-from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.firmware.planner import REFUSED
+from crazyflie_virtual.link.crtp import Port
 
 
 @pytest.fixture

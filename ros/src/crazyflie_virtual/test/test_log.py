@@ -6,8 +6,8 @@ import struct
 import pytest
 from virtual_bench import Bench
 
-from crazyflie_virtual.crtp import Port
-from crazyflie_virtual.log_table import log_variables
+from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.tables.log_table import log_variables
 
 TABLE, CONTROL, DATA = 0, 1, 2
 
@@ -59,7 +59,10 @@ def test_users_variables_exist(name):
 
 def test_every_variable_can_be_read_and_fits_into_a_packet(bench):
     for variable in log_variables():
-        assert len(variable.kind.pack(variable.read(bench.firmware))) == variable.kind.size
+        assert (
+            len(variable.number_type.pack(variable.read(bench.firmware)))
+            == variable.number_type.size
+        )
         assert len(variable.group) + len(variable.name) <= 24
     names = [(v.group, v.name) for v in log_variables()]
     assert len(set(names)) == len(names)

@@ -6,10 +6,10 @@ import threading
 import pytest
 from natnet import NatNetClient
 
+from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.mocap.server import MocapServer
 from crazyflie_virtual.mocap.settings import MocapSettings
-from crazyflie_virtual.server import Server
-from crazyflie_virtual.settings import Settings
+from crazyflie_virtual.settings import VehicleSettings
 
 LIMIT = 10.0
 
@@ -21,24 +21,24 @@ class Watcher:
         self.client = client
         self.frames = []
         self.model = None
-        self._heard = threading.Condition()
+        self._received = threading.Condition()
         client.on_data_frame_received_event.handlers.append(self._on_frame)
         client.on_data_description_received_event.handlers.append(self._on_model)
 
     def _on_frame(self, frame):
-        with self._heard:
+        with self._received:
             self.frames.append(frame)
-            self._heard.notify()
+            self._received.notify()
 
     def _on_model(self, model):
-        with self._heard:
+        with self._received:
             self.model = model
-            self._heard.notify()
+            self._received.notify()
 
     def wait(self, condition):
         """Wait until ``condition()`` holds."""
-        with self._heard:
-            assert self._heard.wait_for(condition, LIMIT)
+        with self._received:
+            assert self._received.wait_for(condition, LIMIT)
 
     def wait_for_body(self, condition):
         """Return a body of a later frame for which ``condition(body)`` holds."""
@@ -82,8 +82,8 @@ def vehicle():
     with contextlib.ExitStack() as stack:
 
         def vehicle(server, **options):
-            settings = Settings(port=0, observer_port=server.observer_port, **options)
-            virtual = Server(settings)
+            settings = VehicleSettings(port=0, observer_port=server.observer_port, **options)
+            virtual = VehicleServer(settings)
             stack.callback(virtual.stop)
             virtual.start()
             return virtual

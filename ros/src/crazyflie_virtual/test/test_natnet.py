@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from crazyflie_virtual.mocap import natnet
 from crazyflie_virtual.mocap.natnet import BodyPose, Encoder, Stamps
-from crazyflie_virtual.mocap.scene import Scene, Switches
+from crazyflie_virtual.mocap.scene import MocapSwitches, Scene
 from crazyflie_virtual.observer import Observation
 
 BODIES = [
@@ -90,7 +90,7 @@ def observation(time, body_id=1, **changes):
 
 
 def test_bodies_go_on_between_observations():
-    scene = Scene(Switches())
+    scene = Scene(MocapSwitches())
     scene.observe(observation(10.0, velocity=(1.0, -2.0, 0.5), rates=(0.0, 0.0, 2.0)))
     (body,) = scene.bodies(10.01)
     np.testing.assert_allclose(body.position, (1.01, 1.98, 3.005))
@@ -100,7 +100,7 @@ def test_bodies_go_on_between_observations():
 
 
 def test_a_vehicle_that_is_gone_is_not_tracked():
-    scene = Scene(Switches())
+    scene = Scene(MocapSwitches())
     scene.observe(observation(10.0))
     assert scene.bodies(10.4)[0].is_tracked
     (body,) = scene.bodies(10.6)
@@ -109,7 +109,7 @@ def test_a_vehicle_that_is_gone_is_not_tracked():
 
 
 def test_invalid_bodies_keep_the_pose_they_were_seen_at():
-    switches = Switches(invalid="2, 5")
+    switches = MocapSwitches(invalid="2, 5")
     scene = Scene(switches)
     scene.observe(observation(10.0, 1))
     scene.observe(observation(10.0, 2))
@@ -121,7 +121,7 @@ def test_invalid_bodies_keep_the_pose_they_were_seen_at():
 
 
 def test_dropout_takes_its_share():
-    scene = Scene(Switches(dropout=0.25))
+    scene = Scene(MocapSwitches(dropout=0.25))
     tracked = 0
     for k in range(4000):
         scene.observe(observation(0.01 * k))
@@ -130,7 +130,7 @@ def test_dropout_takes_its_share():
 
 
 def test_noise_has_its_deviations():
-    scene = Scene(Switches(), position_noise=0.002, attitude_noise=0.01, seed=3)
+    scene = Scene(MocapSwitches(), position_noise=0.002, attitude_noise=0.01, seed=3)
     positions, angles = [], []
     for k in range(2000):
         scene.observe(observation(0.01 * k))

@@ -5,9 +5,9 @@ import time
 
 import pytest
 
+from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.observer import Observation, decode
-from crazyflie_virtual.server import Server
-from crazyflie_virtual.settings import Settings
+from crazyflie_virtual.settings import VehicleSettings
 
 LIMIT = 10.0
 
@@ -27,7 +27,7 @@ def test_rubbish_is_no_observation():
 @pytest.mark.parametrize(("port", "name"), [(19850, "cf1"), (19859, "cf10"), (17850, "cf17850")])
 def test_names_follow_from_ports(port, name):
     try:
-        server = Server(Settings(port=port, observer_port=0))
+        server = VehicleServer(VehicleSettings(port=port, observer_port=0))
     except OSError:
         pytest.skip(f"port {port} is taken")
     try:
@@ -41,7 +41,7 @@ def test_a_vehicle_tells_its_observer():
         observer.bind(("127.0.0.1", 0))
         observer.settimeout(LIMIT)
         port = observer.getsockname()[1]
-        server = Server(Settings(port=0, observer_port=port, body_id=5, init_y=2.0))
+        server = VehicleServer(VehicleSettings(port=0, observer_port=port, body_id=5, init_y=2.0))
         server.start()
         try:
             first, second = (decode(observer.recv(1024)) for _ in range(2))

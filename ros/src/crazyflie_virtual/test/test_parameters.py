@@ -7,9 +7,9 @@ import struct
 import pytest
 from virtual_bench import Bench
 
-from crazyflie_virtual.crtp import Port
-from crazyflie_virtual.kinds import FLOAT, U8
-from crazyflie_virtual.parameter_table import parameter_specs
+from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.tables.number_types import FLOAT, U8
+from crazyflie_virtual.tables.parameter_table import parameter_specs
 
 TABLE, READ, WRITE, MISC = 0, 1, 2, 3
 READ_ONLY, EXTENDED = 0x40, 0x10
@@ -42,16 +42,16 @@ def read(bench, name):
     spec = parameter_specs()[NAMES.index(name)]
     answer = bench.ask_one(Port.PARAMETERS, READ, number(name))
     assert answer[:3] == number(name) + b"\0"
-    return spec.kind.unpack(answer[3:])
+    return spec.number_type.unpack(answer[3:])
 
 
 def write(bench, name, value):
     """Set a parameter; return the value in the answer."""
     spec = parameter_specs()[NAMES.index(name)]
-    data = number(name) + spec.kind.pack(value)
+    data = number(name) + spec.number_type.pack(value)
     answer = bench.ask_one(Port.PARAMETERS, WRITE, data)
     assert answer[:2] == number(name)
-    return spec.kind.unpack(answer[2:])
+    return spec.number_type.unpack(answer[2:])
 
 
 def misc(bench, command, name):
@@ -108,9 +108,9 @@ def test_errors(bench):
 
 
 def test_set_by_name(bench):
-    def by_name(group, name, kind, value):
+    def by_name(group, name, number_type, value):
         names = b"\0" + group + b"\0" + name + b"\0"
-        data = names + bytes([kind.parameter_code]) + kind.pack(value)
+        data = names + bytes([number_type.parameter_code]) + number_type.pack(value)
         answer = bench.ask_one(Port.PARAMETERS, MISC, data)
         assert answer[:-1] == names
         return answer[-1]

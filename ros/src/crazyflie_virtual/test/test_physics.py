@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from crazyflie_model.units import GRAVITY, HOVER_PWM
-from crazyflie_virtual.battery import FULL_VOLTAGE
-from crazyflie_virtual.firmware.sensors import Sensors
-from crazyflie_virtual.physics import STEP, Physics
+from crazyflie_virtual.body.battery import FULL_VOLTAGE
+from crazyflie_virtual.body.physics import STEP, Physics
+from crazyflie_virtual.body.sensors import Sensors
 
 
 def fly(physics, commands, duration, voltage=FULL_VOLTAGE):

@@ -6,9 +6,9 @@ import struct
 import pytest
 from virtual_bench import Bench, attitude, cflib_client, generic
 
-from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.firmware.setpoints import decode_generic
 from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY
+from crazyflie_virtual.link.crtp import Port
 
 
 def sent_by_cflib(method, *arguments, protocol=12):
@@ -26,7 +26,7 @@ def decoded(method, *arguments, protocol=12):
 
 
 def modes(setpoint):
-    return (setpoint.mode_x, setpoint.mode_y, setpoint.mode_z, setpoint.mode_yaw)
+    return (setpoint.mode.x, setpoint.mode.y, setpoint.mode.z, setpoint.mode.yaw)
 
 
 def test_attitude_signs_on_the_wire():
@@ -57,8 +57,8 @@ def test_rate_mode_of_attitude_setpoints():
     bench.firmware.attitude_decoder.roll_mode = 0
     bench.ask(*attitude(roll=30.0, pitch=5.0))
     setpoint = bench.firmware.commander.setpoint
-    assert (setpoint.mode_roll, setpoint.roll_rate, setpoint.roll) == (VELOCITY, 30.0, 0.0)
-    assert (setpoint.mode_pitch, setpoint.pitch) == (ABSOLUTE, 5.0)
+    assert (setpoint.mode.roll, setpoint.roll_rate, setpoint.roll) == (VELOCITY, 30.0, 0.0)
+    assert (setpoint.mode.pitch, setpoint.pitch) == (ABSOLUTE, 5.0)
 
 
 @pytest.mark.filterwarnings("ignore:Using legacy:DeprecationWarning")
@@ -104,7 +104,7 @@ def test_full_state_rates_are_milliradians():
     assert setpoint.quaternion == pytest.approx(quaternion, abs=2e-3)
     rates = (setpoint.roll_rate, setpoint.pitch_rate, setpoint.yaw_rate)
     assert rates == pytest.approx([math.degrees(rate) for rate in (0.1, 0.2, 0.3)], abs=0.1)
-    assert (*modes(setpoint), setpoint.mode_quaternion) == (1, 1, 1, 0, 1)
+    assert (*modes(setpoint), setpoint.mode.quaternion) == (1, 1, 1, 0, 1)
 
 
 @pytest.mark.parametrize("is_rate", [False, True])
@@ -112,13 +112,13 @@ def test_manual(is_rate):
     setpoint = decoded("send_setpoint_manual", 3.0, 4.0, 5.0, 50.0, is_rate)
     tilt = (setpoint.roll_rate, setpoint.pitch_rate) if is_rate else (setpoint.roll, setpoint.pitch)
     assert tilt == (3.0, -4.0)
-    assert setpoint.mode_roll == (VELOCITY if is_rate else ABSOLUTE)
+    assert setpoint.mode.roll == (VELOCITY if is_rate else ABSOLUTE)
     assert (setpoint.yaw_rate, setpoint.thrust) == (5.0, 35000.0)
 
 
 def test_stop_is_nothing_at_all():
     setpoint = decoded("send_stop_setpoint")
-    assert setpoint.modes == (DISABLED,) * 7
+    assert setpoint.mode == (DISABLED,) * 7
     assert setpoint.thrust == 0.0
 
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from crazyflie_virtual.firmware.states import DISABLED, VELOCITY, Setpoint
+from crazyflie_virtual.firmware.states import DISABLED, VELOCITY, Modes, Setpoint
 from crazyflie_virtual.firmware.supervisor import State, Supervisor
 
 PERIOD = 0.04
@@ -76,9 +76,9 @@ def test_motors_that_stop_are_a_landing_even_when_the_stream_ends():
 def test_levelling_overrides_all_but_the_height(flying):
     flying.setpoint_age = 1.0
     flying.run(PERIOD)
-    given = Setpoint(mode_x=VELOCITY, vx=1.0, roll=20.0, yaw_rate=30.0, thrust=40000.0)
+    given = Setpoint(mode=Modes(x=VELOCITY), vx=1.0, roll=20.0, yaw_rate=30.0, thrust=40000.0)
     flown = flying.supervisor.override(given)
-    assert (flown.mode_x, flown.mode_y, flown.roll, flown.pitch) == (DISABLED, DISABLED, 0.0, 0.0)
+    assert (flown.mode.x, flown.mode.y, flown.roll, flown.pitch) == (DISABLED, DISABLED, 0.0, 0.0)
     assert (flown.yaw_rate, flown.thrust) == (0.0, 40000.0)
 
 

@@ -7,9 +7,9 @@ import pytest
 from virtual_bench import Bench, attitude, generic
 
 from crazyflie_model.units import HOVER_PWM
-from crazyflie_virtual.crtp import Port
 from crazyflie_virtual.firmware.power import LOW
 from crazyflie_virtual.firmware.supervisor import State
+from crazyflie_virtual.link.crtp import Port
 
 HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)
 EMERGENCY_STOPS = {
@@ -79,9 +79,9 @@ def test_positive_yaw_rate_on_the_attitude_port_is_clockwise(flying):
     assert flying.firmware.estimate.yaw < -10.0
 
 
-@pytest.mark.parametrize(("kind", "sign"), [(10, 1.0), (5, -1.0)])
-def test_yaw_rate_of_hover_setpoints(flying, kind, sign):
-    flying.stream(generic(kind, "ffff", 0.0, 0.0, 30.0, 1.0), 1.0)
+@pytest.mark.parametrize(("setpoint_type", "sign"), [(10, 1.0), (5, -1.0)])
+def test_yaw_rate_of_hover_setpoints(flying, setpoint_type, sign):
+    flying.stream(generic(setpoint_type, "ffff", 0.0, 0.0, 30.0, 1.0), 1.0)
     assert sign * flying.firmware.estimate.yaw == pytest.approx(28.0, abs=5.0)
     assert flying.physics.rates[2] * sign == pytest.approx(np.radians(30.0), abs=0.05)
 
@@ -240,7 +240,7 @@ def test_estimator_can_be_reset(flying):
     assert flying.firmware.estimator.variance_position > 1e3 * variance
 
 
-# Faults.
+# FaultSwitches.
 
 
 def test_motor_failure_ends_the_flight(flying):

@@ -7,9 +7,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_virtual.crtp import Packet, decode
-from crazyflie_virtual.kinds import FLOAT, FP16, I8, I16, LOG_KINDS, PARAMETER_KINDS, U8, U16, U32
-from crazyflie_virtual.toc import Entry, Table
+from crazyflie_virtual.link.crtp import Packet, decode
+from crazyflie_virtual.tables.number_types import (
+    FLOAT,
+    FP16,
+    I8,
+    I16,
+    LOG_TYPES,
+    PARAMETER_TYPES,
+    U8,
+    U16,
+    U32,
+)
+from crazyflie_virtual.tables.toc import Entry, Table
 
 
 def test_header_is_port_reserved_bits_channel():
@@ -30,7 +40,7 @@ def test_packets_of_a_wrong_size_are_none():
 
 
 def test_codes_of_the_types():
-    assert [LOG_KINDS[i].name for i in range(1, 9)] == [
+    assert [LOG_TYPES[i].name for i in range(1, 9)] == [
         "uint8_t",
         "uint16_t",
         "uint32_t",
@@ -40,12 +50,12 @@ def test_codes_of_the_types():
         "float",
         "FP16",
     ]
-    sizes = {code: kind.size for code, kind in PARAMETER_KINDS.items()}
+    sizes = {code: number_type.size for code, number_type in PARAMETER_TYPES.items()}
     assert sizes == {0x8: 1, 0x9: 2, 0xA: 4, 0xB: 8, 0x0: 1, 0x1: 2, 0x2: 4, 0x6: 4}
 
 
 @pytest.mark.parametrize(
-    ("kind", "value", "packed"),
+    ("number_type", "value", "packed"),
     [
         (U8, True, b"\x01"),
         (U8, 300.0, b"\xff"),
@@ -58,8 +68,8 @@ def test_codes_of_the_types():
         (FP16, 1e6, struct.pack("<e", 65504.0)),
     ],
 )
-def test_values_are_limited_to_their_type(kind, value, packed):
-    assert kind.pack(value) == packed
+def test_values_are_limited_to_their_type(number_type, value, packed):
+    assert number_type.pack(value) == packed
 
 
 def entries(*names):

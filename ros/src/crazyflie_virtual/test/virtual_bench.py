@@ -5,17 +5,17 @@ from unittest.mock import MagicMock
 
 from cflib.crazyflie import Crazyflie
 
-from crazyflie_virtual import crtp
-from crazyflie_virtual.crtp import Packet, Port
-from crazyflie_virtual.settings import Settings
-from crazyflie_virtual.vehicle import Vehicle
+from crazyflie_virtual.link import crtp
+from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual.vehicle import VirtualVehicle
 
 
 class Bench:
     """A vehicle, and what it has sent without being asked."""
 
     def __init__(self, **options):
-        self.vehicle = Vehicle(Settings(**options))
+        self.vehicle = VirtualVehicle(VehicleSettings(**options))
         self.unsolicited = []
         self.run(0.2)
 
@@ -74,9 +74,9 @@ def attitude(roll=0.0, pitch=0.0, yaw_rate=0.0, thrust=42000):
     return (Port.SETPOINT, 0, struct.pack("<fffH", roll, pitch, yaw_rate, thrust))
 
 
-def generic(kind, form, *values):
+def generic(setpoint_type, form, *values):
     """Return a generic setpoint as it is on the wire."""
-    return (Port.GENERIC_SETPOINT, 0, struct.pack("<B" + form, kind, *values))
+    return (Port.GENERIC_SETPOINT, 0, struct.pack("<B" + form, setpoint_type, *values))
 
 
 SETPOINTS_STOP = (Port.GENERIC_SETPOINT, 1, struct.pack("<BI", 0, 0))

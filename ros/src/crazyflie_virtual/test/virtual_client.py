@@ -11,7 +11,7 @@ LIMIT = 10.0
 
 
 class Client:
-    """A cflib client, and what it was told."""
+    """A cflib client, and the events it was notified of."""
 
     def __init__(self, uri, cache=None):
         cflib.crtp.init_drivers()
@@ -19,16 +19,16 @@ class Client:
         self.cf = Crazyflie(rw_cache=cache)
         self.events = {}
         self.text = ""
-        self._told = threading.Condition()
+        self._changed = threading.Condition()
         callbacks = ("connected", "fully_connected", "connection_failed", "connection_lost")
         for name in callbacks:
-            getattr(self.cf, name).add_callback(lambda *a, name=name: self._tell(name, a))
+            getattr(self.cf, name).add_callback(lambda *a, name=name: self._record(name, a))
         self.cf.console.receivedChar.add_callback(self._print)
 
-    def _tell(self, name, arguments):
-        with self._told:
+    def _record(self, name, arguments):
+        with self._changed:
             self.events[name] = arguments
-            self._told.notify()
+            self._changed.notify()
 
     def _print(self, text):
         self.text += text
@@ -44,8 +44,8 @@ class Client:
 
     def wait_for(self, event):
         """Wait until cflib has called back; return the arguments."""
-        with self._told:
-            assert self._told.wait_for(lambda: event in self.events, LIMIT), self.events
+        with self._changed:
+            assert self._changed.wait_for(lambda: event in self.events, LIMIT), self.events
         return self.events[event]
 
     def log(self, *variables, period=10):
@@ -61,16 +61,16 @@ class Client:
 
     def set(self, name, value):
         """Set a parameter and wait until the vehicle has confirmed it."""
-        told = threading.Event()
+        confirmation = threading.Event()
         group, parameter = name.split(".")
 
         def confirm(_, confirmed):
             if float(confirmed) == value:
-                told.set()
+                confirmation.set()
 
         self.cf.param.add_update_callback(group, parameter, confirm)
         self.cf.param.set_value(name, value)
-        assert told.wait(LIMIT), f"{name} was not set"
+        assert confirmation.wait(LIMIT), f"{name} was not set"
         self.cf.param.remove_update_callback(group, parameter, confirm)
 
 

@@ -9,8 +9,6 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-import rosgraph.names
-
 
 class ParameterType:
     """Base class of parameter types.
@@ -193,7 +191,10 @@ class GraphName(ParameterType):
         """Return the value."""
         if not isinstance(value, str) or not value:
             raise ValueError
-        if not rosgraph.names.is_legal_name(value):
+        # Here, since programs without ROS have no such names.
+        from rosgraph.names import is_legal_name
+
+        if not is_legal_name(value):
             raise ValueError
         return value
 

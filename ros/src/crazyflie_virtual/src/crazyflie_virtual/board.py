@@ -1,18 +1,21 @@
-"""The microcontroller: firmware and services, from power-up on."""
+"""The microcontroller: firmware and ports, from power-up on."""
 
-from crazyflie_virtual import memories
-from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.body.physics import MotorCommands, Physics
+from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.firmware import Firmware
-from crazyflie_virtual.memories import Memory
-from crazyflie_virtual.services.high_level import HighLevelService
-from crazyflie_virtual.services.link import LinkService
-from crazyflie_virtual.services.localization import LocalizationService
-from crazyflie_virtual.services.log import LogService
-from crazyflie_virtual.services.memory import MemoryService
-from crazyflie_virtual.services.parameters import ParameterService
-from crazyflie_virtual.services.platform import PlatformService
-from crazyflie_virtual.services.setpoints import AttitudeSetpointService, GenericSetpointService
-from crazyflie_virtual.services.supervisor import SupervisorService
+from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.ports.high_level import HighLevelPort
+from crazyflie_virtual.ports.link import LinkPort
+from crazyflie_virtual.ports.localization import LocalizationPort
+from crazyflie_virtual.ports.log import LogPort
+from crazyflie_virtual.ports.memory import MemoryPort
+from crazyflie_virtual.ports.parameters import ParameterPort
+from crazyflie_virtual.ports.platform import PlatformPort
+from crazyflie_virtual.ports.setpoints import AttitudeSetpointPort, GenericSetpointPort
+from crazyflie_virtual.ports.supervisor import SupervisorPort
+from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual.tables import memories
+from crazyflie_virtual.tables.memories import Memory
 
 _ADDRESS_PREFIX = 0xE7E7E7E700
 
@@ -28,7 +31,7 @@ class Storage:
 
     def __init__(self, address: int):
         self.eeprom = memories.eeprom(_ADDRESS_PREFIX | address)
-        self.parameters = {}
+        self.parameters: dict[str, float] = {}
 
 
 class Board:
@@ -37,48 +40,50 @@ class Board:
     Parameters
     ----------
     physics : Physics
-    faults : Faults
-    settings : Settings
+    faults : FaultSwitches
+    settings : VehicleSettings
     storage : Storage
     """
 
-    def __init__(self, physics, faults, settings, storage: Storage):
+    def __init__(
+        self, physics: Physics, faults: FaultSwitches, settings: VehicleSettings, storage: Storage
+    ):
         firmware = self.firmware = Firmware(physics, faults, settings)
-        supervisor = SupervisorService(firmware)
-        self._log = LogService(firmware)
-        services = (
-            LinkService(firmware.new_client),
-            PlatformService(settings.protocol, supervisor),
+        supervisor = SupervisorPort(firmware)
+        self._log = LogPort(firmware)
+        ports = (
+            LinkPort(firmware.new_client),
+            PlatformPort(settings.protocol, supervisor),
             self._log,
-            ParameterService(firmware, storage.parameters),
-            MemoryService(
+            ParameterPort(firmware, storage.parameters),
+            MemoryPort(
                 (
                     Memory.over(memories.EEPROM, storage.eeprom),
                     Memory.over(memories.TRAJECTORY, firmware.planner.memory),
                     firmware.memory_tester.memory(),
                 )
             ),
-            AttitudeSetpointService(firmware),
-            GenericSetpointService(firmware),
-            HighLevelService(firmware),
-            LocalizationService(firmware, settings.address),
+            AttitudeSetpointPort(firmware),
+            GenericSetpointPort(firmware),
+            HighLevelPort(firmware),
+            LocalizationPort(firmware, settings.address),
             supervisor,
         )
-        self._services = {service.port: service for service in services}
+        self._ports = {port.port: port for port in ports}
 
-    def receive(self, packet: Packet) -> list:
+    def receive(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         self.firmware.link_statistics.count_received(self.firmware.time)
-        service = self._services.get(packet.port)
-        answers = service.handle(packet) if service else []
+        port = self._ports.get(packet.port)
+        answers = port.handle(packet) if port else []
         self.firmware.link_statistics.count_sent(len(answers))
         return answers
 
-    def step(self, voltage: float) -> tuple:
+    def step(self, voltage: float) -> MotorCommands:
         """Take a step and return the motor commands; see `Firmware.step`."""
         return self.firmware.step(voltage)
 
-    def unsolicited(self) -> list:
+    def unsolicited(self) -> list[Packet]:
         """Return the packets that are sent without being asked for: log and console."""
         packets = self._log.collect()
         firmware = self.firmware

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 
 @dataclass
-class Faults:
+class FaultSwitches:
     """Switches, which may be changed at any time.
 
     Attributes

@@ -2,8 +2,11 @@
 
 import signal
 import sys
+from collections.abc import Callable
+from typing import Any
 
-from crazyflie_virtual.options import parse_arguments
+from crazyflie_utils.command_line import parse_arguments
+from crazyflie_utils.parameters import Parameters
 
 _DESCRIPTION = (
     "A Crazyflie in software that speaks CRTP over UDP: connect with any cflib program to "
@@ -22,10 +25,11 @@ def virtual_crazyflie() -> None:
         from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
 
         _run_node(VirtualCrazyflieNode, "virtual_crazyflie")
-    from crazyflie_virtual.server import Server
-    from crazyflie_virtual.settings import Settings
+        return
+    from crazyflie_virtual.link.server import VehicleServer
+    from crazyflie_virtual.settings import VehicleSettings
 
-    _run("virtual_crazyflie", _DESCRIPTION, Settings, Server)
+    _run("virtual_crazyflie", _DESCRIPTION, VehicleSettings, VehicleServer)
 
 
 def virtual_mocap() -> None:
@@ -34,6 +38,7 @@ def virtual_mocap() -> None:
         from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
 
         _run_node(VirtualMocapNode, "virtual_mocap")
+        return
     from crazyflie_virtual.mocap.server import MocapServer
     from crazyflie_virtual.mocap.settings import MocapSettings
 
@@ -45,16 +50,21 @@ def _is_ros_node():
     return any(":=" in argument for argument in sys.argv[1:])
 
 
-def _run_node(node_class, name):
+def _run_node(node_type: type, name: str) -> None:
     from crazyflie_utils import run
 
-    run(node_class, name)
+    run(node_type, name)
 
 
-def _run(program, description, options_class, server_class):
-    options = parse_arguments(options_class, sys.argv[1:], program, description)
+def _run(
+    program: str,
+    description: str,
+    settings_type: type[Parameters],
+    server_type: Callable[..., Any],
+) -> None:
+    settings = parse_arguments(settings_type, sys.argv[1:], program, description)
     try:
-        server = server_class(options, lambda text: print(text, file=sys.stderr, flush=True))
+        server = server_type(settings, lambda text: print(text, file=sys.stderr, flush=True))
     except OSError as error:
         sys.exit(f"{program}: cannot listen: {error}")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))

@@ -1,4 +1,4 @@
-"""The true pose, told to local observers: a datagram now and then.
+"""The true pose as a datagram, sent to local observers.
 
 Motion capture sees the vehicle this way, and tests do. The time is that of the
 machine's monotonic clock, which all its processes share.
@@ -6,6 +6,8 @@ machine's monotonic clock, which all its processes share.
 
 import struct
 from typing import NamedTuple
+
+from crazyflie_model.angles import Quaternion, Triple
 
 DEFAULT_PORT = 19800
 
@@ -33,10 +35,10 @@ class Observation(NamedTuple):
     body_id: int
     name: str
     time: float
-    position: tuple
-    velocity: tuple
-    quaternion: tuple
-    rates: tuple
+    position: Triple
+    velocity: Triple
+    quaternion: Quaternion
+    rates: Triple
 
     def encode(self) -> bytes:
         """Return the observation as a datagram."""

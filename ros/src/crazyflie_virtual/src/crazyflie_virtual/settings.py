@@ -1,78 +1,117 @@
-"""The options of a virtual vehicle."""
+"""The settings of a virtual vehicle: ROS parameters, or a command line."""
 
-from dataclasses import dataclass
-
-from crazyflie_virtual.faults import Faults
+from crazyflie_utils.parameter_types import (
+    BOOLEAN,
+    METRES,
+    TEXT,
+    Integer,
+    Number,
+    Text,
+)
+from crazyflie_utils.parameters import Parameters, parameter
+from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.localization import DECK, NONE
 from crazyflie_virtual.observer import DEFAULT_PORT
-from crazyflie_virtual.options import option
 
 FIRST_PORT = 19850
 """UDP port of the first vehicle: clients scan from here to 19859."""
 
+_FRACTION = Number(minimum=-0.5, maximum=1.0)
+_PROBABILITY = Number(minimum=0.0, maximum=1.0)
+_UDP_PORT = Integer(0, 65535)
 
-@dataclass(frozen=True)
-class Settings:
-    """Options of a virtual vehicle; see the README for what each means."""
 
-    host: str = option("127.0.0.1", "address to listen on")
-    port: int = option(
-        FIRST_PORT, "UDP port; 0 takes a free one, which is printed", minimum=0, maximum=65535
-    )
-    init_x: float = option(0.0, "where the vehicle stands at the beginning, m", "init/x")
-    init_y: float = option(0.0, "the same, y, m", "init/y")
-    init_yaw: float = option(0.0, "heading at the beginning, rad", "init/yaw")
-    positioning: str = option(
+class VehicleSettings(Parameters):
+    """Settings of a virtual vehicle; the live ones are its `FaultSwitches`."""
+
+    host: str = parameter(TEXT, "address to listen on", "127.0.0.1")
+    port: int = parameter(_UDP_PORT, "UDP port; 0 takes a free one, which is printed", FIRST_PORT)
+    init_x: float = parameter(METRES, "where it stands at the beginning", 0.0, "init/x")
+    init_y: float = parameter(METRES, "where it stands at the beginning", 0.0, "init/y")
+    init_yaw: float = parameter(Number("rad"), "its heading there", 0.0, "init/yaw")
+    positioning: str = parameter(
+        Text((DECK, NONE)),
+        "what the estimate rests on without external poses: the true pose, as from a "
+        "positioning deck, or nothing but the inertial sensors",
         DECK,
-        "what the vehicle's estimate rests on without external poses: the truth, as from a "
-        "positioning deck, or nothing but its inertial sensors",
-        choices=(DECK, NONE),
     )
-    auto_arm: bool = option(True, "arm by itself, as a Crazyflie 2.1 does")
-    sensor_noise: bool = option(True, "noise of the sensors")
-    seed: int = option(0, "of noise and of lost packets", minimum=0, maximum=2**31 - 1)
-    mass_error: float = option(
-        0.0, "how much heavier than nominal, as a fraction", minimum=-0.5, maximum=1.0
+    auto_arm: bool = parameter(
+        BOOLEAN,
+        "arm by itself, as a Crazyflie 2.1; else the client arms, as with brushless motors",
+        True,
     )
-    thrust_error: float = option(
-        0.0, "how much more thrust than nominal, as a fraction", minimum=-0.5, maximum=1.0
+    sensor_noise: bool = parameter(BOOLEAN, "noise of gyroscope, accelerometer and barometer", True)
+    seed: int = parameter(Integer(0, 2**31 - 1), "of the noise, and of which packets are lost", 0)
+    mass_error: float = parameter(
+        _FRACTION, "how much heavier than nominal it is, as a fraction", 0.0
     )
-    battery: float = option(1.0, "state of charge at the beginning", minimum=0.0, maximum=1.0)
-    protocol: int = option(12, "CRTP version that is reported", minimum=4, maximum=255)
-    address: int = option(
-        0xE7, "last byte of the radio's address, E7E7E7E7xx", minimum=0, maximum=255
+    thrust_error: float = parameter(
+        _FRACTION, "how much more than nominal its rotors lift, as a fraction", 0.0
     )
-    observer_host: str = option("127.0.0.1", "who is told the true pose", "observer/host")
-    observer_port: int = option(
-        DEFAULT_PORT, "UDP port there; 0 for nobody", "observer/port", minimum=0, maximum=65535
+    battery: float = parameter(
+        Number(minimum=0.0, maximum=1.0), "state of charge at the beginning", 1.0
     )
-    observer_rate: float = option(
-        200.0, "how often, Hz", "observer/rate", minimum=1.0, maximum=500.0
+    protocol: int = parameter(Integer(4, 255), "CRTP protocol version that it reports", 12)
+    address: int = parameter(Integer(0, 255), "last byte of the radio's address, E7E7E7E7xx", 0xE7)
+    observer_host: str = parameter(
+        TEXT, "where the true pose is sent", "127.0.0.1", "observer/host"
     )
-    body_name: str = option("", "rigid body's name there; empty for cfN", "observer/name")
-    body_id: int = option(
-        0, "rigid body's number there; 0 for N", "observer/id", minimum=0, maximum=32767
+    observer_port: int = parameter(
+        _UDP_PORT, "UDP port there; 0 sends nothing", DEFAULT_PORT, "observer/port"
     )
-    loss: float = option(
-        0.0, "probability that a packet is lost", "fault/loss", minimum=0.0, maximum=1.0
+    observer_rate: float = parameter(
+        Number("Hz", minimum=1.0, maximum=500.0), "how often", 200.0, "observer/rate"
     )
-    delay: float = option(
-        0.0, "of each packet, each way, s", "fault/delay", minimum=0.0, maximum=10.0
+    body_name: str = parameter(
+        Text(may_be_empty=True),
+        "rigid body's name there; empty for one by port: cf1 for 19850, and so on",
+        "",
+        "observer/name",
     )
-    silence: float = option(
-        0.0, "for how long the link is silent from now on, s", "fault/silence", minimum=0.0
-    )
-    low_battery: bool = option(False, "nearly empty battery", "fault/low_battery")
-    motor_failure: int = option(
+    body_id: int = parameter(
+        Integer(0, 32767),
+        "rigid body's number there; 0 for one by port: 1 for 19850, and so on",
         0,
-        "motor that stands still, 1 to 4; 0 for none",
+        "observer/id",
+    )
+    loss: float = parameter(
+        _PROBABILITY,
+        "probability that a packet, either way, is lost",
+        0.0,
+        "fault/loss",
+        live=True,
+    )
+    delay: float = parameter(
+        Number("s", minimum=0.0, maximum=10.0),
+        "of each packet, each way",
+        0.0,
+        "fault/delay",
+        live=True,
+    )
+    silence: float = parameter(
+        Number("s", minimum=0.0),
+        "for how long the link is silent from now on; the port stays open, the vehicle flies on",
+        0.0,
+        "fault/silence",
+        live=True,
+    )
+    low_battery: bool = parameter(
+        BOOLEAN,
+        "the battery is nearly empty from now on; cannot be undone",
+        False,
+        "fault/low_battery",
+        live=True,
+    )
+    motor_failure: int = parameter(
+        Integer(0, 4),
+        "the motor that stands still, 1 to 4; 0 for none",
+        0,
         "fault/motor_failure",
-        minimum=0,
-        maximum=4,
+        live=True,
     )
 
-    def faults(self) -> Faults:
+    def switches(self) -> FaultSwitches:
         """Return the fault switches as they are at the beginning."""
-        return Faults(
+        return FaultSwitches(
             self.loss, self.delay, self.silence, int(self.low_battery), self.motor_failure
         )

@@ -3,20 +3,20 @@
 import contextlib
 from collections.abc import Iterator
 
-from crazyflie_virtual.server import Server
-from crazyflie_virtual.settings import Settings
+from crazyflie_virtual.link.server import VehicleServer
+from crazyflie_virtual.settings import VehicleSettings
 
 
 @contextlib.contextmanager
-def virtual_vehicle(**settings: object) -> Iterator[tuple[Server, str]]:
-    """Run a vehicle, on a free port unless told otherwise; yield its server and its address.
+def virtual_vehicle(**settings: object) -> Iterator[tuple[VehicleServer, str]]:
+    """Run a vehicle, on a free port unless given; yield its server and its address.
 
     Parameters
     ----------
     settings
-        Of `crazyflie_virtual.settings.Settings`.
+        Of `crazyflie_virtual.settings.VehicleSettings`.
     """
-    server = Server(Settings(**{"port": 0, "observer_port": 0, **settings}))
+    server = VehicleServer(VehicleSettings(**{"port": 0, "observer_port": 0, **settings}))
     server.start()
     try:
         yield server, "udp://{}:{}".format(*server.address)

@@ -2,11 +2,12 @@
 
 import math
 
-from crazyflie_virtual import crtp
-from crazyflie_virtual.battery import LOW_CHARGE, Battery
 from crazyflie_virtual.board import Board, Storage
-from crazyflie_virtual.crtp import Packet, Port
-from crazyflie_virtual.physics import STEP, Physics
+from crazyflie_virtual.body.battery import LOW_CHARGE, Battery
+from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
+from crazyflie_virtual.link import crtp
+from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.settings import VehicleSettings
 
 _RADIO_CHANNEL = 3
 """Of the link port: packets that the radio chip answers itself, also while the
@@ -17,31 +18,29 @@ _ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
 
 _BATTERY_STEPS = 10
 
-_STOPPED = (0.0,) * 4
+_STOPPED: MotorCommands = (0.0, 0.0, 0.0, 0.0)
 
 
-class Vehicle:
+class VirtualVehicle:
     """Body, battery, radio chip and microcontroller.
 
     Parameters
     ----------
-    settings : Settings
-    faults : Faults, optional
-        Switches; by default those of the settings.
+    settings : VehicleSettings
 
     Attributes
     ----------
     physics : Physics
         The truth.
     battery : Battery
-    faults : Faults
+    faults : FaultSwitches
     board : Board or None
         None while the microcontroller is off.
     """
 
-    def __init__(self, settings, faults=None):
+    def __init__(self, settings: VehicleSettings):
         self._settings = settings
-        self.faults = settings.faults() if faults is None else faults
+        self.faults = settings.switches()
         self.physics = Physics(
             (settings.init_x, settings.init_y, 0.0),
             settings.init_yaw,
@@ -52,7 +51,7 @@ class Vehicle:
         self._storage = Storage(settings.address)
         self._steps = 0
         self._is_dead = False
-        self.board = None
+        self.board: Board | None = None
         self._turn_on()
 
     @property
@@ -60,7 +59,7 @@ class Vehicle:
         """How far the vehicle has come, s."""
         return self._steps * STEP
 
-    def receive(self, datagram: bytes) -> list:
+    def receive(self, datagram: bytes) -> list[bytes]:
         """Return the datagrams that answer one."""
         packet = crtp.decode(datagram)
         if packet is None or self._is_dead:
@@ -73,7 +72,7 @@ class Vehicle:
             return []
         return [answer.encode() for answer in self.board.receive(packet)]
 
-    def advance_to(self, time: float) -> list:
+    def advance_to(self, time: float) -> list[bytes]:
         """Go on to the last whole step before ``time`` (s).
 
         Returns

@@ -1,12 +1,12 @@
 """ROS interface of a virtual vehicle."""
 
-from crazyflie_virtual.server import Server
+from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.server_node import ServerNode
-from crazyflie_virtual.settings import Settings
+from crazyflie_virtual.settings import VehicleSettings
 
 
 class VirtualCrazyflieNode(ServerNode):
-    """A virtual vehicle whose options are parameters."""
+    """A virtual vehicle behind a UDP port."""
 
-    def __init__(self):
-        super().__init__(Settings, Server)
+    settings_type = VehicleSettings
+    server_type = VehicleServer

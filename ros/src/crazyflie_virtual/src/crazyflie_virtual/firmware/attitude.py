@@ -15,7 +15,8 @@ from crazyflie_model.inner_loops import (
     TILT,
     TILT_RATE,
 )
-from crazyflie_virtual.firmware.pid import Pid
+from crazyflie_virtual.firmware.pid import FirmwarePid
+from crazyflie_virtual.firmware.states import Estimate
 
 
 def wrap_degrees(angle: float) -> float:
@@ -28,9 +29,9 @@ class AttitudeController:
 
     Attributes
     ----------
-    roll, pitch, yaw : Pid
+    roll, pitch, yaw : FirmwarePid
         deg to deg/s.
-    roll_rate, pitch_rate, yaw_rate : Pid
+    roll_rate, pitch_rate, yaw_rate : FirmwarePid
         deg/s to PWM.
     yaw_max_delta : float
         How far the desired heading may run ahead of the vehicle's, deg; 0 for
@@ -38,22 +39,22 @@ class AttitudeController:
     """
 
     def __init__(self):
-        self.roll = Pid(TILT, PERIOD)
-        self.pitch = Pid(TILT, PERIOD)
-        self.yaw = Pid(HEADING, PERIOD)
-        self.roll_rate = Pid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
-        self.pitch_rate = Pid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
-        self.yaw_rate = Pid(HEADING_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
+        self.roll = FirmwarePid(TILT, PERIOD)
+        self.pitch = FirmwarePid(TILT, PERIOD)
+        self.yaw = FirmwarePid(HEADING, PERIOD)
+        self.roll_rate = FirmwarePid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
+        self.pitch_rate = FirmwarePid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
+        self.yaw_rate = FirmwarePid(HEADING_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
         self.yaw_max_delta = 0.0
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Forget integrals and last measurements."""
         for pid in (self.roll, self.pitch, self.yaw):
             pid.reset()
         for pid in (self.roll_rate, self.pitch_rate, self.yaw_rate):
             pid.reset()
 
-    def desired_rates(self, estimate, roll: float, pitch: float, yaw: float) -> Triple:
+    def desired_rates(self, estimate: Estimate, roll: float, pitch: float, yaw: float) -> Triple:
         """Return the body rates (deg/s) that lead to an attitude (deg)."""
         yaw_error = wrap_degrees(yaw - estimate.yaw)
         return (

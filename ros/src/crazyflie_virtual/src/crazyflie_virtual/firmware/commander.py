@@ -1,6 +1,7 @@
-"""Who is listened to: streamed setpoints come before the high-level commander."""
+"""Which setpoint holds: streamed ones come before the high-level commander."""
 
-from crazyflie_virtual.firmware.states import Setpoint
+from crazyflie_virtual.firmware.planner import Planner
+from crazyflie_virtual.firmware.states import Estimate, Setpoint
 
 NOBODY, HIGH_LEVEL, STREAMED = 0, 1, 2
 """Priorities."""
@@ -22,10 +23,10 @@ class Commander:
     priority : int
         Of the setpoint: `NOBODY`, `HIGH_LEVEL` or `STREAMED`.
     high_level_enabled : int
-        Whether the high-level commander is asked.
+        Whether the high-level commander is used.
     """
 
-    def __init__(self, planner):
+    def __init__(self, planner: Planner):
         self._planner = planner
         self.setpoint = Setpoint()
         self.priority = NOBODY
@@ -37,7 +38,7 @@ class Commander:
         self.priority = STREAMED
         self._planner.disable()
 
-    def release(self, estimate) -> None:
+    def release(self, estimate: Estimate) -> None:
         """Let the high-level commander take over, from the vehicle's state."""
         self.priority = min(self.priority, HIGH_LEVEL)
         self._planner.tell_state(estimate)
@@ -48,8 +49,8 @@ class Commander:
         self.setpoint = Setpoint()
         self._planner.stop()
 
-    def ask_planner(self, time: float, estimate) -> None:
-        """Let the high-level commander give its setpoint for ``time`` (s)."""
+    def update_from_planner(self, time: float, estimate: Estimate) -> None:
+        """Take the high-level commander's setpoint for ``time`` (s)."""
         if not self.high_level_enabled:
             return
         setpoint = self._planner.setpoint(time, estimate)

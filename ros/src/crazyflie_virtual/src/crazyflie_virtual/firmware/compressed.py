@@ -2,12 +2,14 @@
 
 import math
 
+from crazyflie_model.angles import Quaternion
+
 _BITS = 9
 _MASK = (1 << _BITS) - 1
 _ROOT_HALF = math.sqrt(0.5)
 
 
-def compress_quaternion(quaternion) -> int:
+def compress_quaternion(quaternion: Quaternion) -> int:
     """Return a unit quaternion (x, y, z, w) in 32 bits.
 
     The two highest bits tell which component is largest; it is left out. The
@@ -26,7 +28,7 @@ def compress_quaternion(quaternion) -> int:
     return word
 
 
-def decompress_quaternion(word: int) -> tuple:
+def decompress_quaternion(word: int) -> Quaternion:
     """Return the unit quaternion (x, y, z, w) of 32 bits; inverse of `compress_quaternion`."""
     largest = word >> 30
     parts = []
@@ -36,4 +38,5 @@ def decompress_quaternion(word: int) -> tuple:
         parts.append(-magnitude if field >> _BITS & 1 else magnitude)
     rest = math.sqrt(max(0.0, 1.0 - sum(part * part for part in parts)))
     parts.insert(largest, rest)
-    return tuple(parts)
+    x, y, z, w = parts
+    return x, y, z, w

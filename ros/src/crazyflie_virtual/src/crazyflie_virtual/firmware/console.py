@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from crazyflie_virtual.crtp import MAX_DATA
+from crazyflie_virtual.link.crtp import MAX_DATA
 
 _KEPT = 100
 """Pieces kept until a client reads them."""
@@ -11,13 +11,13 @@ _KEPT = 100
 class Console:
     """Text on its way to the client.
 
-    What is said before there is a client is kept, the latest of it.
+    What is printed before there is a client is kept, the latest of it.
     """
 
     def __init__(self):
-        self._pieces = deque(maxlen=_KEPT)
+        self._pieces: deque[bytes] = deque(maxlen=_KEPT)
 
-    def say(self, line: str) -> None:
+    def write_line(self, line: str) -> None:
         """Print a line."""
         data = (line + "\n").encode("ascii", "replace")
         self._pieces.extend(data[i : i + MAX_DATA] for i in range(0, len(data), MAX_DATA))

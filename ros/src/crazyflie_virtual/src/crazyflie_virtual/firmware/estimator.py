@@ -11,6 +11,8 @@ import math
 
 from crazyflie_model.angles import quaternion_from_zyx, rotate, zyx_from_quaternion
 from crazyflie_model.units import GRAVITY
+from crazyflie_virtual.body.sensors import Sensors
+from crazyflie_virtual.firmware.states import Estimate
 
 _ACCELERATION_NOISE = 0.5
 """Process noise, m/s^2, held for one step of the position's filter."""
@@ -44,13 +46,13 @@ class Estimator:
         m^2, m^2/s^2, rad^2.
     """
 
-    def __init__(self, estimate):
+    def __init__(self, estimate: Estimate):
         self._estimate = estimate
         self.initial_x = self.initial_y = self.initial_z = self.initial_yaw = 0.0
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew at the initial pose, at rest, and unsure of it."""
+        """Return to the initial pose, at rest, with the initial variances."""
         e = self._estimate
         e.x, e.y, e.z = self.initial_x, self.initial_y, self.initial_z
         e.vx = e.vy = e.vz = e.ax = e.ay = e.az = 0.0
@@ -70,7 +72,7 @@ class Estimator:
         """Variance of the velocity along each axis, m^2/s^2."""
         return self._covariance[2]
 
-    def predict(self, sensors, dt: float) -> None:
+    def predict(self, sensors: Sensors, dt: float) -> None:
         """Move on by ``dt`` (s) with what the inertial sensors measure."""
         e = self._estimate
         x, y, z, w = e.qx, e.qy, e.qz, e.qw
@@ -135,7 +137,7 @@ class Estimator:
         self._blend(x, y, z, w, gain)
         self.variance_attitude *= 1.0 - gain
 
-    def rest(self, sensors, dt: float) -> None:
+    def rest(self, sensors: Sensors, dt: float) -> None:
         """Take it that the vehicle stands still: no velocity, and gravity shows what is up."""
         e = self._estimate
         e.vx = e.vy = e.vz = 0.0

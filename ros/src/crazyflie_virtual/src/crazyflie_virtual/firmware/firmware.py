@@ -1,23 +1,25 @@
-"""The firmware as a whole: all its parts, and the order in which they have their turn."""
+"""The firmware as a whole: all its parts, and the order in which they run."""
 
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
+from crazyflie_virtual.body.sensors import Sensors
+from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.commander import Commander
 from crazyflie_virtual.firmware.console import Console
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.firmware.localization import DECK, Localization
 from crazyflie_virtual.firmware.planner import Phase, Planner
 from crazyflie_virtual.firmware.power import PowerMonitor
-from crazyflie_virtual.firmware.sensors import Sensors
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
 from crazyflie_virtual.firmware.stabilizer import Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
 from crazyflie_virtual.firmware.supervisor import Supervisor
-from crazyflie_virtual.link_statistics import LinkStatistics
-from crazyflie_virtual.memories import MemoryTester
-from crazyflie_virtual.physics import STEP
+from crazyflie_virtual.link.statistics import LinkStatistics
+from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual.tables.memories import MemoryTester
 
 POSITION_STEPS = 5
-"""Steps from one turn of position controller and high-level commander to the next: 100 Hz."""
+"""Steps between two updates of position controller and high-level commander: 100 Hz."""
 
 _SUPERVISOR_STEPS = 20
 _POWER_STEPS = 50
@@ -31,9 +33,9 @@ class Firmware:
     ----------
     physics : Physics
         What the sensors measure.
-    faults : Faults
+    faults : FaultSwitches
         Switches, which are parameters of the virtual vehicle too.
-    settings : Settings
+    settings : VehicleSettings
 
     Attributes
     ----------
@@ -43,7 +45,7 @@ class Firmware:
         What is flown.
     """
 
-    def __init__(self, physics, faults, settings):
+    def __init__(self, physics: Physics, faults: FaultSwitches, settings: VehicleSettings):
         self._physics = physics
         self.faults = faults
         self._steps = 0
@@ -56,20 +58,20 @@ class Firmware:
         self.planner = Planner()
         self.commander = Commander(self.planner)
         self.attitude_decoder = AttitudeDecoder()
-        self.supervisor = Supervisor(self.console.say, settings.auto_arm)
+        self.supervisor = Supervisor(self.console.write_line, settings.auto_arm)
         self.stabilizer = Stabilizer()
         self.power = PowerMonitor()
         self.link_statistics = LinkStatistics()
         self.memory_tester = MemoryTester()
         self.setpoint = Setpoint()
         self.reset_estimation = 0
-        # The checks before the first flight take three turns; a client that
+        # The checks before the first flight take three updates; a client that
         # connects at once is not to find them unfinished.
         for _ in range(3):
             self._supervise()
-        self.console.say("SYS: ----------------------------")
-        self.console.say("SYS: Virtual Crazyflie 2.1 is up and running!")
-        self.console.say("STAB: Ready to fly.")
+        self.console.write_line("SYS: ----------------------------")
+        self.console.write_line("SYS: Virtual Crazyflie 2.1 is up and running!")
+        self.console.write_line("STAB: Ready to fly.")
 
     @property
     def milliseconds(self) -> int:
@@ -78,7 +80,7 @@ class Firmware:
 
     @property
     def info(self) -> SupervisorState:
-        """What clients are told of supervisor and high-level commander."""
+        """State of supervisor and high-level commander, as clients see it."""
         phase = self.planner.phase
         return self.supervisor.flags | SupervisorState.of(
             high_level_active=phase in (Phase.FLYING, Phase.LANDING),
@@ -86,7 +88,7 @@ class Firmware:
             high_level_disabled=phase is Phase.DISABLED,
         )
 
-    def step(self, voltage: float) -> tuple:
+    def step(self, voltage: float) -> MotorCommands:
         """Take `STEP` and return the motor commands, PWM.
 
         Parameters
@@ -101,8 +103,8 @@ class Firmware:
         sensors.sample_inertial(physics.rates, physics.specific_force)
         self.estimator.predict(sensors, STEP)
         if with_position:
-            self._estimate_slowly()
-            self.commander.ask_planner(self.time, estimate)
+            self._correct_estimate()
+            self.commander.update_from_planner(self.time, estimate)
         if self._steps % _SUPERVISOR_STEPS == 0:
             self._supervise()
         if self._steps % _POWER_STEPS == 0:
@@ -123,7 +125,7 @@ class Firmware:
         if not self.supervisor.is_flying:
             self.commander.forget()
 
-    def _estimate_slowly(self):
+    def _correct_estimate(self):
         if self.reset_estimation:
             self.reset_estimation = 0
             self.estimator.reset()
@@ -143,4 +145,4 @@ class Firmware:
         was_low = self.power.state
         self.power.update(self.time, voltage)
         if self.power.state and not was_low:
-            self.console.say(f"PM: battery low, {voltage:.2f} V")
+            self.console.write_line(f"PM: battery low, {voltage:.2f} V")

@@ -5,6 +5,10 @@ motion capture system. In their absence a positioning deck measures the true
 pose; without a deck the estimate is dead reckoning.
 """
 
+from crazyflie_model.angles import Quaternion, Triple
+from crazyflie_virtual.body.physics import Physics
+from crazyflie_virtual.firmware.estimator import Estimator
+
 DECK, NONE = "deck", "none"
 """What a vehicle can carry."""
 
@@ -39,14 +43,14 @@ class Localization:
         Standard deviations that external measurements are taken to have, m and rad.
     """
 
-    def __init__(self, estimator, physics, has_deck: bool):
+    def __init__(self, estimator: Estimator, physics: Physics, has_deck: bool):
         self._estimator = estimator
         self._physics = physics
         self.has_deck = has_deck
         self.x = self.y = self.z = 0.0
         self.qx = self.qy = self.qz = 0.0
         self.qw = 1.0
-        self.time = None
+        self.time: float | None = None
         self.position_deviation = 0.01
         self.attitude_deviation = 0.0045
 
@@ -55,13 +59,13 @@ class Localization:
         """When the last external measurement came, ms, in the 16 bits of the log."""
         return 0.0 if self.time is None else 1000.0 * self.time % 65536.0
 
-    def take_position(self, time: float, position) -> None:
+    def take_position(self, time: float, position: Triple) -> None:
         """Take in an external position (m)."""
         self.time = time
         self.x, self.y, self.z = position
         self._estimator.correct_position(*position, self.position_deviation)
 
-    def take_pose(self, time: float, position, quaternion) -> None:
+    def take_pose(self, time: float, position: Triple, quaternion: Quaternion) -> None:
         """Take in an external position (m) and attitude, a unit quaternion (x, y, z, w)."""
         self.take_position(time, position)
         self.qx, self.qy, self.qz, self.qw = quaternion

@@ -4,7 +4,7 @@ from crazyflie_model.elementwise import clip
 from crazyflie_model.pid import Gains, terms
 
 
-class Pid:
+class FirmwarePid:
     """PID with feed-forward; the derivative is that of the measurement.
 
     Parameters
@@ -32,7 +32,7 @@ class Pid:
         self.output_limit = output_limit
         self._dt = dt
         self._integral = 0.0
-        self._last = None
+        self._last: float | None = None
         self.desired = 0.0
         self.out_p = self.out_i = self.out_d = self.out_ff = 0.0
 
@@ -56,7 +56,12 @@ class Pid:
         slope = 0.0 if self._last is None else (measured - self._last) / self._dt
         self._last = measured
         self.out_p, self.out_i, self.out_d, self._integral = terms(
-            self, error, self._integral, slope, self._dt
+            # It has the attributes of Gains, but clients change them.
+            self,  # type: ignore[arg-type]
+            error,
+            self._integral,
+            slope,
+            self._dt,
         )
         self.out_ff = self.kff * desired
         output = self.out_p + self.out_i + self.out_d + self.out_ff

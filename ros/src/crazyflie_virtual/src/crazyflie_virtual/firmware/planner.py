@@ -4,8 +4,9 @@ import errno
 import math
 from enum import Enum
 
+from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece
-from crazyflie_virtual.firmware.states import ABSOLUTE, Setpoint
+from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Modes, Setpoint
 from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece, straight_piece
 
 MEMORY_SIZE = 4096
@@ -20,6 +21,8 @@ REFUSED = 1
 _SHORTEST = 0.01
 """Least duration of a plan, s."""
 
+_TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
+
 
 class Phase(Enum):
     """What the planner is doing."""
@@ -33,7 +36,7 @@ class Phase(Enum):
 
 
 class Planner:
-    """Plans trajectories and tells where they are.
+    """Plans trajectories and evaluates them.
 
     Commands return 0 or an error number.
 
@@ -53,46 +56,31 @@ class Planner:
         self.phase = Phase.STOPPED
         self.blocked = False
         self.takeoff_speed = self.landing_speed = 0.5
-        self._definitions = {}
-        self._trajectory = None
+        self._definitions: dict[int, tuple[int, int]] = {}
+        self._trajectory: Trajectory | None = None
         self._begin = 0.0
         self._last = Goal((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
 
     def is_finished(self, time: float) -> bool:
-        """Tell whether what was planned last has come to its end."""
+        """Return whether what was planned last has come to its end."""
         return self._trajectory is None or time >= self._begin + self._trajectory.duration
 
-    def setpoint(self, time: float, estimate) -> Setpoint | None:
+    def setpoint(self, time: float, estimate: Estimate) -> Setpoint | None:
         """Return what the vehicle is to do at ``time`` (s); None when disabled."""
         if self.phase is Phase.LANDING and self.is_finished(time):
             self.phase = Phase.STOPPED
-        if self.phase in (Phase.STOPPED, Phase.DISABLED):
+        if self._trajectory is None or self.phase in (Phase.STOPPED, Phase.DISABLED):
             self.tell_state(estimate)
             return Setpoint(time=time) if self.phase is Phase.STOPPED else None
         goal = self._last = self._trajectory.evaluate(time - self._begin)
-        x, y, z = goal.position
-        vx, vy, vz = goal.velocity
-        ax, ay, az = goal.acceleration
         return Setpoint(
-            mode_x=ABSOLUTE,
-            mode_y=ABSOLUTE,
-            mode_z=ABSOLUTE,
-            mode_yaw=ABSOLUTE,
-            x=x,
-            y=y,
-            z=z,
-            vx=vx,
-            vy=vy,
-            vz=vz,
-            ax=ax,
-            ay=ay,
-            az=az,
+            mode=_TRACKING,
             yaw=math.degrees(goal.yaw),
             yaw_rate=math.degrees(goal.yaw_rate),
             time=time,
-        )
+        ).with_motion(goal.position, goal.velocity, goal.acceleration)
 
-    def tell_state(self, estimate) -> None:
+    def tell_state(self, estimate: Estimate) -> None:
         """Begin the next plan at the vehicle's state and not at the last setpoint."""
         self._last = Goal(
             (estimate.x, estimate.y, estimate.z),
@@ -129,7 +117,7 @@ class Planner:
             return REFUSED
         return self._move_vertically(time, height, yaw, duration, Phase.LANDING)
 
-    def climb_time(self, height: float, is_relative: bool, speed: float) -> tuple:
+    def climb_time(self, height: float, is_relative: bool, speed: float) -> tuple[float, float]:
         """Return height (m) and duration (s) of a climb at a mean speed (m/s)."""
         now = self._last.position[2]
         height = now + height if is_relative else height
@@ -138,7 +126,7 @@ class Planner:
     def go_to(
         self,
         time: float,
-        position: tuple,
+        position: Triple,
         yaw: float,
         duration: float,
         relative: bool,
@@ -153,7 +141,7 @@ class Planner:
         return self._fly(time, plan, start, position, yaw, duration, Phase.FLYING)
 
     def define(self, trajectory_id: int, offset: int, pieces: int) -> int:
-        """Say where in the memory a trajectory is: offset in bytes, number of pieces."""
+        """Define where in the memory a trajectory is: offset in bytes, number of pieces."""
         fits = pieces > 0 and offset + pieces * PIECE_SIZE <= len(self.memory)
         if trajectory_id >= DEFINITIONS or not fits:
             return errno.ENOMEM
@@ -179,7 +167,7 @@ class Planner:
         offset, count = self._definitions[trajectory_id]
         chunks = (self.memory[offset + i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
         try:
-            pieces = tuple(PolynomialPiece.unpack(chunk) for chunk in chunks)
+            pieces = tuple(PolynomialPiece.unpack(bytes(chunk)) for chunk in chunks)
         except ValueError:
             return errno.EINVAL
         trajectory = Trajectory(pieces, time_scale, backwards)

@@ -7,10 +7,11 @@ Crazyflie 2.1's firmware (2024, controller PID).
 
 import math
 
+from crazyflie_model.angles import Triple
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.pid import Gains
-from crazyflie_virtual.firmware.pid import Pid
-from crazyflie_virtual.firmware.states import ABSOLUTE
+from crazyflie_virtual.firmware.pid import FirmwarePid
+from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Setpoint
 
 DT = 0.01
 """Time between two updates, s."""
@@ -27,9 +28,9 @@ class PositionController:
 
     Attributes
     ----------
-    x, y, z : Pid
+    x, y, z : FirmwarePid
         m to m/s.
-    vx, vy, vz : Pid
+    vx, vy, vz : FirmwarePid
         m/s to deg, deg and thousands of PWM.
     roll_limit, pitch_limit : float
         deg.
@@ -43,12 +44,14 @@ class PositionController:
     """
 
     def __init__(self):
-        self.x = Pid(Gains(2.0, 0.0, 0.0), DT)
-        self.y = Pid(Gains(2.0, 0.0, 0.0), DT)
-        self.z = Pid(Gains(2.0, 0.5, 0.0), DT)
-        self.vx = Pid(Gains(25.0, 1.0, 0.0), DT)
-        self.vy = Pid(Gains(25.0, 1.0, 0.0), DT)
-        self.vz = Pid(Gains(25.0, 15.0, 0.0), DT, output_limit=FULL_PWM / 2.0 / _THRUST_SCALE)
+        self.x = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)
+        self.y = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)
+        self.z = FirmwarePid(Gains(2.0, 0.5, 0.0), DT)
+        self.vx = FirmwarePid(Gains(25.0, 1.0, 0.0), DT)
+        self.vy = FirmwarePid(Gains(25.0, 1.0, 0.0), DT)
+        self.vz = FirmwarePid(
+            Gains(25.0, 15.0, 0.0), DT, output_limit=FULL_PWM / 2.0 / _THRUST_SCALE
+        )
         self.roll_limit = self.pitch_limit = 20.0
         self.vx_max = self.vy_max = self.vz_max = 1.0
         self.thrust_base = 36000
@@ -56,11 +59,11 @@ class PositionController:
         self.body_x = self.body_y = self.body_vx = self.body_vy = 0.0
 
     def reset(self) -> None:
-        """Begin anew."""
+        """Forget integrals and last measurements."""
         for pid in (self.x, self.y, self.z, self.vx, self.vy, self.vz):
             pid.reset()
 
-    def update(self, setpoint, estimate) -> tuple:
+    def update(self, setpoint: Setpoint, estimate: Estimate) -> Triple:
         """Return roll (deg), pitch (deg, the firmware's sign) and thrust (PWM)."""
         yaw = math.radians(estimate.yaw)
         c, s = math.cos(yaw), math.sin(yaw)
@@ -72,13 +75,13 @@ class PositionController:
         vx, vy, vz = setpoint.vx, setpoint.vy, setpoint.vz
         if not setpoint.velocity_body:
             vx, vy = vx * c + vy * s, vy * c - vx * s
-        if setpoint.mode_x == ABSOLUTE:
+        if setpoint.mode.x == ABSOLUTE:
             self.x.output_limit = self.vx_max * _OVERHEAD
             vx = self.x.update(setpoint.x * c + setpoint.y * s, self.body_x)
-        if setpoint.mode_y == ABSOLUTE:
+        if setpoint.mode.y == ABSOLUTE:
             self.y.output_limit = self.vy_max * _OVERHEAD
             vy = self.y.update(setpoint.y * c - setpoint.x * s, self.body_y)
-        if setpoint.mode_z == ABSOLUTE:
+        if setpoint.mode.z == ABSOLUTE:
             self.z.output_limit = max(self.vz_max, 0.5) * _OVERHEAD
             vz = self.z.update(setpoint.z, estimate.z)
 

@@ -18,7 +18,7 @@ class PowerMonitor:
     voltage : float
         V.
     level : int
-        Charge as the firmware guesses it from the voltage, %.
+        Charge as the firmware estimates it from the voltage, %.
     state : int
         `ON_BATTERY` or `LOW`.
     low_voltage, critical_voltage : float
@@ -33,7 +33,8 @@ class PowerMonitor:
         self.state = ON_BATTERY
         self.low_voltage, self.critical_voltage = 3.2, 3.0
         self.is_exhausted = False
-        self._good_time = self._fair_time = None
+        self._good_time: float | None = None
+        self._fair_time: float | None = None
 
     @property
     def millivolts(self) -> float:

@@ -2,11 +2,14 @@
 
 import math
 import struct
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
 
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_virtual.firmware.commander import NOBODY
 from crazyflie_virtual.firmware.compressed import decompress_quaternion
-from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Setpoint
+from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Modes, Setpoint
 
 _LEAST_THRUST = 1000
 """Of an attitude setpoint, PWM: less is none."""
@@ -59,10 +62,12 @@ class AttitudeDecoder:
         if thrust == 0:
             self.is_locked = False
         used = 0.0 if self.is_locked or thrust < _LEAST_THRUST else min(thrust, MAX_SETPOINT_PWM)
-        setpoint = Setpoint(mode_yaw=VELOCITY, yaw_rate=-yaw_rate, thrust=float(used), time=time)
-        _set_tilt(setpoint, "roll", roll, self.roll_mode == _RATE_MODE)
-        _set_tilt(setpoint, "pitch", pitch, self.pitch_mode == _RATE_MODE)
-        return setpoint
+        setpoint = Setpoint(
+            mode=Modes(yaw=VELOCITY), yaw_rate=-yaw_rate, thrust=float(used), time=time
+        )
+        return _with_tilt(
+            setpoint, roll, self.roll_mode == _RATE_MODE, pitch, self.pitch_mode == _RATE_MODE
+        )
 
 
 def decode_generic(data: bytes, time: float) -> Setpoint | None:
@@ -91,107 +96,86 @@ def _unpack(form, data):
     return values if all(map(math.isfinite, values)) else None
 
 
-def _set_tilt(setpoint, axis, value, is_rate):
-    setattr(setpoint, f"mode_{axis}", VELOCITY if is_rate else ABSOLUTE)
-    setattr(setpoint, f"{axis}_rate" if is_rate else axis, value)
+def _with_tilt(setpoint, roll, roll_is_rate, pitch, pitch_is_rate):
+    # Each of roll and pitch is an angle or a rate.
+    mode = setpoint.mode._replace(
+        roll=VELOCITY if roll_is_rate else ABSOLUTE, pitch=VELOCITY if pitch_is_rate else ABSOLUTE
+    )
+    values = {
+        "roll_rate" if roll_is_rate else "roll": roll,
+        "pitch_rate" if pitch_is_rate else "pitch": pitch,
+    }
+    return replace(setpoint, mode=mode, **values)
 
 
-def _four(build, yaw_sign=1.0):
-    def decode(data):
+class _FourFloats(NamedTuple):
+    """A type of setpoint whose payload is four floats.
+
+    Attributes
+    ----------
+    fields : tuple of str
+        Of the setpoint: what the floats are.
+    mode : Modes
+    velocity_body : bool
+    """
+
+    fields: tuple[str, str, str, str]
+    mode: Modes
+    velocity_body: bool = False
+
+    def decode(self, data: bytes) -> Setpoint | None:
+        """Return the setpoint in a payload; None when it holds none."""
         values = _unpack(_FOUR, data)
-        return None if values is None else build(*values, yaw_sign)
+        if values is None:
+            return None
+        setpoint = Setpoint(mode=self.mode, velocity_body=self.velocity_body)
+        return replace(setpoint, **dict(zip(self.fields, values, strict=True)))
 
-    return decode
+    def decode_clockwise(self, data: bytes) -> Setpoint | None:
+        """Return the setpoint in a payload of an older client, whose yaw rate is clockwise."""
+        setpoint = self.decode(data)
+        return setpoint and replace(setpoint, yaw_rate=-setpoint.yaw_rate)
+
+
+_VELOCITY_WORLD = _FourFloats(
+    ("vx", "vy", "vz", "yaw_rate"), Modes(x=VELOCITY, y=VELOCITY, z=VELOCITY, yaw=VELOCITY)
+)
+_Z_DISTANCE = _FourFloats(
+    ("roll", "pitch", "yaw_rate", "z"),
+    Modes(z=ABSOLUTE, roll=ABSOLUTE, pitch=ABSOLUTE, yaw=VELOCITY),
+)
+_VERTICAL_SPEED = _FourFloats(
+    ("roll", "pitch", "yaw_rate", "vz"),
+    Modes(z=VELOCITY, roll=ABSOLUTE, pitch=ABSOLUTE, yaw=VELOCITY),
+)
+_HOVER = _FourFloats(
+    ("vx", "vy", "yaw_rate", "z"),
+    Modes(x=VELOCITY, y=VELOCITY, z=ABSOLUTE, yaw=VELOCITY),
+    velocity_body=True,
+)
+_POSITION = _FourFloats(
+    ("x", "y", "z", "yaw"), Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
+)
 
 
 def _stop(data):
     return Setpoint()
 
 
-def _velocity_world(vx, vy, vz, yaw_rate, sign):
-    return Setpoint(
-        mode_x=VELOCITY,
-        mode_y=VELOCITY,
-        mode_z=VELOCITY,
-        mode_yaw=VELOCITY,
-        vx=vx,
-        vy=vy,
-        vz=vz,
-        yaw_rate=sign * yaw_rate,
-    )
-
-
-def _z_distance(roll, pitch, yaw_rate, z, sign):
-    return Setpoint(
-        mode_z=ABSOLUTE,
-        mode_roll=ABSOLUTE,
-        mode_pitch=ABSOLUTE,
-        mode_yaw=VELOCITY,
-        roll=roll,
-        pitch=pitch,
-        yaw_rate=sign * yaw_rate,
-        z=z,
-    )
-
-
-def _climb(roll, pitch, yaw_rate, vz, sign):
-    return Setpoint(
-        mode_z=VELOCITY,
-        mode_roll=ABSOLUTE,
-        mode_pitch=ABSOLUTE,
-        mode_yaw=VELOCITY,
-        roll=roll,
-        pitch=pitch,
-        yaw_rate=sign * yaw_rate,
-        vz=vz,
-    )
-
-
-def _hover(vx, vy, yaw_rate, z, sign):
-    return Setpoint(
-        mode_x=VELOCITY,
-        mode_y=VELOCITY,
-        mode_z=ABSOLUTE,
-        mode_yaw=VELOCITY,
-        vx=vx,
-        vy=vy,
-        velocity_body=True,
-        yaw_rate=sign * yaw_rate,
-        z=z,
-    )
-
-
-def _position(x, y, z, yaw, sign):
-    return Setpoint(
-        mode_x=ABSOLUTE, mode_y=ABSOLUTE, mode_z=ABSOLUTE, mode_yaw=ABSOLUTE, x=x, y=y, z=z, yaw=yaw
-    )
-
-
 def _full_state(data):
     values = _unpack(_FULL_STATE, data)
     if values is None:
         return None
-    x, y, z, vx, vy, vz, ax, ay, az, word, p, q, r = values
-    rates = [math.degrees(rate / 1000.0) for rate in (p, q, r)]
+    *motion, word, p, q, r = values
+    # mm and milliradians on the wire.
+    motion = [part / 1000.0 for part in motion]
     return Setpoint(
-        mode_x=ABSOLUTE,
-        mode_y=ABSOLUTE,
-        mode_z=ABSOLUTE,
-        mode_quaternion=ABSOLUTE,
-        x=x / 1000.0,
-        y=y / 1000.0,
-        z=z / 1000.0,
-        vx=vx / 1000.0,
-        vy=vy / 1000.0,
-        vz=vz / 1000.0,
-        ax=ax / 1000.0,
-        ay=ay / 1000.0,
-        az=az / 1000.0,
+        mode=Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, quaternion=ABSOLUTE),
         quaternion=decompress_quaternion(word),
-        roll_rate=rates[0],
-        pitch_rate=rates[1],
-        yaw_rate=rates[2],
-    )
+        roll_rate=math.degrees(p / 1000.0),
+        pitch_rate=math.degrees(q / 1000.0),
+        yaw_rate=math.degrees(r / 1000.0),
+    ).with_motion(motion[0:3], motion[3:6], motion[6:9])
 
 
 def _manual(data):
@@ -199,23 +183,21 @@ def _manual(data):
     if values is None:
         return None
     roll, pitch, yaw_rate, thrust, is_rate = values
-    setpoint = Setpoint(mode_yaw=VELOCITY, yaw_rate=yaw_rate, thrust=float(thrust))
-    _set_tilt(setpoint, "roll", roll, bool(is_rate))
-    _set_tilt(setpoint, "pitch", pitch, bool(is_rate))
-    return setpoint
+    setpoint = Setpoint(mode=Modes(yaw=VELOCITY), yaw_rate=yaw_rate, thrust=float(thrust))
+    return _with_tilt(setpoint, roll, bool(is_rate), pitch, bool(is_rate))
 
 
-_DECODERS = {
+_DECODERS: dict[int, Callable[[bytes], Setpoint | None]] = {
     0: _stop,
-    1: _four(_velocity_world, yaw_sign=-1.0),
-    2: _four(_z_distance, yaw_sign=-1.0),
-    4: _four(_climb),
-    5: _four(_hover, yaw_sign=-1.0),
+    1: _VELOCITY_WORLD.decode_clockwise,
+    2: _Z_DISTANCE.decode_clockwise,
+    4: _VERTICAL_SPEED.decode,
+    5: _HOVER.decode_clockwise,
     6: _full_state,
-    7: _four(_position),
-    8: _four(_velocity_world),
-    9: _four(_z_distance),
-    10: _four(_hover),
+    7: _POSITION.decode,
+    8: _VELOCITY_WORLD.decode,
+    9: _Z_DISTANCE.decode,
+    10: _HOVER.decode,
     11: _manual,
 }
-"""Type -> decoder. 1, 2 and 5 are 8, 9 and 10 of older clients, with the yaw rate reversed."""
+"""Type -> decoder. 1, 2 and 5 are 8, 9 and 10 of older clients."""

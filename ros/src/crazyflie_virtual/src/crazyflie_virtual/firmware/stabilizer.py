@@ -5,11 +5,20 @@ import math
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.mixer import limit, mix
+from crazyflie_virtual.body.physics import MotorCommands
+from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
 from crazyflie_virtual.firmware.position import PositionController
-from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Setpoint
+from crazyflie_virtual.firmware.states import (
+    ABSOLUTE,
+    DISABLED,
+    VELOCITY,
+    Estimate,
+    Modes,
+    Setpoint,
+)
 
-_OFF = (0.0,) * 4
+_OFF: MotorCommands = (0.0, 0.0, 0.0, 0.0)
 
 
 class MotorOverride:
@@ -27,10 +36,10 @@ class MotorOverride:
         self.enable = 0
         self.m1 = self.m2 = self.m3 = self.m4 = 0
 
-    def commands(self) -> tuple | None:
+    def commands(self) -> MotorCommands | None:
         """Return the commands that hold, or None."""
         if self.enable == 1:
-            return tuple(map(float, (self.m1, self.m2, self.m3, self.m4)))
+            return float(self.m1), float(self.m2), float(self.m3), float(self.m4)
         return (float(self.m1),) * 4 if self.enable else None
 
 
@@ -64,11 +73,16 @@ class Stabilizer:
         self.thrust = self.command_roll = self.command_pitch = self.command_yaw = 0.0
         self.requested = self.commands = _OFF
         self._automatic = (0.0, 0.0, 0.0)
-        self._modes = Setpoint().modes
+        self._mode = Modes()
 
     def update(
-        self, setpoint: Setpoint, estimate, sensors, with_position: bool, may_run: bool
-    ) -> tuple:
+        self,
+        setpoint: Setpoint,
+        estimate: Estimate,
+        sensors: Sensors,
+        with_position: bool,
+        may_run: bool,
+    ) -> MotorCommands:
         """Return the motor commands, PWM.
 
         Parameters
@@ -77,19 +91,19 @@ class Stabilizer:
         estimate : Estimate
         sensors : Sensors
         with_position : bool
-            Whether the position controller has its turn.
+            Whether the position controller runs in this step.
         may_run : bool
             Whether the supervisor lets motors run.
         """
-        if setpoint.modes != self._modes:
-            self._modes = setpoint.modes
+        if setpoint.mode != self._mode:
+            self._mode = setpoint.mode
             self._reset(estimate)
         if with_position:
             self._control_position(setpoint, estimate)
-        self._desire_yaw(setpoint, estimate)
-        self._desire_tilt(setpoint)
+        self._update_desired_yaw(setpoint, estimate)
+        self._update_desired_tilt(setpoint)
         if self.thrust <= 0.0:
-            self._rest(estimate)
+            self._idle(estimate)
         else:
             self._control_attitude(setpoint, estimate, sensors)
             # The mixer's pitch is positive nose down.
@@ -109,11 +123,11 @@ class Stabilizer:
         self._automatic = (estimate.roll, estimate.pitch, 0.0)
 
     def _control_position(self, setpoint, estimate):
-        if (setpoint.mode_x, setpoint.mode_y, setpoint.mode_z) != (DISABLED,) * 3:
+        if (setpoint.mode.x, setpoint.mode.y, setpoint.mode.z) != (DISABLED,) * 3:
             self._automatic = self.position.update(setpoint, estimate)
 
-    def _desire_yaw(self, setpoint, estimate):
-        if setpoint.mode_yaw == VELOCITY:
+    def _update_desired_yaw(self, setpoint, estimate):
+        if setpoint.mode.yaw == VELOCITY:
             # A commanded yaw rate moves the heading that is held.
             yaw = self.yaw + setpoint.yaw_rate * PERIOD
             most = self.attitude.yaw_max_delta
@@ -121,32 +135,32 @@ class Stabilizer:
                 ahead = wrap_degrees(yaw - estimate.yaw)
                 yaw = estimate.yaw + max(-most, min(most, ahead))
             self.yaw = wrap_degrees(yaw)
-        elif setpoint.mode_yaw == ABSOLUTE:
+        elif setpoint.mode.yaw == ABSOLUTE:
             self.yaw = wrap_degrees(setpoint.yaw)
-        elif setpoint.mode_quaternion == ABSOLUTE:
+        elif setpoint.mode.quaternion == ABSOLUTE:
             self.yaw = math.degrees(zyx_from_quaternion(setpoint.quaternion)[2])
 
-    def _desire_tilt(self, setpoint):
+    def _update_desired_tilt(self, setpoint):
         roll, pitch, thrust = self._automatic
-        self.thrust = setpoint.thrust if setpoint.mode_z == DISABLED else thrust
-        if DISABLED in (setpoint.mode_x, setpoint.mode_y):
+        self.thrust = setpoint.thrust if setpoint.mode.z == DISABLED else thrust
+        if DISABLED in (setpoint.mode.x, setpoint.mode.y):
             roll, pitch = setpoint.roll, setpoint.pitch
         self.roll, self.pitch = roll, pitch
 
     def _control_attitude(self, setpoint, estimate, sensors):
         rates = self.attitude.desired_rates(estimate, self.roll, self.pitch, self.yaw)
         roll_rate, pitch_rate, yaw_rate = rates
-        if setpoint.mode_roll == VELOCITY:
+        if setpoint.mode.roll == VELOCITY:
             roll_rate = setpoint.roll_rate
-        if setpoint.mode_pitch == VELOCITY:
+        if setpoint.mode.pitch == VELOCITY:
             pitch_rate = setpoint.pitch_rate
         self.roll_rate, self.pitch_rate, self.yaw_rate = roll_rate, pitch_rate, yaw_rate
         gyro = (sensors.gyro_x, -sensors.gyro_y, sensors.gyro_z)
         outputs = self.attitude.outputs((roll_rate, pitch_rate, yaw_rate), gyro)
         self.command_roll, self.command_pitch, self.command_yaw = outputs
 
-    def _rest(self, estimate):
-        # Without thrust the controllers begin anew, and the heading that is
+    def _idle(self, estimate):
+        # Without thrust the controllers are reset, and the heading that is
         # held is the vehicle's.
         self._reset(estimate)
         self.yaw = estimate.yaw

@@ -5,10 +5,12 @@ motors have been off for a while counts as landed also while its setpoint is
 old: it stands on the ground then, and need not be locked.
 """
 
+from collections.abc import Callable
 from enum import Enum
 
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.states import Setpoint
 
 EMERGENCY_WATCHDOG = 1.0
@@ -46,8 +48,8 @@ class Supervisor:
 
     Parameters
     ----------
-    say : callable
-        ``say(text)`` prints a line on the console.
+    write_line : callable
+        ``write_line(text)`` prints on the console.
     auto_arm : bool
         Arm as soon as the checks have passed, as a Crazyflie 2.1 does; otherwise
         wait for the client, as vehicles with brushless motors do.
@@ -65,8 +67,8 @@ class Supervisor:
         it does not take off, and after landing.
     """
 
-    def __init__(self, say, auto_arm: bool = True):
-        self._say = say
+    def __init__(self, write_line: Callable[[str], None], auto_arm: bool = True):
+        self._write_line = write_line
         self.auto_arm = auto_arm
         self.state = State.NOT_READY
         self.is_armed = self.is_tumbled = self.is_crashed = False
@@ -74,9 +76,9 @@ class Supervisor:
         self.tumble_check = 1
         self.preflight_timeout, self.landed_timeout = 30000, 3000
         self._emergency = False
-        self._watchdog_time = None
-        self._thrust_time = None
-        self._tumble_time = None
+        self._watchdog_time: float | None = None
+        self._thrust_time: float | None = None
+        self._tumble_time: float | None = None
         self._state_time = 0.0
 
     @property
@@ -86,12 +88,12 @@ class Supervisor:
 
     @property
     def is_flying(self) -> bool:
-        """Whether the vehicle is in the air, as far as the supervisor knows."""
+        """Whether the vehicle is in the air, as the supervisor sees it."""
         return self.state in _IN_AIR
 
     @property
     def flags(self) -> SupervisorState:
-        """The state as clients are told."""
+        """The state as clients see it."""
         return SupervisorState.of(
             can_be_armed=self.state is State.CHECKED,
             armed=self.is_armed,
@@ -125,7 +127,7 @@ class Supervisor:
         """Hold off the emergency stop; from the first time on this must go on."""
         self._watchdog_time = time
 
-    def update(self, time: float, sensors, setpoint_age: float, motors_run: bool) -> None:
+    def update(self, time: float, sensors: Sensors, setpoint_age: float, motors_run: bool) -> None:
         """Take the state at ``time`` (s) on by one step.
 
         Parameters
@@ -154,7 +156,7 @@ class Supervisor:
             self.is_armed = True
         if state in (State.LOCKED, State.CRASHED):
             remedy = "reboot" if state is State.LOCKED else "recovery"
-            self._say(f"SUP: {state.value}, {remedy} required")
+            self._write_line(f"SUP: {state.value}, {remedy} required")
 
     def override(self, setpoint: Setpoint) -> Setpoint:
         """Return the setpoint that is flown in the place of the commander's."""

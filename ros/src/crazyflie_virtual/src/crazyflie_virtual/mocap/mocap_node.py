@@ -6,7 +6,7 @@ from crazyflie_virtual.server_node import ServerNode
 
 
 class VirtualMocapNode(ServerNode):
-    """A NatNet server whose options are parameters."""
+    """A NatNet server."""
 
-    def __init__(self):
-        super().__init__(MocapSettings, MocapServer)
+    settings_type = MocapSettings
+    server_type = MocapServer

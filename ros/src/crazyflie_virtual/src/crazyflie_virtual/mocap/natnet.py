@@ -5,7 +5,10 @@ begins with its number and the length of what follows, 16 bits each.
 """
 
 import struct
+from collections.abc import Sequence
 from typing import NamedTuple
+
+from crazyflie_model.angles import Quaternion, Triple
 
 CONNECT, SERVER_INFO = 0, 1
 REQUEST_MODEL, MODEL = 4, 5
@@ -41,8 +44,8 @@ class BodyPose(NamedTuple):
 
     body_id: int
     name: str
-    position: tuple
-    quaternion: tuple
+    position: Triple
+    quaternion: Quaternion
     is_tracked: bool
 
 
@@ -60,7 +63,7 @@ class Stamps(NamedTuple):
     sent: float
 
 
-def parse(datagram: bytes) -> tuple | None:
+def parse(datagram: bytes) -> tuple[int, bytes] | None:
     """Return number and payload of a message; None when it is none."""
     if len(datagram) < _HEADER.size:
         return None
@@ -95,7 +98,7 @@ class Encoder:
         )
         return _message(SERVER_INFO, payload)
 
-    def model(self, bodies) -> bytes:
+    def model(self, bodies: Sequence[BodyPose]) -> bytes:
         """Return the answer to `REQUEST_MODEL`: names and numbers of the bodies."""
         payload = struct.pack("<i", len(bodies))
         for body in bodies:
@@ -113,7 +116,7 @@ class Encoder:
             payload += description
         return _message(MODEL, payload)
 
-    def frame(self, number: int, bodies, stamps: Stamps) -> bytes:
+    def frame(self, number: int, bodies: Sequence[BodyPose], stamps: Stamps) -> bytes:
         """Return a frame.
 
         Parameters

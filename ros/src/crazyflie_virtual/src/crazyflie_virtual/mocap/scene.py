@@ -3,14 +3,16 @@
 import math
 import random
 
+from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_virtual.mocap.natnet import BodyPose
+from crazyflie_virtual.observer import Observation
 
 _STALE = 0.5
 """How long after the last observation a body counts as gone, s."""
 
 
-class Switches:
+class MocapSwitches:
     """What can be made to go wrong, at any time.
 
     Parameters
@@ -29,7 +31,7 @@ class Switches:
         self.silent = silent
 
     def hides(self, body_id: int) -> bool:
-        """Tell whether a body is one of those that are not tracked."""
+        """Return whether a body is one of those that are not tracked."""
         names = [part.strip() for part in self.invalid.split(",")]
         return "all" in names or str(body_id) in names
 
@@ -39,7 +41,7 @@ class Scene:
 
     Parameters
     ----------
-    switches : Switches
+    switches : MocapSwitches
     position_noise, attitude_noise : float
         Standard deviations along and about each axis, m and rad.
     seed : int
@@ -47,7 +49,7 @@ class Scene:
 
     def __init__(
         self,
-        switches: Switches,
+        switches: MocapSwitches,
         position_noise: float = 0.0,
         attitude_noise: float = 0.0,
         seed: int = 0,
@@ -56,18 +58,18 @@ class Scene:
         self._noise = (position_noise, attitude_noise)
         self._seed = seed
         self._random = random.Random(seed)
-        self._observations = {}
-        self._cameras = {}
-        self._seen = {}
+        self._observations: dict[int, Observation] = {}
+        self._cameras: dict[int, MotionCapture] = {}
+        self._seen: dict[int, tuple[Triple, Quaternion]] = {}
 
-    def observe(self, observation) -> None:
+    def observe(self, observation: Observation) -> None:
         """Take in an `Observation`."""
         body_id = observation.body_id
         if body_id not in self._cameras:
             self._cameras[body_id] = MotionCapture(*self._noise, seed=(self._seed, body_id))
         self._observations[body_id] = observation
 
-    def bodies(self, time: float) -> list:
+    def bodies(self, time: float) -> list[BodyPose]:
         """Return every body as it is seen at ``time`` (s), in the order of their numbers.
 
         Returns
@@ -75,9 +77,9 @@ class Scene:
         list of BodyPose
             A body that is not tracked has the pose it was seen at last.
         """
-        return [self._look(self._observations[i], time) for i in sorted(self._observations)]
+        return [self._see(self._observations[i], time) for i in sorted(self._observations)]
 
-    def _look(self, observation, time):
+    def _see(self, observation, time):
         body_id, name = observation.body_id, observation.name
         lost = (
             time - observation.time > _STALE

@@ -5,15 +5,17 @@ import socket
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 
+from crazyflie_virtual.link.sockets import Address, open_socket, received, send
 from crazyflie_virtual.mocap import natnet
-from crazyflie_virtual.mocap.natnet import Encoder, Stamps
+from crazyflie_virtual.mocap.natnet import BodyPose, Encoder, Stamps
 from crazyflie_virtual.mocap.scene import Scene
+from crazyflie_virtual.mocap.settings import MocapSettings
 from crazyflie_virtual.observer import decode
-from crazyflie_virtual.sockets import open_socket, received, send
 
 _CLIENT_LIMIT = 5.0
-"""How long after its last word a client is sent frames, s."""
+"""How long after its last message a client is sent frames, s."""
 
 _LONGEST_WAIT = 0.1
 """s."""
@@ -30,11 +32,11 @@ class MocapServer:
 
     Attributes
     ----------
-    address : tuple
+    address : tuple of str and int
         Host and port for commands.
     observer_port : int
-        Where the vehicles tell their poses.
-    switches : Switches
+        Where the vehicles' true poses arrive.
+    switches : MocapSwitches
 
     Raises
     ------
@@ -42,7 +44,7 @@ class MocapServer:
         A port is taken, or an address is none.
     """
 
-    def __init__(self, settings, warn=None):
+    def __init__(self, settings: MocapSettings, warn: Callable[[str], None] | None = None):
         self._settings = settings
         _check_address("multicast_address", settings.multicast_address)
         self.switches = settings.switches()
@@ -61,13 +63,13 @@ class MocapServer:
         if settings.multicast:
             interface = socket.inet_aton(settings.host)
             self._commands.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
-        self._clients = {}
+        self._clients: dict[Address, float] = {}
         self._period = 1.0 / settings.rate
         self._begin = time.monotonic()
         self._frames = 0
-        self._pending = deque()
+        self._pending: deque[tuple[float, float, int, list[BodyPose]]] = deque()
         self._is_stopping = False
-        self._thread = None
+        self._thread: threading.Thread | None = None
 
     @property
     def description(self) -> str:
@@ -99,25 +101,26 @@ class MocapServer:
             wait = min(max(0.0, wake - time.monotonic()), _LONGEST_WAIT)
             ready, _, _ = select.select([self._commands, self._observations], [], [], wait)
             if self._observations in ready:
-                self._hear_vehicles()
+                self._receive_observations()
             if self._commands in ready:
-                self._hear_clients(time.monotonic())
+                self._receive_commands(time.monotonic())
             self._expose(time.monotonic())
             self._dispatch(time.monotonic())
 
-    def _hear_vehicles(self):
+    def _receive_observations(self):
         for datagram, _ in received(self._observations):
             observation = decode(datagram)
             if observation is not None:
                 self._scene.observe(observation)
 
-    def _hear_clients(self, now):
+    def _receive_commands(self, now):
         for datagram, client in received(self._commands):
             message = natnet.parse(datagram)
             if message is None:
                 continue
             self._clients[client] = now
-            answer = self._answer(*message, now)
+            number, payload = message
+            answer = self._answer(number, payload, now)
             if answer is not None:
                 send(self._commands, answer, client)
 

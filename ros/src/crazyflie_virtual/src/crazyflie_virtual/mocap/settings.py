@@ -1,53 +1,65 @@
-"""The options of the virtual motion capture system."""
+"""The settings of the virtual motion capture system: ROS parameters, or a command line."""
 
-from dataclasses import dataclass
-
+from crazyflie_utils.parameter_types import BOOLEAN, TEXT, Integer, Number, Text
+from crazyflie_utils.parameters import Parameters, parameter
 from crazyflie_virtual.mocap.natnet import VERSIONS
-from crazyflie_virtual.mocap.scene import Switches
+from crazyflie_virtual.mocap.scene import MocapSwitches
 from crazyflie_virtual.observer import DEFAULT_PORT
-from crazyflie_virtual.options import option
 
 
-@dataclass(frozen=True)
-class MocapSettings:
-    """Options of the NatNet server; see the README for what each means."""
+class MocapSettings(Parameters):
+    """Settings of the NatNet server; the live ones are its `MocapSwitches`."""
 
-    host: str = option("127.0.0.1", "address to listen on and to stream from")
-    command_port: int = option(
-        1510, "UDP port for commands; 0 takes a free one", minimum=0, maximum=65535
+    host: str = parameter(
+        TEXT, "address to listen on, and of the interface for multicast", "127.0.0.1"
     )
-    data_port: int = option(1511, "UDP port of the multicast stream", minimum=1, maximum=65535)
-    multicast: bool = option(False, "stream to a group and not to each client")
-    multicast_address: str = option("239.255.42.99", "the group")
-    version: str = option("3.1", "NatNet version of the stream", choices=VERSIONS)
-    rate: float = option(120.0, "frames per second", minimum=1.0, maximum=1000.0)
-    observer_port: int = option(
+    command_port: int = parameter(
+        Integer(0, 65535), "UDP port for commands; 0 takes a free one", 1510
+    )
+    data_port: int = parameter(Integer(1, 65535), "UDP port of the multicast stream", 1511)
+    multicast: bool = parameter(
+        BOOLEAN, "stream to the group, not to each client that sends keep-alives", False
+    )
+    multicast_address: str = parameter(TEXT, "the group, an IPv4 address", "239.255.42.99")
+    version: str = parameter(
+        Text(VERSIONS), "NatNet version of the stream (quote it in YAML)", "3.1"
+    )
+    rate: float = parameter(Number("Hz", minimum=1.0, maximum=1000.0), "frames per second", 120.0)
+    observer_port: int = parameter(
+        Integer(0, 65535),
+        "UDP port at which the vehicles' true poses arrive; 0 takes a free one",
         DEFAULT_PORT,
-        "UDP port at which the vehicles tell their true poses; 0 takes a free one",
         "observer/port",
-        minimum=0,
-        maximum=65535,
     )
-    position_noise: float = option(
-        0.0, "standard deviation along each axis, m", "noise/position", minimum=0.0
+    position_noise: float = parameter(
+        Number("m", minimum=0.0), "standard deviation along each axis", 0.0, "noise/position"
     )
-    attitude_noise: float = option(
-        0.0, "standard deviation about each axis, rad", "noise/attitude", minimum=0.0
-    )
-    latency: float = option(0.0, "from exposure to dispatch, s", minimum=0.0, maximum=1.0)
-    seed: int = option(0, "of the noise", minimum=0, maximum=2**31 - 1)
-    dropout: float = option(
+    attitude_noise: float = parameter(
+        Number("rad", minimum=0.0),
+        "standard deviation about each axis of the body",
         0.0,
+        "noise/attitude",
+    )
+    latency: float = parameter(
+        Number("s", minimum=0.0, maximum=1.0), "from exposure to dispatch", 0.0
+    )
+    seed: int = parameter(Integer(0, 2**31 - 1), "of the noise", 0)
+    dropout: float = parameter(
+        Number(minimum=0.0, maximum=1.0),
         "probability with which a body is not tracked in a frame",
+        0.0,
         "fault/dropout",
-        minimum=0.0,
-        maximum=1.0,
+        live=True,
     )
-    invalid: str = option(
-        "", "numbers of bodies that are not tracked, with commas, or all", "fault/invalid"
+    invalid: str = parameter(
+        Text(may_be_empty=True),
+        "bodies that are not tracked: numbers with commas, or all",
+        "",
+        "fault/invalid",
+        live=True,
     )
-    silent: bool = option(False, "hold back all frames", "fault/silent")
+    silent: bool = parameter(BOOLEAN, "no frames are sent", False, "fault/silent", live=True)
 
-    def switches(self) -> Switches:
+    def switches(self) -> MocapSwitches:
         """Return the switches as they are at the beginning."""
-        return Switches(self.dropout, self.invalid, self.silent)
+        return MocapSwitches(self.dropout, self.invalid, self.silent)

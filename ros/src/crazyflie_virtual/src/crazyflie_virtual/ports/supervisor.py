@@ -2,7 +2,8 @@
 
 import struct
 
-from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.link.crtp import Packet, Port
 
 _INFO, _COMMAND = 0, 1
 _FIRST_BIT, _LAST_BIT, _ALL_BITS = 0x01, 0x0B, 0x0C
@@ -10,7 +11,7 @@ _ARM, _RECOVER, _EMERGENCY_STOP, _EMERGENCY_WATCHDOG = 1, 2, 3, 4
 _RESPONSE = 0x80
 
 
-class SupervisorService:
+class SupervisorPort:
     """Questions and commands to the supervisor.
 
     Parameters
@@ -20,10 +21,10 @@ class SupervisorService:
 
     port = Port.SUPERVISOR
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         if not packet.data:
             return []

@@ -1,13 +1,14 @@
 """Ports 3 and 7: streamed setpoints."""
 
-from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.firmware.setpoints import decode_generic
+from crazyflie_virtual.link.crtp import Packet, Port
 
 _SETPOINT, _META = 0, 1
 _SETPOINTS_STOP = 0
 
 
-class AttitudeSetpointService:
+class AttitudeSetpointPort:
     """Attitude setpoints.
 
     Parameters
@@ -17,10 +18,10 @@ class AttitudeSetpointService:
 
     port = Port.SETPOINT
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Take a setpoint; there is no answer."""
         f = self._firmware
         if packet.channel == _SETPOINT:
@@ -30,7 +31,7 @@ class AttitudeSetpointService:
         return []
 
 
-class GenericSetpointService:
+class GenericSetpointPort:
     """Setpoints of all other types, and the end of streaming.
 
     Parameters
@@ -40,10 +41,10 @@ class GenericSetpointService:
 
     port = Port.GENERIC_SETPOINT
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Take a setpoint or a command; there is no answer."""
         f = self._firmware
         if packet.channel == _SETPOINT:

@@ -6,10 +6,13 @@ from crazyflie_model.angles import Quaternion, Triple, rotate_back
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe
 from crazyflie_model.units import GRAVITY
-from crazyflie_virtual.battery import FULL_VOLTAGE
+from crazyflie_virtual.body.battery import FULL_VOLTAGE
 
 STEP = PERIOD
 """Step of the integration, s: that of the firmware's attitude controller."""
+
+MotorCommands = tuple[float, float, float, float]
+"""PWM of the four motors."""
 
 _OVERTURNING = 0.5
 """Cosine of the tilt beyond which a vehicle that comes down lies on its back."""
@@ -40,7 +43,7 @@ class Physics:
 
     def __init__(
         self,
-        position=(0.0, 0.0, 0.0),
+        position: Triple = (0.0, 0.0, 0.0),
         yaw: float = 0.0,
         mass_error: float = 0.0,
         thrust_error: float = 0.0,
@@ -50,29 +53,33 @@ class Physics:
         x[6:10] = [0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]
         x[13:17] = [0.0] * 4
         self._x = x
-        self.specific_force = (0.0, 0.0, GRAVITY)
+        self.specific_force: Triple = (0.0, 0.0, GRAVITY)
         self.impact_speed = 0.0
         self.is_overturned = False
 
     @property
     def position(self) -> Triple:
         """m, fixed frame."""
-        return tuple(self._x[0:3])
+        x, y, z = self._x[0:3]
+        return x, y, z
 
     @property
     def velocity(self) -> Triple:
         """m/s, fixed frame."""
-        return tuple(self._x[3:6])
+        x, y, z = self._x[3:6]
+        return x, y, z
 
     @property
     def quaternion(self) -> Quaternion:
         """(x, y, z, w), body to fixed frame."""
-        return tuple(self._x[6:10])
+        x, y, z, w = self._x[6:10]
+        return x, y, z, w
 
     @property
     def rates(self) -> Triple:
         """Body rates, rad/s."""
-        return tuple(self._x[10:13])
+        x, y, z = self._x[10:13]
+        return x, y, z
 
     @property
     def load(self) -> float:
@@ -84,12 +91,12 @@ class Physics:
         self.is_overturned = False
         self.specific_force = (0.0, 0.0, GRAVITY)
 
-    def step(self, commands, voltage: float) -> None:
+    def step(self, commands: MotorCommands, voltage: float) -> None:
         """Take the body on by `STEP`.
 
         Parameters
         ----------
-        commands : sequence, 4 components
+        commands : tuple, 4 components
             Motor commands, PWM.
         voltage : float
             Of the battery, V: it limits the speed of the motors.
@@ -97,7 +104,7 @@ class Physics:
         top = CRAZYFLIE.max_rotor_speed * voltage / FULL_VOLTAGE
         before = self._x
         if self.is_overturned:
-            commands = (0.0,) * 4
+            commands = (0.0, 0.0, 0.0, 0.0)
         speeds = [min(top, CRAZYFLIE.rotor_speed(command)) for command in commands]
         after = self._x = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
         if before[2] > 0.0 and after[2] <= 0.0:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Kind:
+class NumberType:
     """A number's type.
 
     Attributes
@@ -34,11 +34,11 @@ class Kind:
         """Return the bytes of a value; whole numbers are limited to the type's range."""
         return struct.pack("<" + self.format, self.convert(value))
 
-    def unpack(self, data: bytes):
+    def unpack(self, data: bytes) -> float:
         """Return the value of `size` bytes."""
         return struct.unpack("<" + self.format, data)[0]
 
-    def convert(self, value: float):
+    def convert(self, value: float) -> float:
         """Return the value that is packed: limited, and whole where the type is whole."""
         if self.format in "fde":
             largest = _LARGEST.get(self.format, math.inf)
@@ -52,18 +52,18 @@ class Kind:
 
 _LARGEST = {"f": 3.4028234e38, "e": 65504.0}
 
-U8 = Kind("uint8_t", "B", 1, 0x8)
-U16 = Kind("uint16_t", "H", 2, 0x9)
-U32 = Kind("uint32_t", "I", 3, 0xA)
-I8 = Kind("int8_t", "b", 4, 0x0)
-I16 = Kind("int16_t", "h", 5, 0x1)
-I32 = Kind("int32_t", "i", 6, 0x2)
-FLOAT = Kind("float", "f", 7, 0x6)
-FP16 = Kind("FP16", "e", 8, None)
-U64 = Kind("uint64_t", "Q", None, 0xB)
+U8 = NumberType("uint8_t", "B", 1, 0x8)
+U16 = NumberType("uint16_t", "H", 2, 0x9)
+U32 = NumberType("uint32_t", "I", 3, 0xA)
+I8 = NumberType("int8_t", "b", 4, 0x0)
+I16 = NumberType("int16_t", "h", 5, 0x1)
+I32 = NumberType("int32_t", "i", 6, 0x2)
+FLOAT = NumberType("float", "f", 7, 0x6)
+FP16 = NumberType("FP16", "e", 8, None)
+U64 = NumberType("uint64_t", "Q", None, 0xB)
 
-LOG_KINDS = {kind.log_code: kind for kind in (U8, U16, U32, I8, I16, I32, FLOAT, FP16)}
-"""Code on the wire -> kind."""
+LOG_TYPES = {t.log_code: t for t in (U8, U16, U32, I8, I16, I32, FLOAT, FP16)}
+"""Code on the wire -> type."""
 
-PARAMETER_KINDS = {kind.parameter_code: kind for kind in (U8, U16, U32, U64, I8, I16, I32, FLOAT)}
-"""Code on the wire -> kind."""
+PARAMETER_TYPES = {t.parameter_code: t for t in (U8, U16, U32, U64, I8, I16, I32, FLOAT)}
+"""Code on the wire -> type."""

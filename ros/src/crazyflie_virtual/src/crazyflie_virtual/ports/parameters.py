@@ -5,10 +5,11 @@ import math
 import struct
 from operator import attrgetter
 
-from crazyflie_virtual.crtp import MAX_DATA, Packet, Port
-from crazyflie_virtual.kinds import PARAMETER_KINDS
-from crazyflie_virtual.parameter_table import parameter_specs
-from crazyflie_virtual.toc import Entry, Table
+from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
+from crazyflie_virtual.tables.number_types import PARAMETER_TYPES
+from crazyflie_virtual.tables.parameter_table import ParameterSpec, parameter_specs
+from crazyflie_virtual.tables.toc import Entry, Table
 
 _TABLE, _READ, _WRITE, _MISC = 0, 1, 2, 3
 
@@ -28,7 +29,7 @@ class Parameter:
     firmware : Firmware
     """
 
-    def __init__(self, spec, firmware):
+    def __init__(self, spec: ParameterSpec, firmware: Firmware):
         self.spec = spec
         self.full_name = f"{spec.group}.{spec.name}"
         self._owner = None
@@ -40,11 +41,11 @@ class Parameter:
         self.default = self.value
 
     @property
-    def value(self):
+    def value(self) -> float:
         """The present value."""
         return self._value if self._owner is None else getattr(self._owner, self._attribute)
 
-    def set(self, value) -> None:
+    def set(self, value: float) -> None:
         """Change the value, unless it is read-only or the new one is no number."""
         if self.spec.read_only or not math.isfinite(value):
             return
@@ -58,10 +59,12 @@ class Parameter:
         """Type and flags in the table."""
         spec = self.spec
         extended = _EXTENDED if spec.persistent else 0
-        return spec.kind.parameter_code | extended | (_READ_ONLY if spec.read_only else _CORE)
+        return (
+            spec.number_type.parameter_code | extended | (_READ_ONLY if spec.read_only else _CORE)
+        )
 
 
-class ParameterService:
+class ParameterPort:
     """Reads and writes parameters, and stores the persistent ones.
 
     Parameters
@@ -73,7 +76,7 @@ class ParameterService:
 
     port = Port.PARAMETERS
 
-    def __init__(self, firmware, stored: dict):
+    def __init__(self, firmware: Firmware, stored: dict[str, float]):
         self._parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
         self._stored = stored
         for parameter in self._parameters:
@@ -81,7 +84,7 @@ class ParameterService:
                 parameter.set(stored[parameter.full_name])
         self.table = Table([Entry(p.spec.group, p.spec.name, p.code) for p in self._parameters])
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         data = packet.data
         if packet.channel == _TABLE:
@@ -104,16 +107,16 @@ class ParameterService:
         parameter = self._find(data)
         if parameter is None:
             return data[:2] + bytes([errno.ENOENT])
-        return data[:2] + b"\0" + parameter.spec.kind.pack(parameter.value)
+        return data[:2] + b"\0" + parameter.spec.number_type.pack(parameter.value)
 
     def _write(self, data):
         parameter = self._find(data)
         if parameter is None:
             return data[:2] + bytes([errno.ENOENT])
-        kind = parameter.spec.kind
-        if len(data) >= 2 + kind.size:
-            parameter.set(kind.unpack(data[2 : 2 + kind.size]))
-        return data[:2] + kind.pack(parameter.value)
+        number_type = parameter.spec.number_type
+        if len(data) >= 2 + number_type.size:
+            parameter.set(number_type.unpack(data[2 : 2 + number_type.size]))
+        return data[:2] + number_type.pack(parameter.value)
 
     def _misc(self, data):
         if not data:
@@ -132,16 +135,19 @@ class ParameterService:
             return None
         group, name = parts[0].decode("latin1"), parts[1].decode("latin1")
         index = self.table.index(group, name)
-        kind, value = PARAMETER_KINDS.get(parts[2][0]), parts[2][1:]
+        number_type, value = PARAMETER_TYPES.get(parts[2][0]), parts[2][1:]
         error = 0
         if index is None:
             error = errno.ENOENT
-        elif kind is not self._parameters[index].spec.kind or len(value) != kind.size:
+        elif (
+            number_type is not self._parameters[index].spec.number_type
+            or len(value) != number_type.size
+        ):
             error = errno.EINVAL
         elif self._parameters[index].spec.read_only:
             error = errno.EACCES
         else:
-            self._parameters[index].set(kind.unpack(value))
+            self._parameters[index].set(number_type.unpack(value))
         names = data[: 1 + len(parts[0]) + 1 + len(parts[1]) + 1]
         return (names + bytes([error]))[:MAX_DATA]
 
@@ -156,7 +162,7 @@ class ParameterService:
     def _default(self, parameter):
         if parameter is None or parameter.spec.read_only:
             return bytes([errno.ENOENT])
-        return parameter.spec.kind.pack(parameter.default)
+        return parameter.spec.number_type.pack(parameter.default)
 
     def _default_2(self, parameter):
         value = self._default(parameter)
@@ -178,19 +184,19 @@ class ParameterService:
     def _state(self, parameter):
         if parameter is None or not parameter.spec.persistent:
             return bytes([errno.ENOENT])
-        kind = parameter.spec.kind
-        default = kind.pack(parameter.default)
+        number_type = parameter.spec.number_type
+        default = number_type.pack(parameter.default)
         if parameter.full_name not in self._stored:
             return b"\0" + default
-        return b"\1" + default + kind.pack(self._stored[parameter.full_name])
+        return b"\1" + default + number_type.pack(self._stored[parameter.full_name])
 
 
 _MISC_HANDLERS = {
-    _EXTENDED_TYPE: ParameterService._extended_type,
-    _STORE: ParameterService._store,
-    _STATE: ParameterService._state,
-    _CLEAR: ParameterService._clear,
-    _DEFAULT: ParameterService._default,
-    _EXTENDED_TYPE_2: ParameterService._extended_type_2,
-    _DEFAULT_2: ParameterService._default_2,
+    _EXTENDED_TYPE: ParameterPort._extended_type,
+    _STORE: ParameterPort._store,
+    _STATE: ParameterPort._state,
+    _CLEAR: ParameterPort._clear,
+    _DEFAULT: ParameterPort._default,
+    _EXTENDED_TYPE_2: ParameterPort._extended_type_2,
+    _DEFAULT_2: ParameterPort._default_2,
 }

@@ -1,13 +1,15 @@
 """Port 15: the link itself."""
 
-from crazyflie_virtual.crtp import MAX_DATA, Packet, Port
+from collections.abc import Callable
+
+from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
 
 _ECHO, _SOURCE, _SINK = 0, 1, 2
 
 _IDENTITY = b"Bitcraze Crazyflie"
 
 
-class LinkService:
+class LinkPort:
     """Echo, and who is there.
 
     Parameters
@@ -19,10 +21,10 @@ class LinkService:
 
     port = Port.LINK
 
-    def __init__(self, on_new_client):
+    def __init__(self, on_new_client: Callable[[], None]):
         self._on_new_client = on_new_client
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         if packet.channel == _ECHO:
             return [packet]

@@ -2,7 +2,8 @@
 
 import struct
 
-from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.ports.supervisor import SupervisorPort
 
 _COMMAND, _VERSION = 0, 1
 _CONTINUOUS_WAVE, _ARM, _RECOVER, _NOTIFY = 0, 1, 2, 3
@@ -12,24 +13,24 @@ DEVICE = "CF21"
 FIRMWARE = "virtual"
 
 
-class PlatformService:
+class PlatformPort:
     """Versions and platform commands.
 
     Parameters
     ----------
     protocol : int
         Version of the protocol to report.
-    supervisor : SupervisorService
+    supervisor : SupervisorPort
         Which arms and recovers.
     """
 
     port = Port.PLATFORM
 
-    def __init__(self, protocol: int, supervisor):
+    def __init__(self, protocol: int, supervisor: SupervisorPort):
         self._protocol = protocol
         self._supervisor = supervisor
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         if not packet.data:
             return []

@@ -28,11 +28,11 @@ class Memory:
 
     type: int
     size: int
-    read: Callable
-    write: Callable
+    read: Callable[[int, int], bytes]
+    write: Callable[[int, bytes], None]
 
     @classmethod
-    def over(cls, kind: int, buffer: bytearray) -> "Memory":
+    def over(cls, memory_type: int, buffer: bytearray) -> "Memory":
         """Return the memory of a type that is a buffer."""
 
         def write(address, data):
@@ -41,7 +41,7 @@ class Memory:
         def read(address, count):
             return bytes(buffer[address : address + count])
 
-        return cls(kind, len(buffer), read, write)
+        return cls(memory_type, len(buffer), read, write)
 
 
 class MemoryTester:

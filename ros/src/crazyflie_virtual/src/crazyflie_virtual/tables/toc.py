@@ -46,9 +46,6 @@ class Table:
         self.crc = zlib.crc32(b"".join(self._items))
         """Changes with the table: clients keep tables by it."""
 
-    def __len__(self) -> int:
-        return len(self._items)
-
     def index(self, group: str, name: str) -> int | None:
         """Return the number of an entry; None when there is none."""
         return self._index.get((group, name))

@@ -21,7 +21,7 @@ class LinkStatistics:
         self.is_connected = False
         self.received = 0
         self.received_rate = self.sent_rate = 0.0
-        self._last = None
+        self._last: float | None = None
         self._window = 0.0
         self._in = self._out = 0
 

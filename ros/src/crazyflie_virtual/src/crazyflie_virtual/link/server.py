@@ -4,12 +4,14 @@ import random
 import select
 import threading
 import time
+from collections.abc import Callable
 
-from crazyflie_virtual.channel import Channel
+from crazyflie_virtual.faults import FaultSwitches
+from crazyflie_virtual.link.channel import Channel
+from crazyflie_virtual.link.sockets import Address, open_socket, received, send
 from crazyflie_virtual.observer import Observation
-from crazyflie_virtual.settings import FIRST_PORT
-from crazyflie_virtual.sockets import open_socket, received, send
-from crazyflie_virtual.vehicle import Vehicle
+from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
+from crazyflie_virtual.vehicle import VirtualVehicle
 
 _TICK = 0.005
 """How long the vehicle may be behind the clock when nothing happens, s."""
@@ -21,19 +23,19 @@ _NULL = b"\xff"
 """What a scanner sends: it is no client."""
 
 
-class Server:
+class VehicleServer:
     """A vehicle behind a socket.
 
     Parameters
     ----------
-    settings : Settings
+    settings : VehicleSettings
     warn : callable
         ``warn(text)`` is called when the vehicle cannot keep up with the clock.
 
     Attributes
     ----------
-    vehicle : Vehicle
-    address : tuple
+    vehicle : VirtualVehicle
+    address : tuple of str and int
         Host and port.
 
     Raises
@@ -42,15 +44,15 @@ class Server:
         The port is taken.
     """
 
-    def __init__(self, settings, warn=lambda text: None):
+    def __init__(self, settings: VehicleSettings, warn: Callable[[str], None] = lambda text: None):
         self._socket = open_socket(settings.host, settings.port)
         self.address = self._socket.getsockname()
         self._warn = warn
-        self.vehicle = Vehicle(settings)
+        self.vehicle = VirtualVehicle(settings)
         source = random.Random(settings.seed)
-        self._up = Channel(self.vehicle.faults, source)
-        self._down = Channel(self.vehicle.faults, source)
-        self._client = None
+        self._up = Channel[tuple[bytes, Address]](self.vehicle.faults, source)
+        self._down = Channel[tuple[bytes, Address]](self.vehicle.faults, source)
+        self._client: Address | None = None
         self._begin = self._last_turn = time.monotonic()
         self._observer = (settings.observer_host, settings.observer_port)
         self._observation_period = 1.0 / settings.observer_rate
@@ -59,7 +61,7 @@ class Server:
         self._body_id = settings.body_id or number
         self._body_name = settings.body_name or f"cf{number}"
         self._is_stopping = False
-        self._thread = None
+        self._thread: threading.Thread | None = None
 
     @property
     def description(self) -> str:
@@ -68,7 +70,7 @@ class Server:
         return f"virtual Crazyflie at udp://{host}:{port}"
 
     @property
-    def switches(self):
+    def switches(self) -> FaultSwitches:
         """The vehicle's fault switches."""
         return self.vehicle.faults
 

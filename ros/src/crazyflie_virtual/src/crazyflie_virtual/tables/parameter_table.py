@@ -7,7 +7,7 @@ has no effect on the virtual vehicle.
 
 from typing import NamedTuple
 
-from crazyflie_virtual.kinds import FLOAT, I8, U8, U16, U32, Kind
+from crazyflie_virtual.tables.number_types import FLOAT, I8, U8, U16, U32, NumberType
 
 
 class ParameterSpec(NamedTuple):
@@ -16,7 +16,7 @@ class ParameterSpec(NamedTuple):
     Attributes
     ----------
     group, name : str
-    kind : Kind
+    number_type : NumberType
     source : str or float
         Path to the attribute, or the first value of one without effect.
     persistent : bool
@@ -26,13 +26,13 @@ class ParameterSpec(NamedTuple):
 
     group: str
     name: str
-    kind: Kind
-    source: object
+    number_type: NumberType
+    source: str | float
     persistent: bool = False
     read_only: bool = False
 
 
-def parameter_specs() -> list:
+def parameter_specs() -> list[ParameterSpec]:
     """Return all parameters, in the order of their numbers."""
     return [
         ParameterSpec(group, *row) for group, parameters in _GROUPS.items() for row in parameters
@@ -42,12 +42,12 @@ def parameter_specs() -> list:
 _KEPT, _PERSISTENT = False, True
 
 
-def _rows(kind, persistent, **sources):
-    return [(name, kind, source, persistent) for name, source in sources.items()]
+def _rows(number_type, persistent, **sources):
+    return [(name, number_type, source, persistent) for name, source in sources.items()]
 
 
-def _constants(kind, **values):
-    return [(name, kind, value, False, True) for name, value in values.items()]
+def _constants(number_type, **values):
+    return [(name, number_type, value, False, True) for name, value in values.items()]
 
 
 def _pid(names, path, form):
@@ -235,5 +235,5 @@ _GROUPS = {
         ("motorFailure", U8, "faults.motor_failure"),
     ],
 }
-"""Group -> (name, kind, source, persistent, read only). The group "virtual" is not the firmware's:
-its parameters are the fault switches."""
+"""Group -> (name, type, source, persistent, read only). The group "virtual" is not the
+firmware's: its parameters are the fault switches."""

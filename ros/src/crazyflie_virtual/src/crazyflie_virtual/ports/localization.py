@@ -3,8 +3,9 @@
 import math
 import struct
 
-from crazyflie_virtual.crtp import Packet, Port
 from crazyflie_virtual.firmware.compressed import decompress_quaternion
+from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.link.crtp import Packet, Port
 
 _POSITION, _GENERIC, _PACKED_POSITIONS = 0, 1, 2
 _EMERGENCY_STOP, _EMERGENCY_WATCHDOG, _POSE, _PACKED_POSES = 3, 4, 8, 9
@@ -13,7 +14,7 @@ _PACKED_POSITION = struct.Struct("<B3h")
 _PACKED_POSE = struct.Struct("<B3hI")
 
 
-class LocalizationService:
+class LocalizationPort:
     """Hands external measurements to the estimator.
 
     Parameters
@@ -26,11 +27,11 @@ class LocalizationService:
 
     port = Port.LOCALIZATION
 
-    def __init__(self, firmware, address: int):
+    def __init__(self, firmware: Firmware, address: int):
         self._firmware = firmware
         self._address = address
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Take a measurement; there is no answer."""
         data = packet.data
         if packet.channel == _POSITION:
@@ -43,19 +44,19 @@ class LocalizationService:
             self._generic(data[0], data[1:])
         return []
 
-    def _generic(self, kind, data):
+    def _generic(self, command, data):
         supervisor = self._firmware.supervisor
-        if kind == _POSE and len(data) == 28:
+        if command == _POSE and len(data) == 28:
             values = struct.unpack("<7f", data)
             self._take_pose(values[:3], values[3:])
-        elif kind == _PACKED_POSES:
+        elif command == _PACKED_POSES:
             for values in _each(_PACKED_POSE, data):
                 if values[0] == self._address:
                     position = [part / 1000.0 for part in values[1:4]]
                     self._take_pose(position, decompress_quaternion(values[4]))
-        elif kind == _EMERGENCY_STOP:
+        elif command == _EMERGENCY_STOP:
             supervisor.stop()
-        elif kind == _EMERGENCY_WATCHDOG:
+        elif command == _EMERGENCY_WATCHDOG:
             supervisor.feed_watchdog(self._firmware.time)
 
     def _position(self, data):

@@ -2,6 +2,10 @@
 
 import contextlib
 import socket
+from collections.abc import Iterator
+
+Address = tuple[str, int]
+"""Host and port."""
 
 _BURST = 256
 """Datagrams taken in at one time, so that a flood does not stop everything else."""
@@ -25,7 +29,7 @@ def open_socket(host: str, port: int) -> socket.socket:
     return result
 
 
-def received(source: socket.socket):
+def received(source: socket.socket) -> Iterator[tuple[bytes, Address]]:
     """Yield (datagram, sender) for what waits in a socket."""
     for _ in range(_BURST):
         try:
@@ -37,7 +41,7 @@ def received(source: socket.socket):
             continue
 
 
-def send(source: socket.socket, datagram: bytes, receiver: tuple) -> None:
+def send(source: socket.socket, datagram: bytes, receiver: Address) -> None:
     """Send a datagram; one that the network does not take is one that is lost."""
     with contextlib.suppress(OSError):
         source.sendto(datagram, receiver)

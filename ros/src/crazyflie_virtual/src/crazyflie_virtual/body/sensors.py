@@ -3,7 +3,7 @@
 import math
 import random
 
-from crazyflie_model.angles import rotate_back
+from crazyflie_model.angles import Quaternion, Triple, rotate_back
 from crazyflie_model.units import GRAVITY
 
 _GYRO_NOISE = 0.1
@@ -66,14 +66,14 @@ class Sensors:
         self.pressure = _SEA_LEVEL_PRESSURE
         self.temperature = 25.0
 
-    def sample_inertial(self, rates, specific_force) -> None:
+    def sample_inertial(self, rates: Triple, specific_force: Triple) -> None:
         """Measure.
 
         Parameters
         ----------
-        rates : sequence, 3 components
+        rates : tuple, 3 components
             Body rates, rad/s.
-        specific_force : sequence, 3 components
+        specific_force : tuple, 3 components
             Acceleration without gravity's, m/s^2, body frame.
         """
         start = self._next
@@ -87,7 +87,7 @@ class Sensors:
         self.acc_y = _clip(specific_force[1] / GRAVITY + sigma * n[4], limit)
         self.acc_z = _clip(specific_force[2] / GRAVITY + sigma * n[5], limit)
 
-    def sample_slow(self, height: float, quaternion) -> None:
+    def sample_slow(self, height: float, quaternion: Quaternion) -> None:
         """Measure pressure and magnetic field at a height (m) and an attitude (x, y, z, w)."""
         self.mag_x, self.mag_y, self.mag_z = rotate_back(quaternion, _FIELD)
         self.asl = height + _BAROMETER_NOISE * self._noise[self._next]

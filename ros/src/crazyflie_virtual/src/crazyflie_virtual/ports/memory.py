@@ -2,8 +2,10 @@
 
 import errno
 import struct
+from collections.abc import Iterable
 
-from crazyflie_virtual.crtp import Packet, Port
+from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.tables.memories import Memory
 
 _INFO, _READ, _WRITE = 0, 1, 2
 _COUNT, _DETAILS = 1, 2
@@ -12,21 +14,21 @@ _MOST = 24
 """Bytes read or written at once."""
 
 
-class MemoryService:
+class MemoryPort:
     """Reads and writes memories.
 
     Parameters
     ----------
-    memories : sequence of Memory
+    memories : iterable of Memory
         In the order of their numbers.
     """
 
     port = Port.MEMORY
 
-    def __init__(self, memories):
+    def __init__(self, memories: Iterable[Memory]):
         self._memories = tuple(memories)
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         handlers = {_INFO: self._info, _READ: self._read, _WRITE: self._write}
         handler = handlers.get(packet.channel)

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from virtual_bench import Bench
 
-from crazyflie_virtual.crtp import Port
-from crazyflie_virtual.settings import Settings
-from crazyflie_virtual.vehicle import Vehicle
+from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual.vehicle import VirtualVehicle
 
 
 @pytest.fixture
@@ -107,7 +107,7 @@ def test_memory_tester(bench):
 
 
 def test_it_can_fly_from_the_first_moment():
-    assert Vehicle(Settings()).board.firmware.supervisor.can_fly
+    assert VirtualVehicle(VehicleSettings()).board.firmware.supervisor.can_fly
 
 
 def test_supervisor_bits(bench):

@@ -1,24 +1,24 @@
-"""Options from a command line, and what the programs need."""
+"""Settings from a command line, and what the programs need."""
 
 import subprocess
 import sys
 
 import pytest
 
-from crazyflie_virtual.faults import Faults
+from crazyflie_utils.command_line import parse_arguments
+from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.mocap.settings import MocapSettings
-from crazyflie_virtual.options import parse_arguments
-from crazyflie_virtual.settings import Settings
+from crazyflie_virtual.settings import VehicleSettings
 
 
-def parse(*arguments, options_class=Settings):
-    return parse_arguments(options_class, arguments, "program", "text")
+def parse(*arguments, settings_type=VehicleSettings):
+    return parse_arguments(settings_type, list(arguments), "program", "text")
 
 
 def test_defaults_are_those_of_the_class():
-    assert parse() == Settings()
-    assert parse(options_class=MocapSettings) == MocapSettings()
-    assert Settings().faults() == Faults()
+    assert parse() == VehicleSettings()
+    assert parse(settings_type=MocapSettings) == MocapSettings()
+    assert VehicleSettings().switches() == FaultSwitches()
 
 
 def test_all_types():
@@ -28,28 +28,28 @@ def test_all_types():
     )  # fmt: skip
     assert (settings.port, settings.init_x, settings.positioning) == (19855, -1.5, "none")
     assert (settings.auto_arm, settings.address) == (False, 0x2A)
-    assert settings.faults() == Faults(low_battery=1, motor_failure=2)
+    assert settings.switches() == FaultSwitches(low_battery=1, motor_failure=2)
 
 
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (("--port", "70000"), "--port: 70000: expected 0 to 65535"),
-        (("--port", "many"), "--port: 'many': expected a number"),
-        (("--init-x", "nan"), "--init-x: nan: expected"),
-        (("--positioning", "gps"), "'gps': expected one of deck, none"),
-        (("--auto-arm", "1"), "'1': expected true or false"),
+        (("--port", "70000"), "--port is 70000; expected an integer from 0 to 65535"),
+        (("--port", "many"), "--port is 'many'; expected an integer"),
+        (("--init-x", "nan"), "--init-x is nan; expected a finite number"),
+        (("--positioning", "gps"), "--positioning is 'gps'; expected one of deck, none"),
+        (("--auto-arm", "1"), "--auto-arm is '1'; expected true or false"),
         (("--wings", "2"), "unrecognized arguments: --wings 2"),
     ],
 )
-def test_bad_options_are_named(arguments, text, capsys):
+def test_bad_settings_are_named(arguments, text, capsys):
     with pytest.raises(SystemExit) as exit_info:
         parse(*arguments)
     assert exit_info.value.code == 2
     assert text in capsys.readouterr().err
 
 
-def test_help_tells_every_option(capsys):
+def test_help_names_every_setting(capsys):
     with pytest.raises(SystemExit):
         parse("--help")
     text = capsys.readouterr().out
@@ -57,13 +57,16 @@ def test_help_tells_every_option(capsys):
         assert name in text
 
 
-@pytest.mark.parametrize("package", ["crazyflie_virtual", "crazyflie_virtual.mocap"])
-def test_programs_need_no_ros(package):
+@pytest.mark.parametrize(
+    ("package", "server"),
+    [("crazyflie_virtual", "link.server"), ("crazyflie_virtual.mocap", "server")],
+)
+def test_programs_need_no_ros(package, server):
     code = (
         "import runpy, sys\n"
         "sys.modules.update(dict.fromkeys(('rospy', 'rosgraph', 'genpy', 'roslib')))\n"
         "sys.argv[1:] = ['--port=0', '--help']\n"
-        f"import {package}.server\n"
+        f"import {package}.{server}\n"
         f"runpy.run_module('{package}', run_name='__main__')\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)

@@ -2,11 +2,13 @@
 
 import errno
 import struct
+from collections.abc import Callable
 
-from crazyflie_virtual.crtp import Packet, Port
-from crazyflie_virtual.kinds import LOG_KINDS
-from crazyflie_virtual.log_table import log_variables
-from crazyflie_virtual.toc import Entry, Table
+from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.tables.log_table import log_variables
+from crazyflie_virtual.tables.number_types import LOG_TYPES, NumberType
+from crazyflie_virtual.tables.toc import Entry, Table
 
 MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
 """Blocks at one time, variables in all of them, bytes of values in one."""
@@ -20,17 +22,17 @@ _PERIOD_UNIT = 10
 
 class _Block:
     def __init__(self):
-        self.variables = []
+        self.variables: list[tuple[Callable[[Firmware], float], NumberType]] = []
         self.size = 0
         self.period = 0
-        self.due = None
+        self.due: int | None = None
 
-    def add(self, variable, kind):
-        self.variables.append((variable.read, kind))
-        self.size += kind.size
+    def add(self, variable, number_type):
+        self.variables.append((variable.read, number_type))
+        self.size += number_type.size
 
 
-class LogService:
+class LogPort:
     """Sends the values of variables that the client asks for, periodically.
 
     Parameters
@@ -41,15 +43,15 @@ class LogService:
 
     port = Port.LOG
 
-    def __init__(self, firmware):
+    def __init__(self, firmware: Firmware):
         self._firmware = firmware
         self._variables = log_variables()
-        entries = [Entry(v.group, v.name, v.kind.log_code) for v in self._variables]
+        entries = [Entry(v.group, v.name, v.number_type.log_code) for v in self._variables]
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
-        self._blocks = {}
-        self._due = None
+        self._blocks: dict[int, _Block] = {}
+        self._due: int | None = None
 
-    def handle(self, packet: Packet) -> list:
+    def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         if packet.channel == _TABLE:
             answer = self.table.answer(packet.data)
@@ -61,7 +63,7 @@ class LogService:
             return [Packet(Port.LOG, _CONTROL, bytes([command, block_id, error]))]
         return []
 
-    def collect(self) -> list:
+    def collect(self) -> list[Packet]:
         """Return the packets with values that are due."""
         now = self._firmware.milliseconds
         if self._due is None or now < self._due:
@@ -116,14 +118,16 @@ class LogService:
                 return errno.ENOENT
             variable = self._variables[index]
             # The low half of the code is the type to send; 0 is the variable's own.
-            kind = LOG_KINDS.get(code & 0xF, variable.kind if code & 0xF == 0 else None)
-            if kind is None:
+            number_type = LOG_TYPES.get(
+                code & 0xF, variable.number_type if code & 0xF == 0 else None
+            )
+            if number_type is None:
                 return errno.ENOENT
-            if block.size + kind.size > MAX_BYTES:
+            if block.size + number_type.size > MAX_BYTES:
                 return errno.E2BIG
             if sum(len(b.variables) for b in self._blocks.values()) >= MAX_VARIABLES:
                 return errno.ENOMEM
-            block.add(variable, kind)
+            block.add(variable, number_type)
         return 0
 
     def _schedule(self):
@@ -132,6 +136,6 @@ class LogService:
 
     def _data_packet(self, block_id, block, now):
         firmware = self._firmware
-        values = b"".join(kind.pack(read(firmware)) for read, kind in block.variables)
+        values = b"".join(number_type.pack(read(firmware)) for read, number_type in block.variables)
         stamp = (now & 0xFFFFFF).to_bytes(3, "little")
         return Packet(Port.LOG, _DATA, bytes([block_id]) + stamp + values)

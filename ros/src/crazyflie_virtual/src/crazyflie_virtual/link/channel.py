@@ -2,24 +2,30 @@
 
 import math
 from collections import deque
+from random import Random
+from typing import Generic, TypeVar
+
+from crazyflie_virtual.faults import FaultSwitches
+
+T = TypeVar("T")
 
 
-class Channel:
+class Channel(Generic[T]):
     """Datagrams on their way.
 
     Parameters
     ----------
-    faults : Faults
+    faults : FaultSwitches
     random : random.Random
         Decides what is lost.
     """
 
-    def __init__(self, faults, random):
+    def __init__(self, faults: FaultSwitches, random: Random):
         self._faults = faults
         self._random = random
-        self._on_the_way = deque()
+        self._on_the_way: deque[tuple[float, T]] = deque()
 
-    def push(self, time: float, item) -> None:
+    def push(self, time: float, item: T) -> None:
         """Send something at ``time`` (s)."""
         faults = self._faults
         if faults.silence > 0.0 or self._random.random() < faults.loss:
@@ -30,7 +36,7 @@ class Channel:
             due = max(due, self._on_the_way[-1][0])
         self._on_the_way.append((due, item))
 
-    def pop(self, time: float) -> list:
+    def pop(self, time: float) -> list[T]:
         """Return what has arrived at ``time`` (s), oldest first."""
         arrived = []
         while self._on_the_way and self._on_the_way[0][0] <= time:

@@ -1,0 +1,1 @@
+"""Airframe, battery and sensors."""

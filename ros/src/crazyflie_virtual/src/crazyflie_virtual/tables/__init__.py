@@ -1,0 +1,1 @@
+"""What a client can list: log variables, parameters, memories."""

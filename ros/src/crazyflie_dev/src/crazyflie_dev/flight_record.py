@@ -68,7 +68,7 @@ class Series:
 
 @dataclass
 class FlightRecord:
-    """Everything that was said about one flight; times in s of ROS time.
+    """Messages and events of one flight; times in s of ROS time.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ def complaints(log: Path) -> list[str]:
 
 
 @contextlib.contextmanager
-def launched(arguments: list[str], log: Path) -> Iterator[subprocess.Popen]:
+def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen]:
     """Run roslaunch on a master of its own for the time of a with block.
 
     Parameters

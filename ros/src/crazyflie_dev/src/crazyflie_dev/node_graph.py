@@ -13,7 +13,7 @@ from pathlib import Path
 
 import rosgraph
 
-from crazyflie_dev.launching import launched
+from crazyflie_dev.launching import roslaunch
 
 Registrations = list[tuple[str, list[str]]]
 """Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them."""
@@ -95,7 +95,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "sw_hover.log"
         print("launching sw_hover", flush=True)
-        with launched(["crazyflie_examples", "sw_hover.launch", "rviz:=false"], log):
+        with roslaunch(["crazyflie_examples", "sw_hover.launch", "rviz:=false"], log):
             try:
                 graph = dot(*running_graph(expected))
             except TimeoutError as error:

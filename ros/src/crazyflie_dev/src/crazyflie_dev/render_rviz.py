@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from crazyflie_description.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
 from crazyflie_dev.demo import HOVER
+from crazyflie_dev.flight_operator import FlightError, FlightOperator
 from crazyflie_dev.flight_report import HOVER_TOLERANCE
-from crazyflie_dev.launching import launched
-from crazyflie_dev.pilot import FlightError, Pilot
+from crazyflie_dev.launching import roslaunch
 from crazyflie_dev.virtual_display import DisplayError, screenshot, virtual_display
 from crazyflie_utils.runtime import runner
 
@@ -156,15 +156,15 @@ def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
         scene = Scene(display, description)
         arguments = ["crazyflie_examples", "sw_hover.launch", "rviz:=true", *launch_arguments]
         say(f"launching {' '.join(arguments)} on display {display}")
-        with launched(arguments, log):
-            pilot = Pilot(runner.begin("render_pilot"))
-            pilot.wait_until_ready()
+        with roslaunch(arguments, log):
+            operator = FlightOperator(runner.begin("render_rviz"))
+            operator.wait_until_ready()
             say("waiting for RViz to draw the vehicle")
             scene.wait_for_vehicle()
             say("taking off")
-            pilot.takeoff()
-            pilot.hover(1.0)
-            error = math.dist(pilot.position, HOVER)
+            operator.takeoff()
+            operator.hover(1.0)
+            error = math.dist(operator.position, HOVER)
             if error > HOVER_TOLERANCE:
                 raise FlightError(f"it hovers {error:.3f} m from where it should")
             say("waiting for RViz to draw vehicle, path and reference")

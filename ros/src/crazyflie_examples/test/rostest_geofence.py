@@ -39,13 +39,13 @@ MARGIN, HORIZONTAL, VERTICAL, RATE = 0.5, (1.5, 0.4), (4.0, 0.2), 1.0
 
 
 @dataclass
-class Flight:
+class FenceFlight:
     """What was recorded: true positions, regular and final control, and the legs."""
 
     positions: Series
     regular: Series
     final: Series
-    legs: list
+    legs: list[tuple[float, float]]
 
     @property
     def start(self):
@@ -93,7 +93,7 @@ def record(process, flight):
 def flight():
     """Fly once, against every wall and then home."""
     process = ros_process()
-    flight = Flight(Series(("x", "y", "z")), Series(CONTROL_FIELDS), None, [])
+    flight = FenceFlight(Series(("x", "y", "z")), Series(CONTROL_FIELDS), None, [])
     handle = record(process, flight)
     operator = FlightOperator(process)
     operator.wait_until_ready()

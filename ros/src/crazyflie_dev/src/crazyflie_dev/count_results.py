@@ -48,7 +48,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Count the tests below a folder of results.")
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
-    count = Counter()
+    count: Counter[str] = Counter()
     for path in sorted(folder.rglob("*.xml")):
         for verdict, reason in verdicts(path):
             count[verdict] += 1

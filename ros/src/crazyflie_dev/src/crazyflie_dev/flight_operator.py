@@ -2,10 +2,10 @@
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_dev.flight_record import FlightRecord
@@ -48,7 +48,7 @@ class FlightOperator:
             process.start()
 
     @property
-    def position(self) -> np.ndarray:
+    def position(self) -> NDArray[np.float64]:
         """Where the vehicle was last, m, shape (3,)."""
         return self._recorder.record.state.last[:3]
 
@@ -73,7 +73,7 @@ class FlightOperator:
         end = state.last_time + duration
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")
 
-    def refer_to(self, point: ArrayLike) -> None:
+    def refer_to(self, point: Sequence[float]) -> None:
         """Publish a point (x, y, z), m, as reference, to be at rest there."""
         x, y, z = map(float, point)
         reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=z))

@@ -1,7 +1,7 @@
 """Draws the nodes and topics of the running software example.
 
-The picture shows what the master says, not what the documentation thinks: nodes
-are ovals, topics boxes, an arrow is a registration as publisher or subscriber.
+Nodes are ovals, topics boxes; an arrow is a registration of a publisher or subscriber with the
+master.
 """
 
 import argparse
@@ -33,8 +33,7 @@ def dot(published: Registrations, subscribed: Registrations) -> str:
     Parameters
     ----------
     published, subscribed : Registrations
-        Topics that nobody
-        publishes, or nobody subscribes to, are left out.
+        Topics without a publisher or without a subscriber are left out.
     """
     sources = {topic: nodes for topic, nodes in published if topic not in HIDDEN_TOPICS}
     sinks = {topic: nodes for topic, nodes in subscribed if topic not in HIDDEN_TOPICS}
@@ -66,7 +65,8 @@ def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
     """
     master = rosgraph.Master("/node_graph")
     deadline = time.monotonic() + _LIMIT
-    graph, since = ([], []), time.monotonic()
+    graph: tuple[Registrations, Registrations] = ([], [])
+    since = time.monotonic()
     while time.monotonic() < deadline:
         if rosgraph.is_master_online():
             published, subscribed, _ = master.getSystemState()

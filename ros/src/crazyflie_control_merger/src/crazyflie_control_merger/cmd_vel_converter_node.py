@@ -15,7 +15,7 @@ class CmdVelConverterParameters(Parameters):
 
     control_topic: str = parameter(TOPIC, "where controls come from", name="topics/control")
     cmd_vel_topic: str = parameter(
-        TOPIC, "where the radio driver listens to commands", name="topics/cmd_vel"
+        TOPIC, "where commands of the radio driver go", name="topics/cmd_vel"
     )
 
 

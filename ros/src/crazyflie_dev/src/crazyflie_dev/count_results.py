@@ -19,7 +19,7 @@ def verdicts(path: Path) -> Iterator[tuple[str, str]]:
     """Yield "passed", "failed" or "skipped" for each test in a JUnit XML file, and its reason.
 
     A file that cannot be read or has no test in it is a failed test: its program
-    has died before it could tell.
+    has died before it wrote its results.
     """
     try:
         cases = list(ElementTree.parse(path).getroot().iter("testcase"))

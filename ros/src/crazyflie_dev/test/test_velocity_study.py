@@ -12,7 +12,7 @@ from crazyflie_dev.velocity_study import (
     IDEAL,
     PERIOD,
     REAL,
-    Flight,
+    SampledFlight,
     estimate,
     fly,
     lag,
@@ -66,7 +66,7 @@ def moving_in_z(position, velocity, thrust, measured=None):
 
     control = np.stack([zeros, zeros, zeros, thrust], axis=1)
     measured = position if measured is None else measured
-    return Flight(upwards(position), upwards(velocity), zeros, control, upwards(measured))
+    return SampledFlight(upwards(position), upwards(velocity), zeros, control, upwards(measured))
 
 
 @pytest.mark.parametrize("frequency", [0.25, 0.5, 1.0, 2.0])

@@ -2,8 +2,8 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
+from crazyflie_dev.flight_operator import FlightOperator
 from crazyflie_dev.flight_record import FlightRecord
-from crazyflie_dev.pilot import Pilot
 from crazyflie_utils.runtime.runner import ros_process
 
 
@@ -23,13 +23,12 @@ def fly(names: list[str], hover: float) -> dict[str, FlightRecord]:
         By name.
     """
     process = ros_process()
-    pilots = [Pilot(process, f"/{name}", start=False) for name in names]
+    operators = [FlightOperator(process, f"/{name}", start=False) for name in names]
     process.start()
 
     try:
         with ThreadPoolExecutor(len(names)) as threads:
-            return dict(
-                zip(names, threads.map(lambda pilot: pilot.fly(hover), pilots), strict=True)
-            )
+            records = threads.map(lambda operator: operator.fly(hover), operators)
+            return dict(zip(names, records, strict=True))
     finally:
         process.stop()

@@ -8,10 +8,10 @@ import pytest
 import rospy
 from tf2_msgs.msg import TFMessage
 
+from crazyflie_dev.flight_operator import FlightOperator
 from crazyflie_dev.flight_record import CONTROL_FIELDS, Series
-from crazyflie_dev.pilot import Pilot
 from crazyflie_geofence.geofence import MAX_HORIZONTAL, MAX_VERTICAL_BRAKING
-from crazyflie_lqr.linear_feedback import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils.runtime.runner import ros_process
@@ -39,13 +39,13 @@ MARGIN, HORIZONTAL, VERTICAL, RATE = 0.5, (1.5, 0.4), (4.0, 0.2), 1.0
 
 
 @dataclass
-class Flight:
+class FenceFlight:
     """What was recorded: true positions, regular and final control, and the legs."""
 
     positions: Series
     regular: Series
     final: Series
-    legs: list
+    legs: list[tuple[float, float]]
 
     @property
     def start(self):
@@ -93,17 +93,17 @@ def record(process, flight):
 def flight():
     """Fly once, against every wall and then home."""
     process = ros_process()
-    flight = Flight(Series(("x", "y", "z")), Series(CONTROL_FIELDS), None, [])
+    flight = FenceFlight(Series(("x", "y", "z")), Series(CONTROL_FIELDS), None, [])
     handle = record(process, flight)
-    pilot = Pilot(process)
-    pilot.wait_until_ready()
-    pilot.takeoff()
+    operator = FlightOperator(process)
+    operator.wait_until_ready()
+    operator.takeoff()
     for reference, duration in [*OUTSIDE, (HOME, 8.0)]:
         start = flight.positions.last_time
-        pilot.refer_to(reference)
-        pilot.hover(duration)
+        operator.refer_to(reference)
+        operator.hover(duration)
         flight.legs.append((start, flight.positions.last_time))
-    flight.final = pilot.finish().final_control
+    flight.final = operator.finish().final_control
     handle.close()
     process.stop()
     return flight

@@ -7,7 +7,7 @@ import rosgraph
 import rospy
 import rosservice
 
-from crazyflie_dev.pilot import boarded
+from crazyflie_dev.flight_operator import ready_operator
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 
 LIMIT = 20.0
@@ -23,14 +23,14 @@ TOPICS = {
 
 
 @pytest.fixture(scope="module")
-def pilot():
-    """Return a pilot in flight."""
-    with boarded() as pilot:
-        pilot.takeoff()
-        yield pilot
+def operator():
+    """Return an operator in flight."""
+    with ready_operator() as operator:
+        operator.takeoff()
+        yield operator
 
 
-def test_documented_topics_and_services_are_there(pilot):
+def test_documented_topics_and_services_are_there(operator):
     published, _, _ = rosgraph.Master("/test").getSystemState()
     assert {name for name, _ in published} >= set(TOPICS)
     types = dict(rosgraph.Master("/test").getTopicTypes())
@@ -45,16 +45,16 @@ def test_parameters_are_under_the_nodes_names():
     assert rospy.get_param("/takeoff_server/hover/z") == 1.0
 
 
-def test_an_outside_reference_is_followed(pilot):
+def test_an_outside_reference_is_followed(operator):
     goal = PositionVelocityState(x=0.3, y=-0.2, z=1.2)
 
     def distance():
-        return math.dist(pilot.position, (goal.x, goal.y, goal.z))
+        return math.dist(operator.position, (goal.x, goal.y, goal.z))
 
     publisher = rospy.Publisher("/ref", PositionVelocityStateStamped, queue_size=1)
     for _ in range(int(LIMIT / 0.1)):
         publisher.publish(PositionVelocityStateStamped(state=goal))
-        pilot.hover(0.1)
+        operator.hover(0.1)
         if distance() < 0.02:
             break
     assert distance() < 0.02

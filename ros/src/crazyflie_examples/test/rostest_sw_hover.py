@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import rospy
 
+from crazyflie_dev.flight_operator import FlightError, ready_operator
 from crazyflie_dev.flight_report import FlightReport
-from crazyflie_dev.pilot import FlightError, boarded
 from crazyflie_model.units import GRAVITY
 
 HOVER = (0.0, 0.0, 1.0)
@@ -16,14 +16,14 @@ HOVER = (0.0, 0.0, 1.0)
 @pytest.fixture(scope="module")
 def flight():
     """Fly once; every test looks at the record and at how calls were refused."""
-    with boarded() as pilot:
-        refusals = [refusal(pilot.land)]
-        pilot.takeoff()
-        refusals.append(refusal(pilot.takeoff))
-        pilot.hover(rospy.get_param("/hover_duration", 6.0))
-        pilot.land()
-        refusals.append(refusal(pilot.land))
-        return pilot.finish(), refusals
+    with ready_operator() as operator:
+        refusals = [refusal(operator.land)]
+        operator.takeoff()
+        refusals.append(refusal(operator.takeoff))
+        operator.hover(rospy.get_param("/hover_duration", 6.0))
+        operator.land()
+        refusals.append(refusal(operator.land))
+        return operator.finish(), refusals
 
 
 @pytest.fixture

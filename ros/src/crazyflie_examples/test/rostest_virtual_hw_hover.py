@@ -2,8 +2,8 @@
 
 import pytest
 
+from crazyflie_dev.flight_operator import ready_operator
 from crazyflie_dev.flight_report import TOUCHDOWN_LIMIT
-from crazyflie_dev.pilot import boarded
 
 HOVER = (0.0, 0.0, 1.0)
 SETTLING = 10.0
@@ -13,8 +13,8 @@ TOLERANCE = 0.03
 @pytest.fixture(scope="module")
 def record():
     """Fly once; every test looks at the record."""
-    with boarded() as pilot:
-        return pilot.fly(SETTLING + 5.0)
+    with ready_operator() as operator:
+        return operator.fly(SETTLING + 5.0)
 
 
 def test_hovers_within_3_cm_after_10_s(record):

@@ -1,4 +1,4 @@
-"""The tour, and the node that offers it on a fake process."""
+"""The route, and the node that offers it on a fake process."""
 
 import math
 from pathlib import Path
@@ -11,7 +11,7 @@ from std_srvs.srv import EmptyRequest, EmptyResponse
 
 from crazyflie_dev import launch_files
 from crazyflie_examples.move_server_node import MoveServerNode
-from crazyflie_examples.tour import DEFAULT_POINTS, Points, Tour
+from crazyflie_examples.route import DEFAULT_POINTS, Points, Route
 from crazyflie_utils.runtime.runner import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
@@ -23,8 +23,8 @@ POINTS = st.lists(st.lists(COORDINATE, min_size=3, max_size=3), min_size=1, max_
 
 @given(POINTS, st.integers(0, 30))
 def test_visits_points_in_turn(points, count):
-    tour = Tour(Points()(points))
-    visited = [tour.move_on() for _ in range(count)]
+    route = Route(Points()(points))
+    visited = [route.next_point() for _ in range(count)]
     assert visited == [tuple(points[k % len(points)]) for k in range(count)]
 
 

@@ -47,12 +47,12 @@ def test_the_visualizer_finds_its_parameters(composed):
     assert ("/visualizer" in nodes) == (composed == "false")
     process = FakeProcess(parameters)
     assert process.launch(VisualizerNode(), "/visualizer"), process.logged("error")
-    assert "/cf7/ref" in process.transport.inlets
+    assert "/cf7/ref" in process.transport.subscribers
     configuration = Path(PACKAGES.get_path("crazyflie_description")) / "launch" / "crazyflie.rviz"
     shown = yaml.safe_load(configuration.read_text())["Visualization Manager"]["Displays"]
     topics = [display["Marker Topic"] for display in shown if "Marker Topic" in display]
     assert topics == ["/visualizer/markers"]
-    assert set(topics) <= set(process.transport.outlets)
+    assert set(topics) <= set(process.transport.publishers)
 
 
 def test_the_composed_process_can_make_a_visualizer():

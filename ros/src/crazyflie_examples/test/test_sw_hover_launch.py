@@ -13,7 +13,8 @@ from crazyflie_utils.runtime.runner import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 
 PACKAGES = rospkg.RosPack()
-SW_HOVER = Path(PACKAGES.get_path("crazyflie_examples")) / "launch" / "sw_hover.launch"
+LAUNCH = Path(PACKAGES.get_path("crazyflie_examples")) / "launch"
+SW_HOVER = LAUNCH / "sw_hover.launch"
 DYNAMICS = ("near_hover", "coupled_7d", "quadrotor")
 
 
@@ -100,3 +101,17 @@ def test_vehicles_share_a_process():
     names = launch_files.composed_nodes(parameters)
     assert {name.partition("/")[0] for name in names} == {"cf7"}
     assert "cf7/simulator" in names
+
+
+@pytest.mark.parametrize("file", ["sw_hover", "sw_controller", "sw_geofence"])
+def test_a_node_that_dies_ends_the_launch_or_is_started_again(file):
+    nodes, _ = launch_files.expand(LAUNCH / f"{file}.launch", rviz="true")
+    required = {name for name, node in nodes.items() if node.required}
+    respawning = {name for name, node in nodes.items() if node.respawn}
+    assert required == {"/simulator", "/lqr_controller"}
+    assert respawning == set(nodes) - required - {"/rviz", "/visualizer"}
+
+
+def test_the_launch_ends_with_the_one_process():
+    nodes, _ = expand(composed="true")
+    assert nodes["/composed"].required

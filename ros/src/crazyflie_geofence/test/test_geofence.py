@@ -17,7 +17,7 @@ from crazyflie_geofence.geofence import (
     acceleration_from_control,
     control_from_acceleration,
 )
-from crazyflie_lqr.linear_feedback import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 
 LOWER, UPPER = np.array([-1.5, -1.0, 0.3]), np.array([1.5, 1.2, 2.5])
@@ -89,7 +89,7 @@ def at_stopping_point(stop, velocity):
 
 
 @given(VECTOR, VECTOR, YAW, REGULAR)
-def test_no_say_while_the_stopping_point_is_in_the_inner_box(unit, velocity, yaw, regular):
+def test_no_weight_while_the_stopping_point_is_in_the_inner_box(unit, velocity, yaw, regular):
     stop = MIDDLE + unit * ((UPPER - LOWER) / 2.0 - MARGIN)
     position = at_stopping_point(stop, velocity)
     control, priority = FENCE.control(position, velocity, yaw, regular)
@@ -107,7 +107,7 @@ def test_agrees_with_the_regular_controller_in_the_middle(yaw, regular):
 
 
 @given(VECTOR, VECTOR, st.integers(0, 2), st.floats(1.0, 3.0), st.sampled_from([-1.0, 1.0]))
-def test_all_say_where_the_stopping_point_is_outside(unit, velocity, axis, beyond, sign):
+def test_full_weight_where_the_stopping_point_is_outside(unit, velocity, axis, beyond, sign):
     unit[axis] = sign * beyond
     position = at_stopping_point(inside(unit), velocity)
     _, priority = FENCE.control(position, velocity, 0.0, HOVER)
@@ -115,26 +115,26 @@ def test_all_say_where_the_stopping_point_is_outside(unit, velocity, axis, beyon
 
 
 @given(VECTOR, VECTOR, VECTOR)
-def test_say_is_smooth(unit, velocity, step):
+def test_the_weight_is_smooth(unit, velocity, step):
     position = inside(unit)
     excess = FENCE.excess(position, velocity)
     other = FENCE.excess(position + 0.01 * step, velocity)
-    change = np.abs(FENCE.say(other) - FENCE.say(excess))
+    change = np.abs(FENCE.weight(other) - FENCE.weight(excess))
     assert np.all(change <= 1.5 / MARGIN * np.abs(other - excess) + 1e-12)
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 2.0), st.floats(0.0, 2.0))
-def test_say_grows_with_the_speed_towards_the_wall(x, slow, more):
+def test_the_weight_grows_with_the_speed_towards_the_wall(x, slow, more):
     position = MIDDLE + [x, 0.0, 0.0]
-    says = [
-        FENCE.say(FENCE.excess(position, np.array([speed, 0.0, 0.0])))[0]
+    weights = [
+        FENCE.weight(FENCE.excess(position, np.array([speed, 0.0, 0.0])))[0]
         for speed in (slow, slow + more)
     ]
-    assert says[0] <= says[1]
+    assert weights[0] <= weights[1]
 
 
 @given(VECTOR, VECTOR, YAW, REGULAR)
-def test_each_axis_is_mixed_by_its_own_say(unit, velocity, yaw, regular):
+def test_each_axis_is_mixed_by_its_own_weight(unit, velocity, yaw, regular):
     position = inside(unit)
     regular[3] = max(regular[3], MIN_THRUST)
     control, priority = FENCE.control(position, velocity, yaw, regular)
@@ -143,8 +143,8 @@ def test_each_axis_is_mixed_by_its_own_say(unit, velocity, yaw, regular):
     excess = FENCE.excess(position, velocity)
     wanted = acceleration_from_control(regular, yaw)
     mixed = priority * acceleration_from_control(control, yaw) + (1.0 - priority) * wanted
-    say = FENCE.say(excess)
-    by_axis = say * FENCE.acceleration(velocity, excess) + (1.0 - say) * wanted
+    weight = FENCE.weight(excess)
+    by_axis = weight * FENCE.acceleration(velocity, excess) + (1.0 - weight) * wanted
     np.testing.assert_allclose(mixed, by_axis, atol=1e-9)
 
 

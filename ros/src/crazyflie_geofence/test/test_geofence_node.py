@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospkg
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_control_merger.regular_control_merger_node import RegularControlMergerNode
 from crazyflie_dev import launch_files
@@ -18,6 +20,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 
@@ -108,14 +111,37 @@ def test_bad_parameters_are_named(name, value, expected):
     fake = FakeProcess()
     assert not fake.launch(GeofenceNode(), "/geofence", {**PARAMETERS, name: value})
     [error] = fake.logged("error")
-    assert f"/geofence/{name} is {value}; expected" in error
+    assert f"{name} is {value}; expected" in error
     assert expected in error
 
 
 def test_a_wide_margin_needs_a_wide_box():
     fake = FakeProcess()
     assert not fake.launch(GeofenceNode(), "/geofence", {**PARAMETERS, "margin": 1.6})
-    assert "/geofence/box/max/x is 2.0; expected at least 2.2 m" in fake.logged("error")[0]
+    assert "box/max/x is 2.0; expected at least 2.2 m" in fake.logged("error")[0]
+
+
+def reconfigure(process, **values):
+    """Change parameters as dynamic_reconfigure does."""
+    return process.call("/geofence/set_parameters", ReconfigureRequest(encode_config(values)))
+
+
+def test_the_box_may_be_changed_in_flight(process):
+    publish_regular(process, *REGULAR)
+    reconfigure(process, **{"box/min/x": -9.0, "box/max/x": 9.0, "margin": 0.25})
+    publish_state(process, *STATE)
+    reconfigure(process, **{"box/max/x": 1.5})
+    publish_state(process, *STATE)
+    priorities = [m.control.priority for m in process.published("/control/geofence")]
+    assert priorities == [0.0, 1.0]
+
+
+def test_a_box_that_is_too_small_is_refused(process):
+    with pytest.raises(ServiceError, match="box/max/z is 3.0; expected at least 3.5 m"):
+        reconfigure(process, **{"box/min/z": 2.5})
+    publish_regular(process, *REGULAR)
+    publish_state(process, *STATE)
+    assert process.published("/control/geofence")[0].control.priority > 0.5
 
 
 def test_stands_between_controller_and_takeoff_filter():

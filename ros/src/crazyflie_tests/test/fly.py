@@ -7,9 +7,9 @@ import sys
 import tempfile
 from pathlib import Path
 
+from crazyflie_dev.flight_operator import FlightError, FlightOperator
 from crazyflie_dev.flight_report import FlightReport
-from crazyflie_dev.launching import launched
-from crazyflie_dev.pilot import FlightError, Pilot
+from crazyflie_dev.launching import roslaunch
 from crazyflie_utils.runtime import runner
 
 HOVER = (0.0, 0.0, 1.0)
@@ -20,9 +20,9 @@ def main(arguments: list[str]) -> int:
     """Take off, hover, land; return the exit status, 0 for a good flight."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "launch.log"
-        with launched(arguments, log):
+        with roslaunch(arguments, log):
             try:
-                record = Pilot(runner.begin("pilot")).fly(HOVER_DURATION)
+                record = FlightOperator(runner.begin("flight")).fly(HOVER_DURATION)
             except FlightError as error:
                 print(f"the flight failed: {error}\n{log.read_text()}")
                 return 1

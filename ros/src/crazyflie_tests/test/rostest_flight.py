@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from crazyflie_dev.flight_operator import ready_operator
 from crazyflie_dev.flight_report import HOVER_TOLERANCE, FlightReport
-from crazyflie_dev.pilot import boarded
 from crazyflie_model.units import GRAVITY
 
 HOVER = (0.0, 0.0, 1.0)
@@ -13,8 +13,8 @@ HOVER = (0.0, 0.0, 1.0)
 @pytest.fixture(scope="module")
 def record():
     """Fly once, and return what was recorded."""
-    with boarded() as pilot:
-        return pilot.fly(6.0)
+    with ready_operator() as operator:
+        return operator.fly(6.0)
 
 
 def test_stays_on_the_ground_until_it_is_told_to_take_off(record):

@@ -1,97 +1,73 @@
-"""The tables in the packages' READMEs name the parameters that the code reads, and no others."""
+"""The tables of parameters are as the code declares them, and every node has one."""
 
 import ast
-import itertools
+import functools
 import re
 
 import pytest
-from pages import PACKAGE_PAGES, Page
+from pages import PACKAGE_PAGES, PAGES
+from workspaces import TOP
 
-ANYTHING = ".+"
+from crazyflie_dev.parameter_tables import with_tables
 
-
-def parameters_read(package):
-    """Return patterns of the names that calls of ``handle.param`` in a package ask for."""
-    patterns = set()
-    for file in package.glob("src/**/*.py"):
-        module = ast.parse(file.read_text())
-        for call in ast.walk(module):
-            if isinstance(call, ast.Call) and getattr(call.func, "attr", "") == "param":
-                patterns |= patterns_of(call.args[0], module)
-    return patterns
+COMMENT = re.compile(r"<!-- parameters: (.+?) -->")
 
 
-def patterns_of(name, module):
-    """Return regular expressions for what a name in the code may be."""
-    if isinstance(name, ast.Constant):
-        return {re.escape(name.value)}
-    if isinstance(name, ast.JoinedStr):
-        parts = [part.value if isinstance(part, ast.Constant) else None for part in name.values]
-        return {"".join(ANYTHING if part is None else re.escape(part) for part in parts)}
-    values = [
-        node.value
-        for node in ast.walk(module)
-        if isinstance(node, ast.Assign)
-        and getattr(node.targets[0], "id", "") == getattr(name, "id", None)
-    ]
-    known = [value for value in values if isinstance(value, (ast.Constant, ast.JoinedStr))]
-    return set().union(*(patterns_of(value, module) for value in known))
+def documented():
+    """Return the pages with tables, and the names of the classes that they document."""
+    found = {page: COMMENT.findall(page.read_text()) for page in [*PAGES, *PACKAGE_PAGES]}
+    names = {path.rpartition(":")[2] for each in found.values() for path in " ".join(each).split()}
+    return [page for page, comments in found.items() if comments], names
 
 
-def parameters_documented(page):
-    """Return the names in the columns of parameters of a page's tables."""
-    names = set()
-    for table in page.tables:
-        head, *rows = table.rows
-        columns = [k for k, title in enumerate(head) if re.match(r"parameter\b", title)]
-        names |= {name for row in rows for k in columns for name in expanded(row[k])}
-    return {name for name in names if "..." not in name}
+@functools.cache
+def syntax():
+    """Return all nodes of the syntax trees of the packages' modules."""
+    files = (TOP / "ros" / "src").glob("**/src/**/*.py")
+    return [node for file in files for node in ast.walk(ast.parse(file.read_text()))]
 
 
-def words_in_tables(page):
-    """Return all names in all tables of a page: topics stand in tables of their own."""
-    cells = [cell for table in page.tables for row in table.rows for cell in row]
-    return {name for cell in cells for name in expanded(cell)}
+def classes_that_nodes_load():
+    """Return the names of the classes that are given to ``handle.load``.
 
-
-def expanded(cell):
-    """Return the names in a cell.
-
-    ``a/{x,y}`` are a/x and a/y; ``a_b, _c`` are a_b and a_c.
+    A class attribute in their place, such as ``self.parameters_type``, stands for all its values.
     """
-    names = []
-    for name in re.split(r", *(?![^{]*})", cell.replace("`", "")):
-        if name.startswith("_") and names:
-            name = names[0].rpartition("_")[0] + name
-        parts = re.split(r"{([^}]*)}", name.strip().lstrip("~"))
-        choices = [part.split(",") if k % 2 else [part] for k, part in enumerate(parts)]
-        names += ["".join(choice) for choice in itertools.product(*choices)]
-    return names
-
-
-PACKAGES = [page.parent for page in PACKAGE_PAGES if parameters_read(page.parent)]
-
-
-def test_names_are_expanded():
-    assert expanded("`~a`, `b/{x,y}`, c") == ["a", "b/x", "b/y", "c"]
-    assert expanded("~a_b_c, _d") == ["a_b_c", "a_b_d"]
-
-
-def test_packages_with_parameters_are_found():
-    assert {"crazyflie_simulator", "crazyflie_takeoff"} <= {path.name for path in PACKAGES}
-
-
-@pytest.mark.parametrize("package", PACKAGES, ids=lambda package: package.name)
-def test_table_and_code_agree(package):
-    page = Page(package / "README.md")
-    read = parameters_read(package)
-    documented = parameters_documented(page)
-    unread = {name for name in documented if not any(re.fullmatch(each, name) for each in read)}
-    assert unread == set(), "documented but not read"
-    mentioned = documented | words_in_tables(page)
-    # A name whose beginning is open is no parameter of the node's own.
-    named = {each for each in read if not each.startswith(ANYTHING)}
-    unknown = {
-        each for each in named if not any(re.fullmatch(f"{each}(/.*)?", name) for name in mentioned)
+    given = [
+        call.args[0]
+        for call in syntax()
+        if isinstance(call, ast.Call)
+        and isinstance(call.func, ast.Attribute)
+        and call.func.attr == "load"
+        and ast.unparse(call.func.value).endswith("handle")
+    ]
+    attributes = {each.attr for each in given if isinstance(each, ast.Attribute)}
+    return {each.id for each in given if isinstance(each, ast.Name)} | {
+        statement.value.id
+        for owner in syntax()
+        if isinstance(owner, ast.ClassDef)
+        for statement in owner.body
+        if isinstance(statement, ast.Assign | ast.AnnAssign)
+        and isinstance(statement.value, ast.Name)
+        and attributes & {target.id for target in targets(statement)}
     }
-    assert unknown == set(), "read but not documented"
+
+
+def targets(statement):
+    """Return what an assignment in the body of a class assigns to."""
+    return statement.targets if isinstance(statement, ast.Assign) else [statement.target]
+
+
+@pytest.mark.parametrize("page", documented()[0], ids=lambda page: str(page.relative_to(TOP)))
+def test_tables_are_as_declared(page):
+    text = page.read_text()
+    hint = f"run python3 -m crazyflie_dev.parameter_tables {page}"
+    assert text == with_tables(text), hint
+
+
+def test_nodes_are_found():
+    assert {"TakeoffServerParameters", "MergerParameters"} <= classes_that_nodes_load()
+
+
+@pytest.mark.parametrize("name", sorted(classes_that_nodes_load()))
+def test_every_node_has_a_table(name):
+    assert name in documented()[1]

@@ -1,6 +1,27 @@
-"""What rostest says, as pytest understands it."""
+"""How rostest's words become pytest's, and what an interrupt is."""
+
+import subprocess
+import sys
+from xml.etree import ElementTree
 
 from crazyflie_utils.testing.pytest_node import pytest_arguments
+
+INTERRUPTED = """
+import os, signal
+
+def test_runs():
+    os.kill(os.getpid(), signal.SIGINT)
+
+def test_is_not_reached():
+    pass
+"""
+PROGRAM = """
+import sys
+import pytest
+from crazyflie_utils.testing.pytest_node import InterruptIsFailure
+
+sys.exit(pytest.main(sys.argv[1:], plugins=[InterruptIsFailure()]))
+"""
 
 
 def test_results_go_where_rostest_looks_for_them():
@@ -10,3 +31,16 @@ def test_results_go_where_rostest_looks_for_them():
 
 def test_text_mode_has_no_results():
     assert pytest_arguments(["a.py", "--text"])[:2] == ["a.py", "-p"]
+
+
+def test_an_interrupt_is_a_failure(tmp_path):
+    tests, results = tmp_path / "test_interrupted.py", tmp_path / "results.xml"
+    tests.write_text(INTERRUPTED)
+    arguments = [str(tests), f"--junit-xml={results}", "-p", "no:cacheprovider"]
+    run = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, timeout=60
+    )
+    assert run.returncode == 1
+    [case] = ElementTree.parse(results).getroot().iter("testcase")
+    assert case.get("name") == "test_runs"
+    assert "has a required node died?" in case.find("failure").get("message")

@@ -30,6 +30,6 @@ def cmd_vel_from_control(
         (0, 0, yaw rate in deg/s, clockwise).
     """
     return (
-        (math.degrees(pitch), math.degrees(roll), pwm_from_thrust(thrust)),
+        (math.degrees(pitch), math.degrees(roll), float(pwm_from_thrust(thrust))),
         (0.0, 0.0, -math.degrees(yaw_dot)),
     )

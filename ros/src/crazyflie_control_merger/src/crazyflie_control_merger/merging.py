@@ -25,16 +25,21 @@ class Merger:
     A prioritised control counts for `crazyflie_utils.last_valid.HOLD_LIMIT`. Without
     one the regular control is left as it is, in every mode.
 
+    Attributes
+    ----------
+    mode : str
+        One of `MODES`; may be changed at any time.
+
     Parameters
     ----------
     mode : str
-        One of `MODES`.
+        Its first value.
     entries : tuple of int
         Entries of the control that are mixed; the others stay regular.
     """
 
     def __init__(self, mode: str, entries: tuple[int, ...] = ALL_ENTRIES):
-        self._mode = mode
+        self.mode = mode
         self._entries = list(entries)
         self._prioritized: NDArray[np.float64] = np.zeros(len(entries))
         self._priority = 0.0
@@ -75,4 +80,4 @@ class Merger:
         # Time that has stepped back is that of another run.
         if self._time is None or not 0.0 <= time - self._time < HOLD_LIMIT:
             return 0.0
-        return {MERGE: self._priority, LQR: 0.0, PRIORITIZED: 1.0}[self._mode]
+        return {MERGE: self._priority, LQR: 0.0, PRIORITIZED: 1.0}[self.mode]

@@ -1,8 +1,11 @@
 """Merger for a prioritised controller that leaves the yaw alone."""
 
+from numpy.typing import ArrayLike
+from typing_extensions import override
+
 from crazyflie_control_merger.merger_node import MergerNode
 from crazyflie_control_merger.merging import NO_YAW_ENTRIES
-from crazyflie_msgs.msg import NoYawControlStamped
+from crazyflie_msgs.msg import NoYawControl, NoYawControlStamped
 from crazyflie_utils.vectors import to_vector
 
 
@@ -12,7 +15,7 @@ class NoYawMergerNode(MergerNode):
     prioritized_type = NoYawControlStamped
     entries = NO_YAW_ENTRIES
 
-    def split(self, prioritized) -> tuple:
-        """See `MergerNode.split`."""
+    @override
+    def split(self, prioritized: NoYawControl) -> tuple[ArrayLike, float]:
         *control, priority = to_vector(prioritized)
         return control, priority

@@ -1,7 +1,10 @@
 """Merger for a prioritised controller that decides on everything."""
 
+from numpy.typing import ArrayLike
+from typing_extensions import override
+
 from crazyflie_control_merger.merger_node import MergerNode
-from crazyflie_msgs.msg import PrioritizedControlStamped
+from crazyflie_msgs.msg import PrioritizedControl, PrioritizedControlStamped
 from crazyflie_utils.vectors import to_vector
 
 
@@ -10,6 +13,6 @@ class RegularControlMergerNode(MergerNode):
 
     prioritized_type = PrioritizedControlStamped
 
-    def split(self, prioritized) -> tuple:
-        """See `MergerNode.split`."""
+    @override
+    def split(self, prioritized: PrioritizedControl) -> tuple[ArrayLike, float]:
         return to_vector(prioritized.control), prioritized.priority

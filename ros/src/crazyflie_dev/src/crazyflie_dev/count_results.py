@@ -19,7 +19,7 @@ def verdicts(path: Path) -> Iterator[tuple[str, str]]:
     """Yield "passed", "failed" or "skipped" for each test in a JUnit XML file, and its reason.
 
     A file that cannot be read or has no test in it is a failed test: its program
-    has died before it could tell.
+    has died before it wrote its results.
     """
     try:
         cases = list(ElementTree.parse(path).getroot().iter("testcase"))
@@ -48,7 +48,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Count the tests below a folder of results.")
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
-    count = Counter()
+    count: Counter[str] = Counter()
     for path in sorted(folder.rglob("*.xml")):
         for verdict, reason in verdicts(path):
             count[verdict] += 1

@@ -6,8 +6,8 @@ import sys
 from pathlib import Path
 
 from crazyflie_dev import flight_plot, flight_report
-from crazyflie_dev.launching import LaunchError, complaints, launched
-from crazyflie_dev.pilot import FlightError, Pilot
+from crazyflie_dev.flight_operator import FlightError, FlightOperator
+from crazyflie_dev.launching import LaunchError, complaints, roslaunch
 from crazyflie_utils.runtime import runner
 
 HOVER = (0.0, 0.0, 1.0)
@@ -23,22 +23,22 @@ def fly(folder: Path, launch_arguments: list[str]) -> int:
     rviz = "true" if os.environ.get("DISPLAY") else "false"
     arguments = ["crazyflie_examples", "sw_hover.launch", f"rviz:={rviz}", *launch_arguments]
     print(f"launching {' '.join(arguments)}  (its output: {log})", flush=True)
-    with launched(arguments, log):
+    with roslaunch(arguments, log):
         print(f"watch it with  export ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}", flush=True)
         try:
-            pilot = Pilot(runner.begin("demo_pilot"), limit=LIMIT)
-            pilot.wait_until_ready()
+            operator = FlightOperator(runner.begin("demo"), limit=LIMIT)
+            operator.wait_until_ready()
             print("rosservice call /takeoff", flush=True)
-            pilot.takeoff()
+            operator.takeoff()
             print(f"hovering for {HOVER_DURATION:g} s", flush=True)
-            pilot.hover(HOVER_DURATION)
+            operator.hover(HOVER_DURATION)
             print("rosservice call /land", flush=True)
-            pilot.land()
+            operator.land()
         except FlightError as error:
             print(f"the flight failed: {error}; see {log}", file=sys.stderr)
             print(*complaints(log), sep="\n", file=sys.stderr)
             return 1
-    record = pilot.finish()
+    record = operator.finish()
     record.save_csv(folder / "sw_hover.csv")
     flight_plot.save(record, HOVER, folder / "sw_hover.png")
     report = flight_report.FlightReport.of(record, HOVER)

@@ -1,4 +1,4 @@
-"""A vehicle for tests: it answers over UDP as a test has it answer, and flies nowhere.
+"""A vehicle for tests, which answers over UDP as a test lets it and has no dynamics.
 
 It knows the set-up of a connection, log blocks, parameters and replies, and keeps
 every packet that it gets. `crazyflie_virtual` is a vehicle that flies.
@@ -43,7 +43,7 @@ class FakeVehicle:
     lose : callable
         ``lose(count)`` tells whether to lose the reply with this number.
     is_frozen : bool
-        Whether it neither hears nor says anything.
+        Whether it neither receives nor sends anything.
     """
 
     def __init__(
@@ -56,16 +56,16 @@ class FakeVehicle:
         self.log = log if log is not None else {"pm.vbat": ("f", 3.9)}
         self.parameters = parameters if parameters is not None else {"ring.effect": ("B", 1, 0)}
         self.protocol = protocol
-        self.received = []
-        self.deaf = set()
-        self.answers = {}
-        self.lose = lambda count: False
+        self.received: list[tuple[int, int, bytes]] = []
+        self.deaf: set[tuple[int, int, bytes]] = set()
+        self.answers: dict[tuple[int, int, int | None], bytes] = {}
+        self.lose: Callable[[int], bool] = lambda count: False
         self.is_frozen = False
         self._changed = threading.Condition()
         self._replies = 0
-        self._blocks = {}
-        self._started = {}
-        self._peer = None
+        self._blocks: dict[int, list[str]] = {}
+        self._started: dict[int, tuple[float, float]] = {}
+        self._peer: tuple[str, int] | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
         self._socket.settimeout(0.01)
@@ -174,7 +174,7 @@ class FakeVehicle:
     # Log.
 
     def _on_5_0(self, data):
-        items = [(LOG_TYPES[kind], name) for name, (kind, _) in self.log.items()]
+        items = [(LOG_TYPES[code], name) for name, (code, _) in self.log.items()]
         return _table(data, items, 0x10000000, b"\x10\x80")
 
     def _on_5_1(self, data):
@@ -200,18 +200,18 @@ class FakeVehicle:
                 continue
             self._started[block] = (period, max(due + period, now))
             values = [self.log[name] for name in self._blocks[block]]
-            packed = struct.pack("<" + "".join(kind for kind, _ in values), *(v for _, v in values))
+            packed = struct.pack("<" + "".join(code for code, _ in values), *(v for _, v in values))
             stamp = (int(now * 1000) & 0xFFFFFF).to_bytes(3, "little")
             self.say(5, 2, bytes([block]) + stamp + packed)
 
     # Memory.
 
     def _on_4_0(self, data):
-        number, kind, size = TRAJECTORY_MEMORY
+        number, code, size = TRAJECTORY_MEMORY
         if data[0] == 1:
             return b"\x01\x02"
         # The first is one that nobody asks for anything.
-        details = (number, kind, size) if data[1] == number else (data[1], 0x18, 0)
+        details = (number, code, size) if data[1] == number else (data[1], 0x18, 0)
         return b"\x02" + struct.pack("<BBI", *details) + bytes(8)
 
     def _on_4_2(self, data):
@@ -221,19 +221,19 @@ class FakeVehicle:
 
     def _on_2_0(self, data):
         items = [
-            (PARAMETER_TYPES[kind] | flags, name)
-            for name, (kind, _, flags) in self.parameters.items()
+            (PARAMETER_TYPES[code] | flags, name)
+            for name, (code, _, flags) in self.parameters.items()
         ]
         return _table(data, items, 0x20000000, b"")
 
     def _on_2_1(self, data):
-        kind, value, _ = list(self.parameters.values())[struct.unpack("<H", data)[0]]
-        return data + b"\0" + struct.pack("<" + kind, value)
+        code, value, _ = list(self.parameters.values())[struct.unpack("<H", data)[0]]
+        return data + b"\0" + struct.pack("<" + code, value)
 
     def _on_2_2(self, data):
         name = list(self.parameters)[struct.unpack_from("<H", data)[0]]
-        kind, _, flags = self.parameters[name]
-        self.parameters[name] = (kind, struct.unpack("<" + kind, data[2:])[0], flags)
+        code, _, flags = self.parameters[name]
+        self.parameters[name] = (code, struct.unpack("<" + code, data[2:])[0], flags)
         return data
 
     def _on_2_3(self, data):
@@ -260,11 +260,11 @@ def _table(data, items, seed, tail):
     if data[0] == 3:
         # Tables are cached by their checksum: it must change with the contents.
         checksum = seed
-        for kind, name in items:
-            for byte in (kind, *name.encode()):
+        for code, name in items:
+            for byte in (code, *name.encode()):
                 checksum = (checksum * 31 + byte) & 0x0FFFFFFF
         return b"\x03" + struct.pack("<HI", len(items), seed | checksum) + tail
     if data[0] != 2:
         return None
-    kind, name = items[struct.unpack_from("<H", data, 1)[0]]
-    return data[:3] + bytes([kind]) + name.replace(".", "\0").encode() + b"\0"
+    code, name = items[struct.unpack_from("<H", data, 1)[0]]
+    return data[:3] + bytes([code]) + name.replace(".", "\0").encode() + b"\0"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 STATE_FIELDS = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
 CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
@@ -25,8 +25,8 @@ class Series:
 
     def __init__(self, fields: tuple[str, ...]):
         self.fields = fields
-        self._times = []
-        self._rows = []
+        self._times: list[float] = []
+        self._rows: list[ArrayLike] = []
 
     def append(self, time: float, row: ArrayLike) -> None:
         """Add a row, shape (len(fields),), at ``time`` (s)."""
@@ -37,20 +37,20 @@ class Series:
         return len(self._times)
 
     @property
-    def times(self) -> np.ndarray:
+    def times(self) -> NDArray[np.float64]:
         """Times, s, shape (n,)."""
         return np.array(self._times, dtype=float)
 
     @property
-    def values(self) -> np.ndarray:
+    def values(self) -> NDArray[np.float64]:
         """Rows, shape (n, len(fields))."""
         return np.array(self._rows, dtype=float).reshape(-1, len(self.fields))
 
-    def column(self, name: str) -> np.ndarray:
+    def column(self, name: str) -> NDArray[np.float64]:
         """Return one column, shape (n,)."""
         return self.values[:, self.fields.index(name)]
 
-    def between(self, start: float, end: float) -> np.ndarray:
+    def between(self, start: float, end: float) -> NDArray[np.float64]:
         """Return the rows with start <= time <= end (s), shape (m, len(fields))."""
         times = self.times
         return self.values[(times >= start) & (times <= end)]
@@ -61,14 +61,14 @@ class Series:
         return self._times[-1]
 
     @property
-    def last(self) -> np.ndarray:
+    def last(self) -> NDArray[np.float64]:
         """The newest row."""
-        return self._rows[-1]
+        return np.asarray(self._rows[-1], dtype=float)
 
 
 @dataclass
 class FlightRecord:
-    """Everything that was said about one flight; times in s of ROS time.
+    """Messages and events of one flight; times in s of ROS time.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class FlightRecord:
     order: list[str] = field(default_factory=list)
     events: dict[str, float] = field(default_factory=dict)
 
-    def position_error(self, point: ArrayLike) -> np.ndarray:
+    def position_error(self, point: ArrayLike) -> NDArray[np.float64]:
         """Return the distance of every recorded state from a point (m), shape (n,)."""
         return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
 

@@ -1,8 +1,9 @@
-"""Listens to a flight and keeps what it hears."""
+"""Subscribes to the topics of a flight and keeps their messages."""
 
 import threading
 
 from std_msgs.msg import Empty
+from typing_extensions import override
 
 from crazyflie_dev.flight_record import FlightRecord
 from crazyflie_msgs.msg import (
@@ -10,10 +11,25 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils.node import Node
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import TOPIC
-from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.vectors import to_vector
+
+
+class FlightRecorderParameters(Parameters):
+    """Parameters of `FlightRecorderNode`: relative names are in its namespace."""
+
+    state: str = parameter(TOPIC, "estimated states", "state", "topics/state")
+    reference: str = parameter(TOPIC, "references", "ref", "topics/reference")
+    takeoff_control: str = parameter(
+        TOPIC, "the takeoff server's controls", "control/takeoff", "topics/takeoff_control"
+    )
+    final_control: str = parameter(
+        TOPIC, "the vehicle's controls", "control/final", "topics/final_control"
+    )
+    in_flight: str = parameter(
+        TOPIC, "toggles between ground and flight", "in_flight", "topics/in_flight"
+    )
 
 
 class FlightRecorderNode(Node):
@@ -22,32 +38,22 @@ class FlightRecorderNode(Node):
     Attributes
     ----------
     record : FlightRecord
-        What has been heard so far.
-    heard : threading.Condition
+        What has been received so far.
+    received : threading.Condition
         Notified after every message.
     """
 
     def __init__(self):
-        super().__init__()
         self.record = FlightRecord()
-        self.heard = threading.Condition()
-        self._topics = {}
+        self.received = threading.Condition()
         self._stopped = False
 
+    @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        """See `Node.load_parameters`."""
-        defaults = {
-            "state": "state",
-            "reference": "ref",
-            "takeoff_control": "control/takeoff",
-            "final_control": "control/final",
-            "in_flight": "in_flight",
-        }
-        for name, default in defaults.items():
-            self._topics[name] = handle.param(f"topics/{name}", TOPIC, default)
+        self._topics = handle.load(FlightRecorderParameters)
 
+    @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        """See `Node.register_callbacks`."""
         series = [
             ("state", PositionVelocityYawStateStamped, "state"),
             ("reference", PositionVelocityStateStamped, "state"),
@@ -56,31 +62,31 @@ class FlightRecorderNode(Node):
         ]
         for name, message_type, content in series:
             callback = self._appender(name, content)
-            handle.subscribe(self._topics[name], message_type, callback)
-        handle.subscribe(self._topics["in_flight"], Empty, self._on_toggle)
+            handle.subscribe(getattr(self._topics, name), message_type, callback)
+        handle.subscribe(self._topics.in_flight, Empty, self._on_toggle)
 
     def stop(self) -> None:
         """Let the record be as it is."""
-        with self.heard:
+        with self.received:
             self._stopped = True
 
     def _appender(self, name, content):
         series = getattr(self.record, name)
 
         def append(message):
-            with self.heard:
-                if self._stopped:
-                    return
-                self.record.order.append(name)
-                series.append(message.header.stamp.to_sec(), to_vector(getattr(message, content)))
-                self.heard.notify_all()
+            row = to_vector(getattr(message, content))
+            self._record(name, lambda: series.append(message.header.stamp.to_sec(), row))
 
         return append
 
-    def _on_toggle(self, message):
-        with self.heard:
+    def _on_toggle(self, _):
+        now = self._handle.stamp().to_sec()
+        self._record("toggles", lambda: self.record.toggles.append(now))
+
+    def _record(self, name, append):
+        with self.received:
             if self._stopped:
                 return
-            self.record.order.append("toggles")
-            self.record.toggles.append(self._handle.stamp().to_sec())
-            self.heard.notify_all()
+            self.record.order.append(name)
+            append()
+            self.received.notify_all()

@@ -1,8 +1,7 @@
 """The verdict on a hover flight."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-
-from numpy.typing import ArrayLike
 
 from crazyflie_dev.flight_record import GROUND_TOLERANCE, FlightRecord
 
@@ -45,8 +44,8 @@ class FlightReport:
     final_thrust: float
 
     @classmethod
-    def of(cls, record: FlightRecord, point: ArrayLike) -> "FlightReport":
-        """Judge a record by the point (m) where it should have hovered."""
+    def of(cls, record: FlightRecord, point: Sequence[float]) -> "FlightReport":
+        """Judge a record by the point x, y, z (m) where it should have hovered."""
         mean, largest = record.hover_error(point, HOVER_WINDOW)
         try:
             touchdown = record.touchdown_speed()

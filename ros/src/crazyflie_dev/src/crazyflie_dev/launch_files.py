@@ -18,7 +18,7 @@ def composed_nodes(parameters: dict[str, object]) -> dict[str, str]:
     """Return what the parameters list for the composed process: class path by node name."""
     listed = "/composed/nodes/"
     return {
-        name.removeprefix(listed): value
+        name.removeprefix(listed): str(value)
         for name, value in parameters.items()
         if name.startswith(listed)
     }

@@ -8,6 +8,7 @@ import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import rosgraph
 
@@ -31,7 +32,7 @@ def complaints(log: Path) -> list[str]:
 
 
 @contextlib.contextmanager
-def launched(arguments: list[str], log: Path) -> Iterator[subprocess.Popen]:
+def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen[Any]]:
     """Run roslaunch on a master of its own for the time of a with block.
 
     Parameters

@@ -1,7 +1,7 @@
 """Draws the nodes and topics of the running software example.
 
-The picture shows what the master says, not what the documentation thinks: nodes
-are ovals, topics boxes, an arrow is a registration as publisher or subscriber.
+Nodes are ovals, topics boxes; an arrow is a registration of a publisher or subscriber with the
+master.
 """
 
 import argparse
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import rosgraph
 
-from crazyflie_dev.launching import launched
+from crazyflie_dev.launching import roslaunch
 
 Registrations = list[tuple[str, list[str]]]
 """Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them."""
@@ -33,8 +33,7 @@ def dot(published: Registrations, subscribed: Registrations) -> str:
     Parameters
     ----------
     published, subscribed : Registrations
-        Topics that nobody
-        publishes, or nobody subscribes to, are left out.
+        Topics without a publisher or without a subscriber are left out.
     """
     sources = {topic: nodes for topic, nodes in published if topic not in HIDDEN_TOPICS}
     sinks = {topic: nodes for topic, nodes in subscribed if topic not in HIDDEN_TOPICS}
@@ -66,7 +65,8 @@ def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
     """
     master = rosgraph.Master("/node_graph")
     deadline = time.monotonic() + _LIMIT
-    graph, since = ([], []), time.monotonic()
+    graph: tuple[Registrations, Registrations] = ([], [])
+    since = time.monotonic()
     while time.monotonic() < deadline:
         if rosgraph.is_master_online():
             published, subscribed, _ = master.getSystemState()
@@ -95,7 +95,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "sw_hover.log"
         print("launching sw_hover", flush=True)
-        with launched(["crazyflie_examples", "sw_hover.launch", "rviz:=false"], log):
+        with roslaunch(["crazyflie_examples", "sw_hover.launch", "rviz:=false"], log):
             try:
                 graph = dot(*running_graph(expected))
             except TimeoutError as error:

@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 from collections.abc import Iterator
+from typing import Any
 
 _END_LIMIT = 20.0
 """How long a program may take to end after each signal, s; roslaunch gives its nodes 15."""
@@ -19,7 +20,7 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
 
 
 @contextlib.contextmanager
-def running(*command: object, **options: object) -> Iterator[subprocess.Popen]:
+def running(*command: object, **options: Any) -> Iterator[subprocess.Popen[Any]]:
     """Run a program; Ctrl-C is what ends it, and what it has started.
 
     Parameters

@@ -13,13 +13,13 @@ import numpy as np
 import rospkg
 import yaml
 from matplotlib import image
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_description.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
 from crazyflie_dev.demo import HOVER
+from crazyflie_dev.flight_operator import FlightError, FlightOperator
 from crazyflie_dev.flight_report import HOVER_TOLERANCE
-from crazyflie_dev.launching import launched
-from crazyflie_dev.pilot import FlightError, Pilot
+from crazyflie_dev.launching import roslaunch
 from crazyflie_dev.virtual_display import DisplayError, screenshot, virtual_display
 from crazyflie_utils.runtime import runner
 
@@ -35,7 +35,7 @@ _SMALLEST_SHARE = 0.5
 _LOG_LINES = 40
 
 
-def pixels_of(picture: np.ndarray, colour: ArrayLike) -> int:
+def pixels_of(picture: NDArray[np.uint8], colour: ArrayLike) -> int:
     """Count the pixels of a colour, in light or in shadow.
 
     Parameters
@@ -51,7 +51,7 @@ def pixels_of(picture: np.ndarray, colour: ArrayLike) -> int:
     return int(np.count_nonzero((brightness > 60.0) & (pixels @ colour > 0.99 * brightness)))
 
 
-def crop_to_scene(screen: np.ndarray, background: ArrayLike) -> np.ndarray:
+def crop_to_scene(screen: NDArray[np.uint8], background: ArrayLike) -> NDArray[np.uint8]:
     """Cut RViz's panels away: return the part of a screen that has the background colour.
 
     Parameters
@@ -83,7 +83,9 @@ def background_of(configuration: Path) -> list[int]:
 def material_of(model: Path, name: str) -> list[float]:
     """Return the colour of a URDF's material, three numbers from 0 to 1."""
     colour = ElementTree.parse(model).find(f"material[@name='{name}']/color")
-    return [float(part) for part in colour.get("rgba").split()[:3]]
+    if colour is None:
+        raise ValueError(f"there is no material {name} in {model}")
+    return [float(part) for part in colour.attrib["rgba"].split()[:3]]
 
 
 class Scene:
@@ -106,7 +108,7 @@ class Scene:
         """Wait until the vehicle is drawn."""
         self._wait({"vehicle": self._vehicle})
 
-    def wait_for_everything(self) -> np.ndarray:
+    def wait_for_everything(self) -> NDArray[np.uint8]:
         """Return the picture when vehicle, path and reference are on it, shape (h, w, 3)."""
         markers = {"path": PATH_COLOUR, "reference": REFERENCE_COLOUR}
         colours = {name: (colour.r, colour.g, colour.b) for name, colour in markers.items()}
@@ -155,27 +157,27 @@ def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
         os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
         scene = Scene(display, description)
         arguments = ["crazyflie_examples", "sw_hover.launch", "rviz:=true", *launch_arguments]
-        say(f"launching {' '.join(arguments)} on display {display}")
-        with launched(arguments, log):
-            pilot = Pilot(runner.begin("render_pilot"))
-            pilot.wait_until_ready()
-            say("waiting for RViz to draw the vehicle")
+        show_progress(f"launching {' '.join(arguments)} on display {display}")
+        with roslaunch(arguments, log):
+            operator = FlightOperator(runner.begin("render_rviz"))
+            operator.wait_until_ready()
+            show_progress("waiting for RViz to draw the vehicle")
             scene.wait_for_vehicle()
-            say("taking off")
-            pilot.takeoff()
-            pilot.hover(1.0)
-            error = math.dist(pilot.position, HOVER)
+            show_progress("taking off")
+            operator.takeoff()
+            operator.hover(1.0)
+            error = math.dist(operator.position, HOVER)
             if error > HOVER_TOLERANCE:
                 raise FlightError(f"it hovers {error:.3f} m from where it should")
-            say("waiting for RViz to draw vehicle, path and reference")
+            show_progress("waiting for RViz to draw vehicle, path and reference")
             picture = scene.wait_for_everything()
     output.parent.mkdir(parents=True, exist_ok=True)
     image.imsave(output, np.ascontiguousarray(picture))
-    say(f"{output}: {picture.shape[1]} x {picture.shape[0]} pixels")
+    show_progress(f"{output}: {picture.shape[1]} x {picture.shape[0]} pixels")
 
 
-def say(text: str) -> None:
-    """Tell the user what goes on."""
+def show_progress(text: str) -> None:
+    """Print what is being done."""
     print(text, flush=True)
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.dynamics import coupled_acceleration
@@ -39,7 +40,7 @@ _WAYPOINTS = np.array([(0, 0, 1), (0, 0, 1), (1, 0, 1), (1, 1, 1.5), (-1, 0.5, 0
 
 
 @dataclass(frozen=True)
-class Vehicle:
+class ModelError:
     """How a vehicle differs from the model that follows its controls at once.
 
     Attributes
@@ -61,12 +62,12 @@ class Vehicle:
     gusts: float = 0.0
 
 
-IDEAL = Vehicle()
-REAL = Vehicle(response_time=0.05, thrust_factor=0.9, drag=0.2, gusts=0.3)
+IDEAL = ModelError()
+REAL = ModelError(response_time=0.05, thrust_factor=0.9, drag=0.2, gusts=0.3)
 
 
 @dataclass(frozen=True)
-class Flight:
+class SampledFlight:
     """A flight, sampled every `PERIOD`; n samples.
 
     Attributes
@@ -81,19 +82,19 @@ class Flight:
         Position with noise, m.
     """
 
-    position: np.ndarray
-    velocity: np.ndarray
-    yaw: np.ndarray
-    control: np.ndarray
-    measured: np.ndarray
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    yaw: NDArray[np.float64]
+    control: NDArray[np.float64]
+    measured: NDArray[np.float64]
 
     @property
-    def time(self) -> np.ndarray:
+    def time(self) -> NDArray[np.float64]:
         """Time of the samples, s, shape (n,)."""
         return PERIOD * np.arange(len(self.yaw))
 
 
-def fly(vehicle: Vehicle, duration: float, seed: int = 0) -> Flight:
+def fly(vehicle: ModelError, duration: float, seed: int = 0) -> SampledFlight:
     """Return a flight: hover, then steps between waypoints, 1 to 2.2 m apart, while turning.
 
     The controller knows the true state, so that the same flight serves every
@@ -101,7 +102,7 @@ def fly(vehicle: Vehicle, duration: float, seed: int = 0) -> Flight:
 
     Parameters
     ----------
-    vehicle : Vehicle
+    vehicle : ModelError
     duration : float
         s.
     seed : int
@@ -127,15 +128,16 @@ def fly(vehicle: Vehicle, duration: float, seed: int = 0) -> Flight:
             position = position + _STEP * velocity + 0.5 * _STEP**2 * acceleration
             velocity = velocity + _STEP * acceleration
             yaw += _STEP * control[2]
-    position, velocity, yaw, control = map(np.array, zip(*log, strict=True))
-    measured = position + NOISE * rng.normal(size=position.shape)
-    return Flight(position, velocity, yaw, control, measured)
+    positions, velocities, yaws, controls = map(np.array, zip(*log, strict=True))
+    measured = positions + NOISE * rng.normal(size=positions.shape)
+    return SampledFlight(positions, velocities, yaws, controls, measured)
 
 
 def _control(time, position, velocity, yaw):
     waypoint = _WAYPOINTS[int(time / _LEG) % len(_WAYPOINTS)]
     error = position - waypoint
-    forward, left = rotate_by_yaw(*(0.25 * error[:2] + 0.25 * velocity[:2]), -yaw)
+    x, y = 0.25 * error[:2] + 0.25 * velocity[:2]
+    forward, left = rotate_by_yaw(x, y, -yaw)
     thrust = GRAVITY - 1.5 * error[2] - 1.0 * velocity[2]
     roll, pitch = np.clip([left, -forward], -MAX_TILT, MAX_TILT)
     return np.array([roll, pitch, _YAW_RATE, np.clip(thrust, MIN_THRUST, MAX_THRUST)])
@@ -177,7 +179,9 @@ FILTERS = {
 """Name -> (estimator, whether it is given the control)."""
 
 
-def estimate(flight: Flight, make_estimator: Callable, uses_control: bool) -> np.ndarray:
+def estimate(
+    flight: SampledFlight, make_estimator: Callable[[], MotionEstimator], uses_control: bool
+) -> NDArray[np.float64]:
     """Return the velocities (n, 3), m/s, that an estimator finds; 0 at the first sample."""
     estimator, control = make_estimator(), ControlInput()
     velocity = np.zeros_like(flight.measured)
@@ -193,12 +197,12 @@ def estimate(flight: Flight, make_estimator: Callable, uses_control: bool) -> np
     return velocity
 
 
-def rms_error(flight: Flight, velocity: np.ndarray) -> float:
+def rms_error(flight: SampledFlight, velocity: NDArray[np.float64]) -> float:
     """Return the root mean square of the velocity error, m/s, over all but the first second."""
     return float(np.sqrt(np.mean((velocity - flight.velocity)[_settled()] ** 2)))
 
 
-def lag(flight: Flight, velocity: np.ndarray) -> float:
+def lag(flight: SampledFlight, velocity: NDArray[np.float64]) -> float:
     """Return by how much, in s, the true velocity has to be delayed to fit an estimate best."""
     shifts = np.arange(-0.03, 0.1, 0.0005)
     misfits = []
@@ -213,13 +217,17 @@ def _settled():
 
 
 def draw(
-    flight: Flight, velocities: dict[str, np.ndarray], path: str, start: float, end: float
+    flight: SampledFlight,
+    velocities: dict[str, NDArray[np.float64]],
+    path: str,
+    start: float,
+    end: float,
 ) -> None:
     """Draw x_dot of a flight, and its errors, between two times (s) into a file.
 
     Parameters
     ----------
-    flight : Flight
+    flight : SampledFlight
     velocities : dict of str to ndarray, shape (n, 3)
         What the filters found, by name.
     path : str

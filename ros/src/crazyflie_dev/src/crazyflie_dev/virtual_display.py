@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 from PIL import ImageGrab
 
 _START_LIMIT = 10.0
@@ -18,7 +19,7 @@ class DisplayError(Exception):
     """There is no display, or no picture; the text says why."""
 
 
-def screenshot(display: str) -> np.ndarray:
+def screenshot(display: str) -> NDArray[np.uint8]:
     """Return what is on a display, such as ":7", now: shape (height, width, 3), uint8.
 
     Raises
@@ -46,16 +47,16 @@ def virtual_display(width: int, height: int) -> Iterator[str]:
     DisplayError
         Xvfb is not installed or does not start.
     """
-    number, told = os.pipe()
-    command = ["Xvfb", "-displayfd", str(told), "-screen", "0", f"{width}x{height}x24"]
+    number, writable = os.pipe()
+    command = ["Xvfb", "-displayfd", str(writable), "-screen", "0", f"{width}x{height}x24"]
     command += ["-nocursor", "-nolisten", "tcp"]
     try:
-        server = subprocess.Popen(command, pass_fds=[told], start_new_session=True)
+        server = subprocess.Popen(command, pass_fds=[writable], start_new_session=True)
     except FileNotFoundError:
         os.close(number)
         raise DisplayError("Xvfb is not installed (Debian package xvfb)") from None
     finally:
-        os.close(told)
+        os.close(writable)
     try:
         yield f":{_read_line(number)}"
     finally:

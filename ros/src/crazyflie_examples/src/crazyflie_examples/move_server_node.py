@@ -1,38 +1,41 @@
-"""ROS interface of a tour: a service that sends the vehicle to its next point."""
+"""ROS interface of a route: a service that sends the vehicle to its next point."""
 
 from std_srvs.srv import Empty, EmptyResponse
+from typing_extensions import override
 
-from crazyflie_examples.tour import DEFAULT_POINTS, Points, Tour
+from crazyflie_examples.route import DEFAULT_POINTS, Point, Points, Route
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.node import Node
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import SERVICE, TOPIC
 
 
+class MoveServerParameters(Parameters):
+    """Parameters of `MoveServerNode`."""
+
+    reference_topic: str = parameter(TOPIC, "where references go", name="topics/ref")
+    service: str = parameter(SERVICE, "moves the vehicle to the next point", "/move", "srv/move")
+    points: tuple[Point, ...] = parameter(
+        Points(), "the route; after its last point comes the first", DEFAULT_POINTS
+    )
+
+
 class MoveServerNode(Node):
-    """Publish the next of a list of points as reference whenever the service is called."""
+    """Publish the next point of a route as reference whenever the service is called."""
 
-    def __init__(self):
-        super().__init__()
-        self._reference_topic = None
-        self._service = None
-        self._tour = None
-        self._publisher = None
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(MoveServerParameters)
+        self._route = Route(self._parameters.points)
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._reference_topic = handle.param("topics/ref", TOPIC)
-        self._service = handle.param("srv/move", SERVICE, "/move")
-        self._tour = Tour(handle.param("points", Points(), DEFAULT_POINTS))
-
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher(
-            self._reference_topic, PositionVelocityStateStamped, latch=True
+            self._parameters.reference_topic, PositionVelocityStateStamped, latch=True
         )
-        handle.advertise_service(self._service, Empty, self._on_move)
+        handle.advertise_service(self._parameters.service, Empty, self._on_move)
 
-    def _on_move(self, request):
-        x, y, z = self._tour.move_on()
+    def _on_move(self, _):
+        x, y, z = self._route.next_point()
         reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=z))
         reference.header.stamp = self._handle.stamp()
         self._publisher.publish(reference)

@@ -7,7 +7,7 @@ axis, with position x and velocity v, that is the stopping point
 
 for a reaction time T and a deceleration b. As long as X is in the box, x is
 inside and can be kept inside. Its rate is X' = v + (T + |v| / b) a, so that the
-acceleration a has an immediate hold on it.
+acceleration a acts on it at once.
 
 An inner box lies within the box, smaller by a margin on all sides. With e the
 signed distance of X from the inner box, the fence asks for the acceleration
@@ -15,19 +15,20 @@ signed distance of X from the inner box, the fence asks for the acceleration
     a = -(v + r e) / (T + |v| / b),
 
 which gives X' = -r e: the stopping point returns to the inner box exponentially,
-at the rate r. Its say s is 0 while X is in the inner box and rises smoothly with
+at the rate r. Its weight s is 0 while X is in the inner box and rises smoothly with
 |e| to 1 where X reaches the wall. Mixed with what the regular controller wants,
 
     X' = (1 - s) (v + (T + |v| / b) a_regular) - s r e,
 
-which points inwards at the wall whatever the regular controller does; one whose
-acceleration is limited and that pushes against the wall is held in the margin.
+which points inwards at the wall whatever the regular controller does. A regular
+controller with limited acceleration that steers into the wall is stopped in the margin.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
@@ -41,6 +42,8 @@ MAX_HORIZONTAL_BRAKING = MAX_HORIZONTAL / math.sqrt(2.0)
 
 MAX_VERTICAL_BRAKING = min(GRAVITY - MIN_THRUST, MAX_THRUST - GRAVITY)
 """What thrust can do upwards as well as downwards, m/s^2."""
+
+Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,13 @@ class Geofence:
     """
 
     def __init__(
-        self, lower, upper, margin: float, horizontal: Braking, vertical: Braking, recovery_rate
+        self,
+        lower: ArrayLike,
+        upper: ArrayLike,
+        margin: float,
+        horizontal: Braking,
+        vertical: Braking,
+        recovery_rate: float,
     ):
         self._inner_lower = np.asarray(lower, dtype=float) + margin
         self._inner_upper = np.asarray(upper, dtype=float) - margin
@@ -86,22 +95,22 @@ class Geofence:
         self._reaction_time = np.array([axis.reaction_time for axis in axes])
         self._recovery_rate = recovery_rate
 
-    def stopping_point(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    def stopping_point(self, position: Vector, velocity: Vector) -> Vector:
         """Return where the vehicle would come to rest, m, shape (3,)."""
         braking_time = np.abs(velocity) / self._deceleration
         return position + velocity * (self._reaction_time + braking_time / 2.0)
 
-    def excess(self, position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    def excess(self, position: Vector, velocity: Vector) -> Vector:
         """Return by how much the stopping point is outside the inner box, m, shape (3,), signed."""
         stop = self.stopping_point(position, velocity)
         return stop - np.clip(stop, self._inner_lower, self._inner_upper)
 
-    def say(self, excess: np.ndarray) -> np.ndarray:
-        """Return how much the fence decides on each axis, 0 ... 1, shape (3,)."""
+    def weight(self, excess: Vector) -> Vector:
+        """Return the weight of the fence's control on each axis, 0 ... 1, shape (3,)."""
         x = np.minimum(np.abs(excess) / self._margin, 1.0)
         return x * x * (3.0 - 2.0 * x)
 
-    def acceleration(self, velocity: np.ndarray, excess: np.ndarray) -> np.ndarray:
+    def acceleration(self, velocity: Vector, excess: Vector) -> Vector:
         """Return what brings the stopping point back, m/s^2, shape (3,), fixed frame.
 
         Horizontally at most `MAX_HORIZONTAL`, in the right direction.
@@ -114,13 +123,13 @@ class Geofence:
         return wanted
 
     def control(
-        self, position: np.ndarray, velocity: np.ndarray, yaw: float, regular: np.ndarray
-    ) -> tuple:
+        self, position: Vector, velocity: Vector, yaw: float, regular: Vector
+    ) -> tuple[Vector, float]:
         """Return a control and the priority with which it is to be mixed with the regular one.
 
-        The priority is the largest say of the axes. Where the fence has less say
-        it moves its control towards the regular one, so that the mixture gives
-        each axis its own: a wall ahead does not keep the vehicle from moving along
+        The priority is the largest weight of the axes. On the others the fence's
+        control is moved towards the regular one, so that the mixture gives each
+        axis its own weight: a wall ahead does not keep the vehicle from moving along
         it, or from holding its height.
 
         Parameters
@@ -140,9 +149,9 @@ class Geofence:
             Priority, 0 ... 1.
         """
         excess = self.excess(position, velocity)
-        say = self.say(excess)
-        priority = float(say.max())
-        share = say / priority if priority > 0.0 else say
+        weight = self.weight(excess)
+        priority = float(weight.max())
+        share = weight / priority if priority > 0.0 else weight
         fence = self.acceleration(velocity, excess)
         wanted = acceleration_from_control(regular, yaw)
         return control_from_acceleration(
@@ -150,7 +159,7 @@ class Geofence:
         ), priority
 
 
-def acceleration_from_control(control: np.ndarray, yaw: float) -> np.ndarray:
+def acceleration_from_control(control: Vector, yaw: float) -> Vector:
     """Return the acceleration, m/s^2, shape (3,), fixed frame, of a vehicle near hover.
 
     x'' = g tan(pitch), y'' = -g tan(roll), z'' = thrust cos(roll) cos(pitch) - g in the
@@ -162,7 +171,7 @@ def acceleration_from_control(control: np.ndarray, yaw: float) -> np.ndarray:
     return np.array([x, y, thrust * math.cos(roll) * math.cos(pitch) - GRAVITY])
 
 
-def control_from_acceleration(acceleration: np.ndarray, yaw: float, yaw_dot: float) -> np.ndarray:
+def control_from_acceleration(acceleration: Vector, yaw: float, yaw_dot: float) -> Vector:
     """Return the control of an acceleration: the inverse of `acceleration_from_control`.
 
     Tilt and thrust are limited as those of the regular controller are.

@@ -1,5 +1,11 @@
 """ROS interface of the geofence."""
 
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import override
+
 from crazyflie_geofence.geofence import (
     MAX_HORIZONTAL_BRAKING,
     MAX_VERTICAL_BRAKING,
@@ -13,12 +19,92 @@ from crazyflie_msgs.msg import (
     PrioritizedControl,
     PrioritizedControlStamped,
 )
-from crazyflie_utils.node import Node
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import METRES, TIME_STEP, TOPIC, Number
-from crazyflie_utils.parameters import ParameterError
-from crazyflie_utils.vectors import from_vector, is_finite, to_vector
+from crazyflie_utils.parameters import group
+from crazyflie_utils.vectors import from_vector, to_vector
 
-_RATE = Number(unit="1/s", above=0.0)
+
+class CornerParameters(Parameters):
+    """A corner of the box."""
+
+    x: float = parameter(METRES, "lowest and highest corner, in the frame of the state", live=True)
+    y: float = parameter(METRES, "lowest and highest corner, in the frame of the state", live=True)
+    z: float = parameter(METRES, "lowest and highest corner, in the frame of the state", live=True)
+
+    def vector(self) -> tuple[float, float, float]:
+        """Return x, y, z in m."""
+        return self.x, self.y, self.z
+
+
+class GeofenceParameters(Parameters):
+    """Parameters of `GeofenceNode`."""
+
+    state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
+    control_topic: str = parameter(TOPIC, "where regular controls come from", name="topics/control")
+    prioritized_topic: str = parameter(
+        TOPIC, "where the fence's controls go", name="topics/prioritized_control"
+    )
+    lower: CornerParameters = group(CornerParameters, "box/min")
+    upper: CornerParameters = group(CornerParameters, "box/max")
+    margin: float = parameter(
+        Number("m", above=0.0),
+        "the fence acts when the stopping point is nearer to a wall than this; at most half "
+        "the box's width",
+        0.5,
+        live=True,
+    )
+    horizontal_braking: float = parameter(
+        Number("m/s^2", above=0.0, maximum=MAX_HORIZONTAL_BRAKING),
+        "deceleration b along x and y",
+        1.5,
+        "braking/horizontal",
+        live=True,
+    )
+    vertical_braking: float = parameter(
+        Number("m/s^2", above=0.0, maximum=MAX_VERTICAL_BRAKING),
+        "deceleration b along z; less for a vehicle that is heavy",
+        4.0,
+        "braking/vertical",
+        live=True,
+    )
+    horizontal_reaction_time: float = parameter(
+        TIME_STEP,
+        "T along x and y: estimator, attitude loop, motors",
+        0.4,
+        "reaction_time/horizontal",
+        live=True,
+    )
+    vertical_reaction_time: float = parameter(
+        TIME_STEP, "T along z", 0.2, "reaction_time/vertical", live=True
+    )
+    recovery_rate: float = parameter(
+        Number("1/s", above=0.0),
+        "how quickly the stopping point is brought back",
+        1.0,
+        live=True,
+    )
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        corners = zip("xyz", self.lower.vector(), self.upper.vector(), strict=True)
+        for axis, low, high in corners:
+            if high - low < 2.0 * self.margin:
+                yield (
+                    f"box/max/{axis} is {high}; expected at least "
+                    f"{low + 2.0 * self.margin:g} m, which is box/min/{axis} and twice the margin"
+                )
+
+    def geofence(self) -> Geofence:
+        """Return the fence."""
+        return Geofence(
+            self.lower.vector(),
+            self.upper.vector(),
+            self.margin,
+            Braking(self.horizontal_braking, self.horizontal_reaction_time),
+            Braking(self.vertical_braking, self.vertical_reaction_time),
+            self.recovery_rate,
+        )
 
 
 class GeofenceNode(Node):
@@ -28,53 +114,31 @@ class GeofenceNode(Node):
     """
 
     def __init__(self):
-        super().__init__()
-        self._state_topic = None
-        self._control_topic = None
-        self._prioritized_topic = None
-        self._fence = None
-        self._regular = None
-        self._publisher = None
+        self._regular: NDArray[np.float64] | None = None
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._state_topic = handle.param("topics/state", TOPIC)
-        self._control_topic = handle.param("topics/control", TOPIC)
-        self._prioritized_topic = handle.param("topics/prioritized_control", TOPIC)
-        margin = handle.param("margin", Number(unit="m", above=0.0), 0.5)
-        lower = [handle.param(f"box/min/{axis}", METRES) for axis in "xyz"]
-        upper = [handle.param(f"box/max/{axis}", METRES) for axis in "xyz"]
-        for axis, low, high in zip("xyz", lower, upper, strict=True):
-            if high - low < 2.0 * margin:
-                raise ParameterError(
-                    f"parameter {handle.resolve(f'~box/max/{axis}')} is {high}; expected at "
-                    f"least {low + 2.0 * margin:g} m, which is box/min/{axis} and twice the margin"
-                )
-        self._fence = Geofence(
-            lower,
-            upper,
-            margin,
-            _braking(handle, "horizontal", MAX_HORIZONTAL_BRAKING, 1.5, 0.4),
-            _braking(handle, "vertical", MAX_VERTICAL_BRAKING, 4.0, 0.2),
-            handle.param("recovery_rate", _RATE, 1.0),
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(GeofenceParameters, self._reconfigure)
+        self._fence = self._parameters.geofence()
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = handle.publisher(parameters.prioritized_topic, PrioritizedControlStamped)
+        handle.subscribe(
+            parameters.control_topic, ControlStamped, self._on_control, finite="control"
+        )
+        handle.subscribe(
+            parameters.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
         )
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
-        self._publisher = handle.publisher(self._prioritized_topic, PrioritizedControlStamped)
-        handle.subscribe(self._control_topic, ControlStamped, self._on_control)
-        handle.subscribe(self._state_topic, PositionVelocityYawStateStamped, self._on_state)
+    def _reconfigure(self, parameters):
+        self._fence = parameters.geofence()
 
     def _on_control(self, message):
-        if is_finite(message.control):
-            self._regular = to_vector(message.control)
-        else:
-            self._warn_not_finite("a control", self._control_topic)
+        self._regular = to_vector(message.control)
 
     def _on_state(self, message):
-        if not is_finite(message.state):
-            self._warn_not_finite("a state", self._state_topic)
-            return
         if self._regular is None:
             return
         x = to_vector(message.state)
@@ -84,14 +148,3 @@ class GeofenceNode(Node):
         )
         prioritized.header.stamp = message.header.stamp
         self._publisher.publish(prioritized)
-
-    def _warn_not_finite(self, what, topic):
-        self._handle.warn(f"ignoring {what} on {topic} that is not finite", throttle=1.0)
-
-
-def _braking(handle, direction, most, deceleration, reaction_time):
-    kind = Number(unit="m/s^2", above=0.0, maximum=most)
-    return Braking(
-        handle.param(f"braking/{direction}", kind, deceleration),
-        handle.param(f"reaction_time/{direction}", TIME_STEP, reaction_time),
-    )

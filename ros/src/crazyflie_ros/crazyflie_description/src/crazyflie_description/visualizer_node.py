@@ -3,15 +3,14 @@
 import genpy
 from geometry_msgs.msg import Point
 from std_msgs.msg import ColorRGBA
+from typing_extensions import override
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_description.flown_path import FlownPath, circle
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.last_valid import Held
-from crazyflie_utils.node import Node
+from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
+from crazyflie_utils.last_valid import LastValid
 from crazyflie_utils.parameter_types import FRAME, TOPIC
-from crazyflie_utils.runtime.transforms import TransformError
-from crazyflie_utils.vectors import is_finite
 
 PERIOD = 0.05
 """Between two looks at the vehicle's pose, s."""
@@ -32,6 +31,15 @@ _TEXT_SIZE = 0.016
 _LABEL_HEIGHT = 0.075
 
 
+class VisualizerParameters(Parameters):
+    """Parameters of `VisualizerNode`."""
+
+    fixed_frame: str = parameter(FRAME, "frame in which it is drawn", name="frames/fixed")
+    robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
+    reference_topic: str = parameter(TOPIC, "where references come from", name="topics/reference")
+    markers_topic: str = parameter(TOPIC, "where markers go", name="topics/markers")
+
+
 class VisualizerNode(Node):
     """Publish a vehicle's path and reference as markers.
 
@@ -40,39 +48,33 @@ class VisualizerNode(Node):
     """
 
     def __init__(self):
-        super().__init__()
-        self._fixed_frame = None
-        self._robot_frame = None
-        self._reference_topic = None
-        self._markers_topic = None
-        self._publisher = None
-        self._lookup = None
         self._path = FlownPath(SPACING, CAPACITY)
-        self._reference = Held()
-        self._shown_reference = None
+        self._reference: LastValid[tuple[float, float, float]] = LastValid()
+        self._shown_reference: tuple[float, float, float] | None = None
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._fixed_frame = handle.param("frames/fixed", FRAME)
-        self._robot_frame = handle.param("frames/robot", FRAME)
-        self._reference_topic = handle.param("topics/reference", TOPIC)
-        self._markers_topic = handle.param("topics/markers", TOPIC)
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(VisualizerParameters)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
-        self._publisher = handle.publisher(self._markers_topic, MarkerArray, latch=True)
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = handle.publisher(parameters.markers_topic, MarkerArray, latch=True)
         self._lookup = handle.listen_to_transforms()
-        handle.subscribe(self._reference_topic, PositionVelocityStateStamped, self._on_reference)
+        handle.subscribe(
+            parameters.reference_topic,
+            PositionVelocityStateStamped,
+            self._on_reference,
+            finite="state",
+            on_invalid=self._on_invalid_reference,
+        )
         handle.timer(PERIOD, self._on_timer)
 
     def _on_reference(self, message):
-        if is_finite(message.state):
-            self._reference.good((message.state.x, message.state.y, message.state.z))
-            return
-        self._reference.bad(self._handle.time())
-        self._handle.warn(
-            f"ignoring a reference on {self._reference_topic} that is not finite", throttle=1.0
-        )
+        self._reference.update((message.state.x, message.state.y, message.state.z))
+
+    def _on_invalid_reference(self):
+        self._reference.invalidate(self._handle.time())
 
     def _on_timer(self):
         path_changed = self._extend_path()
@@ -82,13 +84,12 @@ class VisualizerNode(Node):
             self._publisher.publish(self._markers())
 
     def _extend_path(self):
+        fixed, robot = self._parameters.fixed_frame, self._parameters.robot_frame
         try:
-            transform = self._lookup(self._fixed_frame, self._robot_frame)
+            transform = self._lookup(fixed, robot)
         except TransformError as error:
             self._handle.warn(
-                f"no transform {self._fixed_frame} -> {self._robot_frame}: {error}",
-                throttle=5.0,
-                key="no transform",
+                f"no transform {fixed} -> {robot}: {error}", throttle=5.0, key="no transform"
             )
             return False
         translation = transform.transform.translation
@@ -113,9 +114,9 @@ class VisualizerNode(Node):
             path.action = Marker.DELETE
         return MarkerArray([path, ring, label])
 
-    def _marker(self, name, kind, colour):
-        marker = Marker(ns=name, type=kind, color=colour)
-        marker.header.frame_id = self._fixed_frame
+    def _marker(self, name, shape, colour):
+        marker = Marker(ns=name, type=shape, color=colour)
+        marker.header.frame_id = self._parameters.fixed_frame
         # The time 0 asks for the latest transform, so that RViz draws markers
         # with any fixed frame at once, also after simulated time was reset.
         marker.header.stamp = genpy.Time()

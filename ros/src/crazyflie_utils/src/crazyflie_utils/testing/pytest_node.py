@@ -6,6 +6,7 @@ In a .test file::
           args="$(find my_package)/test/rostest_hover.py" time-limit="60" />
 """
 
+import signal
 import sys
 
 import pytest
@@ -32,6 +33,23 @@ def pytest_arguments(arguments: list[str]) -> list[str]:
     return [*told, "-p", "no:cacheprovider", "-v", "-W", "ignore:notifyAll:DeprecationWarning"]
 
 
+class InterruptIsFailure:
+    """Plugin of pytest: an interrupt fails the test that runs, and is the end of all.
+
+    roslaunch interrupts the tests when a required node dies. To pytest by itself that is
+    no failure, so that rostest would count the tests that were not run as passed.
+    """
+
+    def pytest_sessionstart(self, session: pytest.Session) -> None:
+        """Take over the signal."""
+
+        def stop(*_):
+            session.shouldfail = "interrupted"
+            pytest.fail("interrupted: has a required node died?")
+
+        signal.signal(signal.SIGINT, stop)
+
+
 def main() -> int:
     """Run pytest on the files named on the command line; return its exit status."""
     if not rosgraph.is_master_online():
@@ -39,7 +57,8 @@ def main() -> int:
         return 1
     rospy.init_node("pytest_node", anonymous=True, disable_signals=True)
     try:
-        return pytest.main(pytest_arguments(rospy.myargv(sys.argv)[1:]))
+        arguments = pytest_arguments(rospy.myargv(sys.argv)[1:])
+        return pytest.main(arguments, plugins=[InterruptIsFailure()])
     finally:
         # rospy's sending threads would keep the process alive.
         rospy.signal_shutdown("tests are through")

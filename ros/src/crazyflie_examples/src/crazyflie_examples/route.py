@@ -1,10 +1,16 @@
 """Points that a vehicle visits, one after the other, over and over again."""
 
 from collections.abc import Sequence
+from typing import Any
 
-from crazyflie_utils.parameter_types import METRES
+from typing_extensions import override
 
-DEFAULT_POINTS = (
+from crazyflie_utils.parameter_types import METRES, ParameterType
+
+Point = tuple[float, float, float]
+"""x, y, z in m."""
+
+DEFAULT_POINTS: tuple[Point, ...] = (
     (0.5, 0.5, 1.0),
     (-0.5, 0.5, 1.0),
     (-0.5, -0.5, 1.5),
@@ -14,17 +20,21 @@ DEFAULT_POINTS = (
 """Around the default hover point and back to it, m."""
 
 
-class Points:
-    """Kind of a parameter that lists points."""
+class Points(ParameterType):
+    """A list of points."""
 
-    def __call__(self, value) -> tuple:
-        """Return a tuple of (x, y, z), m."""
+    label = "list of [x, y, z]"
+    unit = "m"
+    range = "at least one"
+
+    @override
+    def __call__(self, value: Any) -> tuple[Point, ...]:
         if not isinstance(value, list) or not value:
             raise ValueError
         return tuple(_point(number, item) for number, item in enumerate(value, start=1))
 
+    @override
     def __str__(self) -> str:
-        """Return what is expected."""
         return "a list of points [x, y, z], finite numbers in m"
 
 
@@ -36,21 +46,21 @@ def _point(number, item):
         raise ValueError(f"point {number} is {item!r}") from None
 
 
-class Tour:
+class Route:
     """A cycle through points.
 
     Parameters
     ----------
-    points : sequence of (x, y, z)
-        At least one, m.
+    points : sequence of Point
+        At least one.
     """
 
-    def __init__(self, points: Sequence[tuple]):
-        self.points = tuple(points)
+    def __init__(self, points: Sequence[Point]):
+        self._points = tuple(points)
         self._next = 0
 
-    def move_on(self) -> tuple:
-        """Return the next point (x, y, z) in m, the first again after the last."""
-        point = self.points[self._next]
-        self._next = (self._next + 1) % len(self.points)
+    def next_point(self) -> Point:
+        """Return the next point, the first again after the last."""
+        point = self._points[self._next]
+        self._next = (self._next + 1) % len(self._points)
         return point

@@ -1,11 +1,11 @@
-"""Flies the hover example through its services, and records the flight."""
+"""Flights of the examples by a program."""
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_dev.flight_record import FlightRecord
@@ -20,8 +20,8 @@ class FlightError(Exception):
     """The flight could not be flown; the text says what went wrong."""
 
 
-class Pilot:
-    """Takes off, hovers and lands.
+class FlightOperator:
+    """Takes off, hovers and lands through a vehicle's services, and records the flight.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Pilot:
     limit : float
         The longest that anything may take, s of the machine's clock.
     start : bool
-        Start the process; of several pilots in it, the last one does.
+        Start the process; where several operators share it, the last one does.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class Pilot:
             process.start()
 
     @property
-    def position(self) -> np.ndarray:
+    def position(self) -> NDArray[np.float64]:
         """Where the vehicle was last, m, shape (3,)."""
         return self._recorder.record.state.last[:3]
 
@@ -73,7 +73,7 @@ class Pilot:
         end = state.last_time + duration
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")
 
-    def refer_to(self, point: ArrayLike) -> None:
+    def refer_to(self, point: Sequence[float]) -> None:
         """Publish a point (x, y, z), m, as reference, to be at rest there."""
         x, y, z = map(float, point)
         reference = PositionVelocityStateStamped(state=PositionVelocityState(x=x, y=y, z=z))
@@ -104,21 +104,21 @@ class Pilot:
         record.events[service] = called_at
         record.events[answered] = record.state.last_time
 
-    def _wait_for(self, condition, complaint):
+    def _wait_for(self, condition, failure):
         deadline = time.monotonic() + self._limit
-        with self._recorder.heard:
+        with self._recorder.received:
             while not condition():
-                if not self._recorder.heard.wait(deadline - time.monotonic()):
-                    raise FlightError(f"{complaint} for {self._limit:g} s")
+                if not self._recorder.received.wait(deadline - time.monotonic()):
+                    raise FlightError(f"{failure} for {self._limit:g} s")
 
 
 @contextlib.contextmanager
-def boarded() -> Iterator[Pilot]:
-    """Yield a pilot who is ready to take off, in a rostest's own process."""
+def ready_operator() -> Iterator[FlightOperator]:
+    """Yield an operator who is ready to take off, in a rostest's own process."""
     process = ros_process()
-    pilot = Pilot(process)
-    pilot.wait_until_ready()
+    operator = FlightOperator(process)
+    operator.wait_until_ready()
     try:
-        yield pilot
+        yield operator
     finally:
         process.stop()

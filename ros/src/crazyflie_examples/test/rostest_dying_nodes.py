@@ -1,0 +1,53 @@
+"""Nodes that die in flight are started again, and the vehicle flies on."""
+
+import os
+import signal
+from xmlrpc.client import ServerProxy
+
+import pytest
+import rosgraph
+
+from crazyflie_dev.flight_operator import ready_operator
+from crazyflie_utils.testing.peer import wait_until
+
+NODES = ("/state_estimator", "/takeoff_control_filter", "/takeoff_server")
+LOWEST = 0.9
+"""The vehicle does not sink below this while a node is missing, m."""
+
+
+def process_id(node):
+    """Return the process id of a node; None if it cannot be reached."""
+    try:
+        uri = rosgraph.Master("/dying_nodes").lookupNode(node)
+        return ServerProxy(uri).getPid("/dying_nodes")[2]
+    except (OSError, rosgraph.MasterError):
+        return None
+
+
+def kill(node):
+    """Let a node die, and wait until there is another one."""
+    first = process_id(node)
+    os.kill(first, signal.SIGKILL)
+    wait_until(lambda: process_id(node) not in (None, first), f"another {node}")
+
+
+@pytest.fixture(scope="module")
+def record():
+    """Fly once, and kill one node after the other."""
+    with ready_operator() as operator:
+        operator.takeoff()
+        for node in NODES:
+            kill(node)
+            operator.hover(3.0)
+        operator.land()
+        return operator.finish()
+
+
+def test_flies_on(record):
+    heights = record.state.between(record.events["flying"], record.events["land"])[:, 2]
+    assert heights.min() > LOWEST
+
+
+def test_lands(record):
+    assert record.state.last[2] < 0.01
+    assert record.final_control.last[3] == 0.0

@@ -1,6 +1,7 @@
-"""What the last control says about the acceleration of a vehicle."""
+"""The acceleration of a vehicle that its last control commands."""
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from crazyflie_model.dynamics import coupled_acceleration
 from crazyflie_model.limits import MAX_THRUST, MIN_THRUST
@@ -8,20 +9,19 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 
 
 class ControlInput:
-    """The last control, for as long as it says something about the motion."""
+    """The last control, while it is informative about the motion."""
 
-    def __init__(self):
-        self._control = None
-        self._time = None
+    def __init__(self) -> None:
+        self._control: ArrayLike | None = None
+        self._time = 0.0
 
-    def command(self, control: np.ndarray, time: float) -> None:
+    def command(self, control: ArrayLike, time: float) -> None:
         """Take a control given at ``time`` (s).
 
         Parameters
         ----------
         control : array_like, shape (4,)
             Roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2.
-        time : float
         """
         self._control = control
         self._time = time

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 
 import numpy as np
+from typing_extensions import override
 
 
 class RateFilter(ABC):
@@ -13,7 +14,9 @@ class RateFilter(ABC):
         """Forget everything and take the first sample, shape (n,)."""
 
     @abstractmethod
-    def step(self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None) -> tuple:
+    def step(
+        self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Take the next sample.
 
         Parameters
@@ -22,8 +25,7 @@ class RateFilter(ABC):
             Time since the last sample, s, positive.
         value : ndarray, shape (n,)
         acceleration : ndarray, shape (n,), optional
-            What the axes were told to accelerate at since the last sample, if
-            that is known. Not every filter has a use for it.
+            The commanded acceleration since the last sample, if it is known. Not every filter has a use for it.
 
         Returns
         -------
@@ -41,15 +43,14 @@ class FiniteDifference(RateFilter):
     the samples becomes sqrt(2) s / dt on the rate.
     """
 
-    def __init__(self):
-        self._value = None
-
+    @override
     def start(self, value: np.ndarray) -> None:
-        """See `RateFilter.start`."""
         self._value = value
 
-    def step(self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None) -> tuple:
-        """See `RateFilter.step`; the acceleration is not used."""
+    @override
+    def step(
+        self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         rate = (value - self._value) / dt
         self._value = value
         return value, rate

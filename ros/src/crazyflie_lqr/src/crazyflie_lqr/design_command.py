@@ -39,7 +39,7 @@ def main(arguments: list | None = None) -> int:
         design = design_gains(model, weights, options.sample_time, options.delay)
         print(report(model, design))
         if options.out:
-            save_matrix(options.out, design.K, _header(model, weights, options))
+            save_matrix(options.out, design.K, _comment(model, weights, options))
             print(f"wrote {options.out}")
         if options.plot:
             from crazyflie_lqr.design_plot import save_plot
@@ -141,7 +141,7 @@ def _numbers(text):
     return [float(word) for word in text.replace(",", " ").split()]
 
 
-def _header(model, weights, options):
+def _comment(model, weights, options):
     command = f"design_gains --model {model.name} --Q {_words(weights.Q)} --R {_words(weights.R)}"
     if weights.N.any():
         command += f" --N {_words(weights.N)}"

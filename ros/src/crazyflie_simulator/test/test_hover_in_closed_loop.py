@@ -47,8 +47,8 @@ STIFF = lqr([0.1] * 4), (-0.5, 0.5, -10.0), (0.5, 0.5, 0.5)
 
 def errors(controller, duration, **options):
     """Return the distance from the goal, 100 a second, after a take-off from beside it."""
-    K, integrator, limits = controller
-    feedback = IntegralStateFeedback(K, HOVER, 6, integrator, limits)
+    gains, integrator, limits = controller
+    feedback = IntegralStateFeedback(gains, HOVER, 6, integrator, limits)
     estimator = MotionEstimator(FiniteDifference(), FiniteDifference())
     vehicle = SimulatedVehicle(StabilizedQuadrotor(**options), START, 0.0)
     motion_capture = MotionCapture(position_noise=1e-4, attitude_noise=1e-3)

@@ -307,9 +307,7 @@ def test_a_changed_filter_smooths_more():
     assert 0.0 < jump(**{"filter/position_noise": 0.1}) < 0.5 * jump()
 
 
-@pytest.mark.parametrize(
-    ("changes", "walk"), [({}, 3.0), ({"topics/control": "/control"}, 1.0)]
-)
+@pytest.mark.parametrize(("changes", "walk"), [({}, 3.0), ({"topics/control": "/control"}, 1.0)])
 def test_the_walk_that_is_offered_depends_on_the_control(changes, walk):
     process = launch(**{"filter/type": "kalman"}, **changes)
     response = reconfigure(process, **{"filter/angle_noise": 0.01})

@@ -1,6 +1,7 @@
 """Full state; a reference of the same type."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_lqr.gain_file import MatrixFile
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
@@ -13,7 +14,7 @@ class FullStateLqrParameters(LinearFeedbackParameters):
     """Parameters of `FullStateLqrNode`."""
 
     x_dim: int = parameter(Integer(12, 12), "length of the state")
-    K: np.ndarray = parameter(
+    K: NDArray[np.float64] = parameter(
         MatrixFile(4, 12), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
     )
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
 from crazyflie_utils.parameter_types import TEXT, ParameterType
@@ -21,7 +21,7 @@ class GainFileError(ValueError):
     """A gain file is unusable; the text names the file, the line and the expected shape."""
 
 
-def load_matrix(path: str, rows: int, columns: int) -> np.ndarray:
+def load_matrix(path: str, rows: int, columns: int) -> NDArray[np.float64]:
     """Return the matrix in a file.
 
     Parameters
@@ -53,7 +53,7 @@ def load_matrix(path: str, rows: int, columns: int) -> np.ndarray:
     return np.array(matrix)
 
 
-def load_vector(path: str, length: int) -> np.ndarray:
+def load_vector(path: str, length: int) -> NDArray[np.float64]:
     """Return the vector in a file, which may be one row or one column.
 
     Parameters
@@ -117,7 +117,7 @@ class MatrixFile(ParameterType):
     label = "path"
 
     @override
-    def __call__(self, value: Any) -> np.ndarray:
+    def __call__(self, value: Any) -> NDArray[np.float64]:
         return load_matrix(TEXT(value), self.rows, self.columns)
 
     def __str__(self) -> str:
@@ -133,7 +133,7 @@ class VectorFile(ParameterType):
     label = "path"
 
     @override
-    def __call__(self, value: Any) -> np.ndarray:
+    def __call__(self, value: Any) -> NDArray[np.float64]:
         return load_vector(TEXT(value), self.length)
 
     def __str__(self) -> str:

@@ -9,7 +9,7 @@ accelerates to the right of the heading, positive pitch along it.
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
 from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
@@ -24,7 +24,9 @@ MAX_GAP = 0.5
 """Longest time between two states over which `IntegralStateFeedback` integrates, s."""
 
 
-def heading_error(x: np.ndarray, x_ref: np.ndarray, yaw_index: int) -> np.ndarray:
+def heading_error(
+    x: NDArray[np.float64], x_ref: NDArray[np.float64], yaw_index: int
+) -> NDArray[np.float64]:
     """Return the error of a state in the heading frame.
 
     Parameters
@@ -49,7 +51,7 @@ def heading_error(x: np.ndarray, x_ref: np.ndarray, yaw_index: int) -> np.ndarra
     return e
 
 
-def at_rest(x: np.ndarray, yaw_index: int) -> np.ndarray:
+def at_rest(x: NDArray[np.float64], yaw_index: int) -> NDArray[np.float64]:
     """Return the reference, shape (x_dim,), that stays at the place and heading of a state."""
     x_ref = np.zeros_like(x)
     x_ref[:3] = x[:3]
@@ -70,12 +72,14 @@ class LinearFeedback:
         Where the yaw is in the state.
     """
 
-    def __init__(self, K: np.ndarray, u_ref: np.ndarray, yaw_index: int):
+    def __init__(self, K: NDArray[np.float64], u_ref: NDArray[np.float64], yaw_index: int):
         self.K = K
         self.u_ref = u_ref
         self.yaw_index = yaw_index
 
-    def control(self, x: np.ndarray, x_ref: np.ndarray, time: float) -> np.ndarray:
+    def control(
+        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
+    ) -> NDArray[np.float64]:
         """Return the control for a state.
 
         Parameters
@@ -117,8 +121,8 @@ class IntegralStateFeedback(LinearFeedback):
 
     def __init__(
         self,
-        K: np.ndarray,
-        u_ref: np.ndarray,
+        K: NDArray[np.float64],
+        u_ref: NDArray[np.float64],
         yaw_index: int,
         integrator_k: ArrayLike = (0.0, 0.0, 0.0),
         integrator_limit: ArrayLike = (0.0, 0.0, 0.0),
@@ -132,7 +136,9 @@ class IntegralStateFeedback(LinearFeedback):
         self._time: float | None = None
 
     @override
-    def control(self, x: np.ndarray, x_ref: np.ndarray, time: float) -> np.ndarray:
+    def control(
+        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
+    ) -> NDArray[np.float64]:
         """Return the control for a state; see `LinearFeedback.control`.
 
         A state that is not younger than the last one, or comes more than

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
@@ -19,10 +20,10 @@ class LinearFeedbackParameters(Parameters):
 
     x_dim: int = parameter(Integer(7, 7), "length of the state")
     u_dim: int = parameter(Integer(4, 4), "length of the control")
-    K: np.ndarray = parameter(
+    K: NDArray[np.float64] = parameter(
         MatrixFile(4, 7), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
     )
-    u_ref: np.ndarray = parameter(
+    u_ref: NDArray[np.float64] = parameter(
         VectorFile(4),
         "control at the reference, `u_dim` numbers in one row or one column",
         name="u_ref_file",
@@ -57,7 +58,7 @@ class LinearFeedbackNode(Node):
     def __init__(self) -> None:
         self._reference = GuardedReference(self.yaw_index)
 
-    def complete_reference(self, reference: np.ndarray) -> np.ndarray:
+    def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the reference state, shape (x_dim,), that a reference message means.
 
         Parameters

@@ -1,6 +1,7 @@
 """Position, velocity and yaw state; a reference without yaw."""
 
 import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
@@ -46,7 +47,7 @@ class PositionVelocityYawStateLiftLqrNode(LinearFeedbackNode):
     yaw_index = 6
 
     @override
-    def complete_reference(self, reference: np.ndarray) -> np.ndarray:
+    def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the reference with yaw 0."""
         return np.append(reference, 0.0)
 

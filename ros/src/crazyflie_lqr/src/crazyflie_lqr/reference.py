@@ -1,6 +1,7 @@
 """The reference a controller follows while its source may fail."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_lqr.linear_feedback import at_rest
 from crazyflie_utils.last_valid import LastValid
@@ -21,11 +22,11 @@ class GuardedReference:
 
     def __init__(self, yaw_index: int):
         self._yaw_index = yaw_index
-        self._last_valid: LastValid[np.ndarray] = LastValid()
-        self._hold_point: np.ndarray | None = None
+        self._last_valid: LastValid[NDArray[np.float64]] = LastValid()
+        self._hold_point: NDArray[np.float64] | None = None
         self._has_arrived = False
 
-    def update(self, x_ref: np.ndarray) -> None:
+    def update(self, x_ref: NDArray[np.float64]) -> None:
         """Take a valid reference, shape (x_dim,)."""
         self._last_valid.update(x_ref)
         self._hold_point = None
@@ -35,7 +36,7 @@ class GuardedReference:
         """Take note that an invalid reference came at ``time`` (s)."""
         self._last_valid.invalidate(time)
 
-    def value(self, time: float, x: np.ndarray) -> np.ndarray | None:
+    def value(self, time: float, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return what to follow.
 
         Parameters

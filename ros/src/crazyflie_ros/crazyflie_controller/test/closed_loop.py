@@ -76,7 +76,9 @@ class Loop:
 
     def put(self, x, y):
         """Stand the vehicle somewhere on the ground, switched on again."""
-        self._vehicle = SimulatedVehicle(StabilizedQuadrotor(**self._errors), (x, y, 0.0), self.time)
+        self._vehicle = SimulatedVehicle(
+            StabilizedQuadrotor(**self._errors), (x, y, 0.0), self.time
+        )
 
     def pose(self):
         (x, y, z), quaternion = self._vehicle.pose

@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
 
@@ -84,7 +85,7 @@ class MotionCapture:
         return arrived
 
 
-def _turn(quaternion: Quaternion, rotation: np.ndarray) -> Quaternion:
+def _turn(quaternion: Quaternion, rotation: NDArray[np.float64]) -> Quaternion:
     # The quaternion's product with that of a rotation vector in the body frame.
     x, y, z, w = quaternion
     angle = math.hypot(*rotation)

@@ -3,16 +3,16 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_model.dynamics import STEP, Dynamics
-from crazyflie_model.elementwise import split
+from crazyflie_model.elementwise import Vector, split
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 
 _LEVEL_STEPS = round(LEVEL_AGE / STEP)
 _OFF_STEPS = round(OFF_AGE / STEP)
-_OFF = [0.0, 0.0, 0.0, 0.0]
+_OFF: Vector = [0.0, 0.0, 0.0, 0.0]
 
 
 class SimulatedVehicle:
@@ -37,7 +37,7 @@ class SimulatedVehicle:
     def __init__(self, dynamics: Dynamics, position: ArrayLike, time: float):
         self._dynamics = dynamics
         self._x = dynamics.initial_state(split(position))
-        self._u = _OFF
+        self._u: Vector = _OFF
         self._start = time
         self._steps = 0
         self._control_step: int | None = None
@@ -48,7 +48,7 @@ class SimulatedVehicle:
         return self._start + self._steps * STEP
 
     @property
-    def state(self) -> np.ndarray:
+    def state(self) -> NDArray[np.float64]:
         """State of the dynamics, shape (x_dim,)."""
         return np.array(self._x)
 

@@ -1,7 +1,7 @@
 """The acceleration of a vehicle that its last control commands."""
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from crazyflie_model.dynamics import coupled_acceleration
 from crazyflie_model.limits import MAX_THRUST, MIN_THRUST
@@ -12,21 +12,21 @@ class ControlInput:
     """The last control, while it is informative about the motion."""
 
     def __init__(self) -> None:
-        self._control: ArrayLike | None = None
+        self._control: NDArray[np.float64] | None = None
         self._time = 0.0
 
-    def command(self, control: ArrayLike, time: float) -> None:
+    def command(self, control: NDArray[np.float64], time: float) -> None:
         """Take a control given at ``time`` (s).
 
         Parameters
         ----------
-        control : array_like, shape (4,)
+        control : ndarray, shape (4,)
             Roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2.
         """
         self._control = control
         self._time = time
 
-    def acceleration(self, yaw: float, time: float) -> np.ndarray | None:
+    def acceleration(self, yaw: float, time: float) -> NDArray[np.float64] | None:
         """Return the acceleration (3,), m/s^2, at a yaw (rad) and time (s), if it is known.
 
         Returns

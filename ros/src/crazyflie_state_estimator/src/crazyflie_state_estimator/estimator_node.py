@@ -1,6 +1,7 @@
 """ROS interface of the state estimators."""
 
 import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_model.angles import rpy_from_quaternion
@@ -110,7 +111,7 @@ class StateEstimatorNode(Node):
         self._control = ControlInput()
         self._last_success = 0.0
 
-    def state(self, motion: Motion) -> np.ndarray:
+    def state(self, motion: Motion) -> NDArray[np.float64]:
         """Return the state vector, in the order of the message's fields."""
         raise NotImplementedError
 
@@ -184,7 +185,7 @@ class StateEstimatorNode(Node):
             transform.header.stamp.to_nsec(),
             (translation.x, translation.y, translation.z),
             attitude,
-            self._control.acceleration(attitude[2], now),
+            self._control.acceleration(float(attitude[2]), now),
         )
 
     def _report_no_state(self, now, reason):
@@ -213,7 +214,7 @@ class PositionVelocityStateEstimatorNode(StateEstimatorNode):
     parameters_type = PositionVelocityStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> np.ndarray:
+    def state(self, motion: Motion) -> NDArray[np.float64]:
         return np.concatenate([motion.position, motion.velocity])
 
 
@@ -223,7 +224,7 @@ class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
     state_type = PositionVelocityYawStateStamped
 
     @override
-    def state(self, motion: Motion) -> np.ndarray:
+    def state(self, motion: Motion) -> NDArray[np.float64]:
         return np.concatenate([motion.position, motion.velocity, motion.attitude[2:]])
 
 
@@ -240,5 +241,5 @@ class FullStateEstimatorNode(StateEstimatorNode):
     parameters_type = FullStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> np.ndarray:
+    def state(self, motion: Motion) -> NDArray[np.float64]:
         return np.concatenate(motion)

@@ -1,6 +1,7 @@
 """Kalman filter for signals whose acceleration changes slowly."""
 
 import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_state_estimator.rate_filter import RateFilter
@@ -59,7 +60,7 @@ class ConstantAccelerationFilter(RateFilter):
         self.tune(noise, acceleration_walk)
         self._state = np.zeros((3, 0))
         self._covariance = np.zeros((3, 3))
-        self._acceleration: np.ndarray | None = None
+        self._acceleration: NDArray[np.float64] | None = None
 
     def tune(self, noise: float, acceleration_walk: float) -> None:
         """Change the parameters; the state and its covariance stay."""
@@ -67,19 +68,19 @@ class ConstantAccelerationFilter(RateFilter):
         self._walk_density = acceleration_walk**2
 
     @property
-    def covariance(self) -> np.ndarray:
+    def covariance(self) -> NDArray[np.float64]:
         """Covariance of (signal, rate, acceleration) of any one axis, shape (3, 3)."""
         return self._covariance
 
     @override
-    def start(self, value: np.ndarray) -> None:
+    def start(self, value: NDArray[np.float64]) -> None:
         """Take the first sample; next to nothing is assumed about rate and acceleration."""
         self._begin(value, np.zeros_like(value))
 
     @override
     def step(
-        self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self, dt: float, value: NDArray[np.float64], acceleration: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if dt > MEMORY:
             self._begin(value, (value - self._state[0]) / dt)
         else:

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_state_estimator.rate_filter import RateFilter
@@ -25,10 +25,10 @@ class Motion(NamedTuple):
         velocity).
     """
 
-    position: np.ndarray
-    velocity: np.ndarray
-    attitude: np.ndarray
-    attitude_rate: np.ndarray
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    attitude: NDArray[np.float64]
+    attitude_rate: NDArray[np.float64]
 
 
 class MotionEstimator:
@@ -64,7 +64,7 @@ class MotionEstimator:
         stamp: int,
         position: ArrayLike,
         attitude: ArrayLike,
-        acceleration: np.ndarray | None = None,
+        acceleration: NDArray[np.float64] | None = None,
     ) -> Motion | None:
         """Take the next pose and return the motion at its time.
 
@@ -106,7 +106,7 @@ class MotionEstimator:
         self._angles = self._angles + wrap_to_pi(attitude - self._angles)
         position, velocity = self._position_filter.step(dt, position, acceleration)
         _, attitude_rate = self._angle_filter.step(dt, self._angles)
-        return Motion(position, velocity, wrap_to_pi(attitude), attitude_rate)
+        return Motion(position, velocity, np.asarray(wrap_to_pi(attitude)), attitude_rate)
 
     def _start(self, stamp, position, attitude):
         self._stamp = stamp

@@ -3,6 +3,7 @@
 from abc import ABC, abstractmethod
 
 import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
 
@@ -10,13 +11,13 @@ class RateFilter(ABC):
     """Signal and rate of n independent axes, from samples of the signal."""
 
     @abstractmethod
-    def start(self, value: np.ndarray) -> None:
+    def start(self, value: NDArray[np.float64]) -> None:
         """Forget everything and take the first sample, shape (n,)."""
 
     @abstractmethod
     def step(
-        self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self, dt: float, value: NDArray[np.float64], acceleration: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Take the next sample.
 
         Parameters
@@ -25,7 +26,7 @@ class RateFilter(ABC):
             Time since the last sample, s, positive.
         value : ndarray, shape (n,)
         acceleration : ndarray, shape (n,), optional
-            The commanded acceleration since the last sample, if it is known. Not every filter has a use for it.
+            Commanded since the last sample, if it is known. Not every filter uses it.
 
         Returns
         -------
@@ -44,13 +45,13 @@ class FiniteDifference(RateFilter):
     """
 
     @override
-    def start(self, value: np.ndarray) -> None:
+    def start(self, value: NDArray[np.float64]) -> None:
         self._value = value
 
     @override
     def step(
-        self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+        self, dt: float, value: NDArray[np.float64], acceleration: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rate = (value - self._value) / dt
         self._value = value
         return value, rate

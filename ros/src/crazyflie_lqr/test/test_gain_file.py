@@ -1,4 +1,4 @@
-"""Gain files: what can be read, and what the operator is told otherwise."""
+"""Gain files: what can be read, and the messages about what cannot."""
 
 import numpy as np
 import pytest

@@ -15,7 +15,7 @@ from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
 
 
 class ClockedProcess(FakeProcess):
-    """A fake process whose simulator sets the clock, a tick when it is told to."""
+    """A fake process whose simulator sets the clock, one tick per call of `tick`."""
 
     def __init__(self):
         super().__init__(start=0.0)

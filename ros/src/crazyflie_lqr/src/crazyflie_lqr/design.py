@@ -141,7 +141,7 @@ def design_gains(
     Notes
     -----
     With a delay the optimal control also feeds back the controls that are on
-    their way, ``u = K_x x + K_u (u[-1] + ... )``, which a gain file cannot say.
+    their way, ``u = K_x x + K_u (u[-1] + ... )``, which a gain file cannot hold.
     The gains returned are those for controls that change little within the
     delay, ``u = (1 - sum K_u)^-1 K_x x``. They are within some percent of the
     cost of the best gains on the state alone.

@@ -95,9 +95,9 @@ def full_state() -> LinearModel:
     """Return the 12-dimensional model: roll and pitch follow with a first-order lag.
 
     The angular rates are measured, with a lag, and act on nothing: with an
-    attitude of first order they say nothing that attitude and command do not
-    say. With no weight on them their gains are therefore zero, and the noise of
-    differentiated attitudes stays out of the control.
+    attitude of first order they follow from attitude and command. With no weight
+    on them their gains are therefore zero, and the noise of differentiated
+    attitudes stays out of the control.
     """
     translation = ("x", "y", "z", "x_dot", "y_dot", "z_dot")
     states = (*translation, "roll", "pitch", "yaw", "roll_dot", "pitch_dot", "yaw_dot")

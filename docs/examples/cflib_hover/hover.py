@@ -19,8 +19,8 @@ HEIGHT = 0.5
 """m."""
 
 
-def log_position(crazyflie):
-    """Print where the vehicle thinks it is, twice a second."""
+def log_position(crazyflie: Crazyflie) -> None:
+    """Print the vehicle's own estimate of its position, twice a second."""
     config = LogConfig("position", period_in_ms=500)
     for variable in ("stateEstimate.x", "stateEstimate.y", "stateEstimate.z"):
         config.add_variable(variable)
@@ -31,8 +31,8 @@ def log_position(crazyflie):
     config.start()
 
 
-def fly(crazyflie):
-    """Fly; the vehicle's own controller does it."""
+def fly(crazyflie: Crazyflie) -> None:
+    """Take off, move and land by commands to the controller on board."""
     commander = crazyflie.high_level_commander
     commander.takeoff(HEIGHT, 2.0)
     time.sleep(3.0)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_lqr import design_command
 from crazyflie_lqr.gain_file import load_matrix
@@ -37,10 +39,16 @@ def parameters(tmp_path):
     }
 
 
-def control_at(parameters, x):
-    """Return the control for a vehicle that is at x (m) and should be at 0."""
+def control_at(parameters, x, **changes):
+    """Return the control for a vehicle that is at x (m) and should be at 0.
+
+    Changes of parameters are made in flight, as dynamic_reconfigure does.
+    """
     process = FakeProcess()
     assert process.launch(MyControllerNode(), "/lqr_controller", parameters)
+    if changes:
+        request = ReconfigureRequest(encode_config(changes))
+        process.call("/lqr_controller/set_parameters", request)
     reference = PositionVelocityStateStamped(state=PositionVelocityState(z=1.0))
     process.publish("/ref", reference)
     state = PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=x, z=1.0))
@@ -57,6 +65,7 @@ def test_turns_towards_the_heading(parameters):
 def test_tilts_no_more_than_it_may(parameters):
     assert control_at(parameters, -100.0).pitch == 0.2
     assert control_at({**parameters, "max_tilt": 0.05}, 100.0).pitch == -0.05
+    assert control_at(parameters, 100.0, max_tilt=0.05).pitch == -0.05
 
 
 def test_a_bad_parameter_is_named(parameters):
@@ -67,7 +76,7 @@ def test_a_bad_parameter_is_named(parameters):
     assert process.logged("error") == [f"/lqr_controller: {expected}"]
 
 
-def test_gains_are_those_of_the_command_in_their_header(tmp_path):
+def test_gains_are_those_of_the_command_in_their_comment(tmp_path):
     [command] = re.findall("^# design_gains (.*)", K_FILE.read_text(), re.MULTILINE)
     designed = tmp_path / "K.txt"
     assert design_command.main([*command.split(), "--out", str(designed)]) == 0

@@ -25,7 +25,7 @@ def arguments(**changes):
 
 
 @pytest.mark.parametrize("path", sorted(CONFIG.glob("K_*.txt")), ids=lambda path: path.name)
-def test_shipped_gains_are_what_the_command_in_their_header_makes(path, tmp_path):
+def test_shipped_gains_are_what_the_command_in_their_comment_makes(path, tmp_path):
     shipped = path.read_text().splitlines()
     [command] = [line for line in shipped if line.startswith("# design_gains ")]
     out = tmp_path / "K.txt"
@@ -55,7 +55,7 @@ def test_prints_gains_poles_and_margins(capsys):
     assert len(output.splitlines()) < 20
 
 
-def test_sampled_design_says_so_and_keeps_it_in_the_header(tmp_path, capsys):
+def test_sampled_design_says_so_and_keeps_it_in_the_comment(tmp_path, capsys):
     out = tmp_path / "K.txt"
     assert main(arguments(sample_time=0.01, delay=0.025, out=out)) == 0
     assert "sampled every 10 ms, 3 controls on their way" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""Gain files: what can be read, and what the operator is told otherwise."""
+"""Gain files: what can be read, and the messages about what cannot."""
 
 import numpy as np
 import pytest
@@ -21,8 +21,8 @@ def write(tmp_path):
     return write
 
 
-def test_reads_numbers_between_comments(write):
-    path = write("# gains\n\n 1 -2.5\t3e-1 # the first row\n   # more\n4 5 6\n")
+def test_reads_numbers_before_between_and_after_comments(write):
+    path = write("# gains\n\n 1 -2.5\t3e-1 # the first row\n   # more\n4 5 6\n# end\n")
     np.testing.assert_array_equal(load_matrix(path, 2, 3), [[1, -2.5, 0.3], [4, 5, 6]])
 
 
@@ -94,4 +94,7 @@ def test_what_is_saved_is_read_back(tmp_path_factory, matrix):
     save_matrix(path, matrix, "first\n\nlast")
     np.testing.assert_allclose(load_matrix(path, 2, 3), matrix, rtol=1e-11)
     with open(path) as file:
-        assert file.read().startswith("# first\n#\n# last\n")
+        lines = file.read().splitlines()
+    # A reader that knows no comments gets all numbers before the first.
+    assert [line.startswith("#") for line in lines] == [False, False, True, True, True]
+    assert lines[2:] == ["# first", "#", "# last"]

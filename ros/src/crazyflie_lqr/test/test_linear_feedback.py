@@ -12,7 +12,7 @@ from crazyflie_lqr.linear_feedback import (
     MAX_THRUST,
     MAX_TILT,
     MIN_THRUST,
-    LiftController,
+    IntegralStateFeedback,
     LinearFeedback,
     heading_error,
 )
@@ -22,9 +22,9 @@ GENTLE = 0.001 * np.arange(1.0, 29.0).reshape(4, 7)
 states = arrays(float, 7, elements=st.floats(-20.0, 20.0))
 
 
-def lift(k=(0.0, 0.0, 0.0), limit=(0.0, 0.0, 0.0), K=GENTLE):
-    """Return a lift controller."""
-    return LiftController(K, U_REF, 6, k, limit)
+def integral(k=(0.0, 0.0, 0.0), limit=(0.0, 0.0, 0.0), K=GENTLE):
+    """Return an integral state feedback."""
+    return IntegralStateFeedback(K, U_REF, 6, k, limit)
 
 
 def state(**values):
@@ -54,7 +54,7 @@ def test_north_of_the_reference_and_looking_north_is_ahead_of_it():
 @given(states, states)
 def test_inputs_are_left_alone(x, x_ref):
     before = x.copy(), x_ref.copy()
-    lift(limit=(1.0, 1.0, 1.0)).control(x, x_ref, 0.0)
+    integral(limit=(1.0, 1.0, 1.0)).control(x, x_ref, 0.0)
     np.testing.assert_array_equal(before, (x, x_ref))
 
 
@@ -85,9 +85,9 @@ def test_a_quarter_turn_of_the_world_does_not_change_the_control(x, yaw):
 
 
 @given(states, states)
-def test_lift_control_is_limited_linear_feedback(x, x_ref):
+def test_integral_state_feedback_is_limited_linear_feedback(x, x_ref):
     K = 100.0 * GENTLE
-    u = lift(K=K).control(x, x_ref, 0.0)
+    u = integral(K=K).control(x, x_ref, 0.0)
     linear = LinearFeedback(K, U_REF, 6).control(x, x_ref, 0.0)
     low = [-MAX_TILT, -MAX_TILT, -math.inf, MIN_THRUST]
     high = [MAX_TILT, MAX_TILT, math.inf, MAX_THRUST]
@@ -99,7 +99,7 @@ def test_limits():
 
 
 def test_integrator_acts_on_pitch_roll_and_thrust():
-    controller = lift(k=(-0.01, 0.02, -0.3), limit=(9.0, 9.0, 9.0), K=np.zeros((4, 7)))
+    controller = integral(k=(-0.01, 0.02, -0.3), limit=(9.0, 9.0, 9.0), K=np.zeros((4, 7)))
     x = state(x=1.0, y=2.0, z=3.0)
     for time in np.arange(0.0, 1.05, 0.1):
         u = controller.control(x, np.zeros(7), time)
@@ -107,7 +107,7 @@ def test_integrator_acts_on_pitch_roll_and_thrust():
 
 
 def test_integrator_is_clamped_and_comes_back_at_once():
-    controller = lift(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 0.5), K=np.zeros((4, 7)))
+    controller = integral(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 0.5), K=np.zeros((4, 7)))
     for time in np.arange(0.0, 20.0, 0.1):
         u = controller.control(state(z=1.0), np.zeros(7), time)
     assert u[3] == pytest.approx(9.81 + 0.5)
@@ -117,7 +117,7 @@ def test_integrator_is_clamped_and_comes_back_at_once():
 
 @pytest.mark.parametrize("step", [0.0, -0.1, -100.0, 0.51, 3600.0])
 def test_integrator_skips_time_that_cannot_be(step):
-    controller = lift(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 5.0), K=np.zeros((4, 7)))
+    controller = integral(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 5.0), K=np.zeros((4, 7)))
     for time in (10.0, 10.1, 10.1 + step):
         u = controller.control(state(z=1.0), np.zeros(7), time)
     assert u[3] == pytest.approx(9.81 + 0.1)
@@ -127,14 +127,45 @@ def test_integrator_skips_time_that_cannot_be(step):
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_integrator_forgets_what_overflows():
-    controller = lift(k=(0.0, 0.0, 1.0), limit=(1.0, 1.0, 1.0), K=np.zeros((4, 7)))
+    controller = integral(k=(0.0, 0.0, 1.0), limit=(1.0, 1.0, 1.0), K=np.zeros((4, 7)))
     for time, x in enumerate([1.7e308, 1.7e308, 0.0]):
         u = controller.control(state(x=x), state(x=-1.7e308 if x else 0.0), 0.1 * time)
     np.testing.assert_allclose(u, U_REF)
 
 
 def test_integrator_is_off_by_default():
-    controller = lift(k=(1.0, 1.0, 1.0))
+    controller = integral(k=(1.0, 1.0, 1.0))
     for time in (0.0, 0.1, 0.2):
         u = controller.control(state(z=0.1), np.zeros(7), time)
     np.testing.assert_allclose(u, U_REF + GENTLE @ state(z=0.1))
+
+
+@pytest.mark.parametrize("k", [0.5, -0.5, 4.0])
+def test_a_change_of_the_integrator_gain_does_not_make_the_control_jump(k):
+    before = integral(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 5.0))
+    for time in (0.0, 0.1, 0.2):
+        u = before.control(state(z=1.0), np.zeros(7), time)
+    after = integral(k=(0.0, 0.0, k), limit=(0.0, 0.0, 5.0))
+    after.take_over(before)
+    np.testing.assert_allclose(after.control(state(z=1.0), np.zeros(7), 0.2), u)
+    later = after.control(state(z=1.0), np.zeros(7), 0.3)
+    assert later[3] == pytest.approx(u[3] + 0.1 * k)
+
+
+def test_a_change_keeps_the_integral_within_the_new_limits():
+    before = integral(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 5.0), K=np.zeros((4, 7)))
+    for time in np.arange(0.0, 5.0, 0.1):
+        before.control(state(z=1.0), np.zeros(7), time)
+    after = integral(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 0.5), K=np.zeros((4, 7)))
+    after.take_over(before)
+    u = after.control(state(), np.zeros(7), time)
+    assert u[3] == pytest.approx(9.81 + 0.5)
+
+
+def test_an_integral_that_had_no_effect_begins_at_zero():
+    before = integral(limit=(0.0, 0.0, 5.0), K=np.zeros((4, 7)))
+    for time in (0.0, 0.1, 0.2):
+        before.control(state(z=1.0), np.zeros(7), time)
+    after = integral(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 5.0), K=np.zeros((4, 7)))
+    after.take_over(before)
+    np.testing.assert_allclose(after.control(state(), np.zeros(7), 0.3), U_REF)

@@ -1,10 +1,12 @@
-"""The lift controller's node on a fake process."""
+"""The node of the integral state feedback on a fake process."""
 
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
@@ -15,6 +17,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 
@@ -188,3 +191,44 @@ def test_a_control_that_overflows_is_not_sent(process):
     refer(process, x=-1.7e308)
     assert answer(process, x=1.7e308) == []
     assert "not finite" in process.logged("warn")[0]
+
+
+# Changes in flight.
+
+
+def reconfigure(process, **values):
+    """Change parameters as dynamic_reconfigure does."""
+    request = ReconfigureRequest(encode_config(values))
+    return process.call("/lqr_controller/set_parameters", request)
+
+
+def test_gains_may_be_changed_in_flight(process, tmp_path):
+    gains = tmp_path / "K.txt"
+    gains.write_text("0 0 0 0 0 0 0\n" * 3 + "0 0 -2 0 0 0 0\n")
+    refer(process, z=1.0)
+    reconfigure(process, K_file=str(gains))
+    [control] = answer(process, z=0.5)
+    np.testing.assert_allclose(control, [0.0, 0.0, 0.0, 9.81 + 1.0])
+
+
+def test_a_change_of_the_integrator_keeps_its_integral(process):
+    reconfigure(process, **{"integrator/k/z": -1.0, "integrator/thresh/z": 1.0})
+    refer(process, z=1.0)
+    for _ in range(6):
+        [before] = answer(process, z=0.8)
+        process.advance(0.1)
+    reconfigure(process, **{"integrator/k/x": -0.1})
+    [after] = answer(process, z=0.8)
+    assert before[3] == pytest.approx(9.81 + 0.3 + 0.1)
+    assert after[3] == pytest.approx(9.81 + 0.3 + 0.12)
+
+
+def test_bad_gains_are_refused_and_the_old_ones_stay(process, tmp_path):
+    gains = tmp_path / "K.txt"
+    gains.write_text("0 0 0\n")
+    refer(process, z=1.0)
+    [before] = answer(process, z=0.5)
+    with pytest.raises(ServiceError, match=r"line 1: 3 numbers, expected 4 rows of 7 numbers"):
+        reconfigure(process, K_file=str(gains))
+    [after] = answer(process, z=0.5)
+    np.testing.assert_array_equal(after, before)

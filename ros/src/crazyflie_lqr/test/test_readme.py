@@ -32,7 +32,7 @@ def node():
     assert len(code.splitlines()) <= 45
     names = {"__name__": "example"}
     exec(compile(code, "README.md", "exec"), names)
-    return names["PatientNode"]()
+    return names["GradualNode"]()
 
 
 def test_a_controller_of_ones_own_replaces_the_lift_controller(node):

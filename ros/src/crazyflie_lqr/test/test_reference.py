@@ -13,37 +13,37 @@ def followed(reference, time, x=HERE):
     return list(reference.value(time, x))
 
 
-def test_nothing_before_the_first_good_one():
+def test_nothing_before_the_first_valid_one():
     reference = GuardedReference(6)
     assert reference.value(0.0, HERE) is None
-    reference.bad(1.0)
+    reference.invalidate(1.0)
     assert reference.value(0.0, HERE) is None
     assert reference.value(10.0, HERE) is None
 
 
-def test_a_good_one_stays_for_ever():
+def test_a_valid_one_stays_for_ever():
     reference = GuardedReference(6)
-    reference.good(GOAL)
+    reference.update(GOAL)
     assert followed(reference, 1e6) == list(GOAL)
 
 
-def test_bad_ones_end_it_after_half_a_second_at_the_place_reached_by_then():
+def test_invalid_ones_end_it_after_half_a_second_at_a_hold_point():
     reference = GuardedReference(6)
-    reference.good(GOAL)
+    reference.update(GOAL)
     for time in (10.0, 10.2, 10.4):
-        reference.bad(time)
+        reference.invalidate(time)
     assert followed(reference, 10.49) == list(GOAL)
     assert followed(reference, 10.51) == REST_HERE
-    reference.bad(10.6)
+    reference.invalidate(10.6)
     assert followed(reference, 20.0, HERE + 1.0) == REST_HERE
 
 
-def test_a_good_one_is_followed_again_and_the_next_refuge_is_elsewhere():
+def test_a_valid_one_is_followed_again_and_the_next_hold_point_is_elsewhere():
     reference = GuardedReference(6)
-    reference.good(GOAL)
-    reference.bad(10.0)
+    reference.update(GOAL)
+    reference.invalidate(10.0)
     assert followed(reference, 11.0) == REST_HERE
-    reference.good(2.0 * GOAL)
+    reference.update(2.0 * GOAL)
     assert followed(reference, 12.0) == list(2.0 * GOAL)
-    reference.bad(13.0)
+    reference.invalidate(13.0)
     assert followed(reference, 14.0, np.ones(7)) == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]

@@ -16,7 +16,7 @@ from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorCoupled7DNode,
     NearHoverSimulatorNode,
 )
-from crazyflie_simulator.vehicle import Vehicle
+from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_simulator.wind import Wind
 from crazyflie_utils.testing import FakeProcess
 
@@ -37,7 +37,7 @@ def best(function, count: int) -> float:
 
 def one_vehicle(dynamics) -> float:
     """Return us per step of one vehicle with a control every 10 ms."""
-    vehicle = Vehicle(dynamics, (0.0, 0.0, 1.0), 0.0)
+    vehicle = SimulatedVehicle(dynamics, (0.0, 0.0, 1.0), 0.0)
 
     def fly():
         for _ in range(200):

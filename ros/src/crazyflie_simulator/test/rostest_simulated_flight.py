@@ -19,6 +19,6 @@ def test_flies_by_simulated_time():
             if transform.transform.translation.z > 0.0:
                 stamps.append(transform.header.stamp.to_sec())
                 heights.append(transform.transform.translation.z)
-    # 1 m/s^2 by the stamps, whatever the machine's clock says.
+    # 1 m/s^2 by the stamps, whatever the machine's clock.
     acceleration = 2.0 * np.polyfit(np.array(stamps) - stamps[0], heights, 2)[0]
     assert acceleration == pytest.approx(1.0, rel=1e-3)

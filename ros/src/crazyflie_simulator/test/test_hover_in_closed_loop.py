@@ -4,72 +4,66 @@ At 100 Hz: position from a pose with noise, velocity from its finite difference,
 feedback with an integrator of the position error, limits on tilt and thrust.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
-from scipy.linalg import solve_continuous_are
+from rospkg import RosPack
 
-from crazyflie_model.angles import rotate_by_yaw, rpy_from_quaternion
+from crazyflie_lqr.design import Weights, design_gains
+from crazyflie_lqr.gain_file import load_matrix
+from crazyflie_lqr.linear_feedback import IntegralStateFeedback
+from crazyflie_lqr.models import near_hover
+from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
 from crazyflie_simulator.motion_capture import MotionCapture
-from crazyflie_simulator.vehicle import Vehicle
+from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_simulator.wind import Wind
+from crazyflie_state_estimator.motion import MotionEstimator
+from crazyflie_state_estimator.rate_filter import FiniteDifference
 
 PERIOD = 0.01
-GOAL = np.array([0.0, 0.0, 1.0])
+GOAL = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
 START = np.array([0.1, -0.1, 0.0])
-MAX_TILT = 0.2618
+HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
 
 
 def lqr(r):
-    """Return the gain K of u = u_ref + K (x - x_ref) for the hover and weights diag(r)^2 of u."""
-    a, b = np.zeros((7, 7)), np.zeros((7, 4))
-    a[:3, 3:6] = np.eye(3)
-    b[3, 1], b[4, 0], b[5, 3], b[6, 2] = GRAVITY, -GRAVITY, 1.0, 1.0
+    """Return the gain K for the hover and weights diag(r)^2 of u."""
     q = np.diag([1.0, 1.0, 2.0, 1.0, 1.0, 2.0, 10.0]) ** 2
-    r = np.diag(r) ** 2
-    return -np.linalg.solve(r, b.T @ solve_continuous_are(a, b, q, r))
+    return design_gains(near_hover(), Weights(q, np.diag(r) ** 2, np.zeros((7, 4)))).K
 
 
-def gains(tilt, yaw, lift):
-    """Return a gain K of gains on position and velocity, yaw, height and climb."""
-    k = np.zeros((4, 7))
-    k[0, [1, 4]] = tilt
-    k[1, [0, 3]] = np.negative(tilt)
-    k[2, 6] = -yaw
-    k[3, [2, 5]] = np.negative(lift)
-    return k
-
-
-# For each: K, gains of the integrator (on x for pitch, y for roll, z for
-# thrust), and its limits.
-SOFT = gains((0.25, 1.0), 3.5, (1.5, 1.0)), (-0.05, 0.05, -0.5), (1.0, 1.0, 6.0)
+# For each: K, gains of the integrator, and its limits.
+SOFT = (
+    load_matrix(str(Path(RosPack().get_path("crazyflie_lqr"), "config", "K_soft.txt")), 4, 7),
+    (-0.05, 0.05, -0.5),
+    (1.0, 1.0, 6.0),
+)
 LQR = lqr([2.0, 2.0, 3.0, 1.0 / 3.0]), (-0.1, 0.1, -4.0), (0.5, 0.5, 0.7)
 STIFF = lqr([0.1] * 4), (-0.5, 0.5, -10.0), (0.5, 0.5, 0.5)
 
 
 def errors(controller, duration, **options):
     """Return the distance from the goal, 100 a second, after a take-off from beside it."""
-    k, integrator, limits = controller
-    vehicle = Vehicle(StabilizedQuadrotor(**options), START, 0.0)
+    gains, integrator, limits = controller
+    feedback = IntegralStateFeedback(gains, HOVER, 6, integrator, limits)
+    estimator = MotionEstimator(FiniteDifference(), FiniteDifference())
+    vehicle = SimulatedVehicle(StabilizedQuadrotor(**options), START, 0.0)
     motion_capture = MotionCapture(position_noise=1e-4, attitude_noise=1e-3)
-    integral, last, distances = np.zeros(3), START, []
-    for moment in np.arange(0.0, duration, PERIOD):
+    distances = []
+    for count in range(round(duration / PERIOD)):
+        moment = count * PERIOD
         vehicle.advance_to(moment)
         motion_capture.measure(moment, *vehicle.pose)
         ((_, position, quaternion),) = motion_capture.arrivals(moment)
-        position = np.array(position)
-        yaw = rpy_from_quaternion(*quaternion)[2]
-        e = np.array([*(position - GOAL), *((position - last) / PERIOD), yaw])
-        last = position
-        e[:2], e[3:5] = rotate_by_yaw(*e[:2], -yaw), rotate_by_yaw(*e[3:5], -yaw)
-        integral = np.clip(integral + e[:3] * PERIOD, np.negative(limits), limits)
-        u = [0.0, 0.0, 0.0, GRAVITY] + k @ e
-        u[[1, 0, 3]] += np.multiply(integrator, integral)
-        u[:2] = np.clip(u[:2], -MAX_TILT, MAX_TILT)
-        u[3] = np.clip(u[3], 4.0, 16.0)
-        vehicle.command(u)
-        distances.append(np.linalg.norm(vehicle.state[:3] - GOAL))
+        attitude = rpy_from_quaternion(*quaternion)
+        motion = estimator.update(round(moment * 1e9), position, attitude)
+        if motion is not None:
+            state = np.array([*motion.position, *motion.velocity, motion.attitude[2]])
+            vehicle.command(feedback.control(state, GOAL, moment))
+        distances.append(np.linalg.norm(vehicle.state[:3] - GOAL[:3]))
     return np.array(distances)
 
 

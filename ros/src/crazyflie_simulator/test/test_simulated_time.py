@@ -15,7 +15,7 @@ from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
 
 
 class ClockedProcess(FakeProcess):
-    """A fake process whose simulator sets the clock, a tick when it is told to."""
+    """A fake process whose simulator sets the clock, one tick per call of `tick`."""
 
     def __init__(self):
         super().__init__(start=0.0)
@@ -35,7 +35,7 @@ class ClockedProcess(FakeProcess):
             self.executor.submit(work)
 
 
-class Pilot(Node):
+class ThrustProfile(Node):
     """Commands, every 50 ms of simulated time, a thrust that depends on time alone."""
 
     def load_parameters(self, handle):
@@ -52,11 +52,11 @@ class Pilot(Node):
 
 
 def clocked(node_class=NearHoverSimulatorNode, **changes):
-    """Return a process in which a pilot flies a simulator that sets the clock."""
+    """Return a process in which a thrust profile flies a simulator that sets the clock."""
     process = ClockedProcess()
     parameters = {**PARAMETERS, "clock/publish": True, **changes}
     assert process.launch(node_class(), "/simulator", parameters)
-    assert process.launch(Pilot(), "/pilot")
+    assert process.launch(ThrustProfile(), "/thrust_profile")
     return process
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from crazyflie_model.dynamics import Coupled7D, NearHover
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
-from crazyflie_simulator.vehicle import Vehicle
+from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_simulator.wind import Wind
 
 HOVER = np.array([0.0, 0.0, 0.0, GRAVITY])
@@ -26,7 +26,7 @@ MODELS = pytest.mark.parametrize(
 
 @MODELS
 def test_stays_put_until_the_first_control(make_dynamics):
-    vehicle = Vehicle(make_dynamics(), [1.0, 2.0, 3.0], time=5.0)
+    vehicle = SimulatedVehicle(make_dynamics(), [1.0, 2.0, 3.0], time=5.0)
     vehicle.advance_to(65.0)
     assert vehicle.pose == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
     np.testing.assert_array_equal(vehicle.state[3:6], 0.0)
@@ -35,7 +35,7 @@ def test_stays_put_until_the_first_control(make_dynamics):
 
 @MODELS
 def test_ground_stops_the_fall_but_not_the_climb(make_dynamics):
-    vehicle = Vehicle(make_dynamics(), [0.0, 0.0, 0.1], time=0.0)
+    vehicle = SimulatedVehicle(make_dynamics(), [0.0, 0.0, 0.1], time=0.0)
     vehicle.command([0.0, 0.0, 0.0, 0.0])
     vehicle.advance_to(1.0)
     assert vehicle.state[2] == 0.0
@@ -49,7 +49,7 @@ def test_ground_stops_the_fall_but_not_the_climb(make_dynamics):
 @given(moments=st.lists(st.floats(0.0, 0.4), max_size=30))
 def test_how_often_it_is_asked_does_not_matter(make_dynamics, moments):
     def fly(moments):
-        vehicle = Vehicle(make_dynamics(), [0.0, 0.0, 1.0], time=0.0)
+        vehicle = SimulatedVehicle(make_dynamics(), [0.0, 0.0, 1.0], time=0.0)
         vehicle.command([0.05, -0.1, 0.2, 10.0])
         for moment in moments:
             vehicle.advance_to(moment)
@@ -62,7 +62,7 @@ def test_how_often_it_is_asked_does_not_matter(make_dynamics, moments):
 def test_the_same_controls_at_the_same_times_give_the_same_flight(make_dynamics):
     def fly():
         rng = np.random.default_rng(3)
-        vehicle = Vehicle(make_dynamics(), [0.0, 0.0, 1.0], time=12.3)
+        vehicle = SimulatedVehicle(make_dynamics(), [0.0, 0.0, 1.0], time=12.3)
         states = []
         for moment in 12.3 + np.cumsum(rng.uniform(0.001, 0.03, 100)):
             vehicle.advance_to(moment)
@@ -74,7 +74,7 @@ def test_the_same_controls_at_the_same_times_give_the_same_flight(make_dynamics)
 
 
 def test_levels_out_and_stops_when_controls_stop():
-    vehicle = Vehicle(NearHover(), [0.0, 0.0, 100.0], time=0.0)
+    vehicle = SimulatedVehicle(NearHover(), [0.0, 0.0, 100.0], time=0.0)
     vehicle.command([0.1, 0.1, 0.3, GRAVITY])
     vehicle.advance_to(0.499)
     turning = vehicle.pose[1]
@@ -90,7 +90,7 @@ def test_levels_out_and_stops_when_controls_stop():
 
 @MODELS
 def test_goes_on_when_the_clock_is_reset(make_dynamics):
-    vehicle = Vehicle(make_dynamics(), [0.0, 0.0, 1.0], time=50.0)
+    vehicle = SimulatedVehicle(make_dynamics(), [0.0, 0.0, 1.0], time=50.0)
     vehicle.command(HOVER)
     vehicle.advance_to(50.3)
     vehicle.advance_to(1.0)
@@ -102,7 +102,7 @@ def test_goes_on_when_the_clock_is_reset(make_dynamics):
 
 
 def test_a_time_just_past_changes_nothing():
-    vehicle = Vehicle(NearHover(), [0.0, 0.0, 1.0], time=0.0)
+    vehicle = SimulatedVehicle(NearHover(), [0.0, 0.0, 1.0], time=0.0)
     vehicle.command([0.1, 0.0, 0.0, 11.0])
     vehicle.advance_to(0.1)
     state = vehicle.state

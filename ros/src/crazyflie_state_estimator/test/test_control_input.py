@@ -1,4 +1,4 @@
-"""When a control says something about acceleration, and what."""
+"""When the acceleration is known from a control, and its value."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def test_a_control_is_known_until_it_is_old():
     assert control.acceleration(0.0, 10.01 + HOLD_LIMIT) is None
 
 
-def test_a_control_from_before_a_reset_of_time_says_nothing():
+def test_a_control_from_before_a_reset_of_time_is_not_used():
     control = ControlInput()
     control.command(HOVER, 10.0)
     assert control.acceleration(0.0, 1.0) is None
@@ -38,7 +38,7 @@ def test_thrust_is_taken_for_no_more_than_a_vehicle_has(thrust, acceleration):
 
 
 @pytest.mark.parametrize("thrust", [0.0, -5.0, 3.9])
-def test_less_thrust_than_in_flight_says_nothing(thrust):
+def test_less_thrust_than_in_flight_is_not_used(thrust):
     control = ControlInput()
     control.command(np.array([0.1, 0.1, 0.0, thrust]), 0.0)
     assert control.acceleration(0.0, 0.0) is None

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from tf2_msgs.msg import TFMessage
 
@@ -14,6 +16,7 @@ from crazyflie_state_estimator.estimator_node import (
     PositionVelocityStateEstimatorNode,
     PositionVelocityYawStateEstimatorNode,
 )
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 
@@ -212,8 +215,8 @@ def test_the_kalman_filter_smooths(axis):
         position, attitude = moving(elapsed)
         return position + 0.001 * rng.normal(size=3), attitude + 0.005 * rng.normal(size=3)
 
-    def deviation(kind):
-        process = launch(FullStateEstimatorNode, x_dim=12, **{"filter/type": kind})
+    def deviation(filter_type):
+        process = launch(FullStateEstimatorNode, x_dim=12, **{"filter/type": filter_type})
         fly(process, noisily, 3.0)
         states = [message.state for message in process.published("/state")]
         assert len(states) == 299
@@ -240,7 +243,7 @@ def thrown(process, thrust):
             errors.append(abs(process.published("/state")[-1].state.z_dot - speed))
             acceleration = 5.0
         control = Control(thrust=thrust + acceleration)
-        if "/control" in process.transport.inlets:
+        if "/control" in process.transport.subscribers:
             process.publish("/control", ControlStamped(control=control))
         height += 0.01 * speed + 0.5 * 0.01**2 * acceleration
         speed += 0.01 * acceleration
@@ -248,10 +251,10 @@ def thrown(process, thrust):
 
 
 def test_the_kalman_filter_uses_the_control_it_is_given():
-    untold = thrown(launch(**{"filter/type": "kalman"}), 9.81)
-    told = thrown(launch(**{"filter/type": "kalman", "topics/control": "/control"}), 9.81)
-    assert max(untold) > 0.1
-    assert max(told) < 0.001
+    without = thrown(launch(**{"filter/type": "kalman"}), 9.81)
+    with_control = thrown(launch(**{"filter/type": "kalman", "topics/control": "/control"}), 9.81)
+    assert max(without) > 0.1
+    assert max(with_control) < 0.001
 
 
 def test_controls_that_are_not_finite_are_ignored():
@@ -270,3 +273,52 @@ def test_the_kalman_filter_begins_anew_when_time_is_reset():
     fly(process, moving, 0.02)
     (message,) = process.published("/state")[before:]
     assert message.state.x_dot == pytest.approx(1.0, abs=0.01)
+
+
+# Changes in flight.
+
+
+def reconfigure(process, **values):
+    """Change parameters as dynamic_reconfigure does."""
+    request = ReconfigureRequest(encode_config(values))
+    return process.call("/state_estimator/set_parameters", request)
+
+
+def test_a_change_of_the_filter_keeps_what_it_knows():
+    changed, unchanged = (launch(**{"filter/type": "kalman"}) for _ in range(2))
+    for process in (changed, unchanged):
+        fly(process, moving, 1.0)
+    reconfigure(changed, **{"filter/position_noise": 0.02, "filter/acceleration_walk": 0.5})
+    for process in (changed, unchanged):
+        fly(process, lambda elapsed: moving(1.0 + elapsed), 0.05)
+        speeds = [message.state.x_dot for message in process.published("/state")[-5:]]
+        assert speeds == pytest.approx([1.0] * 5, abs=1e-6)
+
+
+def test_a_changed_filter_smooths_more():
+    def jump(**changes):
+        process = launch(**{"filter/type": "kalman"})
+        fly(process, moving, 1.0)
+        reconfigure(process, **changes)
+        process.publish("/tf", TFMessage([transform(process, (2.02, -2.0, 0.5))]))
+        process.advance(0.01)
+        return process.published("/state")[-1].state.x_dot - 1.0
+
+    assert 0.0 < jump(**{"filter/position_noise": 0.1}) < 0.5 * jump()
+
+
+@pytest.mark.parametrize(("changes", "walk"), [({}, 3.0), ({"topics/control": "/control"}, 1.0)])
+def test_the_walk_that_is_offered_depends_on_the_control(changes, walk):
+    process = launch(**{"filter/type": "kalman"}, **changes)
+    response = reconfigure(process, **{"filter/angle_noise": 0.01})
+    doubles = {parameter.name: parameter.value for parameter in response.config.doubles}
+    assert doubles["filter/acceleration_walk"] == walk
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("filter/position_noise", 0.0), ("filter/type", "finite_difference")]
+)
+def test_bad_changes_are_refused(name, value):
+    process = launch(**{"filter/type": "kalman"})
+    with pytest.raises(ServiceError, match=name):
+        reconfigure(process, **{name: value})

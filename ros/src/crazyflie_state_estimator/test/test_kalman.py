@@ -118,11 +118,13 @@ def test_a_known_acceleration_is_taken_over_at_once():
     rate = DT * np.concatenate([[0.0], np.cumsum(known[:-1])])
     signal = np.concatenate([[0.0], np.cumsum(DT * rate[:-1] + DT**2 / 2.0 * known[:-1])])
     acting = [None, *[np.array([value]) for value in known[:-1]]]
-    _, told = run(ConstantAccelerationFilter(NOISE, 1.0), signal[:, None], accelerations=acting)
-    _, untold = run(ConstantAccelerationFilter(NOISE, 1.0), signal[:, None])
+    _, with_control = run(
+        ConstantAccelerationFilter(NOISE, 1.0), signal[:, None], accelerations=acting
+    )
+    _, without = run(ConstantAccelerationFilter(NOISE, 1.0), signal[:, None])
     settled = slice(150, None)
-    assert np.abs(told[settled, 0] - rate[1:][settled]).max() < 1e-3
-    assert np.abs(untold[settled, 0] - rate[1:][settled]).max() > 0.1
+    assert np.abs(with_control[settled, 0] - rate[1:][settled]).max() < 1e-3
+    assert np.abs(without[settled, 0] - rate[1:][settled]).max() > 0.1
 
 
 @pytest.mark.parametrize("offset", [-3.0, 9.81])

@@ -4,7 +4,13 @@ State x = (x, y, z, x_dot, y_dot, z_dot, yaw, yaw_dot) in the fixed frame, m, m/
 rad and rad/s; control as everywhere: roll, pitch, yaw_dot, thrust.
 """
 
+from collections.abc import Sequence
+
+from typing_extensions import override
+
+from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_model.dynamics import Dynamics, NearHover
+from crazyflie_model.elementwise import Number, Vector
 
 
 class YawLag(Dynamics):
@@ -16,21 +22,22 @@ class YawLag(Dynamics):
         self._time_constant = time_constant
         self._near_hover = NearHover()
 
-    def initial_state(self, position) -> list:
-        """See `Dynamics.initial_state`; yaw is 0."""
+    @override
+    def initial_state(self, position: Sequence[Number]) -> Vector:
         return [*self._near_hover.initial_state(position), 0.0]
 
-    def rates(self, t: float, x: list, u: list) -> list:
-        """See `Dynamics.rates`."""
+    @override
+    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
         *others, yaw_dot = x
         roll, pitch, commanded, thrust = u
         rates = self._near_hover.rates(t, others, [roll, pitch, yaw_dot, thrust])
         return [*rates, (commanded - yaw_dot) / self._time_constant]
 
-    def on_ground(self, x: list) -> list:
-        """See `Dynamics.on_ground`."""
+    @override
+    def on_ground(self, x: Vector) -> Vector:
         return [*self._near_hover.on_ground(x[:7]), x[7]]
 
-    def pose(self, x: list, u: list) -> tuple:
-        """See `Dynamics.pose`: roll and pitch are those of the control."""
+    @override
+    def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:
+        # Roll and pitch are those of the control.
         return self._near_hover.pose(x[:7], u)

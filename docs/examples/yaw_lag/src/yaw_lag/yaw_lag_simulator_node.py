@@ -1,15 +1,26 @@
 """Simulator of a vehicle with a lagging yaw rate."""
 
+from typing_extensions import override
+
 from crazyflie_model.dynamics import Dynamics
-from crazyflie_simulator.simulator_node import SimulatorNode
-from crazyflie_utils.parameter_types import Number
+from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
+from crazyflie_utils import parameter
+from crazyflie_utils.parameter_types import TIME_STEP
 from yaw_lag.dynamics import YawLag
 from yaw_lag.gains import TIME_CONSTANT
 
 
-class YawLagSimulatorNode(SimulatorNode):
-    """Own parameter: ~yaw_time_constant (s)."""
+class YawLagSimulatorParameters(SimulatorParameters):
+    """Parameters of `YawLagSimulatorNode`."""
 
-    def load_dynamics(self, handle) -> Dynamics:
-        """See `SimulatorNode.load_dynamics`."""
-        return YawLag(handle.param("yaw_time_constant", Number(unit="s", above=0.0), TIME_CONSTANT))
+    yaw_time_constant: float = parameter(TIME_STEP, "lag of the yaw rate", TIME_CONSTANT)
+
+
+class YawLagSimulatorNode(SimulatorNode):
+    """A vehicle whose yaw rate follows its command with a lag."""
+
+    parameters_type = YawLagSimulatorParameters
+
+    @override
+    def make_dynamics(self, parameters: YawLagSimulatorParameters) -> Dynamics:
+        return YawLag(parameters.yaw_time_constant)

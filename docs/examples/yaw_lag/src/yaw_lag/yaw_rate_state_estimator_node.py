@@ -1,20 +1,29 @@
 """Position, velocity, yaw and yaw rate from tf."""
 
 import numpy as np
+from typing_extensions import override
 
-from crazyflie_state_estimator.estimator_node import StateEstimatorNode
+from crazyflie_state_estimator.estimator_node import StateEstimatorNode, StateEstimatorParameters
 from crazyflie_state_estimator.motion import Motion
-from yaw_lag.msg import YawRateState, YawRateStateStamped
+from crazyflie_utils import parameter
+from crazyflie_utils.parameter_types import Integer
+from yaw_lag.msg import YawRateStateStamped
+
+
+class YawRateStateEstimatorParameters(StateEstimatorParameters):
+    """Parameters of `YawRateStateEstimatorNode`."""
+
+    x_dim: int = parameter(Integer(8, 8), "number of fields of the state")
 
 
 class YawRateStateEstimatorNode(StateEstimatorNode):
     """Publish x, y, z, x_dot, y_dot, z_dot, yaw, yaw_dot."""
 
-    def __init__(self):
-        super().__init__(YawRateStateStamped, YawRateState)
+    state_type = YawRateStateStamped
+    parameters_type = YawRateStateEstimatorParameters
 
+    @override
     def state(self, motion: Motion) -> np.ndarray:
-        """See `StateEstimatorNode.state`."""
         return np.concatenate(
             [motion.position, motion.velocity, motion.attitude[2:], motion.attitude_rate[2:]]
         )

@@ -1,10 +1,21 @@
 """Position, velocity, yaw and yaw rate state; a reference without the last two."""
 
 import numpy as np
+from typing_extensions import override
 
-from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode
+from crazyflie_lqr.gain_file import MatrixFile
+from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
 from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_utils import parameter
+from crazyflie_utils.parameter_types import Integer
 from yaw_lag.msg import YawRateStateStamped
+
+
+class YawRateStateLqrParameters(LinearFeedbackParameters):
+    """Parameters of `YawRateStateLqrNode`."""
+
+    x_dim: int = parameter(Integer(8, 8), "length of the state")
+    K: np.ndarray = parameter(MatrixFile(4, 8), "gain file", name="K_file", live=True)
 
 
 class YawRateStateLqrNode(LinearFeedbackNode):
@@ -12,9 +23,10 @@ class YawRateStateLqrNode(LinearFeedbackNode):
 
     state_type = YawRateStateStamped
     reference_type = PositionVelocityStateStamped
-    x_dim = 8
+    parameters_type = YawRateStateLqrParameters
     yaw_index = 6
 
-    def lift(self, reference: np.ndarray) -> np.ndarray:
-        """See `LinearFeedbackNode.lift`: reference yaw and yaw rate are 0."""
+    @override
+    def complete_reference(self, reference: np.ndarray) -> np.ndarray:
+        """Return the reference with yaw and yaw rate 0."""
         return np.append(reference, [0.0, 0.0])

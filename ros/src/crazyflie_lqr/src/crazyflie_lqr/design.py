@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from crazyflie_lqr.models import LinearModel
@@ -38,9 +39,9 @@ class Weights:
         Of their products: ``[[Q, N], [N^T, R]]`` is positive semidefinite.
     """
 
-    Q: np.ndarray
-    R: np.ndarray
-    N: np.ndarray
+    Q: NDArray[np.float64]
+    R: NDArray[np.float64]
+    N: NDArray[np.float64]
 
     def check(self) -> None:
         """Raise `DesignError` unless the weights make a cost that has a minimum."""
@@ -92,19 +93,19 @@ class Design:
         s; 0 is continuous.
     """
 
-    K: np.ndarray
-    A: np.ndarray
-    B: np.ndarray
+    K: NDArray[np.float64]
+    A: NDArray[np.float64]
+    B: NDArray[np.float64]
     sample_time: float
 
     @property
-    def feedback(self) -> np.ndarray:
+    def feedback(self) -> NDArray[np.float64]:
         """Gains on all states of the plant, shape (u_dim, n): none on controls on their way."""
         missing = self.A.shape[0] - self.K.shape[1]
         return np.pad(self.K, ((0, 0), (0, missing)))
 
     @property
-    def poles(self) -> np.ndarray:
+    def poles(self) -> NDArray[np.float64]:
         """Poles of the closed loop, shape (n,), rad/s; of a sampled one log(z) / sample_time.
 
         A pole near z = 0, gone after some samples, is at minus infinity.
@@ -140,7 +141,7 @@ def design_gains(
     Notes
     -----
     With a delay the optimal control also feeds back the controls that are on
-    their way, ``u = K_x x + K_u (u[-1] + ... )``, which a gain file cannot say.
+    their way, ``u = K_x x + K_u (u[-1] + ... )``, which a gain file cannot hold.
     The gains returned are those for controls that change little within the
     delay, ``u = (1 - sum K_u)^-1 K_x x``. They are within some percent of the
     cost of the best gains on the state alone.
@@ -175,7 +176,9 @@ def design_gains(
     return design
 
 
-def sampled(model: LinearModel, sample_time: float, delay: float) -> tuple:
+def sampled(
+    model: LinearModel, sample_time: float, delay: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return one step of a model whose control is held and comes late.
 
     Parameters

@@ -23,7 +23,7 @@ of a text file with them
 """
 
 
-def main(arguments: list | None = None) -> int:
+def main(arguments: list[str] | None = None) -> int:
     """Run the command; return its exit status: 0, 1 for a design that cannot be, 2 for usage.
 
     Parameters
@@ -39,7 +39,7 @@ def main(arguments: list | None = None) -> int:
         design = design_gains(model, weights, options.sample_time, options.delay)
         print(report(model, design))
         if options.out:
-            save_matrix(options.out, design.K, _header(model, weights, options))
+            save_matrix(options.out, design.K, _comment(model, weights, options))
             print(f"wrote {options.out}")
         if options.plot:
             from crazyflie_lqr.design_plot import save_plot
@@ -93,7 +93,7 @@ def _parser():
     parser.add_argument("--out", metavar="FILE", help="write the gains to a file")
     parser.add_argument("--plot", metavar="FILE", help="draw step responses and Bode diagrams")
     # What looks like an option but is a list of numbers is one.
-    parser._negative_number_matcher = _NumberList()
+    parser._negative_number_matcher = _NumberList()  # type: ignore[assignment]
     return parser
 
 
@@ -141,7 +141,7 @@ def _numbers(text):
     return [float(word) for word in text.replace(",", " ").split()]
 
 
-def _header(model, weights, options):
+def _comment(model, weights, options):
     command = f"design_gains --model {model.name} --Q {_words(weights.Q)} --R {_words(weights.R)}"
     if weights.N.any():
         command += f" --N {_words(weights.N)}"
@@ -171,7 +171,7 @@ def _time(design):
 
 
 def _poles(design):
-    texts = {}
+    texts: dict[str, int] = {}
     for pole in sorted(design.poles, key=lambda p: (-p.real, abs(p.imag))):
         if pole.imag >= -1e-6 * abs(pole):
             text = f"{pole.real:.4g}"

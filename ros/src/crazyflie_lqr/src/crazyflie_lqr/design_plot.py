@@ -5,6 +5,7 @@ import math
 import control
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from crazyflie_lqr.design import Design
 from crazyflie_lqr.margins import loop_response
@@ -16,7 +17,13 @@ _OUTPUTS = {"x": "pitch", "y": "roll", "z": "thrust", "yaw": "yaw_dot"}
 _UNITS = {"roll": "rad", "pitch": "rad", "yaw_dot": "rad/s", "thrust": "m/s²"}
 
 
-def step_responses(model: LinearModel, design: Design) -> tuple:
+Responses = dict[str, NDArray[np.float64]]
+"""By name of an output, shape (n,)."""
+
+
+def step_responses(
+    model: LinearModel, design: Design
+) -> tuple[NDArray[np.float64], Responses, Responses]:
     """Return what follows a unit step of the reference in x, y, z and yaw, each alone.
 
     Parameters
@@ -28,8 +35,8 @@ def step_responses(model: LinearModel, design: Design) -> tuple:
     -------
     time : ndarray, shape (n,)
         s.
-    states, controls : dict of str to ndarray, shape (n,)
-        By name of the output: how it moves, in m or rad; and the control that moves it.
+    states, controls : dict
+        How each output moves, in m or rad; and the control that moves it.
     """
     slowest = -design.poles.real.max()
     duration = min(8.0 / slowest, 60.0)
@@ -38,7 +45,8 @@ def step_responses(model: LinearModel, design: Design) -> tuple:
     else:
         time = np.linspace(0.0, duration, 1000)
     A = design.A + design.B @ design.feedback
-    states, controls = {}, {}
+    states: Responses = {}
+    controls: Responses = {}
     for output, answer in _OUTPUTS.items():
         index = model.states.index(output)
         B = -design.B @ design.K[:, [index]]
@@ -59,7 +67,8 @@ def save_plot(path: str, model: LinearModel, design: Design) -> None:
     """
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     (position, magnitude), (effort, phase) = figure.subplots(2, 2)
-    _draw_steps(position, effort, *step_responses(model, design), design.sample_time > 0.0)
+    time, states, controls = step_responses(model, design)
+    _draw_steps(position, effort, time, states, controls, design.sample_time > 0.0)
     _draw_bode(magnitude, phase, design)
     figure.suptitle(f"{model.name}: closed loop, and loops broken at the plant's input")
     figure.savefig(path, dpi=120)

@@ -1,7 +1,22 @@
-"""Full state; a reference of the same kind."""
+"""Full state; a reference of the same type."""
 
-from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode
+import numpy as np
+from numpy.typing import NDArray
+
+from crazyflie_lqr.gain_file import MatrixFile
+from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
 from crazyflie_msgs.msg import FullStateStamped
+from crazyflie_utils import parameter
+from crazyflie_utils.parameter_types import Integer
+
+
+class FullStateLqrParameters(LinearFeedbackParameters):
+    """Parameters of `FullStateLqrNode`."""
+
+    x_dim: int = parameter(Integer(12, 12), "length of the state")
+    K: NDArray[np.float64] = parameter(
+        MatrixFile(4, 12), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
+    )
 
 
 class FullStateLqrNode(LinearFeedbackNode):
@@ -13,5 +28,5 @@ class FullStateLqrNode(LinearFeedbackNode):
 
     state_type = FullStateStamped
     reference_type = FullStateStamped
-    x_dim = 12
+    parameters_type = FullStateLqrParameters
     yaw_index = 8

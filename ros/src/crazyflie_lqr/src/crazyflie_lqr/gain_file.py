@@ -1,23 +1,27 @@
 """Gain files: matrices as text.
 
 One row of the matrix a line, numbers separated by blanks; empty lines, and what
-follows a ``#``, are skipped.
+follows a ``#``, are skipped. Files that are written have their comments at the end:
+the reader of the C++ workspace knows no comments, and stops at the first.
 """
 
 import math
 import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import override
 
-from crazyflie_utils.parameter_types import TEXT
+from crazyflie_utils.parameter_types import TEXT, ParameterType
 
 
 class GainFileError(ValueError):
     """A gain file is unusable; the text names the file, the line and the expected shape."""
 
 
-def load_matrix(path: str, rows: int, columns: int) -> np.ndarray:
+def load_matrix(path: str, rows: int, columns: int) -> NDArray[np.float64]:
     """Return the matrix in a file.
 
     Parameters
@@ -36,7 +40,7 @@ def load_matrix(path: str, rows: int, columns: int) -> np.ndarray:
         The file cannot be read, or does not hold such a matrix of finite numbers.
     """
     expected = f"expected {rows} rows of {columns} numbers"
-    matrix = []
+    matrix: list[list[float]] = []
     for number, row in _rows(path, expected):
         if len(row) != columns:
             raise GainFileError(f"{path}, line {number}: {_count(row)}, {expected}")
@@ -49,7 +53,7 @@ def load_matrix(path: str, rows: int, columns: int) -> np.ndarray:
     return np.array(matrix)
 
 
-def load_vector(path: str, length: int) -> np.ndarray:
+def load_vector(path: str, length: int) -> NDArray[np.float64]:
     """Return the vector in a file, which may be one row or one column.
 
     Parameters
@@ -68,8 +72,8 @@ def load_vector(path: str, length: int) -> np.ndarray:
         The file cannot be read, or does not hold such a vector of finite numbers.
     """
     expected = f"expected {length} numbers in one row or one column"
-    vector = []
-    width = None
+    vector: list[float] = []
+    width = 0
     for number, row in _rows(path, expected):
         width = width or len(row)
         vector += row
@@ -81,15 +85,15 @@ def load_vector(path: str, length: int) -> np.ndarray:
     return np.array(vector)
 
 
-def save_matrix(path: str, matrix: np.ndarray, header: str = "") -> None:
+def save_matrix(path: str, matrix: ArrayLike, comment: str = "") -> None:
     """Write a matrix so that `load_matrix` reads it back to 12 digits.
 
     Parameters
     ----------
     path : str
-    matrix : ndarray, shape (rows, columns)
-    header : str
-        Lines of comment for the top of the file, without the ``#``.
+    matrix : array_like, shape (rows, columns)
+    comment : str
+        Lines for the end of the file, without the ``#``.
 
     Raises
     ------
@@ -97,22 +101,23 @@ def save_matrix(path: str, matrix: np.ndarray, header: str = "") -> None:
         The file cannot be written.
     """
     with open(path, "w", encoding="utf-8") as file:
-        for line in header.splitlines():
-            file.write(f"# {line}".rstrip() + "\n")
         # Adding 0 turns -0, which would read like a sign that matters, into 0.
         for row in np.asarray(matrix) + 0.0:
             file.write(" ".join(f"{value:.12g}" for value in row) + "\n")
+        for line in comment.splitlines():
+            file.write(f"# {line}".rstrip() + "\n")
 
 
 @dataclass(frozen=True)
-class MatrixFile:
-    """Kind of a parameter that is the path of a file with a matrix of this shape."""
+class MatrixFile(ParameterType):
+    """The path of a gain file; the value is its matrix, of this shape."""
 
     rows: int
     columns: int
+    label = "path"
 
-    def __call__(self, value) -> np.ndarray:
-        """Return the matrix."""
+    @override
+    def __call__(self, value: Any) -> NDArray[np.float64]:
         return load_matrix(TEXT(value), self.rows, self.columns)
 
     def __str__(self) -> str:
@@ -121,13 +126,14 @@ class MatrixFile:
 
 
 @dataclass(frozen=True)
-class VectorFile:
-    """Kind of a parameter that is the path of a file with a vector of this length."""
+class VectorFile(ParameterType):
+    """The path of a gain file; the value is its vector, of this length."""
 
     length: int
+    label = "path"
 
-    def __call__(self, value) -> np.ndarray:
-        """Return the vector."""
+    @override
+    def __call__(self, value: Any) -> NDArray[np.float64]:
         return load_vector(TEXT(value), self.length)
 
     def __str__(self) -> str:

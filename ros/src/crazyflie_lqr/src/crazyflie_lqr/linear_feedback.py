@@ -6,7 +6,11 @@ yaw_dot, thrust) in rad, rad/s and m/s^2 (mass-normalised): positive roll
 accelerates to the right of the heading, positive pitch along it.
 """
 
+from typing import Self
+
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import override
 
 from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
@@ -17,11 +21,13 @@ _LEAST = np.array([-MAX_TILT, -MAX_TILT, -np.inf, MIN_THRUST])
 _MOST = np.array([MAX_TILT, MAX_TILT, np.inf, MAX_THRUST])
 
 MAX_GAP = 0.5
-"""Longest time between two states over which `LiftController` integrates, s."""
+"""Longest time between two states over which `IntegralStateFeedback` integrates, s."""
 
 
-def heading_error(x: np.ndarray, x_ref: np.ndarray, yaw_index: int) -> np.ndarray:
-    """Return the error of a state as the pilot in the vehicle sees it.
+def heading_error(
+    x: NDArray[np.float64], x_ref: NDArray[np.float64], yaw_index: int
+) -> NDArray[np.float64]:
+    """Return the error of a state in the heading frame.
 
     Parameters
     ----------
@@ -45,7 +51,7 @@ def heading_error(x: np.ndarray, x_ref: np.ndarray, yaw_index: int) -> np.ndarra
     return e
 
 
-def at_rest(x: np.ndarray, yaw_index: int) -> np.ndarray:
+def at_rest(x: NDArray[np.float64], yaw_index: int) -> NDArray[np.float64]:
     """Return the reference, shape (x_dim,), that stays at the place and heading of a state."""
     x_ref = np.zeros_like(x)
     x_ref[:3] = x[:3]
@@ -66,12 +72,14 @@ class LinearFeedback:
         Where the yaw is in the state.
     """
 
-    def __init__(self, K: np.ndarray, u_ref: np.ndarray, yaw_index: int):
+    def __init__(self, K: NDArray[np.float64], u_ref: NDArray[np.float64], yaw_index: int):
         self.K = K
         self.u_ref = u_ref
         self.yaw_index = yaw_index
 
-    def control(self, x: np.ndarray, x_ref: np.ndarray, time: float) -> np.ndarray:
+    def control(
+        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
+    ) -> NDArray[np.float64]:
         """Return the control for a state.
 
         Parameters
@@ -87,9 +95,12 @@ class LinearFeedback:
         """
         return self.u_ref + self.K @ heading_error(x, x_ref, self.yaw_index)
 
+    def take_over(self, previous: Self) -> None:
+        """Continue in flight where a controller with other parameters ends."""
 
-class LiftController(LinearFeedback):
-    """Linear feedback with an integrator, within limits.
+
+class IntegralStateFeedback(LinearFeedback):
+    """Linear feedback with an integral of the position error, saturated.
 
     To the linear feedback it adds ``k I`` for each axis: that of x to the pitch,
     that of y to the roll, that of z to the thrust. I is the integral of the
@@ -109,17 +120,26 @@ class LiftController(LinearFeedback):
     """
 
     def __init__(
-        self, K, u_ref, yaw_index: int, integrator_k=(0.0,) * 3, integrator_limit=(0.0,) * 3
+        self,
+        K: NDArray[np.float64],
+        u_ref: NDArray[np.float64],
+        yaw_index: int,
+        integrator_k: ArrayLike = (0.0, 0.0, 0.0),
+        integrator_limit: ArrayLike = (0.0, 0.0, 0.0),
     ):
         super().__init__(K, u_ref, yaw_index)
+        self._integrator_k = np.asarray(integrator_k, dtype=float)
         self._integrator_K = np.zeros((len(u_ref), 3))
-        self._integrator_K[[PITCH, ROLL, THRUST], [0, 1, 2]] = integrator_k
+        self._integrator_K[[PITCH, ROLL, THRUST], [0, 1, 2]] = self._integrator_k
         self._integrator_limit = np.asarray(integrator_limit, dtype=float)
         self._integral = np.zeros(3)
-        self._time = None
+        self._time: float | None = None
 
-    def control(self, x: np.ndarray, x_ref: np.ndarray, time: float) -> np.ndarray:
-        """See `LinearFeedback.control`.
+    @override
+    def control(
+        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
+    ) -> NDArray[np.float64]:
+        """Return the control for a state; see `LinearFeedback.control`.
 
         A state that is not younger than the last one, or comes more than
         `MAX_GAP` after it, adds nothing to the integral.
@@ -129,11 +149,21 @@ class LiftController(LinearFeedback):
         u = self.u_ref + self.K @ e + self._integrator_K @ self._integral
         return np.minimum(np.maximum(u, _LEAST), _MOST)
 
+    @override
+    def take_over(self, previous: Self) -> None:
+        """Take over the integral such that ``k I`` does not jump, as far as the limits allow."""
+        scale = np.ones(3)
+        np.divide(previous._integrator_k, self._integrator_k, scale, where=self._integrator_k != 0)
+        self._integral = self._within_limits(previous._integral * scale)
+        self._time = previous._time
+
     def _integrate(self, error, time):
         dt = 0.0 if self._time is None else time - self._time
         self._time = time
         # An error that overflowed must not stay in the integral.
         if 0.0 < dt <= MAX_GAP and np.isfinite(error).all():
-            limit = self._integrator_limit
-            integral = self._integral + error * dt
-            self._integral = np.minimum(np.maximum(integral, -limit), limit)
+            self._integral = self._within_limits(self._integral + error * dt)
+
+    def _within_limits(self, integral):
+        limit = self._integrator_limit
+        return np.minimum(np.maximum(integral, -limit), limit)

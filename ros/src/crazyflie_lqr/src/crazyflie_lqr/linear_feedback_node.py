@@ -1,48 +1,64 @@
 """ROS interface of every controller that turns a state and a reference into a control."""
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import override
 
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import LinearFeedback
 from crazyflie_lqr.reference import GuardedReference
 from crazyflie_msgs.msg import Control, ControlStamped
-from crazyflie_utils.node import Node
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import TOPIC, Integer
-from crazyflie_utils.vectors import from_vector, is_finite, to_vector
+from crazyflie_utils.vectors import from_vector, to_vector
+
+
+class LinearFeedbackParameters(Parameters):
+    """Parameters of a controller of 7 states; one of more declares `x_dim` and `K` anew."""
+
+    x_dim: int = parameter(Integer(7, 7), "length of the state")
+    u_dim: int = parameter(Integer(4, 4), "length of the control")
+    K: NDArray[np.float64] = parameter(
+        MatrixFile(4, 7), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
+    )
+    u_ref: NDArray[np.float64] = parameter(
+        VectorFile(4),
+        "control at the reference, `u_dim` numbers in one row or one column",
+        name="u_ref_file",
+        live=True,
+    )
+    reference_topic: str = parameter(TOPIC, "where references come from", name="topics/reference")
+    state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
+    control_topic: str = parameter(TOPIC, "where controls go", name="topics/control")
 
 
 class LinearFeedbackNode(Node):
     """Answer every state with a control that leads towards the reference.
 
-    A subclass says in class attributes what it works with, and may override
-    `lift` and `make_controller`.
+    A subclass describes its state in class attributes, and may override
+    `complete_reference` and `make_controller`.
 
     Attributes
     ----------
     state_type, reference_type : type
         Stamped messages with a field ``state``, all float64.
-    x_dim, u_dim : int
-        Lengths of state and control.
+    parameters_type : type
+        `LinearFeedbackParameters` or a subclass.
     yaw_index : int
         Where the yaw is in the state, which begins with position and velocity.
     """
 
     state_type: type
     reference_type: type
-    x_dim: int
-    u_dim = 4
+    parameters_type: type[LinearFeedbackParameters] = LinearFeedbackParameters
     yaw_index: int
 
-    def __init__(self):
-        super().__init__()
-        self._state_topic = None
-        self._reference_topic = None
-        self._control_topic = None
-        self._controller = None
+    def __init__(self) -> None:
         self._reference = GuardedReference(self.yaw_index)
-        self._publisher = None
 
-    def lift(self, reference: np.ndarray) -> np.ndarray:
+    def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the reference state, shape (x_dim,), that a reference message means.
 
         Parameters
@@ -52,50 +68,46 @@ class LinearFeedbackNode(Node):
         """
         return reference
 
-    def make_controller(self, handle, K: np.ndarray, u_ref: np.ndarray):
-        """Return the control law: an object with the ``control`` of `LinearFeedback`.
+    def make_controller(self, parameters: Any) -> LinearFeedback:
+        """Return the control law, at the start and after a change of live parameters.
 
         Parameters
         ----------
-        handle : NodeHandle
-            For parameters of one's own.
-        K : ndarray, shape (u_dim, x_dim)
-        u_ref : ndarray, shape (u_dim,)
+        parameters : LinearFeedbackParameters
+            Of the type `parameters_type`.
         """
-        return LinearFeedback(K, u_ref, self.yaw_index)
+        return LinearFeedback(parameters.K, parameters.u_ref, self.yaw_index)
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        x_dim = handle.param("x_dim", Integer(self.x_dim, self.x_dim))
-        u_dim = handle.param("u_dim", Integer(self.u_dim, self.u_dim))
-        K = handle.param("K_file", MatrixFile(u_dim, x_dim))
-        u_ref = handle.param("u_ref_file", VectorFile(u_dim))
-        self._reference_topic = handle.param("topics/reference", TOPIC)
-        self._state_topic = handle.param("topics/state", TOPIC)
-        self._control_topic = handle.param("topics/control", TOPIC)
-        self._controller = self.make_controller(handle, K, u_ref)
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(self.parameters_type, self._reconfigure)
+        self._controller = self.make_controller(self._parameters)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
-        self._publisher = handle.publisher(self._control_topic, ControlStamped)
-        handle.subscribe(self._reference_topic, self.reference_type, self._on_reference)
-        handle.subscribe(self._state_topic, self.state_type, self._on_state)
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = handle.publisher(parameters.control_topic, ControlStamped)
+        handle.subscribe(
+            parameters.reference_topic,
+            self.reference_type,
+            self._on_reference,
+            finite="state",
+            on_invalid=self._on_invalid_reference,
+        )
+        handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
+
+    def _reconfigure(self, parameters):
+        controller = self.make_controller(parameters)
+        controller.take_over(self._controller)
+        self._controller = controller
 
     def _on_reference(self, message):
-        if is_finite(message.state):
-            self._reference.good(self.lift(to_vector(message.state)))
-            return
-        self._reference.bad(self._handle.time())
-        self._handle.warn(
-            f"ignoring a reference on {self._reference_topic} that is not finite", throttle=1.0
-        )
+        self._reference.update(self.complete_reference(to_vector(message.state)))
+
+    def _on_invalid_reference(self):
+        self._reference.invalidate(self._handle.time())
 
     def _on_state(self, message):
-        if not is_finite(message.state):
-            self._handle.warn(
-                f"ignoring a state on {self._state_topic} that is not finite", throttle=1.0
-            )
-            return
         x = to_vector(message.state)
         x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None:

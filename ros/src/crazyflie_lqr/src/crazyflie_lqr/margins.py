@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import control
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_lqr.design import Design
 
@@ -40,7 +41,7 @@ class Margins:
     delay: float
 
 
-def loop_response(design: Design, loop: int) -> tuple:
+def loop_response(design: Design, loop: int) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Return the frequency response of one loop broken at the plant's input.
 
     Parameters

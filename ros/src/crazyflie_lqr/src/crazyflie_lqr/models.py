@@ -7,6 +7,7 @@ u = (roll, pitch, yaw_dot, thrust) in rad, rad/s and m/s^2.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_model import inner_loops
 from crazyflie_model.units import GRAVITY
@@ -36,9 +37,9 @@ class LinearModel:
     """
 
     name: str
-    states: tuple
-    A: np.ndarray
-    B: np.ndarray
+    states: tuple[str, ...]
+    A: NDArray[np.float64]
+    B: NDArray[np.float64]
 
     @property
     def x_dim(self) -> int:
@@ -94,12 +95,12 @@ def full_state() -> LinearModel:
     """Return the 12-dimensional model: roll and pitch follow with a first-order lag.
 
     The angular rates are measured, with a lag, and act on nothing: with an
-    attitude of first order they say nothing that attitude and command do not
-    say. With no weight on them their gains are therefore zero, and the noise of
-    differentiated attitudes stays out of the control.
+    attitude of first order they follow from attitude and command. With no weight
+    on them their gains are therefore zero, and the noise of differentiated
+    attitudes stays out of the control.
     """
-    states = ("x", "y", "z", "x_dot", "y_dot", "z_dot")
-    states += ("roll", "pitch", "yaw", "roll_dot", "pitch_dot", "yaw_dot")
+    translation = ("x", "y", "z", "x_dot", "y_dot", "z_dot")
+    states = (*translation, "roll", "pitch", "yaw", "roll_dot", "pitch_dot", "yaw_dot")
     builder = _Builder("full_state", states)
     for axis in "xyz":
         builder.rate(axis, **{f"{axis}_dot": 1.0})

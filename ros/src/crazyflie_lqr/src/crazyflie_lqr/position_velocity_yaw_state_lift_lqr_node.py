@@ -1,32 +1,63 @@
 """Position, velocity and yaw state; a reference without yaw."""
 
 import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import override
 
-from crazyflie_lqr.linear_feedback import LiftController
-from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode
+from crazyflie_lqr.linear_feedback import IntegralStateFeedback
+from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
-from crazyflie_utils.parameter_types import FINITE, Number
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters import group
+
+_TILT_GAIN = Number("rad/(m s)")
+_LIMIT = Number("m s", minimum=0.0)
+
+
+class IntegratorGains(Parameters):
+    """Gains of the integral of the position error."""
+
+    x: float = parameter(_TILT_GAIN, "pitch per integral of the error in x", 0.0, live=True)
+    y: float = parameter(_TILT_GAIN, "roll per integral of the error in y", 0.0, live=True)
+    z: float = parameter(Number("1/s^3"), "thrust per integral of the error in z", 0.0, live=True)
+
+
+class IntegratorLimits(Parameters):
+    """Limits of the integral of the position error."""
+
+    x: float = parameter(_LIMIT, "the integral stays within +- this", 0.0, live=True)
+    y: float = parameter(_LIMIT, "the integral stays within +- this", 0.0, live=True)
+    z: float = parameter(_LIMIT, "the integral stays within +- this", 0.0, live=True)
+
+
+class LiftLqrParameters(LinearFeedbackParameters):
+    """Parameters of `PositionVelocityYawStateLiftLqrNode`."""
+
+    integrator_k: IntegratorGains = group(IntegratorGains, "integrator/k")
+    integrator_limit: IntegratorLimits = group(IntegratorLimits, "integrator/thresh")
 
 
 class PositionVelocityYawStateLiftLqrNode(LinearFeedbackNode):
-    """Linear feedback with an integrator and limits, to a position and velocity at yaw 0."""
+    """Saturated linear feedback with an integrator, to a position and velocity at yaw 0."""
 
     state_type = PositionVelocityYawStateStamped
     reference_type = PositionVelocityStateStamped
-    x_dim = 7
+    parameters_type = LiftLqrParameters
     yaw_index = 6
 
-    def lift(self, reference: np.ndarray) -> np.ndarray:
-        """See `LinearFeedbackNode.lift`: the reference yaw is 0."""
+    @override
+    def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the reference with yaw 0."""
         return np.append(reference, 0.0)
 
-    def make_controller(self, handle, K: np.ndarray, u_ref: np.ndarray) -> LiftController:
-        """See `LinearFeedbackNode.make_controller`."""
-        limit = Number(unit="m s", minimum=0.0)
-        return LiftController(
-            K,
-            u_ref,
+    @override
+    def make_controller(self, parameters: LiftLqrParameters) -> IntegralStateFeedback:
+        k, limit = parameters.integrator_k, parameters.integrator_limit
+        return IntegralStateFeedback(
+            parameters.K,
+            parameters.u_ref,
             self.yaw_index,
-            [handle.param(f"integrator/k/{axis}", FINITE, 0.0) for axis in "xyz"],
-            [handle.param(f"integrator/thresh/{axis}", limit, 0.0) for axis in "xyz"],
+            (k.x, k.y, k.z),
+            (limit.x, limit.y, limit.z),
         )

@@ -1,4 +1,4 @@
-"""Position, velocity and yaw state; a reference of the same kind."""
+"""Position, velocity and yaw state; a reference of the same type."""
 
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
@@ -9,5 +9,4 @@ class PositionVelocityYawStateLqrNode(LinearFeedbackNode):
 
     state_type = PositionVelocityYawStateStamped
     reference_type = PositionVelocityYawStateStamped
-    x_dim = 7
     yaw_index = 6

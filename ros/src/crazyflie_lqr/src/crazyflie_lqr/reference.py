@@ -1,17 +1,18 @@
 """The reference a controller follows while its source may fail."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_lqr.linear_feedback import at_rest
-from crazyflie_utils.last_valid import Held
+from crazyflie_utils.last_valid import LastValid
 
 
 class GuardedReference:
-    """The last good reference; or, some time after bad ones came, the place reached by then.
+    """The last valid reference; or, some time after invalid ones came, a hold point.
 
     A setpoint from a broken source is not followed for ever, yet the vehicle is
-    not dropped: `crazyflie_utils.last_valid.HOLD_LIMIT` after the first bad reference
-    it stops where it is, and stays there until a good reference comes.
+    not dropped: `crazyflie_utils.last_valid.HOLD_LIMIT` after the first invalid
+    reference it stops where it is, and stays there until a valid one comes.
 
     Parameters
     ----------
@@ -21,21 +22,21 @@ class GuardedReference:
 
     def __init__(self, yaw_index: int):
         self._yaw_index = yaw_index
-        self._held = Held()
-        self._refuge = None
+        self._last_valid: LastValid[NDArray[np.float64]] = LastValid()
+        self._hold_point: NDArray[np.float64] | None = None
         self._has_arrived = False
 
-    def good(self, x_ref: np.ndarray) -> None:
-        """Take a reference, shape (x_dim,)."""
-        self._held.good(x_ref)
-        self._refuge = None
+    def update(self, x_ref: NDArray[np.float64]) -> None:
+        """Take a valid reference, shape (x_dim,)."""
+        self._last_valid.update(x_ref)
+        self._hold_point = None
         self._has_arrived = True
 
-    def bad(self, time: float) -> None:
-        """Take note that a reference that cannot be followed came at ``time`` (s)."""
-        self._held.bad(time)
+    def invalidate(self, time: float) -> None:
+        """Take note that an invalid reference came at ``time`` (s)."""
+        self._last_valid.invalidate(time)
 
-    def value(self, time: float, x: np.ndarray) -> np.ndarray | None:
+    def value(self, time: float, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return what to follow.
 
         Parameters
@@ -48,11 +49,11 @@ class GuardedReference:
         Returns
         -------
         ndarray, shape (x_dim,), or None
-            None before the first good reference.
+            None before the first valid reference.
         """
-        x_ref = self._held.value(time)
+        x_ref = self._last_valid.value(time)
         if x_ref is None and self._has_arrived:
-            if self._refuge is None:
-                self._refuge = at_rest(x, self._yaw_index)
-            x_ref = self._refuge
+            if self._hold_point is None:
+                self._hold_point = at_rest(x, self._yaw_index)
+            x_ref = self._hold_point
         return x_ref

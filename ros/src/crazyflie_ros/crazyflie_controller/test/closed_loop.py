@@ -12,7 +12,7 @@ from crazyflie_controller.pid import Gains
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import thrust_from_pwm
-from crazyflie_simulator.vehicle import Vehicle
+from crazyflie_simulator.vehicle import SimulatedVehicle
 
 PERIOD = 0.02
 """Of the controller, s."""
@@ -76,7 +76,9 @@ class Loop:
 
     def put(self, x, y):
         """Stand the vehicle somewhere on the ground, switched on again."""
-        self._vehicle = Vehicle(StabilizedQuadrotor(**self._errors), (x, y, 0.0), self.time)
+        self._vehicle = SimulatedVehicle(
+            StabilizedQuadrotor(**self._errors), (x, y, 0.0), self.time
+        )
 
     def pose(self):
         (x, y, z), quaternion = self._vehicle.pose

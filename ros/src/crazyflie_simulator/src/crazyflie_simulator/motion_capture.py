@@ -1,15 +1,24 @@
-"""What a motion capture system makes of a pose on the way to the estimator."""
+"""The errors of a motion capture system."""
 
 import math
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
+
+from crazyflie_model.angles import Quaternion, Triple
+
+Pose = tuple[float, Triple, Quaternion]
+"""Time of a measurement (s), position (m), quaternion (x, y, z, w)."""
 
 
 class MotionCapture:
     """Poses as they are measured: with noise, some of them late, some never.
 
-    Parameters
+    All attributes may be changed at any time.
+
+    Attributes
     ----------
     position_noise : float
         Standard deviation along each axis, m.
@@ -19,6 +28,11 @@ class MotionCapture:
         Time from a measurement to its arrival, s.
     dropout : float
         Probability in [0, 1] that a pose is lost.
+
+    Parameters
+    ----------
+    position_noise, attitude_noise, latency, dropout : float
+        The attributes.
     seed : int or sequence of int
         The same seed gives the same errors to the same poses.
     """
@@ -29,54 +43,49 @@ class MotionCapture:
         attitude_noise: float = 0.0,
         latency: float = 0.0,
         dropout: float = 0.0,
-        seed=0,
+        seed: int | Sequence[int] = 0,
     ):
-        self._position_noise = position_noise
-        self._attitude_noise = attitude_noise
-        self._latency = latency
-        self._dropout = dropout
+        self.position_noise = position_noise
+        self.attitude_noise = attitude_noise
+        self.latency = latency
+        self.dropout = dropout
         self._random = np.random.default_rng(seed)
-        self._on_the_way = deque()
+        self._in_transit: deque[Pose] = deque()
 
-    def measure(self, time: float, position, quaternion) -> None:
+    def measure(self, time: float, position: Triple, quaternion: Quaternion) -> None:
         """Measure the pose that holds at ``time`` (s).
 
         Parameters
         ----------
         time : float
             Later than at the call before, s; an earlier one is a reset of the
-            clock, at which poses on the way are lost.
-        position : sequence, 3 components
-            m.
-        quaternion : sequence, 4 components
+            clock, at which poses in transit are lost.
+        position : tuple of float
+            x, y, z in m.
+        quaternion : tuple of float
             (x, y, z, w).
         """
-        if self._on_the_way and time < self._on_the_way[-1][0]:
-            self._on_the_way.clear()
-        if self._dropout > 0.0 and self._random.random() < self._dropout:
+        if self._in_transit and time < self._in_transit[-1][0]:
+            self._in_transit.clear()
+        if self.dropout > 0.0 and self._random.random() < self.dropout:
             return
-        if self._position_noise > 0.0:
-            error = self._random.normal(0.0, self._position_noise, 3).tolist()
-            position = tuple(a + b for a, b in zip(position, error, strict=True))
-        if self._attitude_noise > 0.0:
-            quaternion = _turn(quaternion, self._random.normal(0.0, self._attitude_noise, 3))
-        self._on_the_way.append((time, position, quaternion))
+        if self.position_noise > 0.0:
+            error = self._random.normal(0.0, self.position_noise, 3).tolist()
+            x, y, z = (a + b for a, b in zip(position, error, strict=True))
+            position = (x, y, z)
+        if self.attitude_noise > 0.0:
+            quaternion = _turn(quaternion, self._random.normal(0.0, self.attitude_noise, 3))
+        self._in_transit.append((time, position, quaternion))
 
-    def arrivals(self, time: float) -> list:
-        """Return the poses that have arrived since the call before, oldest first.
-
-        Returns
-        -------
-        list of tuple
-            Time of the measurement (s), position (m), quaternion (x, y, z, w).
-        """
+    def arrivals(self, time: float) -> list[Pose]:
+        """Return the poses that have arrived since the call before, oldest first."""
         arrived = []
-        while self._on_the_way and self._on_the_way[0][0] + self._latency <= time + 1e-9:
-            arrived.append(self._on_the_way.popleft())
+        while self._in_transit and self._in_transit[0][0] + self.latency <= time + 1e-9:
+            arrived.append(self._in_transit.popleft())
         return arrived
 
 
-def _turn(quaternion, rotation) -> tuple:
+def _turn(quaternion: Quaternion, rotation: NDArray[np.float64]) -> Quaternion:
     # The quaternion's product with that of a rotation vector in the body frame.
     x, y, z, w = quaternion
     angle = math.hypot(*rotation)

@@ -1,30 +1,68 @@
 """ROS interface of a simulated vehicle with motors, inner loops and wind."""
 
+from typing_extensions import override
+
 from crazyflie_model.dynamics import Dynamics
+from crazyflie_model.quadrotor import CRAZYFLIE, Airframe
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
-from crazyflie_simulator.simulator_node import SEED, SimulatorNode
+from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
 from crazyflie_simulator.wind import Wind
+from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameter_types import TIME_STEP, Number
+from crazyflie_utils.parameters import group
 
 _ERROR = Number(minimum=-0.5, maximum=0.5)
-_SPEED = Number(unit="m/s")
-_SPREAD = Number(unit="m/s", minimum=0.0)
+_SPEED = Number("m/s")
+
+
+class WindParameters(Parameters):
+    """The air around the vehicle."""
+
+    x: float = parameter(_SPEED, "mean wind, fixed frame", 0.0, live=True)
+    y: float = parameter(_SPEED, "mean wind, fixed frame", 0.0, live=True)
+    z: float = parameter(_SPEED, "mean wind, fixed frame", 0.0, live=True)
+    gust: float = parameter(
+        Number("m/s", minimum=0.0), "standard deviation of the gusts, each axis", 0.0, live=True
+    )
+    gust_time: float = parameter(
+        TIME_STEP, "how long a gust lasts (correlation time)", 1.0, live=True
+    )
+
+
+class QuadrotorSimulatorParameters(SimulatorParameters):
+    """Parameters of `QuadrotorSimulatorNode`."""
+
+    mass_error: float = parameter(
+        _ERROR, "how much heavier than nominal the vehicle is, as a fraction", 0.0, live=True
+    )
+    thrust_error: float = parameter(
+        _ERROR, "how much more than nominal its rotors lift, as a fraction", 0.0, live=True
+    )
+    wind: WindParameters = group(WindParameters, "wind")
 
 
 class QuadrotorSimulatorNode(SimulatorNode):
     """A full Crazyflie: a rigid body with four motors and the firmware's inner loops."""
 
-    def load_dynamics(self, handle) -> Dynamics:
-        """See `SimulatorNode.load_dynamics`."""
+    parameters_type = QuadrotorSimulatorParameters
+
+    @override
+    def make_dynamics(self, parameters: QuadrotorSimulatorParameters) -> Dynamics:
+        wind = parameters.wind
         # The air is the same for all vehicles with the same seed.
-        wind = Wind(
-            mean=[handle.param(f"wind/{axis}", _SPEED, 0.0) for axis in "xyz"],
-            gust=handle.param("wind/gust", _SPREAD, 0.0),
-            gust_time=handle.param("wind/gust_time", TIME_STEP, 1.0),
-            seed=handle.param("seed", SEED, 0),
+        self._wind = Wind((wind.x, wind.y, wind.z), wind.gust, wind.gust_time, parameters.seed)
+        self._quadrotor = StabilizedQuadrotor(
+            mass_error=parameters.mass_error,
+            thrust_error=parameters.thrust_error,
+            wind=self._wind.velocity,
         )
-        return StabilizedQuadrotor(
-            mass_error=handle.param("mass_error", _ERROR, 0.0),
-            thrust_error=handle.param("thrust_error", _ERROR, 0.0),
-            wind=wind.velocity,
+        return self._quadrotor
+
+    @override
+    def reconfigure(self, parameters: QuadrotorSimulatorParameters) -> None:
+        super().reconfigure(parameters)
+        wind = parameters.wind
+        self._wind.change((wind.x, wind.y, wind.z), wind.gust, wind.gust_time)
+        self._quadrotor.airframe = Airframe(
+            CRAZYFLIE.with_errors(parameters.mass_error, parameters.thrust_error)
         )

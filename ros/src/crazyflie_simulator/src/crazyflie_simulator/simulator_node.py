@@ -1,14 +1,16 @@
 """ROS interface of a simulated vehicle, whatever its model."""
 
 import zlib
+from typing import Any
 
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from typing_extensions import override
 
 from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.motion_capture import MotionCapture
-from crazyflie_simulator.vehicle import Vehicle
-from crazyflie_utils.node import Node
+from crazyflie_simulator.vehicle import SimulatedVehicle
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
     DURATION,
@@ -19,97 +21,140 @@ from crazyflie_utils.parameter_types import (
     Integer,
     Number,
 )
-from crazyflie_utils.parameters import ParameterError
-from crazyflie_utils.vectors import is_finite, to_vector
+from crazyflie_utils.parameters import group
+from crazyflie_utils.vectors import to_vector
 
-_LENGTH = Number(unit="m", minimum=0.0)
-_ANGLE = Number(unit="rad", minimum=0.0)
-_PROBABILITY = Number(minimum=0.0, maximum=1.0)
-SEED = Integer(0, 2**32 - 1)
-"""Kind of the parameter ``seed``."""
+
+class MotionCaptureParameters(Parameters):
+    """Errors of the motion capture system."""
+
+    position_noise: float = parameter(
+        Number("m", minimum=0.0), "standard deviation, each axis", 0.0, live=True
+    )
+    attitude_noise: float = parameter(
+        Number("rad", minimum=0.0), "standard deviation, each axis of the body", 0.0, live=True
+    )
+    latency: float = parameter(
+        DURATION,
+        "from a pose to its broadcast, rounded up to whole time steps; the stamp stays the pose's",
+        0.0,
+        live=True,
+    )
+    dropout: float = parameter(
+        Number(minimum=0.0, maximum=1.0),
+        "probability that a pose is not broadcast",
+        0.0,
+        live=True,
+    )
+
+
+class SimulatorParameters(Parameters):
+    """Parameters of every `SimulatorNode`."""
+
+    time_step: float = parameter(TIME_STEP, "time from one broadcast to the next")
+    init_x: float = parameter(METRES, "initial position; the ground is z = 0", name="init/x")
+    init_y: float = parameter(METRES, "initial position; the ground is z = 0", name="init/y")
+    init_z: float = parameter(METRES, "initial position; the ground is z = 0", name="init/z")
+    fixed_frame: str = parameter(FRAME, "tf frame of the world", name="frames/fixed")
+    robot_frame: str = parameter(FRAME, "tf frame of the vehicle", name="frames/robot")
+    control_topic: str = parameter(TOPIC, "where controls come from", name="topics/control")
+    publishes_clock: bool = parameter(
+        BOOLEAN,
+        "be the source of simulated time; needs `/use_sim_time`",
+        False,
+        name="clock/publish",
+    )
+    real_time_factor: float = parameter(
+        Number(minimum=0.0),
+        "how fast simulated time passes at most; 0 is as fast as possible",
+        1.0,
+        name="clock/real_time_factor",
+    )
+    mocap: MotionCaptureParameters = group(MotionCaptureParameters, "mocap")
+    seed: int = parameter(
+        Integer(0, 2**32 - 1),
+        "of everything random; motion capture errors also differ by the node's name",
+        0,
+    )
 
 
 class SimulatorNode(Node):
-    """Fly a vehicle on the controls of a topic and tell tf where it is.
+    """Fly a vehicle on the controls of a topic and broadcast its pose to tf.
 
-    A subclass says in `load_dynamics` what kind of vehicle.
+    A subclass defines the vehicle's model in `make_dynamics`.
+
+    Attributes
+    ----------
+    parameters_type : type
+        A subclass of `SimulatorParameters`, where a model has parameters of its own.
     """
 
-    def __init__(self):
-        super().__init__()
-        self._dynamics = None
-        self._vehicle = None
-        self._motion_capture = None
-        self._time_step = None
-        self._position = None
-        self._fixed_frame = None
-        self._robot_frame = None
-        self._control_topic = None
-        self._publishes_clock = False
-        self._real_time_factor = None
-        self._broadcast = None
-        self._set_clock = None
-        self._start = None
+    parameters_type: type[SimulatorParameters] = SimulatorParameters
+
+    def __init__(self) -> None:
         self._ticks = 0
-        self._measured_at = None
+        self._measured_at: float | None = None
 
-    def load_dynamics(self, handle) -> Dynamics:
-        """Return the model of the vehicle, of the node's parameters if it has any.
+    def make_dynamics(self, parameters: Any) -> Dynamics:
+        """Return the model of the vehicle.
 
-        Raises
-        ------
-        ParameterError
+        Parameters
+        ----------
+        parameters : SimulatorParameters
+            Of the type `parameters_type`.
         """
         raise NotImplementedError
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._time_step = handle.param("time_step", TIME_STEP)
-        self._position = [handle.param(f"init/{axis}", METRES) for axis in "xyz"]
-        self._fixed_frame = handle.param("frames/fixed", FRAME)
-        self._robot_frame = handle.param("frames/robot", FRAME)
-        self._control_topic = handle.param("topics/control", TOPIC)
-        self._publishes_clock = handle.param("clock/publish", BOOLEAN, False)
-        self._real_time_factor = handle.param("clock/real_time_factor", Number(minimum=0.0), 1.0)
-        if self._publishes_clock and not handle.uses_sim_time:
+    def reconfigure(self, parameters: Any) -> None:
+        """Apply live parameters that were changed; see `NodeHandle.load`."""
+        errors = parameters.mocap
+        self._motion_capture.position_noise = errors.position_noise
+        self._motion_capture.attitude_noise = errors.attitude_noise
+        self._motion_capture.latency = errors.latency
+        self._motion_capture.dropout = errors.dropout
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        parameters = handle.load(self.parameters_type, self.reconfigure)
+        if parameters.publishes_clock and not handle.uses_sim_time:
             raise ParameterError(
                 f"parameter {handle.resolve('~clock/publish')} is true, but /use_sim_time is "
                 "not; expected both, so that somebody listens to /clock"
             )
+        self._parameters = parameters
         self._motion_capture = MotionCapture(
-            position_noise=handle.param("mocap/position_noise", _LENGTH, 0.0),
-            attitude_noise=handle.param("mocap/attitude_noise", _ANGLE, 0.0),
-            latency=handle.param("mocap/latency", DURATION, 0.0),
-            dropout=handle.param("mocap/dropout", _PROBABILITY, 0.0),
+            parameters.mocap.position_noise,
+            parameters.mocap.attitude_noise,
+            parameters.mocap.latency,
+            parameters.mocap.dropout,
             # Vehicles with the same seed do not make the same errors.
-            seed=(handle.param("seed", SEED, 0), zlib.crc32(handle.name.encode())),
+            seed=(parameters.seed, zlib.crc32(handle.name.encode())),
         )
-        self._dynamics = self.load_dynamics(handle)
+        self._dynamics = self.make_dynamics(parameters)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        position = (parameters.init_x, parameters.init_y, parameters.init_z)
         self._start = handle.time()
-        self._vehicle = Vehicle(self._dynamics, self._position, self._start)
+        self._vehicle = SimulatedVehicle(self._dynamics, position, self._start)
         self._broadcast = handle.broadcast_transforms()
-        if self._publishes_clock:
+        if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
-        handle.subscribe(self._control_topic, ControlStamped, self._on_control)
-        if self._publishes_clock:
-            factor = self._real_time_factor
-            period = self._time_step / factor if factor > 0.0 else 0.0
+        handle.subscribe(
+            parameters.control_topic, ControlStamped, self._on_control, finite="control"
+        )
+        if parameters.publishes_clock:
+            factor = parameters.real_time_factor
+            period = parameters.time_step / factor if factor > 0.0 else 0.0
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
-            handle.timer(self._time_step, self._on_timer)
+            handle.timer(parameters.time_step, self._on_timer)
 
     def _on_control(self, message):
-        if not is_finite(message.control):
-            self._handle.warn(
-                f"ignoring a control on {self._control_topic} that is not finite", throttle=1.0
-            )
-            return
         # Without a clock of its own, the vehicle has to catch up first, so that
         # the control takes effect now and not at the last tick.
-        if not self._publishes_clock:
+        if not self._parameters.publishes_clock:
             self._vehicle.advance_to(self._handle.time())
         self._vehicle.command(to_vector(message.control))
 
@@ -119,7 +164,7 @@ class SimulatorNode(Node):
 
     def _on_clock_timer(self):
         self._ticks += 1
-        now = self._start + self._ticks * self._time_step
+        now = self._start + self._ticks * self._parameters.time_step
         self._vehicle.advance_to(now)
         self._broadcast_pose()
         self._set_clock(now)
@@ -137,8 +182,8 @@ class SimulatorNode(Node):
     def _transform(self, time, position, quaternion):
         transform = TransformStamped()
         transform.header.stamp = self._handle.stamp(time)
-        transform.header.frame_id = self._fixed_frame
-        transform.child_frame_id = self._robot_frame
+        transform.header.frame_id = self._parameters.fixed_frame
+        transform.child_frame_id = self._parameters.robot_frame
         transform.transform.translation = Vector3(*position)
         transform.transform.rotation = Quaternion(*quaternion)
         return transform
@@ -147,14 +192,14 @@ class SimulatorNode(Node):
 class NearHoverSimulatorNode(SimulatorNode):
     """A vehicle with near-hover dynamics."""
 
-    def load_dynamics(self, handle) -> Dynamics:
-        """See `SimulatorNode.load_dynamics`."""
+    @override
+    def make_dynamics(self, parameters: SimulatorParameters) -> Dynamics:
         return NearHover()
 
 
 class NearHoverSimulatorCoupled7DNode(SimulatorNode):
     """A vehicle whose thrust, tilt and yaw are coupled."""
 
-    def load_dynamics(self, handle) -> Dynamics:
-        """See `SimulatorNode.load_dynamics`."""
+    @override
+    def make_dynamics(self, parameters: SimulatorParameters) -> Dynamics:
         return Coupled7D()

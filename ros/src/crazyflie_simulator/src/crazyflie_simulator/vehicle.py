@@ -1,20 +1,22 @@
-"""A vehicle that is simulated in fixed steps, whatever calls for its state and when."""
+"""A vehicle simulated in fixed steps, independent of when its state is asked for."""
 
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
+from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_model.dynamics import STEP, Dynamics
-from crazyflie_model.elementwise import split
+from crazyflie_model.elementwise import Vector, split
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 
 _LEVEL_STEPS = round(LEVEL_AGE / STEP)
 _OFF_STEPS = round(OFF_AGE / STEP)
-_OFF = [0.0, 0.0, 0.0, 0.0]
+_OFF: Vector = [0.0, 0.0, 0.0, 0.0]
 
 
-class Vehicle:
-    """One simulated vehicle.
+class SimulatedVehicle:
+    """One simulated vehicle, with the firmware's watchdog.
 
     It stays put until the first control. When controls stop coming it does what
     the firmware does: after `LEVEL_AGE` it levels out with the thrust it has,
@@ -32,13 +34,13 @@ class Vehicle:
         Its time at the beginning, s.
     """
 
-    def __init__(self, dynamics: Dynamics, position, time: float):
+    def __init__(self, dynamics: Dynamics, position: ArrayLike, time: float):
         self._dynamics = dynamics
         self._x = dynamics.initial_state(split(position))
-        self._u = _OFF
+        self._u: Vector = _OFF
         self._start = time
         self._steps = 0
-        self._control_step = None
+        self._control_step: int | None = None
 
     @property
     def time(self) -> float:
@@ -46,16 +48,16 @@ class Vehicle:
         return self._start + self._steps * STEP
 
     @property
-    def state(self) -> np.ndarray:
+    def state(self) -> NDArray[np.float64]:
         """State of the dynamics, shape (x_dim,)."""
         return np.array(self._x)
 
     @property
-    def pose(self) -> tuple:
+    def pose(self) -> tuple[Triple, Quaternion]:
         """Position (x, y, z) in m and quaternion (x, y, z, w) in the fixed frame."""
         return self._dynamics.pose(self._x, self._effective_control())
 
-    def command(self, u) -> None:
+    def command(self, u: ArrayLike) -> None:
         """Take a control, shape (u_dim,), from the present step on."""
         self._u = split(u)
         self._control_step = self._steps

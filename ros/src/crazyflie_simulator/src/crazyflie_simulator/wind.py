@@ -1,8 +1,12 @@
 """Moving air: a constant wind and gusts on top."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from crazyflie_model.angles import Triple
 
 _WAVES = 64
 """Waves that a gust is made of, along each axis."""
@@ -29,18 +33,30 @@ class Wind:
         The same seed gives the same gust.
     """
 
-    def __init__(self, mean=(0.0, 0.0, 0.0), gust: float = 0.0, gust_time: float = 1.0, seed=0):
-        self._mean = tuple(map(float, mean))
-        self._amplitude = gust * math.sqrt(2.0 / _WAVES)
+    def __init__(
+        self,
+        mean: ArrayLike = (0.0, 0.0, 0.0),
+        gust: float = 0.0,
+        gust_time: float = 1.0,
+        seed: int | Sequence[int] = 0,
+    ):
         random = np.random.default_rng(seed)
         # One frequency out of each of equally likely intervals.
-        quantiles = (np.arange(_WAVES) + random.uniform(size=(3, _WAVES))) / _WAVES
-        self._frequencies = np.tan(math.pi / 2.0 * quantiles) / gust_time
+        self._quantiles = (np.arange(_WAVES) + random.uniform(size=(3, _WAVES))) / _WAVES
         self._phases = random.uniform(0.0, 2.0 * math.pi, size=(3, _WAVES))
+        self.change(mean, gust, gust_time)
 
-    def velocity(self, t: float) -> tuple:
+    def change(self, mean: ArrayLike, gust: float, gust_time: float) -> None:
+        """Change the wind at once; the waves keep their random numbers."""
+        x, y, z = np.asarray(mean, dtype=float).tolist()
+        self._mean = (x, y, z)
+        self._amplitude = gust * math.sqrt(2.0 / _WAVES)
+        self._frequencies = np.tan(math.pi / 2.0 * self._quantiles) / gust_time
+
+    def velocity(self, t: float) -> Triple:
         """Return the velocity of the air (3 components) at time ``t`` (s), m/s."""
         if self._amplitude == 0.0:
             return self._mean
         gust = self._amplitude * np.cos(self._frequencies * t + self._phases).sum(axis=1)
-        return tuple(mean + part for mean, part in zip(self._mean, gust.tolist(), strict=True))
+        x, y, z = (mean + part for mean, part in zip(self._mean, gust.tolist(), strict=True))
+        return x, y, z

@@ -1,6 +1,7 @@
-"""What the last control says about the acceleration of a vehicle."""
+"""The acceleration of a vehicle that its last control commands."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from crazyflie_model.dynamics import coupled_acceleration
 from crazyflie_model.limits import MAX_THRUST, MIN_THRUST
@@ -8,25 +9,24 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 
 
 class ControlInput:
-    """The last control, for as long as it says something about the motion."""
+    """The last control, while it is informative about the motion."""
 
-    def __init__(self):
-        self._control = None
-        self._time = None
+    def __init__(self) -> None:
+        self._control: NDArray[np.float64] | None = None
+        self._time = 0.0
 
-    def command(self, control: np.ndarray, time: float) -> None:
+    def command(self, control: NDArray[np.float64], time: float) -> None:
         """Take a control given at ``time`` (s).
 
         Parameters
         ----------
-        control : array_like, shape (4,)
+        control : ndarray, shape (4,)
             Roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2.
-        time : float
         """
         self._control = control
         self._time = time
 
-    def acceleration(self, yaw: float, time: float) -> np.ndarray | None:
+    def acceleration(self, yaw: float, time: float) -> NDArray[np.float64] | None:
         """Return the acceleration (3,), m/s^2, at a yaw (rad) and time (s), if it is known.
 
         Returns

@@ -1,112 +1,159 @@
 """ROS interface of the state estimators."""
 
 import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import override
 
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_msgs.msg import (
     ControlStamped,
-    FullState,
     FullStateStamped,
-    PositionVelocityState,
     PositionVelocityStateStamped,
-    PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
 from crazyflie_state_estimator import kalman
 from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.motion import Motion, MotionEstimator
 from crazyflie_state_estimator.rate_filter import FiniteDifference
+from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
-from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import FRAME, TIME_STEP, TOPIC, Integer, Number, Text
-from crazyflie_utils.runtime.transforms import TransformError
-from crazyflie_utils.vectors import from_vector, is_finite, to_vector
+from crazyflie_utils.vectors import from_vector, to_vector
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
+
+
+class StateEstimatorParameters(Parameters):
+    """Parameters of an estimator of 7 states; one of others declares `x_dim` anew."""
+
+    x_dim: int = parameter(Integer(7, 7), "number of fields of the state")
+    time_step: float = parameter(TIME_STEP, "period at which tf is read")
+    fixed_frame: str = parameter(FRAME, "frame the state is in", name="frames/fixed")
+    robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
+    state_topic: str = parameter(TOPIC, "where states go", name="topics/state")
+    filter_type: str = parameter(
+        Text((FINITE_DIFFERENCE, KALMAN)), "how rates are found", FINITE_DIFFERENCE, "filter/type"
+    )
+    control_topic: str | None = parameter(
+        TOPIC,
+        "the vehicle's control, such as /control/final; for the Kalman filter only",
+        None,
+        "topics/control",
+    )
+
+
+_ACCELERATION_WALK = Number("m/s^2/sqrt(s)", above=0.0)
+_ACCELERATION_WALK_HELP = (
+    "by how much the unknown part of the acceleration changes in a second (standard deviation)"
+)
+
+
+class KalmanParameters(Parameters):
+    """Parameters of the Kalman filter where the control is not known."""
+
+    position_noise: float = parameter(
+        Number("m", above=0.0),
+        "standard deviation of the poses' coordinates",
+        kalman.POSITION_NOISE,
+        "filter/position_noise",
+        live=True,
+    )
+    acceleration_walk: float = parameter(
+        _ACCELERATION_WALK,
+        _ACCELERATION_WALK_HELP,
+        kalman.ACCELERATION_WALK,
+        "filter/acceleration_walk",
+        live=True,
+    )
+    angle_noise: float = parameter(
+        Number("rad", above=0.0),
+        "standard deviation of the poses' angles",
+        kalman.ANGLE_NOISE,
+        "filter/angle_noise",
+        live=True,
+    )
+    angular_acceleration_walk: float = parameter(
+        Number("rad/s^2/sqrt(s)", above=0.0),
+        "as `filter/acceleration_walk`, of roll, pitch and yaw",
+        kalman.ANGULAR_ACCELERATION_WALK,
+        "filter/angular_acceleration_walk",
+        live=True,
+    )
+
+
+class KalmanWithControlParameters(KalmanParameters):
+    """Parameters of the Kalman filter where the control is known."""
+
+    acceleration_walk: float = parameter(
+        _ACCELERATION_WALK,
+        _ACCELERATION_WALK_HELP,
+        kalman.ACCELERATION_WALK_WITH_CONTROL,
+        "filter/acceleration_walk",
+        live=True,
+    )
 
 
 class StateEstimatorNode(Node):
     """Publish the state of the vehicle that tf knows.
 
-    Parameters
+    Attributes
     ----------
-    stamped_type, state_type : type
-        Message to publish, and the type of its field ``state``.
+    state_type : type
+        Stamped message to publish, with a field ``state``, all float64.
+    parameters_type : type
+        `StateEstimatorParameters` or a subclass.
     """
 
-    def __init__(self, stamped_type: type, state_type: type):
-        super().__init__()
-        self._stamped_type = stamped_type
-        self._state_type = state_type
-        self._time_step = None
-        self._fixed_frame = None
-        self._robot_frame = None
-        self._state_topic = None
-        self._control_topic = None
-        self._control = ControlInput()
-        self._estimator = None
-        self._publisher = None
-        self._lookup = None
-        self._last_success = None
+    state_type: type
+    parameters_type: type[StateEstimatorParameters] = StateEstimatorParameters
 
-    def state(self, motion: Motion) -> np.ndarray:
+    def __init__(self) -> None:
+        self._control = ControlInput()
+        self._last_success = 0.0
+
+    def state(self, motion: Motion) -> NDArray[np.float64]:
         """Return the state vector, in the order of the message's fields."""
         raise NotImplementedError
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        x_dim = len(self._state_type.__slots__)
-        handle.param("x_dim", Integer(x_dim, x_dim))
-        self._time_step = handle.param("time_step", TIME_STEP)
-        self._fixed_frame = handle.param("frames/fixed", FRAME)
-        self._robot_frame = handle.param("frames/robot", FRAME)
-        self._state_topic = handle.param("topics/state", TOPIC)
-        kind = handle.param("filter/type", Text((FINITE_DIFFERENCE, KALMAN)), FINITE_DIFFERENCE)
-        if kind == KALMAN:
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(self.parameters_type)
+        if self._parameters.filter_type == KALMAN:
             self._estimator = self._load_kalman_filters(handle)
         else:
             self._estimator = MotionEstimator(FiniteDifference(), FiniteDifference())
 
     def _load_kalman_filters(self, handle):
-        self._control_topic = handle.param("topics/control", TOPIC, None)
-
-        def positive(name, unit, default):
-            return handle.param(f"filter/{name}", Number(unit=unit, above=0.0), default)
-
-        walk = kalman.ACCELERATION_WALK
-        if self._control_topic is not None:
-            walk = kalman.ACCELERATION_WALK_WITH_CONTROL
-        return MotionEstimator(
-            kalman.ConstantAccelerationFilter(
-                positive("position_noise", "m", kalman.POSITION_NOISE),
-                positive("acceleration_walk", "m/s^2/sqrt(s)", walk),
-            ),
-            kalman.ConstantAccelerationFilter(
-                positive("angle_noise", "rad", kalman.ANGLE_NOISE),
-                positive(
-                    "angular_acceleration_walk",
-                    "rad/s^2/sqrt(s)",
-                    kalman.ANGULAR_ACCELERATION_WALK,
-                ),
-            ),
+        knows_control = self._parameters.control_topic is not None
+        parameters = handle.load(
+            KalmanWithControlParameters if knows_control else KalmanParameters, self._reconfigure
         )
+        self._position_filter = kalman.ConstantAccelerationFilter(
+            parameters.position_noise, parameters.acceleration_walk
+        )
+        self._angle_filter = kalman.ConstantAccelerationFilter(
+            parameters.angle_noise, parameters.angular_acceleration_walk
+        )
+        return MotionEstimator(self._position_filter, self._angle_filter)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
-        self._publisher = handle.publisher(self._state_topic, self._stamped_type)
+    def _reconfigure(self, parameters):
+        self._position_filter.tune(parameters.position_noise, parameters.acceleration_walk)
+        self._angle_filter.tune(parameters.angle_noise, parameters.angular_acceleration_walk)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = handle.publisher(parameters.state_topic, self.state_type)
         self._lookup = handle.listen_to_transforms()
-        if self._control_topic is not None:
-            handle.subscribe(self._control_topic, ControlStamped, self._on_control)
+        if parameters.filter_type == KALMAN and parameters.control_topic is not None:
+            handle.subscribe(
+                parameters.control_topic, ControlStamped, self._on_control, finite="control"
+            )
         self._last_success = handle.time()
-        handle.timer(self._time_step, self._on_timer)
+        handle.timer(parameters.time_step, self._on_timer)
 
     def _on_control(self, message):
-        if is_finite(message.control):
-            self._control.command(to_vector(message.control), self._handle.time())
-        else:
-            self._handle.warn(
-                f"ignoring a control on {self._control_topic} that is not finite", throttle=1.0
-            )
+        self._control.command(to_vector(message.control), self._handle.time())
 
     def _on_timer(self):
         now = self._handle.time()
@@ -115,7 +162,7 @@ class StateEstimatorNode(Node):
             self._estimator.reset()
             self._last_success = now
         try:
-            transform = self._lookup(self._fixed_frame, self._robot_frame)
+            transform = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
         except TransformError as error:
             self._report_no_state(now, str(error))
             return
@@ -125,9 +172,10 @@ class StateEstimatorNode(Node):
             self._report_no_state(now, f"the latest is still that of {stamp:.3f} s")
             return
         self._last_success = now
-        message = self._stamped_type(state=from_vector(self._state_type, self.state(motion)))
+        message = self.state_type()
+        message.state = from_vector(type(message.state), self.state(motion))
         message.header.stamp = transform.header.stamp
-        message.header.frame_id = self._fixed_frame
+        message.header.frame_id = self._parameters.fixed_frame
         self._publisher.publish(message)
 
     def _update(self, transform, now):
@@ -137,7 +185,7 @@ class StateEstimatorNode(Node):
             transform.header.stamp.to_nsec(),
             (translation.x, translation.y, translation.z),
             attitude,
-            self._control.acceleration(attitude[2], now),
+            self._control.acceleration(float(attitude[2]), now),
         )
 
     def _report_no_state(self, now, reason):
@@ -146,41 +194,52 @@ class StateEstimatorNode(Node):
         if now - self._last_success < HOLD_LIMIT:
             return
         self._handle.warn(
-            f"no state: no new transform {self._fixed_frame} -> {self._robot_frame} "
-            f"for {now - self._last_success:.1f} s ({reason})",
+            f"no state: no new transform {self._parameters.fixed_frame} -> "
+            f"{self._parameters.robot_frame} for {now - self._last_success:.1f} s ({reason})",
             throttle=1.0,
             key="no state",
         )
 
 
+class PositionVelocityStateEstimatorParameters(StateEstimatorParameters):
+    """Parameters of `PositionVelocityStateEstimatorNode`."""
+
+    x_dim: int = parameter(Integer(6, 6), "number of fields of the state")
+
+
 class PositionVelocityStateEstimatorNode(StateEstimatorNode):
     """Publish x, y, z, x_dot, y_dot, z_dot."""
 
-    def __init__(self):
-        super().__init__(PositionVelocityStateStamped, PositionVelocityState)
+    state_type = PositionVelocityStateStamped
+    parameters_type = PositionVelocityStateEstimatorParameters
 
-    def state(self, motion: Motion) -> np.ndarray:
-        """See `StateEstimatorNode.state`."""
+    @override
+    def state(self, motion: Motion) -> NDArray[np.float64]:
         return np.concatenate([motion.position, motion.velocity])
 
 
 class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
     """Publish x, y, z, x_dot, y_dot, z_dot, yaw."""
 
-    def __init__(self):
-        super().__init__(PositionVelocityYawStateStamped, PositionVelocityYawState)
+    state_type = PositionVelocityYawStateStamped
 
-    def state(self, motion: Motion) -> np.ndarray:
-        """See `StateEstimatorNode.state`."""
+    @override
+    def state(self, motion: Motion) -> NDArray[np.float64]:
         return np.concatenate([motion.position, motion.velocity, motion.attitude[2:]])
+
+
+class FullStateEstimatorParameters(StateEstimatorParameters):
+    """Parameters of `FullStateEstimatorNode`."""
+
+    x_dim: int = parameter(Integer(12, 12), "number of fields of the state")
 
 
 class FullStateEstimatorNode(StateEstimatorNode):
     """Publish position, velocity, attitude and the rates of the attitude's angles."""
 
-    def __init__(self):
-        super().__init__(FullStateStamped, FullState)
+    state_type = FullStateStamped
+    parameters_type = FullStateEstimatorParameters
 
-    def state(self, motion: Motion) -> np.ndarray:
-        """See `StateEstimatorNode.state`."""
+    @override
+    def state(self, motion: Motion) -> NDArray[np.float64]:
         return np.concatenate(motion)

@@ -1,6 +1,8 @@
 """Kalman filter for signals whose acceleration changes slowly."""
 
 import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import override
 
 from crazyflie_state_estimator.rate_filter import RateFilter
 
@@ -20,7 +22,7 @@ rates are followed up to about 40 rad/s."""
 
 MEMORY = 1.0
 """After a longer pause between two samples, in s, the filter starts afresh: the
-acceleration that it knew says nothing any more."""
+acceleration known by then is out of date."""
 
 _FIRST_RATE_VARIANCE = 10.0**2
 _FIRST_ACCELERATION_VARIANCE = 10.0**2
@@ -55,23 +57,30 @@ class ConstantAccelerationFilter(RateFilter):
     """
 
     def __init__(self, noise: float, acceleration_walk: float):
+        self.tune(noise, acceleration_walk)
+        self._state = np.zeros((3, 0))
+        self._covariance = np.zeros((3, 3))
+        self._acceleration: NDArray[np.float64] | None = None
+
+    def tune(self, noise: float, acceleration_walk: float) -> None:
+        """Change the parameters; the state and its covariance stay."""
         self._noise_variance = noise**2
         self._walk_density = acceleration_walk**2
-        self._state = None
-        self._covariance = None
-        self._acceleration = None
 
     @property
-    def covariance(self) -> np.ndarray:
+    def covariance(self) -> NDArray[np.float64]:
         """Covariance of (signal, rate, acceleration) of any one axis, shape (3, 3)."""
         return self._covariance
 
-    def start(self, value: np.ndarray) -> None:
-        """See `RateFilter.start`; next to nothing is assumed about rate and acceleration."""
+    @override
+    def start(self, value: NDArray[np.float64]) -> None:
+        """Take the first sample; next to nothing is assumed about rate and acceleration."""
         self._begin(value, np.zeros_like(value))
 
-    def step(self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None) -> tuple:
-        """See `RateFilter.step`."""
+    @override
+    def step(
+        self, dt: float, value: NDArray[np.float64], acceleration: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if dt > MEMORY:
             self._begin(value, (value - self._state[0]) / dt)
         else:

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_state_estimator.rate_filter import RateFilter
@@ -24,10 +25,10 @@ class Motion(NamedTuple):
         velocity).
     """
 
-    position: np.ndarray
-    velocity: np.ndarray
-    attitude: np.ndarray
-    attitude_rate: np.ndarray
+    position: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    attitude: NDArray[np.float64]
+    attitude_rate: NDArray[np.float64]
 
 
 class MotionEstimator:
@@ -51,14 +52,20 @@ class MotionEstimator:
     def __init__(self, position_filter: RateFilter, angle_filter: RateFilter):
         self._position_filter = position_filter
         self._angle_filter = angle_filter
-        self._stamp = None
-        self._angles = None
+        self._stamp: int | None = None
+        self._angles = np.zeros(3)
 
     def reset(self) -> None:
         """Forget everything: the next pose is the first."""
         self._stamp = None
 
-    def update(self, stamp: int, position, attitude, acceleration=None) -> Motion | None:
+    def update(
+        self,
+        stamp: int,
+        position: ArrayLike,
+        attitude: ArrayLike,
+        acceleration: NDArray[np.float64] | None = None,
+    ) -> Motion | None:
         """Take the next pose and return the motion at its time.
 
         Parameters
@@ -71,8 +78,7 @@ class MotionEstimator:
         attitude : array_like, shape (3,)
             Roll, pitch, yaw in rad.
         acceleration : ndarray, shape (3,), optional
-            What the control has asked for since the last pose, if it is known,
-            m/s^2.
+            Commanded since the last pose, if it is known, m/s^2.
 
         Returns
         -------
@@ -100,7 +106,7 @@ class MotionEstimator:
         self._angles = self._angles + wrap_to_pi(attitude - self._angles)
         position, velocity = self._position_filter.step(dt, position, acceleration)
         _, attitude_rate = self._angle_filter.step(dt, self._angles)
-        return Motion(position, velocity, wrap_to_pi(attitude), attitude_rate)
+        return Motion(position, velocity, np.asarray(wrap_to_pi(attitude)), attitude_rate)
 
     def _start(self, stamp, position, attitude):
         self._stamp = stamp

@@ -3,17 +3,21 @@
 from abc import ABC, abstractmethod
 
 import numpy as np
+from numpy.typing import NDArray
+from typing_extensions import override
 
 
 class RateFilter(ABC):
     """Signal and rate of n independent axes, from samples of the signal."""
 
     @abstractmethod
-    def start(self, value: np.ndarray) -> None:
+    def start(self, value: NDArray[np.float64]) -> None:
         """Forget everything and take the first sample, shape (n,)."""
 
     @abstractmethod
-    def step(self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None) -> tuple:
+    def step(
+        self, dt: float, value: NDArray[np.float64], acceleration: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Take the next sample.
 
         Parameters
@@ -22,8 +26,7 @@ class RateFilter(ABC):
             Time since the last sample, s, positive.
         value : ndarray, shape (n,)
         acceleration : ndarray, shape (n,), optional
-            What the axes were told to accelerate at since the last sample, if
-            that is known. Not every filter has a use for it.
+            Commanded since the last sample, if it is known. Not every filter uses it.
 
         Returns
         -------
@@ -41,15 +44,14 @@ class FiniteDifference(RateFilter):
     the samples becomes sqrt(2) s / dt on the rate.
     """
 
-    def __init__(self):
-        self._value = None
-
-    def start(self, value: np.ndarray) -> None:
-        """See `RateFilter.start`."""
+    @override
+    def start(self, value: NDArray[np.float64]) -> None:
         self._value = value
 
-    def step(self, dt: float, value: np.ndarray, acceleration: np.ndarray | None = None) -> tuple:
-        """See `RateFilter.step`; the acceleration is not used."""
+    @override
+    def step(
+        self, dt: float, value: NDArray[np.float64], acceleration: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         rate = (value - self._value) / dt
         self._value = value
         return value, rate

@@ -45,12 +45,17 @@ class Health:
         Gaps longer than this are a fault, s.
     now : float
         s.
+
+    Attributes
+    ----------
+    stale_after : float
+        For the reports to come.
     """
 
     def __init__(self, bodies, stale_after: float, now: float):
         self._bodies = {body.key: _BodyCount() for body in bodies}
         self._labels = {body.key: body.label for body in bodies}
-        self._stale_after = stale_after
+        self.stale_after = stale_after
         self._server = None
         self._trouble = "not connected so far"
         self._last_frame = None
@@ -166,7 +171,7 @@ class Health:
             if self._stale:
                 return ERROR, "all frames are stale: is the server paused or playing a recording?"
             return ERROR, "no frames"
-        if gap > self._stale_after:
+        if gap > self.stale_after:
             return WARN, f"gaps of up to {values['longest gap (ms)']} ms"
         return OK, (
             f"{values['rate (Hz)']} frames per second, {values['latency, mean (ms)']} ms old"
@@ -181,7 +186,7 @@ class Health:
         return Status(f"rigid body {self._labels[key]}", level, message, values)
 
     def _body_verdict(self, count, now):
-        if self._last_frame is None or now - self._last_frame > self._stale_after:
+        if self._last_frame is None or now - self._last_frame > self.stale_after:
             return ERROR, "no frames"
         if count.last is None or count.last < self._stream_begin:
             is_early = now - self._stream_begin < _GRACE
@@ -189,7 +194,7 @@ class Health:
             if count.frames:
                 return level, "in the stream, but not tracked so far"
             return level, f"not in the stream so far; {self._other_bodies()}"
-        if now - count.last > self._stale_after:
+        if now - count.last > self.stale_after:
             return ERROR, f"not tracked for {now - count.last:.1f} s"
         if count.tracked < count.frames:
             return WARN, f"tracked in {count.tracked} of {count.frames} frames"

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from mocap_optitrack.axes import normalized, to_z_up
 from mocap_optitrack.clock_offset import ClockOffset
 from mocap_optitrack.frames import Frame
-from mocap_optitrack.settings import RigidBody
+from mocap_optitrack.parameters import RigidBody
 
 
 class Sighting(NamedTuple):
@@ -44,14 +44,19 @@ class Tracker:
     stale_after : float
         s.
     health : Health
-        Is told what happens.
+        Counts what happens.
+
+    Attributes
+    ----------
+    stale_after : float
+        For the frames to come.
     """
 
     def __init__(self, bodies, up_axis: str, stale_after: float, health):
         self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
         self._by_name = {body.name: body for body in bodies if body.name is not None}
         self._up_axis = up_axis
-        self._stale_after = stale_after
+        self.stale_after = stale_after
         self._health = health
         self._newest = -math.inf
         self._clock = ClockOffset()
@@ -75,7 +80,7 @@ class Tracker:
             self._health.learning()
             return []
         age = frame.arrival - time
-        if time <= self._newest or age > self._stale_after:
+        if time <= self._newest or age > self.stale_after:
             self._health.stale()
             return []
         self._newest = time

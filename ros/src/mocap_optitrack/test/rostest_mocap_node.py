@@ -8,8 +8,8 @@ import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Pose2D, PoseStamped
-from virtual_capture import LIMIT, MovingVehicles, mocap_launch, virtual_mocap
 from tf2_msgs.msg import TFMessage
+from virtual_capture import LIMIT, MovingVehicles, mocap_launch, virtual_mocap
 
 from crazyflie_dev.programs import free_port
 from crazyflie_utils.testing.peer import listening

@@ -159,7 +159,9 @@ def _pose(header, sighting):
 
 
 def _transform(header, sighting):
-    transform = TransformStamped(header=header, child_frame_id=sighting.body.parameters.child_frame_id)
+    transform = TransformStamped(
+        header=header, child_frame_id=sighting.body.parameters.child_frame_id
+    )
     transform.transform.translation = Vector3(*sighting.position)
     transform.transform.rotation = Quaternion(*sighting.quaternion)
     return transform

@@ -35,7 +35,9 @@ class RigidBodyParameters(Parameters):
     child_frame_id: str | None = parameter(FRAME, "tf frame of the body", None)
     parent_frame_id: str = parameter(FRAME, "tf frame of the coordinates", "world")
     name: str | None = parameter(
-        TEXT, "name on the server, if it is not the key; without it a number is a streaming ID", None
+        TEXT,
+        "name on the server, if it is not the key; without it a number is a streaming ID",
+        None,
     )
 
 

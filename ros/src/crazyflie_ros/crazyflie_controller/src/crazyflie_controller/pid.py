@@ -26,9 +26,7 @@ class PidParameters(Parameters):
     min_output: float = parameter(
         Number("output"), "least output, at most maxOutput", name="minOutput", live=True
     )
-    max_output: float = parameter(
-        Number("output"), "largest output", name="maxOutput", live=True
-    )
+    max_output: float = parameter(Number("output"), "largest output", name="maxOutput", live=True)
     integrator_min: float = parameter(
         _INTEGRAL,
         "least integral of the error, at most integratorMax",

@@ -55,9 +55,7 @@ class Step(NamedTuple):
 class FlightPlanParameters(Parameters):
     """Parameters that all flights by high-level commands have."""
 
-    height: float = parameter(
-        Number("m", above=0.0, maximum=3.0), "how high the takeoff goes", 0.5
-    )
+    height: float = parameter(Number("m", above=0.0, maximum=3.0), "how high the takeoff goes", 0.5)
     duration: float = parameter(
         Number("s", above=0.0, maximum=60.0), "of takeoff, landing and each go-to", 2.0
     )

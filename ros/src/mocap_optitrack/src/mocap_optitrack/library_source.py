@@ -7,6 +7,7 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Callable
 
 from typing_extensions import override
 
@@ -42,13 +43,13 @@ class LibrarySource(Source):
         Returns the local time, s.
     """
 
-    def __init__(self, system: str, host: str, clock):
+    def __init__(self, system: str, host: str, clock: Callable[[], float]):
         self._system = system
         self._host = host
         self._clock = clock
-        self._worker = None
+        self._worker: subprocess.Popen[bytes] | None = None
         self._received = b""
-        self._last = {}
+        self._last: dict[str, tuple[float, ...]] = {}
 
     @override
     def open(self) -> str:

@@ -140,7 +140,7 @@ class MocapNode(Node):
             )
         self._diagnostics.publish(message)
         stream, *bodies = statuses
-        # Without a stream no body is seen; that is said already.
+        # Without a stream no body is seen; that has been warned of.
         faulty = bodies if stream.level < ERROR else []
         for status in faulty:
             if status.level == ERROR:

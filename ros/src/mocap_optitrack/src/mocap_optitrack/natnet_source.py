@@ -4,6 +4,7 @@ import contextlib
 import select
 import socket
 import time
+from collections.abc import Callable
 
 from typing_extensions import override
 
@@ -40,19 +41,19 @@ class NatNetSource(Source):
         Called with a text about every datagram that is dropped.
     """
 
-    def __init__(self, parameters: NatNetParameters, clock, warn):
+    def __init__(
+        self, parameters: NatNetParameters, clock: Callable[[], float], warn: Callable[[str], None]
+    ):
         self._parameters = parameters
         self._clock = clock
         self._warn = warn
-        self._sockets = []
-        self._commands = None
-        self._server = None
-        self._info = None
-        self._group = None
-        self._names = {}
+        self._sockets: list[socket.socket] = []
+        self._server: tuple[str, int] | None = None
+        self._group: tuple[str, int] | None = None
+        self._names: dict[int, str] = {}
         self._wants_names = True
-        self._asked_names_at = None
-        self._kept_alive_at = None
+        self._asked_names_at: float | None = None
+        self._kept_alive_at: float | None = None
 
     @override
     def open(self) -> str:
@@ -72,7 +73,7 @@ class NatNetSource(Source):
     def read(self, limit: float) -> Frame | None:
         try:
             if self._server is not None:
-                self._speak()
+                self._send_requests()
             ready, _, _ = select.select(self._sockets, [], [], limit)
             for each in ready:
                 frame = self._take(*each.recvfrom(_LARGEST), self._clock())
@@ -144,7 +145,7 @@ class NatNetSource(Source):
         return None
 
     def _silent_server(self):
-        # Frames can be had from a group without a word from the server.
+        # Frames can be had from a group without an answer of the server.
         parameters = self._parameters
         if parameters.version is not None and parameters.multicast_address is not None:
             return natnet.ServerInfo("a server that does not answer", parameters.version)
@@ -165,7 +166,7 @@ class NatNetSource(Source):
             raise SourceError(f"cannot send to the NatNet server at {', '.join(failures)}")
 
     def _find_group(self):
-        # A server's own word counts; older ones say nothing of how they send.
+        # What a server names counts; older ones do not tell how they send.
         info, parameters = self._info, self._parameters
         if info.is_multicast is False:
             return None
@@ -191,26 +192,26 @@ class NatNetSource(Source):
             probe.connect(self._server)
             return probe.getsockname()[0]
 
-    def _speak(self):
+    def _send_requests(self):
         now = time.monotonic()
         if not self._info.is_multicast and _is_due(self._kept_alive_at, _KEEP_ALIVE, now):
             self._kept_alive_at = now
-            self._tell(natnet.KEEP_ALIVE)
+            self._send(natnet.KEEP_ALIVE)
         if self._wants_names and _is_due(self._asked_names_at, _NAMES_AGAIN, now):
             self._asked_names_at = now
-            self._tell(natnet.REQUEST_MODEL)
+            self._send(natnet.REQUEST_MODEL)
 
-    def _tell(self, number):
+    def _send(self, number):
         self._commands.sendto(natnet.request(number), self._server)
 
     def _take(self, datagram, sender, arrival):
         try:
-            return self._understand(*natnet.split(datagram), arrival)
+            return self._decode(*natnet.split(datagram), arrival)
         except natnet.DecodeError as error:
             self._warn(f"ignoring a datagram from {sender[0]}: {error}")
             return None
 
-    def _understand(self, number, payload, arrival):
+    def _decode(self, number, payload, arrival):
         version = self._info.version
         if number == natnet.MODEL:
             self._names = natnet.read_names(payload, version)

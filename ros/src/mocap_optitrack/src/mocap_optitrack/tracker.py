@@ -1,11 +1,13 @@
 """From a system's frames to the poses that are published."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from mocap_optitrack.axes import normalized, to_z_up
 from mocap_optitrack.clock_offset import ClockOffset
-from mocap_optitrack.frames import Frame
+from mocap_optitrack.frames import Frame, Quaternion, Vector3
+from mocap_optitrack.health import Health
 from mocap_optitrack.parameters import RigidBody
 
 
@@ -17,16 +19,16 @@ class Sighting(NamedTuple):
     body : RigidBody
     time : float
         When, s of the local clock.
-    position : tuple, 3 components
+    position : Vector3
         m, z up.
-    quaternion : tuple, 4 components
-        (x, y, z, w), of norm 1.
+    quaternion : Quaternion
+        Of norm 1.
     """
 
     body: RigidBody
     time: float
-    position: tuple
-    quaternion: tuple
+    position: Vector3
+    quaternion: Quaternion
 
 
 class Tracker:
@@ -52,7 +54,9 @@ class Tracker:
         For the frames to come.
     """
 
-    def __init__(self, bodies, up_axis: str, stale_after: float, health):
+    def __init__(
+        self, bodies: Sequence[RigidBody], up_axis: str, stale_after: float, health: Health
+    ):
         self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
         self._by_name = {body.name: body for body in bodies if body.name is not None}
         self._up_axis = up_axis
@@ -65,7 +69,7 @@ class Tracker:
         """Take note that a new connection begins: the server's clock may be another one."""
         self._clock = ClockOffset()
 
-    def take(self, frame: Frame) -> list:
+    def take(self, frame: Frame) -> list[Sighting]:
         """Return what is to be published of a frame.
 
         Returns

@@ -1,5 +1,7 @@
 """Where a vehicle is, as tf knows it."""
 
+from geometry_msgs.msg import Point, Quaternion, Vector3
+
 from crazyflie_controller.go_to import Pose
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils import NodeHandle, Parameters, TransformError, parameter
@@ -49,8 +51,8 @@ class PoseSource:
         return found.header.stamp.to_sec(), pose(transform.translation, transform.rotation)
 
 
-def pose(position, orientation) -> Pose:
-    """Return the pose in a position and a quaternion, messages of geometry_msgs."""
+def pose(position: Point | Vector3, orientation: Quaternion) -> Pose:
+    """Return the pose in two messages."""
     q = orientation
     yaw = rpy_from_quaternion(q.x, q.y, q.z, q.w)[2]
     return Pose(position.x, position.y, position.z, yaw)

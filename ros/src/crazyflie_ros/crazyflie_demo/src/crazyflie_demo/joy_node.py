@@ -82,7 +82,7 @@ class JoyNode(Node):
         try:
             self._file = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
-            hint = _HINTS.get(error.errno, "")
+            hint = _HINTS.get(error.errno or 0, "")
             self._handle.warn(f"cannot open {device}: {error.strerror}; {hint}", throttle=10.0)
         else:
             self._handle.info(f"reading {device}")
@@ -97,16 +97,16 @@ class JoyNode(Node):
         except BlockingIOError:
             return
         except OSError as error:
-            self._lose(error)
+            self._lose(self._file, error)
             return
         for state in self._joystick.feed(data) if data else []:
             self._publish(state)
 
-    def _lose(self, error):
+    def _lose(self, file, error):
         self._handle.error(
             f"lost {self._parameters.dev}: {error.strerror}; all axes are taken for released"
         )
-        os.close(self._file)
+        os.close(file)
         self._file = None
         self._tried = self._handle.time()
         self._publish(self._joystick.release())

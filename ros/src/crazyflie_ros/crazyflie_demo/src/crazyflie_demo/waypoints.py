@@ -42,7 +42,8 @@ class WaypointList(ParameterType):
             raise ValueError(f"waypoint {number} is {entry!r}")
         *pose, duration = entry
         try:
-            return Waypoint(*map(FINITE, pose), DURATION(duration))
+            x, y, z, yaw = map(FINITE, pose)
+            return Waypoint(x, y, z, yaw, DURATION(duration))
         except ValueError:
             raise ValueError(f"waypoint {number} is {entry!r}") from None
 

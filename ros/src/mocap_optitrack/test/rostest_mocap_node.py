@@ -8,8 +8,8 @@ import pytest
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Pose2D, PoseStamped
-from studio import LIMIT, Scene, mocap_launch, virtual_mocap
 from tf2_msgs.msg import TFMessage
+from virtual_capture import LIMIT, MovingVehicles, mocap_launch, virtual_mocap
 
 from crazyflie_dev.programs import free_port
 from crazyflie_utils.testing.peer import listening
@@ -77,7 +77,7 @@ def scene(tmp_path_factory):
         wait_for_status("stream", DiagnosticStatus.ERROR, f"UDP port {port}: is Motive running")
         with (
             virtual_mocap(port, observer_port, latency=0.3),
-            Scene(observer_port, VEHICLES) as scene,
+            MovingVehicles(observer_port, VEHICLES) as scene,
         ):
             yield scene
 

@@ -4,9 +4,9 @@ import pytest
 
 from mocap_optitrack.frames import Body
 from mocap_optitrack.health import ERROR, OK, WARN, Health
-from mocap_optitrack.settings import RigidBodies
+from mocap_optitrack.parameters import RigidBodyDictionary
 
-BODIES = RigidBodies()({"1": {"pose": "one"}, "cf7": {"pose": "seven"}})
+BODIES = RigidBodyDictionary()({"1": {"pose": "one"}, "cf7": {"pose": "seven"}}).bodies
 ONE, SEVEN = BODIES
 
 

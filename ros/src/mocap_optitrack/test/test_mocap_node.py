@@ -6,14 +6,17 @@ from pathlib import Path
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import Point, Pose2D, Quaternion
 
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.mocap_node import MocapNode
 from mocap_optitrack.natnet_source import NatNetSource
-from mocap_optitrack.settings import NatNetSettings
+from mocap_optitrack.parameters import NatNetParameters
 
 SHIPPED = Path(__file__).parents[1] / "config" / "mocap.yaml"
 
@@ -110,7 +113,7 @@ def test_what_is_not_configured_is_not_published():
     assert process.published("/tf") == []
     show(process, node, body(1, is_tracked=False), body(2))
     assert process.published("/mocap_node/Robot_1/pose") == []
-    assert "/cf7/pose2d" not in process.transport.outlets
+    assert "/cf7/pose2d" not in process.transport.publishers
 
 
 def test_a_stream_with_y_up():
@@ -126,6 +129,25 @@ def test_stale_frames_are_dropped():
     show(process, node, body(1))
     node.on_frame(Frame(None, None, process.clock.time(), (body(1),)))
     assert len(process.published("/mocap_node/Robot_1/pose")) == 1
+
+
+def reconfigure(process, **values):
+    """Change parameters as dynamic_reconfigure does."""
+    request = ReconfigureRequest(encode_config(values))
+    return process.call("/mocap_node/set_parameters", request)
+
+
+def test_the_largest_age_may_be_changed():
+    process, node = launch()
+    node.on_connected("a server")
+    reconfigure(process, stale_after=2.0)
+    for _ in range(3):
+        show(process, node, body(1), body(5, "cf7"), body(9))
+        process.advance(1.0)
+    statuses = process.published("/diagnostics")[-1].status
+    assert {status.level for status in statuses} == {DiagnosticStatus.OK}
+    with pytest.raises(ServiceError, match="/mocap_node/stale_after is 0.0; expected"):
+        reconfigure(process, stale_after=0.0)
 
 
 def test_diagnostics():
@@ -174,7 +196,7 @@ def test_trouble_is_warned_of_and_reported():
 def test_natnet_is_the_default():
     _, node = launch()
     assert isinstance(node.source, NatNetSource)
-    assert node._settings == NatNetSettings()
+    assert node._parameters.natnet == NatNetParameters()
 
 
 def test_the_configuration_of_natnet():
@@ -187,7 +209,7 @@ def test_the_configuration_of_natnet():
         "version": [3, 0, 0, 0],
     }
     _, node = launch(optitrack_config=config)
-    assert node._settings == NatNetSettings(**{**config, "version": "3.0"})
+    assert node._parameters.natnet == NatNetParameters(**{**config, "version": "3.0"})
 
 
 @pytest.mark.parametrize("backend", ["vicon", "qualisys", "vrpn"])
@@ -202,7 +224,7 @@ def test_the_shipped_configuration():
     parameters = yaml.safe_load(SHIPPED.read_text())
     assert process.launch(node, "/mocap_node", flat(parameters))
     assert process.logged("warn") == []
-    assert node._settings == NatNetSettings(multicast_address="224.0.0.1")
+    assert node._parameters.natnet == NatNetParameters(multicast_address="224.0.0.1")
     assert isinstance(node.source, NatNetSource)
     show(process, node, body(1), body(2))
     assert len(process.published("/mocap_node/Robot_1/pose")) == 1
@@ -242,7 +264,7 @@ def test_what_means_nothing_is_warned_of():
 )
 def test_bad_parameters_are_named(changes, name, reason):
     text = refusal(**changes)
-    assert f"/mocap_node/{name} is" in text
+    assert f"{name} is" in text
     assert reason in text
 
 

@@ -16,7 +16,7 @@ from crazyflie_virtual.mocap.settings import MocapSettings
 from crazyflie_virtual.observer import Observation
 from mocap_optitrack import natnet_source as module
 from mocap_optitrack.natnet_source import NatNetSource
-from mocap_optitrack.settings import NatNetSettings
+from mocap_optitrack.parameters import NatNetParameters
 from mocap_optitrack.source import SourceError
 
 LIMIT = 10.0
@@ -50,7 +50,7 @@ def see(running, name="cf1"):
 def connection(port, warn=pytest.fail, **settings):
     """Return an open connection and its description."""
     settings = {"server_address": "127.0.0.1", **settings}
-    source = NatNetSource(NatNetSettings(command_port=port, **settings), time.monotonic, warn)
+    source = NatNetSource(NatNetParameters(command_port=port, **settings), time.monotonic, warn)
     try:
         yield source, source.open()
     finally:
@@ -140,13 +140,13 @@ def test_a_group_can_be_heard_without_an_answer(monkeypatch):
     assert frame.exposure == frame.sent
 
 
-def test_a_unicast_server_is_told_again_and_again_that_it_is_wanted(monkeypatch):
+def test_a_unicast_server_is_sent_keep_alives(monkeypatch):
     monkeypatch.setattr(module, "_KEEP_ALIVE", 0.01)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as commands:
         commands.bind(("127.0.0.1", 0))
         commands.settimeout(LIMIT)
         source = NatNetSource(
-            NatNetSettings("127.0.0.1", command_port=commands.getsockname()[1]),
+            NatNetParameters(server_address="127.0.0.1", command_port=commands.getsockname()[1]),
             time.monotonic,
             pytest.fail,
         )

@@ -6,13 +6,13 @@ import pytest
 
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.health import Health
-from mocap_optitrack.settings import RigidBodies
+from mocap_optitrack.parameters import RigidBodyDictionary
 from mocap_optitrack.tracker import Tracker
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
-BODIES = RigidBodies()(
+BODIES = RigidBodyDictionary()(
     {"1": {"pose": "one"}, "cf7": {"pose": "seven"}, "3": {"name": "My Drone", "pose": "drone"}}
-)
+).bodies
 
 
 def tracker(up_axis="z", stale_after=0.2):

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from crazyflie_controller.flight import Flight
-from crazyflie_controller.go_to import AXES, GoToController, Pose
-from crazyflie_controller.pid import Gains
+from crazyflie_controller.flight import GoToFlight
+from crazyflie_controller.go_to import GoToController, Pose
+from crazyflie_controller.pid import PidParameters
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import thrust_from_pwm
@@ -22,15 +22,17 @@ CONFIG = Path(__file__).parents[1] / "config" / "crazyflie2.yaml"
 
 def parameters():
     """Return the gains of the configuration file as private parameters of a node."""
-    pids = yaml.safe_load(CONFIG.read_text())["PIDs"]
+    pids = _configured()
     return {f"PIDs/{axis}/{key}": value for axis in pids for key, value in pids[axis].items()}
 
 
-def gains():
+def pids():
     """Return the gains of the configuration file, by axis."""
-    names = ("kp", "kd", "ki", "minOutput", "maxOutput", "integratorMin", "integratorMax")
-    values = parameters()
-    return {axis: Gains(*(values[f"PIDs/{axis}/{name}"] for name in names)) for axis in AXES}
+    return {axis: PidParameters.from_mapping(values) for axis, values in _configured().items()}
+
+
+def _configured():
+    return yaml.safe_load(CONFIG.read_text())["PIDs"]
 
 
 def control_from_cmd_vel(pitch, roll, thrust, yaw_rate):
@@ -62,7 +64,7 @@ class Loop:
     def __init__(self, ground=0.0, pose_period=PERIOD, **errors):
         self._errors = errors
         self._ground = ground
-        self.flight = Flight(GoToController(gains()))
+        self.flight = GoToFlight(GoToController(pids()))
         self.is_seen = True
         self.track, self.setpoints = [], []
         self._count = 0

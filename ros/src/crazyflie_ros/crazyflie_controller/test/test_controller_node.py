@@ -4,6 +4,8 @@ import math
 
 import pytest
 from closed_loop import control_from_cmd_vel, parameters
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import (
     Point,
     Pose,
@@ -20,8 +22,7 @@ from crazyflie_controller.controller_node import ControllerNode
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
-from crazyflie_utils.node import Node
-from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils import Node, ServiceError
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import from_vector
 
@@ -147,7 +148,7 @@ def test_refuses_what_makes_no_sense():
         call(process, "takeoff")
 
 
-def test_falls_silent_when_it_is_blind_and_says_so():
+def test_falls_silent_without_poses_with_a_warning():
     process = launch()
     fly(process)
     process.advance(0.6)
@@ -172,6 +173,37 @@ def test_a_bad_parameter_is_named(changes, reason):
     settings = {"frame": "cf", **parameters(), **changes}
     assert not process.launch(ControllerNode(), "/crazyflie/controller", settings)
     assert reason in process.logged("error")[0]
+
+
+def reconfigure(process, **values):
+    """Change parameters as dynamic_reconfigure does."""
+    request = ReconfigureRequest(encode_config(values))
+    return process.call("/crazyflie/controller/set_parameters", request)
+
+
+def test_a_gain_may_be_changed_in_flight_without_a_jump_of_the_thrust():
+    process = launch()
+    process.publish("/crazyflie/goal", goal(0.1, 0.0, 0.1))
+    fly(process)
+    pitch, _, thrust, _ = last(process)
+    assert pitch == pytest.approx(4.0)
+    reconfigure(process, **{"PIDs/X/kp": 20.0, "PIDs/Z/ki": 7000.0})
+    show(process, z=0.1)
+    assert last(process)[0] == pytest.approx(2.0, abs=0.01)
+    # The vehicle no longer climbs: what was taken off for that comes back.
+    assert last(process)[2] == pytest.approx(thrust, abs=1.0)
+
+
+def test_a_bad_change_is_refused():
+    process = launch()
+    process.publish("/crazyflie/goal", goal(0.1, 0.0, 0.1))
+    fly(process)
+    with pytest.raises(ServiceError, match="PIDs/X/minOutput is 20; expected at most maxOutput"):
+        reconfigure(process, **{"PIDs/X/minOutput": 20.0})
+    with pytest.raises(ServiceError, match="frame cannot be changed"):
+        reconfigure(process, frame="other")
+    show(process, z=0.1)
+    assert last(process)[0] == pytest.approx(4.0, abs=0.01)
 
 
 def test_every_gain_is_required():

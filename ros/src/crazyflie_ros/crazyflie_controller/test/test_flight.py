@@ -164,8 +164,8 @@ def test_a_vehicle_that_cannot_lift_off_is_not_pushed_for_ever():
     loop = standing(mass_error=0.5, thrust_error=-0.5)
     loop.flight.take_off()
     loop.run_until(lambda: loop.flight.state is State.IDLE, 6.5)
-    assert "60000 PWM" in loop.flight.take_remark()
-    assert loop.flight.take_remark() is None
+    assert "60000 PWM" in loop.flight.take_warning()
+    assert loop.flight.take_warning() is None
     assert loop.setpoints[-1] == OFF
 
 
@@ -190,21 +190,21 @@ def test_a_takeoff_without_a_new_pose_ends():
     loop.run(HOLD_LIMIT + 0.1)
     assert loop.flight.state is State.IDLE
     assert loop.setpoints[-1] == OFF
-    assert "takeoff ended" in loop.flight.take_remark()
+    assert "takeoff ended" in loop.flight.take_warning()
 
 
-def test_a_blind_vehicle_is_left_to_its_watchdog_and_goes_on_when_it_sees_again():
+def test_a_vehicle_without_poses_is_left_to_its_watchdog_until_they_come_again():
     loop = flying()
     loop.run(10.0)
     loop.is_seen = False
     begin = len(loop.setpoints)
     loop.run(HOLD_LIMIT + 0.2)
-    blind = loop.setpoints[begin:]
+    silent = loop.setpoints[begin:]
     # The last setpoint is repeated, then there are none.
     ticks = round(HOLD_LIMIT / PERIOD)
-    assert set(blind[: ticks - 1]) == {loop.setpoints[begin - 1]}
-    assert set(blind[ticks + 1 :]) == {None}
-    assert "sending no setpoints" in loop.flight.take_remark()
+    assert set(silent[: ticks - 1]) == {loop.setpoints[begin - 1]}
+    assert set(silent[ticks + 1 :]) == {None}
+    assert "sending no setpoints" in loop.flight.take_warning()
     loop.is_seen = True
     loop.run(12.0)
     assert loop.flight.state is State.AUTOMATIC

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from closed_loop import gains
+from closed_loop import pids
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -16,7 +16,7 @@ HERE = Pose(0.0, 0.0, 1.0, 0.0)
 
 def steer(goal, pose=HERE):
     """Return the setpoint of a controller that has just begun."""
-    controller = GoToController(gains())
+    controller = GoToController(pids())
     controller.reset(HOVER)
     return controller.update(pose, goal, 0.0)
 
@@ -53,7 +53,7 @@ def test_turns_the_short_way():
 
 def test_an_approach_at_the_right_speed_is_level():
     # The goal is 0.1 m ahead and comes nearer by 0.2 m/s: 40 * 0.1 - 20 * 0.2 = 0.
-    controller = GoToController({**gains()})
+    controller = GoToController(pids())
     controller.reset(HOVER)
     goal = HERE._replace(x=1.0)
     controller.update(HERE._replace(x=0.898), goal, 0.0)
@@ -62,7 +62,7 @@ def test_an_approach_at_the_right_speed_is_level():
 
 
 def test_turning_is_no_motion():
-    controller = GoToController(gains())
+    controller = GoToController(pids())
     controller.reset(HOVER)
     goal = HERE._replace(x=0.1)
     controller.update(HERE, goal, 0.0)
@@ -72,18 +72,18 @@ def test_turning_is_no_motion():
 
 
 def test_a_turn_through_the_seam_is_a_small_one():
-    controller = GoToController(gains())
+    controller = GoToController(pids())
     controller.reset(HOVER)
     goal = HERE._replace(yaw=0.5)
     controller.update(HERE._replace(yaw=0.5 - math.pi + 0.001), goal, 0.0)
     setpoint = controller.update(HERE._replace(yaw=0.5 + math.pi - 0.001), goal, 0.01)
     # An error of nearly half a turn to the right, growing by 0.2 rad/s.
     assert setpoint.yaw_rate == 200.0
-    assert GoToController(gains()).update(HERE, goal, 0.0).yaw_rate == pytest.approx(-100.0)
+    assert GoToController(pids()).update(HERE, goal, 0.0).yaw_rate == pytest.approx(-100.0)
 
 
 def test_a_forgotten_error_has_no_slope():
-    controller = GoToController(gains())
+    controller = GoToController(pids())
     controller.reset(HOVER)
     controller.update(HERE, HERE, 0.0)
     controller.forget_error()
@@ -100,7 +100,7 @@ def test_the_setpoint_does_not_depend_on_where_north_is(path, goal, turn):
     def turned(pose):
         return Pose(*rotate_by_yaw(pose.x, pose.y, turn), pose.z, pose.yaw + turn)
 
-    controllers = [GoToController(gains()) for _ in range(2)]
+    controllers = [GoToController(pids()) for _ in range(2)]
     for pose in path:
         # Exactly half a turn off, rounding decides which way to turn.
         if abs(abs(math.remainder(goal.yaw - pose.yaw, 2.0 * math.pi)) - math.pi) < 1e-6:

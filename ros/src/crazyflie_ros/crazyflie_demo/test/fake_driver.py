@@ -1,10 +1,9 @@
-"""The services of a driver, which only remember that they were called."""
+"""The services of a driver, which only record their calls."""
 
 from std_srvs.srv import Empty
 
 from crazyflie_driver import srv
-from crazyflie_utils.node import Node
-from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils import Node, ServiceError
 
 SERVICES = {
     "emergency": Empty,
@@ -30,7 +29,6 @@ class FakeDriver(Node):
     """
 
     def __init__(self):
-        super().__init__()
         self.calls = []
         self.refused = {}
 

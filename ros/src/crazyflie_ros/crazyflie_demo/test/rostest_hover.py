@@ -8,12 +8,12 @@ import tf2_ros
 import yaml
 from flights import LIMIT, Stick, launched, node, virtual_vehicle, wait_for_service
 
-from crazyflie_demo.keyboard import LAND, PITCH, TAKEOFF
+from crazyflie_demo.gamepad import LAND, PITCH, TAKEOFF
 from crazyflie_dev.programs import free_port
 
 
-class Eyes:
-    """Where tf says that a vehicle is."""
+class Positions:
+    """Positions of vehicles as tf has them."""
 
     def __init__(self, *frames):
         self._frames = frames
@@ -79,7 +79,7 @@ def test_hovers_goes_and_lands(tmp_path):
             z=0.6,
         ),
     ):
-        eyes = Eyes("Robot_1/base_link")
+        eyes = Positions("Robot_1/base_link")
         wait_for_service("/crazyflie/controller/takeoff")
         wait_for_service("/crazyflie/emergency")
         assert eyes.positions()[0] == pytest.approx((0.0, 0.0, 0.0), abs=0.01)

@@ -10,7 +10,7 @@ import rospy
 from flights import LIMIT, Observer, Stick, launched, virtual_vehicle, wait_for_service
 from sensor_msgs.msg import Joy
 
-from crazyflie_demo.keyboard import EMERGENCY, HEADLIGHT, LIFT, PITCH, ROLL, TAKEOFF, YAW
+from crazyflie_demo.gamepad import EMERGENCY, HEADLIGHT, PITCH, ROLL, TAKEOFF, THRUST, YAW
 from crazyflie_dev.programs import running
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.testing.peer import listening, wait_until
@@ -39,11 +39,11 @@ def test_a_joystick(tmp_path):
         stick.press(HEADLIGHT)
         wait_until(lambda: headlight() == 1, "the headlight")
 
-        stick.tilt(LIFT, 0.0)
+        stick.tilt(THRUST, 0.0)
         rospy.wait_for_message("/crazyflie/cmd_vel", rospy.AnyMsg, LIMIT)
-        stick.tilt(LIFT, CLIMB)
+        stick.tilt(THRUST, CLIMB)
         observer.track_until(lambda truth: truth.position[2] > 0.5)
-        stick.tilt(LIFT, HOVER)
+        stick.tilt(THRUST, HOVER)
 
         stick.tilt(PITCH, 0.4)
         observer.track_until(lambda truth: truth.velocity[0] > 0.5)
@@ -57,8 +57,8 @@ def test_a_joystick(tmp_path):
 
         stick.press(EMERGENCY)
         observer.track_until(lambda truth: truth.position[2] < 0.02)
-        # The sticks have no say any more.
-        stick.tilt(LIFT, 1.0)
+        # The sticks have no effect any more.
+        stick.tilt(THRUST, 1.0)
         end = time.monotonic() + 1.0
         track = observer.track_until(lambda truth: time.monotonic() > end)
         assert max(truth.position[2] for truth in track) < 0.1

@@ -1,9 +1,11 @@
 """Flight by hand: sticks to cmd_vel."""
 
 import pytest
+from live import reconfigure
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.cmd_vel_teleop_node import CmdVelTeleopNode
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 NAN = float("nan")
@@ -102,3 +104,20 @@ def test_a_bad_parameter_is_named(parameters):
     process = FakeProcess()
     assert not process.launch(CmdVelTeleopNode(), "/teleop", parameters)
     assert next(iter(parameters)) in process.logged("error")[0]
+
+
+def test_the_largest_tilt_may_be_changed_in_flight():
+    process = launch()
+    tilt(process)
+    reconfigure(process, "/cf/teleop", **{"max/pitch": 10.0})
+    tilt(process, pitch=1.0)
+    assert last(process)[0] == 10.0
+
+
+def test_a_bad_change_is_refused():
+    process = launch()
+    tilt(process)
+    with pytest.raises(ServiceError, match="/cf/teleop/max/pitch is 90.0; expected"):
+        reconfigure(process, "/cf/teleop", **{"max/pitch": 90.0})
+    tilt(process, pitch=1.0)
+    assert last(process)[0] == 30.0

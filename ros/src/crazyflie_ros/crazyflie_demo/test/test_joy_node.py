@@ -4,10 +4,12 @@ import errno
 import os
 
 import pytest
+from live import reconfigure
 from sensor_msgs.msg import Joy
 from test_joystick import axis, button
 
 from crazyflie_demo.joy_node import JoyNode
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -117,3 +119,15 @@ def test_a_bad_parameter_is_named(changes):
     process = FakeProcess()
     assert not process.launch(JoyNode(), "/joy", changes)
     assert f"/joy/{next(iter(changes))}" in process.logged("error")[0]
+
+
+def test_the_dead_zone_may_be_changed(fifo):
+    process = launch(fifo)
+    reconfigure(process, "/crazyflie/joy", deadzone=0.5)
+    with pytest.raises(ServiceError, match="/crazyflie/joy/deadzone is 1.0; expected"):
+        reconfigure(process, "/crazyflie/joy", deadzone=1.0)
+    with open(fifo, "wb", buffering=0) as stick:
+        stick.write(axis(0, -15000))
+        process.advance(0.05)
+    assert states(process)[-1] == ([0.0], [])
+    process.node.shutdown()

@@ -2,26 +2,24 @@
 
 import pytest
 
-from crazyflie_demo.keyboard import (
+from crazyflie_demo.gamepad import (
     AXES,
     EMERGENCY,
-    FIRST_HOLD,
     HEADLIGHT,
     LAND,
-    LIFT,
     PITCH,
-    REPEAT_HOLD,
     ROLL,
     TAKEOFF,
+    THRUST,
     YAW,
-    Keyboard,
 )
+from crazyflie_demo.keyboard import FIRST_HOLD, REPEAT_HOLD, Keyboard
 
 REST = [0.0] * AXES
 
 
 def deflected(**values):
-    numbers = {"roll": ROLL, "pitch": PITCH, "yaw": YAW, "lift": LIFT}
+    numbers = {"roll": ROLL, "pitch": PITCH, "yaw": YAW, "thrust": THRUST}
     axes = list(REST)
     for name, value in values.items():
         axes[numbers[name]] = value
@@ -35,11 +33,11 @@ def deflected(**values):
         ("\x1bOB", {"pitch": -0.5}),
         ("\x1b[D", {"roll": 0.5}),
         ("\x1b[C", {"roll": -0.5}),
-        ("w", {"lift": 0.5}),
-        ("S", {"lift": -0.5}),
+        ("w", {"thrust": 0.5}),
+        ("S", {"thrust": -0.5}),
         ("a", {"yaw": 0.5}),
         ("d", {"yaw": -0.5}),
-        ("w\x1b[Aa", {"pitch": 0.5, "lift": 0.5, "yaw": 0.5}),
+        ("w\x1b[Aa", {"pitch": 0.5, "thrust": 0.5, "yaw": 0.5}),
         ("ad", {"yaw": -0.5}),
         ("q?1\x7f", {}),
     ],
@@ -72,7 +70,7 @@ def test_escape_alone_eats_no_key():
 def test_a_key_is_let_go_when_it_is_not_repeated():
     keyboard = Keyboard(1.0)
     keyboard.feed("w", 0.0)
-    assert keyboard.axes(FIRST_HOLD - 0.01) == deflected(lift=1.0)
+    assert keyboard.axes(FIRST_HOLD - 0.01) == deflected(thrust=1.0)
     assert keyboard.axes(FIRST_HOLD + 0.01) == REST
 
 
@@ -82,8 +80,8 @@ def test_a_key_that_is_held_is_let_go_soon_after():
     keyboard.feed("w", time)
     for time in (0.5, 0.53, 0.56, 0.6, 0.7, 0.8):
         keyboard.feed("w", time)
-        assert keyboard.axes(time) == deflected(lift=1.0)
-    assert keyboard.axes(time + REPEAT_HOLD - 0.01) == deflected(lift=1.0)
+        assert keyboard.axes(time) == deflected(thrust=1.0)
+    assert keyboard.axes(time + REPEAT_HOLD - 0.01) == deflected(thrust=1.0)
     assert keyboard.axes(time + REPEAT_HOLD + 0.01) == REST
 
 
@@ -95,10 +93,10 @@ def test_everything_can_be_let_go(key):
     assert keyboard.axes(0.1) == REST
 
 
-def test_lift_can_go_in_steps_and_stay():
+def test_thrust_can_go_in_steps_and_stay():
     keyboard = Keyboard(1.0, lift_step=0.3)
     levels = []
     for key in "wwwwsss s":
         keyboard.feed(key, 0.0)
-        levels.append(keyboard.axes(100.0)[LIFT])
+        levels.append(keyboard.axes(100.0)[THRUST])
     assert levels == pytest.approx([0.3, 0.6, 0.9, 1.0, 0.7, 0.4, 0.1, 0.0, 0.0])

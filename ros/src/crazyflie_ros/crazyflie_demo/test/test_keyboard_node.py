@@ -5,9 +5,11 @@ import pty
 import termios
 
 import pytest
+from live import reconfigure
 
-from crazyflie_demo.keyboard import LAND, PITCH, TAKEOFF
+from crazyflie_demo.gamepad import LAND, PITCH, TAKEOFF
 from crazyflie_demo.keyboard_node import KeyboardNode
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -87,3 +89,14 @@ def test_needs_a_terminal(monkeypatch):
         process = FakeProcess()
         assert not process.launch(KeyboardNode(), "/keyboard")
     assert "no terminal" in process.logged("error")[0]
+
+
+def test_the_deflection_may_be_changed(terminal):
+    process = launch()
+    reconfigure(process, "/crazyflie/keyboard", deflection=0.2)
+    with pytest.raises(ServiceError, match="/crazyflie/keyboard/deflection is 2.0; expected"):
+        reconfigure(process, "/crazyflie/keyboard", deflection=2.0)
+    terminal.type("\x1b[A")
+    process.advance(0.1)
+    assert messages(process)[-1].axes[PITCH] == 0.2
+    process.node.shutdown()

@@ -4,11 +4,13 @@ import math
 
 import pytest
 from geometry_msgs.msg import Twist
+from live import reconfigure
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.const_thrust_node import ConstThrustNode
 from crazyflie_demo.publish_pose_node import PublishPoseNode, PublishPoseTeleopNode
 from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 PLACE = {"x": 1.0, "y": -2.0, "z": 0.5}
@@ -100,3 +102,24 @@ def test_a_constant_thrust_has_its_limit():
     process = FakeProcess()
     assert not process.launch(ConstThrustNode(), "/const_thrust", {"thrust": 60001.0})
     assert "/const_thrust/thrust is 60001" in process.logged("error")[0]
+
+
+def test_the_speeds_may_be_changed_in_flight():
+    process = launch(PublishPoseTeleopNode())
+    move(process, 1.0, x=1.0)
+    before = last(process)
+    reconfigure(process, "/cf/pose", **{"speed/x": 0.0})
+    move(process, 1.0, x=1.0)
+    assert last(process) == before
+    with pytest.raises(ServiceError, match="/cf/pose/speed/x is -1.0; expected"):
+        reconfigure(process, "/cf/pose", **{"speed/x": -1.0})
+
+
+def test_a_constant_thrust_may_be_changed():
+    process = FakeProcess()
+    assert process.launch(ConstThrustNode(), "/cf/const_thrust")
+    reconfigure(process, "/cf/const_thrust", thrust=20000.0)
+    with pytest.raises(ServiceError, match="/cf/const_thrust/thrust is 60001.0; expected"):
+        reconfigure(process, "/cf/const_thrust", thrust=60001.0)
+    process.advance(0.02)
+    assert process.published("/cf/cmd_vel")[-1].linear.z == 20000.0

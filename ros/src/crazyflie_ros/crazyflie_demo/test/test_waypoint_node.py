@@ -2,10 +2,12 @@
 
 import pytest
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from live import reconfigure
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_demo.waypoint_node import Demo2Node, DemoNode
 from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
+from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -31,7 +33,7 @@ def fly_to(process, x, y, z, yaw):
     process.advance(0.1)
 
 
-def test_leads_a_vehicle_along_the_tour():
+def test_leads_a_vehicle_along_the_waypoints():
     process = launch(Demo2Node(), worldFrame="/world")
     process.advance(0.1)
     visited = []
@@ -46,7 +48,7 @@ def test_leads_a_vehicle_along_the_tour():
     assert goal(process) == pytest.approx(Demo2Node.waypoints[-1][:4])
 
 
-def test_a_tour_can_be_given():
+def test_other_waypoints_can_be_given():
     process = launch(DemoNode(), waypoints=[[1, 2, 1, 0.5, 0], [3, 2, 1, 0, 0]])
     process.advance(0.1)
     assert goal(process) == pytest.approx((1.0, 2.0, 1.0, 0.5))
@@ -83,3 +85,14 @@ def test_a_bad_parameter_is_named(changes, reason):
     process = FakeProcess()
     assert not process.launch(DemoNode(), "/cf/demo", {"frame": "cf", **changes})
     assert reason in process.logged("error")[0]
+
+
+def test_the_tolerance_may_be_changed_in_flight():
+    process = launch(DemoNode(), waypoints=[[0, 0, 1, 0, 0], [1, 0, 1, 0, 0]])
+    fly_to(process, 0.4, 0.0, 1.0, 0.0)
+    assert goal(process)[0] == 0.0
+    with pytest.raises(ServiceError, match="/cf/demo/tolerance/position is 0.0; expected"):
+        reconfigure(process, "/cf/demo", **{"tolerance/position": 0.0})
+    reconfigure(process, "/cf/demo", **{"tolerance/position": 0.5})
+    fly_to(process, 0.4, 0.0, 1.0, 0.0)
+    assert goal(process)[0] == 1.0

@@ -7,15 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_demo.waypoint_node import Demo1Node, Demo2Node, DemoNode
-from crazyflie_demo.waypoints import Tour, Waypoint, WaypointList
+from crazyflie_demo.waypoints import Waypoint, WaypointFollower, WaypointList
 
 A = Waypoint(0.0, 0.0, 1.0, 0.0, 2.0)
 B = Waypoint(1.0, 0.0, 1.0, 1.0, 0.0)
 C = Waypoint(1.0, 1.0, 1.0, 0.0, 1.0)
 
 
-def tour(*waypoints):
-    return Tour(list(waypoints), 0.3, 0.2)
+def follower(*waypoints):
+    return WaypointFollower(list(waypoints), 0.3, 0.2)
 
 
 @pytest.mark.parametrize(
@@ -52,40 +52,40 @@ def test_a_good_list():
 
 
 def test_goes_on_when_it_has_been_there_long_enough():
-    path = tour(A, B, C)
-    path.see(0.0, (0.0, 0.0, 0.0), 0.0)
-    path.see(100.0, (0.0, 0.0, 0.69), 0.0)
+    path = follower(A, B, C)
+    path.update(0.0, (0.0, 0.0, 0.0), 0.0)
+    path.update(100.0, (0.0, 0.0, 0.69), 0.0)
     assert path.goal == A
-    path.see(101.0, (0.0, 0.0, 0.71), 0.0)
-    path.see(102.9, (0.0, 0.0, 1.0), 0.0)
+    path.update(101.0, (0.0, 0.0, 0.71), 0.0)
+    path.update(102.9, (0.0, 0.0, 1.0), 0.0)
     assert path.goal == A
-    path.see(103.0, (0.0, 0.0, 1.0), 0.0)
+    path.update(103.0, (0.0, 0.0, 1.0), 0.0)
     assert path.goal == B
 
 
 def test_the_seconds_pass_also_when_it_drifts():
-    path = tour(A, B)
-    path.see(0.0, A[:3], 0.0)
-    path.see(2.0, (0.4, 0.0, 1.0), 0.0)
+    path = follower(A, B)
+    path.update(0.0, A[:3], 0.0)
+    path.update(2.0, (0.4, 0.0, 1.0), 0.0)
     assert path.goal == B
 
 
 def test_the_heading_counts_and_goes_round():
-    path = tour(Waypoint(0.0, 0.0, 1.0, math.pi, 0.0), B)
-    path.see(0.0, (0.0, 0.0, 1.0), 0.0)
+    path = follower(Waypoint(0.0, 0.0, 1.0, math.pi, 0.0), B)
+    path.update(0.0, (0.0, 0.0, 1.0), 0.0)
     assert path.index == 0
-    path.see(1.0, (0.0, 0.0, 1.0), -math.pi + 0.1)
+    path.update(1.0, (0.0, 0.0, 1.0), -math.pi + 0.1)
     assert path.index == 1
 
 
 def test_the_last_one_stays():
-    path = tour(B, C)
-    path.see(0.0, B[:3], 1.0)
-    path.see(1.0, C[:3], 0.0)
+    path = follower(B, C)
+    path.update(0.0, B[:3], 1.0)
+    path.update(1.0, C[:3], 0.0)
     assert (path.goal, path.is_finished) == (C, False)
-    path.see(2.0, C[:3], 0.0)
+    path.update(2.0, C[:3], 0.0)
     assert (path.goal, path.is_finished) == (C, True)
-    path.see(9.0, A[:3], 0.0)
+    path.update(9.0, A[:3], 0.0)
     assert (path.goal, path.is_finished) == (C, True)
 
 
@@ -97,25 +97,25 @@ waypoints = st.builds(
 
 @given(st.lists(waypoints, min_size=1, max_size=6))
 def test_who_is_always_at_the_goal_ends_after_all_seconds(path):
-    follower = tour(*path)
+    followed = follower(*path)
     time, step = 0.0, 0.1
-    while not follower.is_finished:
-        follower.see(time, follower.goal[:3], follower.goal.yaw)
+    while not followed.is_finished:
+        followed.update(time, followed.goal[:3], followed.goal.yaw)
         time += step
         # Each waypoint may take one step more than its seconds, and one to arrive.
         assert time <= sum(w.seconds for w in path) + 2.0 * step * len(path) + 1e-6
-    assert follower.index == len(path) - 1
+    assert followed.index == len(path) - 1
 
 
 @pytest.mark.parametrize("node", [DemoNode, Demo1Node, Demo2Node])
-def test_the_tours_of_the_demos_stay_in_a_room(node):
+def test_the_waypoints_of_the_demos_are_in_a_room(node):
     assert WaypointList()([list(waypoint) for waypoint in node.waypoints]) == list(node.waypoints)
     for x, y, z, _, _ in node.waypoints:
         assert max(abs(x), abs(y)) <= 1.0
         assert 0.3 <= z <= 1.0
 
 
-def test_the_two_tours_keep_apart_whatever_the_pace():
+def test_the_two_vehicles_keep_apart_whatever_their_pace():
     def legs(node):
         return zip(node.waypoints, node.waypoints[1:], strict=False)
 

@@ -2,6 +2,8 @@
 
 import math
 
+from mocap_optitrack.frames import Quaternion, Vector3
+
 UP_AXES = ("z", "y")
 """Axes that may point up in a stream."""
 
@@ -9,7 +11,7 @@ _NORM_TOLERANCE = 0.01
 """How far the norm of a measured quaternion may be from 1."""
 
 
-def to_z_up(up_axis: str, position: tuple, quaternion: tuple) -> tuple:
+def to_z_up(up_axis: str, position: Vector3, quaternion: Quaternion) -> tuple[Vector3, Quaternion]:
     """Return a pose of a stream in coordinates whose z axis points up.
 
     From y up, the axes are turned by +90 degrees about x, those of the body too:
@@ -20,15 +22,9 @@ def to_z_up(up_axis: str, position: tuple, quaternion: tuple) -> tuple:
     ----------
     up_axis : str
         Of the stream, one of `UP_AXES`.
-    position : tuple, 3 components
+    position : Vector3
         m.
-    quaternion : tuple, 4 components
-        (x, y, z, w).
-
-    Returns
-    -------
-    tuple
-        Position and quaternion.
+    quaternion : Quaternion
     """
     if up_axis == "z":
         return position, quaternion
@@ -37,22 +33,23 @@ def to_z_up(up_axis: str, position: tuple, quaternion: tuple) -> tuple:
     return (x, -z, y), (a, -c, b, w)
 
 
-def normalized(quaternion: tuple) -> tuple | None:
+def normalized(quaternion: Quaternion) -> Quaternion | None:
     """Return a measured quaternion with norm 1; None when it is no rotation."""
     norm = math.hypot(*quaternion)
     # Also false when a component is not a number.
     if not abs(norm - 1.0) < _NORM_TOLERANCE:
         return None
-    return tuple(part / norm for part in quaternion)
+    x, y, z, w = quaternion
+    return x / norm, y / norm, z / norm, w / norm
 
 
-def heading(quaternion: tuple) -> float:
+def heading(quaternion: Quaternion) -> float:
     """Return where the body's x axis points on the ground, rad in [-pi, pi] from +x to +y.
 
     Parameters
     ----------
-    quaternion : tuple, 4 components
-        (x, y, z, w), of norm 1, in coordinates whose z axis points up. This is
+    quaternion : Quaternion
+        Of norm 1, in coordinates whose z axis points up. This is
         tf's yaw (roll, pitch and yaw about fixed axes), as ground poses have it.
     """
     x, y, z, w = quaternion

@@ -1,4 +1,4 @@
-"""The server's clock, told by the local one."""
+"""The server's clock by the local one."""
 
 from collections import deque
 
@@ -22,7 +22,7 @@ _JUMP = 0.1
 
 
 class ClockOffset:
-    """Tells local time from that of a server, whose messages come with varying delay.
+    """Local time from that of a server, whose messages come with varying delay.
 
     A message that is sent at ``s`` and arrives at ``a`` shows ``a - s = offset +
     delay``. Delays are positive, most of them small and a few large, so that the
@@ -32,12 +32,16 @@ class ClockOffset:
     smoothly. When a clock is set or the server starts again, learning begins anew.
     """
 
-    def __init__(self):
+    _offset: float | None
+    _sent: float | None
+    _updated: float
+
+    def __init__(self) -> None:
         self._forget()
 
     @property
     def is_settled(self) -> bool:
-        """Whether enough has been heard to rely on `to_local`."""
+        """Whether enough messages have come to rely on `to_local`."""
         return self._offset is not None
 
     def update(self, sent: float, arrival: float) -> bool:
@@ -71,9 +75,9 @@ class ClockOffset:
 
     def _forget(self):
         # Of each bucket: when it began, and its smallest difference.
-        self._window = deque(maxlen=_BUCKETS)
+        self._window: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)
         self._offset = None
-        self._updated = None
+        self._updated = 0.0
         self._sent = None
 
     def _is_contradiction(self, sent, difference):

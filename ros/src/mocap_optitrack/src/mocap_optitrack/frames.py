@@ -1,6 +1,12 @@
-"""What a motion capture system says, whatever its make."""
+"""Frames of a motion capture system, whatever its make."""
 
 from typing import NamedTuple
+
+Vector3 = tuple[float, float, float]
+"""x, y, z."""
+
+Quaternion = tuple[float, float, float, float]
+"""(x, y, z, w)."""
 
 
 class Body(NamedTuple):
@@ -12,10 +18,10 @@ class Body(NamedTuple):
         Number that the server streams the body under; None when it has none.
     name : str or None
         Name of the body on the server; None when it is not known.
-    position : tuple, 3 components
+    position : Vector3
         m, in the server's coordinates.
-    quaternion : tuple, 4 components
-        (x, y, z, w), from the body's axes to the server's coordinates.
+    quaternion : Quaternion
+        From the body's axes to the server's coordinates.
     is_tracked : bool
         Whether the cameras saw the body in this frame; otherwise the pose is an
         old one, or none.
@@ -23,8 +29,8 @@ class Body(NamedTuple):
 
     body_id: int | None
     name: str | None
-    position: tuple
-    quaternion: tuple
+    position: Vector3
+    quaternion: Quaternion
     is_tracked: bool
 
 
@@ -35,7 +41,7 @@ class Frame(NamedTuple):
     ----------
     exposure : float or None
         When the cameras took the frame, s of the server's clock; None when the
-        server does not tell.
+        stream does not have it.
     sent : float or None
         When the server sent it, s of the same clock; None like `exposure`.
     arrival : float
@@ -46,4 +52,4 @@ class Frame(NamedTuple):
     exposure: float | None
     sent: float | None
     arrival: float
-    bodies: tuple
+    bodies: tuple[Body, ...]

@@ -1,7 +1,11 @@
-"""How well motion capture works, in figures and in words."""
+"""How well motion capture works, for the diagnostics."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
+
+from mocap_optitrack.frames import Body
+from mocap_optitrack.parameters import RigidBody
 
 OK, WARN, ERROR = range(3)
 """Levels, as in diagnostic_msgs/DiagnosticStatus."""
@@ -11,7 +15,7 @@ _GRACE = 2.0
 first moments of a stream, s."""
 
 _MOST_OTHERS = 10
-"""Bodies nobody asked for that are remembered, so that a message can name them."""
+"""Bodies that are not configured and are remembered, so that a message can name them."""
 
 
 class Status(NamedTuple):
@@ -32,7 +36,7 @@ class Status(NamedTuple):
     component: str
     level: int
     message: str
-    values: dict
+    values: dict[str, str]
 
 
 class Health:
@@ -45,17 +49,24 @@ class Health:
         Gaps longer than this are a fault, s.
     now : float
         s.
+
+    Attributes
+    ----------
+    stale_after : float
+        For the reports to come.
     """
 
-    def __init__(self, bodies, stale_after: float, now: float):
+    _longest_gap: float
+
+    def __init__(self, bodies: Sequence[RigidBody], stale_after: float, now: float):
         self._bodies = {body.key: _BodyCount() for body in bodies}
         self._labels = {body.key: body.label for body in bodies}
-        self._stale_after = stale_after
-        self._server = None
+        self.stale_after = stale_after
+        self._server: str | None = None
         self._trouble = "not connected so far"
-        self._last_frame = None
-        self._stream_begin = None
-        self._others = {}
+        self._last_frame: float | None = None
+        self._stream_begin: float | None = None
+        self._others: dict[tuple[int | None, str | None], Body] = {}
         self._begin_period(now)
 
     def learning(self) -> None:
@@ -79,7 +90,7 @@ class Health:
         self._last_frame = now
         self._latencies.append(latency)
 
-    def body(self, body, now: float, is_tracked: bool) -> None:
+    def body(self, body: RigidBody, now: float, is_tracked: bool) -> None:
         """Take note that a wanted body was in a good frame, tracked or not."""
         count = self._bodies[body.key]
         count.frames += 1
@@ -87,8 +98,8 @@ class Health:
             count.tracked += 1
             count.last = now
 
-    def other(self, body) -> None:
-        """Take note of a `Body` in a good frame that nobody asked for."""
+    def other(self, body: Body) -> None:
+        """Take note of a `Body` in a good frame that is not configured."""
         if len(self._others) < _MOST_OTHERS:
             self._others[body.body_id, body.name] = body
 
@@ -106,7 +117,7 @@ class Health:
         for count in self._bodies.values():
             count.begin_period()
 
-    def report(self, now: float) -> list:
+    def report(self, now: float) -> list[Status]:
         """Return the state since the last report; counting begins anew.
 
         Parameters
@@ -126,7 +137,7 @@ class Health:
 
     def _begin_period(self, now):
         self._begin = now
-        self._latencies = []
+        self._latencies: list[float] = []
         self._longest_gap = 0.0
         self._learning = 0
         self._jumps = 0
@@ -151,9 +162,10 @@ class Health:
             mean = math.fsum(self._latencies) / frames
             values["latency, mean (ms)"] = _milliseconds(mean)
             values["latency, maximum (ms)"] = _milliseconds(max(self._latencies))
-        return Status("stream", *self._stream_verdict(values, gap), values)
+        level, message = self._stream_assessment(values, gap)
+        return Status("stream", level, message, values)
 
-    def _stream_verdict(self, values, gap):
+    def _stream_assessment(self, values, gap):
         if self._server is None:
             return ERROR, self._trouble
         if self._jumps > 1:
@@ -166,7 +178,7 @@ class Health:
             if self._stale:
                 return ERROR, "all frames are stale: is the server paused or playing a recording?"
             return ERROR, "no frames"
-        if gap > self._stale_after:
+        if gap > self.stale_after:
             return WARN, f"gaps of up to {values['longest gap (ms)']} ms"
         return OK, (
             f"{values['rate (Hz)']} frames per second, {values['latency, mean (ms)']} ms old"
@@ -177,11 +189,11 @@ class Health:
         values = {"frames": str(count.frames), "tracked": str(count.tracked)}
         if count.last is not None:
             values["last seen (s ago)"] = f"{now - count.last:.2f}"
-        level, message = self._body_verdict(count, now)
+        level, message = self._body_assessment(count, now)
         return Status(f"rigid body {self._labels[key]}", level, message, values)
 
-    def _body_verdict(self, count, now):
-        if self._last_frame is None or now - self._last_frame > self._stale_after:
+    def _body_assessment(self, count, now):
+        if self._last_frame is None or now - self._last_frame > self.stale_after:
             return ERROR, "no frames"
         if count.last is None or count.last < self._stream_begin:
             is_early = now - self._stream_begin < _GRACE
@@ -189,7 +201,7 @@ class Health:
             if count.frames:
                 return level, "in the stream, but not tracked so far"
             return level, f"not in the stream so far; {self._other_bodies()}"
-        if now - count.last > self._stale_after:
+        if now - count.last > self.stale_after:
             return ERROR, f"not tracked for {now - count.last:.1f} s"
         if count.tracked < count.frames:
             return WARN, f"tracked in {count.tracked} of {count.frames} frames"
@@ -203,8 +215,8 @@ class Health:
 
 
 class _BodyCount:
-    def __init__(self):
-        self.last = None
+    def __init__(self) -> None:
+        self.last: float | None = None
         self.begin_period()
 
     def begin_period(self):

@@ -7,6 +7,9 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Callable
+
+from typing_extensions import override
 
 from mocap_optitrack import library_worker
 from mocap_optitrack.frames import Body, Frame
@@ -40,16 +43,16 @@ class LibrarySource(Source):
         Returns the local time, s.
     """
 
-    def __init__(self, system: str, host: str, clock):
+    def __init__(self, system: str, host: str, clock: Callable[[], float]):
         self._system = system
         self._host = host
         self._clock = clock
-        self._worker = None
+        self._worker: subprocess.Popen[bytes] | None = None
         self._received = b""
-        self._last = {}
+        self._last: dict[str, tuple[float, ...]] = {}
 
+    @override
     def open(self) -> str:
-        """See `Source.open`."""
         try:
             # The package does not take names.
             address = socket.gethostbyname(self._host)
@@ -67,8 +70,8 @@ class LibrarySource(Source):
         self._parse(line)
         return f"{self._system} at {self._host}, over the motioncapture package"
 
-    def read(self, limit: float):
-        """See `Source.read`."""
+    @override
+    def read(self, limit: float) -> Frame | None:
         line = self._read_line(limit)
         if line is None:
             return None
@@ -80,15 +83,15 @@ class LibrarySource(Source):
         return Frame(None, None, arrival, tuple(bodies))
 
     @property
+    @override
     def silence_hint(self) -> str:
-        """See `Source.silence_hint`."""
         return (
             f"{self._system} at {self._host} shows no body that moves by so much as its noise: "
             "is it live, and are its objects enabled?"
         )
 
+    @override
     def close(self) -> None:
-        """See `Source.close`."""
         if self._worker is not None:
             self._worker.kill()
             self._worker.wait()

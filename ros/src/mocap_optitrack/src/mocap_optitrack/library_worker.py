@@ -2,7 +2,7 @@
 
 ``python -m mocap_optitrack.library_worker TYPE HOST`` writes JSON to its standard
 output, one value a line: first null, when it is connected, then for every frame a
-list of [name, x, y, z, qx, qy, qz, qw]; m and z up, as the system says. When the
+list of [name, x, y, z, qx, qy, qz, qw]; m and z up, as the system has them. When the
 package fails it writes {"error": text} and ends.
 
 Without a server the package may wait for ever, in C++ and with Python's interpreter
@@ -14,6 +14,7 @@ import json
 import os
 import signal
 import sys
+from typing import Any
 
 CONNECT_LIMIT = 10.0
 """How long connecting may take, s."""
@@ -53,7 +54,7 @@ def _stream(system, host, out):
         print(json.dumps([[name, *pose(body)] for name, body in bodies]), file=out)
 
 
-def pose(body) -> list:
+def pose(body: Any) -> list[float]:
     """Return position and quaternion (x, y, z, w) of one of the package's rigid bodies."""
     rotation = body.rotation
     quaternion = (rotation.x, rotation.y, rotation.z, rotation.w)

@@ -65,7 +65,7 @@ def request(number: int, text: str = "") -> bytes:
     return _HEADER.pack(number, len(payload)) + payload
 
 
-def split(datagram: bytes) -> tuple:
+def split(datagram: bytes) -> tuple[int, bytes]:
     """Return number and payload of a message.
 
     Raises
@@ -77,7 +77,7 @@ def split(datagram: bytes) -> tuple:
     number, length = _HEADER.unpack_from(datagram)
     payload = datagram[_HEADER.size :]
     if length != len(payload):
-        raise DecodeError(f"a message of {len(payload)} bytes says that it has {length}")
+        raise DecodeError(f"a message of {len(payload)} bytes should have {length} by its header")
     return number, payload
 
 
@@ -99,7 +99,7 @@ def read_server_info(payload: bytes) -> ServerInfo:
     )
 
 
-def read_names(payload: bytes, version: str) -> dict:
+def read_names(payload: bytes, version: str) -> dict[int, str]:
     """Return the content of a `MODEL` message: number to name of all rigid bodies.
 
     Raises
@@ -111,7 +111,7 @@ def read_names(payload: bytes, version: str) -> dict:
 
 
 def read_frame(
-    payload: bytes, version: str, clock_frequency: int | None, names: dict, arrival: float
+    payload: bytes, version: str, clock_frequency: int | None, names: dict[int, str], arrival: float
 ) -> Frame:
     """Return the content of a `FRAME` message.
 
@@ -155,8 +155,8 @@ def _is_tracked(body):
 
 
 class _Buffer(PacketBuffer):
-    # natnet reads empty strings beyond the end, and makes room for whatever count
-    # it is told: with a broken datagram it would take hours, or all memory.
+    # natnet reads empty strings beyond the end, and allocates room for whatever count
+    # comes: with a broken datagram it would take hours, or all memory.
 
     def read_string(self, *args, **kwargs):
         self._require(1)
@@ -171,10 +171,10 @@ class _Buffer(PacketBuffer):
             raise ValueError(f"it goes on for {size} bytes beyond byte {self.pointer}")
 
 
-def _decode(kind, payload, version):
+def _decode(message_type, payload, version):
     parsed = None if version is None else Version.from_str(version)
     try:
-        return kind.read_from_buffer(_Buffer(payload), parsed)
+        return message_type.read_from_buffer(_Buffer(payload), parsed)
     except (struct.error, ValueError, IndexError, NatNetError) as error:
-        what = f"{kind.__name__} of NatNet {version}" if version else kind.__name__
+        what = f"{message_type.__name__} of NatNet {version}" if version else message_type.__name__
         raise DecodeError(f"cannot decode a {what} of {len(payload)} bytes: {error}") from None

@@ -4,9 +4,13 @@ import contextlib
 import select
 import socket
 import time
+from collections.abc import Callable
+
+from typing_extensions import override
 
 from mocap_optitrack import natnet_messages as natnet
-from mocap_optitrack.settings import NatNetSettings
+from mocap_optitrack.frames import Frame
+from mocap_optitrack.parameters import NatNetParameters
 from mocap_optitrack.source import Source, SourceError
 
 _ANSWER_LIMIT = 2.0
@@ -30,29 +34,29 @@ class NatNetSource(Source):
 
     Parameters
     ----------
-    settings : NatNetSettings
+    parameters : NatNetParameters
     clock : callable
         Returns the local time, s.
     warn : callable
         Called with a text about every datagram that is dropped.
     """
 
-    def __init__(self, settings: NatNetSettings, clock, warn):
-        self._settings = settings
+    def __init__(
+        self, parameters: NatNetParameters, clock: Callable[[], float], warn: Callable[[str], None]
+    ):
+        self._parameters = parameters
         self._clock = clock
         self._warn = warn
-        self._sockets = []
-        self._commands = None
-        self._server = None
-        self._info = None
-        self._group = None
-        self._names = {}
+        self._sockets: list[socket.socket] = []
+        self._server: tuple[str, int] | None = None
+        self._group: tuple[str, int] | None = None
+        self._names: dict[int, str] = {}
         self._wants_names = True
-        self._asked_names_at = None
-        self._kept_alive_at = None
+        self._asked_names_at: float | None = None
+        self._kept_alive_at: float | None = None
 
+    @override
     def open(self) -> str:
-        """See `Source.open`."""
         try:
             self._commands = self._udp_socket()
             self._commands.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
@@ -65,11 +69,11 @@ class NatNetSource(Source):
             raise SourceError(f"cannot open a NatNet connection: {error}") from None
         return self._description()
 
-    def read(self, limit: float):
-        """See `Source.read`."""
+    @override
+    def read(self, limit: float) -> Frame | None:
         try:
             if self._server is not None:
-                self._speak()
+                self._send_requests()
             ready, _, _ = select.select(self._sockets, [], [], limit)
             for each in ready:
                 frame = self._take(*each.recvfrom(_LARGEST), self._clock())
@@ -80,8 +84,8 @@ class NatNetSource(Source):
         return None
 
     @property
+    @override
     def silence_hint(self) -> str:
-        """See `Source.silence_hint`."""
         if self._group is None:
             return (
                 f"{self._where()} has answered but sends nothing: does it stream rigid bodies, "
@@ -94,8 +98,8 @@ class NatNetSource(Source):
             "machine in the cameras' network?"
         )
 
+    @override
     def close(self) -> None:
-        """See `Source.close`."""
         for each in self._sockets:
             each.close()
         self._sockets = []
@@ -106,21 +110,21 @@ class NatNetSource(Source):
         return made
 
     def _targets(self):
-        settings = self._settings
-        if settings.server_address is None:
-            return [a for a in (settings.multicast_address, _THIS_MACHINE) if a is not None]
+        parameters = self._parameters
+        if parameters.server_address is None:
+            return [a for a in (parameters.multicast_address, _THIS_MACHINE) if a is not None]
         try:
-            return [socket.gethostbyname(settings.server_address)]
+            return [socket.gethostbyname(parameters.server_address)]
         except OSError as error:
             raise SourceError(
-                f"optitrack_config/server_address {settings.server_address!r} is unknown: {error}"
+                f"optitrack_config/server_address {parameters.server_address!r} is unknown: {error}"
             ) from None
 
     def _ask_for_server(self):
         targets = self._targets()
-        port = self._settings.command_port
-        if self._settings.local_address is not None:
-            interface = socket.inet_aton(self._settings.local_address)
+        port = self._parameters.command_port
+        if self._parameters.local_address is not None:
+            interface = socket.inet_aton(self._parameters.local_address)
             self._commands.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
         end = time.monotonic() + _ANSWER_LIMIT
         ask_at = 0.0
@@ -141,13 +145,13 @@ class NatNetSource(Source):
         return None
 
     def _silent_server(self):
-        # Frames can be had from a group without a word from the server.
-        settings = self._settings
-        if settings.version is not None and settings.multicast_address is not None:
-            return natnet.ServerInfo("a server that does not answer", settings.version)
+        # Frames can be had from a group without an answer of the server.
+        parameters = self._parameters
+        if parameters.version is not None and parameters.multicast_address is not None:
+            return natnet.ServerInfo("a server that does not answer", parameters.version)
         raise SourceError(
             f"no NatNet server answers at {' or '.join(self._targets())}, UDP port "
-            f"{settings.command_port}: is Motive running and streaming, is "
+            f"{parameters.command_port}: is Motive running and streaming, is "
             "optitrack_config/server_address right, and does a firewall let UDP pass?"
         )
 
@@ -162,14 +166,14 @@ class NatNetSource(Source):
             raise SourceError(f"cannot send to the NatNet server at {', '.join(failures)}")
 
     def _find_group(self):
-        # A server's own word counts; older ones say nothing of how they send.
-        info, settings = self._info, self._settings
+        # What a server names counts; older ones do not tell how they send.
+        info, parameters = self._info, self._parameters
         if info.is_multicast is False:
             return None
-        address = info.multicast_address or settings.multicast_address
+        address = info.multicast_address or parameters.multicast_address
         if address is None:
             return None
-        return address, info.data_port or settings.data_port
+        return address, info.data_port or parameters.data_port
 
     def _join(self, address, port):
         frames = self._udp_socket()
@@ -180,34 +184,34 @@ class NatNetSource(Source):
         frames.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
 
     def _interface(self):
-        if self._settings.local_address is not None:
-            return self._settings.local_address
+        if self._parameters.local_address is not None:
+            return self._parameters.local_address
         if self._server is None:
             return "0.0.0.0"
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             probe.connect(self._server)
             return probe.getsockname()[0]
 
-    def _speak(self):
+    def _send_requests(self):
         now = time.monotonic()
         if not self._info.is_multicast and _is_due(self._kept_alive_at, _KEEP_ALIVE, now):
             self._kept_alive_at = now
-            self._tell(natnet.KEEP_ALIVE)
+            self._send(natnet.KEEP_ALIVE)
         if self._wants_names and _is_due(self._asked_names_at, _NAMES_AGAIN, now):
             self._asked_names_at = now
-            self._tell(natnet.REQUEST_MODEL)
+            self._send(natnet.REQUEST_MODEL)
 
-    def _tell(self, number):
+    def _send(self, number):
         self._commands.sendto(natnet.request(number), self._server)
 
     def _take(self, datagram, sender, arrival):
         try:
-            return self._understand(*natnet.split(datagram), arrival)
+            return self._decode(*natnet.split(datagram), arrival)
         except natnet.DecodeError as error:
             self._warn(f"ignoring a datagram from {sender[0]}: {error}")
             return None
 
-    def _understand(self, number, payload, arrival):
+    def _decode(self, number, payload, arrival):
         version = self._info.version
         if number == natnet.MODEL:
             self._names = natnet.read_names(payload, version)
@@ -229,7 +233,7 @@ class NatNetSource(Source):
             return f"{where}, NatNet {self._info.version}, unicast"
         address, port = self._group
         text = f"{where}, NatNet {self._info.version}, multicast to {address}:{port}"
-        configured = (self._settings.multicast_address, self._settings.data_port)
+        configured = (self._parameters.multicast_address, self._parameters.data_port)
         if None not in configured and configured != self._group:
             text += f" (which overrules the configured {configured[0]}:{configured[1]})"
         return text

@@ -4,6 +4,7 @@ import threading
 import time
 import traceback
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 from mocap_optitrack.frames import Frame
 
@@ -14,7 +15,7 @@ _RETRY = 1.0
 """From a failure to the next attempt, s."""
 
 _POLL = 0.1
-"""How long a source may wait for a frame before it looks up, s."""
+"""How long a source may wait for a frame before `Receiver.stop` is looked for, s."""
 
 _STOP_LIMIT = 0.5
 """How long `Receiver.stop` waits for the thread, s."""
@@ -72,7 +73,13 @@ class Receiver:
         another attempt.
     """
 
-    def __init__(self, make_source, on_connected, on_frame, on_trouble):
+    def __init__(
+        self,
+        make_source: Callable[[], Source],
+        on_connected: Callable[[str], None],
+        on_frame: Callable[[Frame], None],
+        on_trouble: Callable[[str], None],
+    ):
         self._make_source = make_source
         self._on_connected = on_connected
         self._on_frame = on_frame
@@ -100,7 +107,7 @@ class Receiver:
             except SourceError as error:
                 self._on_trouble(str(error))
             except Exception:
-                # The thread must live, whatever a system or a library comes up with.
+                # The thread must go on, whatever a system or a library raises.
                 self._on_trouble(f"motion capture failed\n{traceback.format_exc()}")
             finally:
                 source.close()

@@ -1,12 +1,14 @@
 """From a system's frames to the poses that are published."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from mocap_optitrack.axes import normalized, to_z_up
 from mocap_optitrack.clock_offset import ClockOffset
-from mocap_optitrack.frames import Frame
-from mocap_optitrack.settings import RigidBody
+from mocap_optitrack.frames import Frame, Quaternion, Vector3
+from mocap_optitrack.health import Health
+from mocap_optitrack.parameters import RigidBody
 
 
 class Sighting(NamedTuple):
@@ -17,16 +19,16 @@ class Sighting(NamedTuple):
     body : RigidBody
     time : float
         When, s of the local clock.
-    position : tuple, 3 components
+    position : Vector3
         m, z up.
-    quaternion : tuple, 4 components
-        (x, y, z, w), of norm 1.
+    quaternion : Quaternion
+        Of norm 1.
     """
 
     body: RigidBody
     time: float
-    position: tuple
-    quaternion: tuple
+    position: Vector3
+    quaternion: Quaternion
 
 
 class Tracker:
@@ -44,14 +46,21 @@ class Tracker:
     stale_after : float
         s.
     health : Health
-        Is told what happens.
+        Counts what happens.
+
+    Attributes
+    ----------
+    stale_after : float
+        For the frames to come.
     """
 
-    def __init__(self, bodies, up_axis: str, stale_after: float, health):
+    def __init__(
+        self, bodies: Sequence[RigidBody], up_axis: str, stale_after: float, health: Health
+    ):
         self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
         self._by_name = {body.name: body for body in bodies if body.name is not None}
         self._up_axis = up_axis
-        self._stale_after = stale_after
+        self.stale_after = stale_after
         self._health = health
         self._newest = -math.inf
         self._clock = ClockOffset()
@@ -60,7 +69,7 @@ class Tracker:
         """Take note that a new connection begins: the server's clock may be another one."""
         self._clock = ClockOffset()
 
-    def take(self, frame: Frame) -> list:
+    def take(self, frame: Frame) -> list[Sighting]:
         """Return what is to be published of a frame.
 
         Returns
@@ -75,7 +84,7 @@ class Tracker:
             self._health.learning()
             return []
         age = frame.arrival - time
-        if time <= self._newest or age > self._stale_after:
+        if time <= self._newest or age > self.stale_after:
             self._health.stale()
             return []
         self._newest = time

@@ -1,60 +1,69 @@
 """ROS interface of the flight to a goal."""
 
+from collections.abc import Iterator
+
 from geometry_msgs.msg import PoseStamped, Twist, Vector3
 from std_srvs.srv import Empty, EmptyResponse
+from typing_extensions import override
 
-from crazyflie_controller.flight import Flight
-from crazyflie_controller.go_to import AXES, GoToController, Pose
-from crazyflie_controller.pid import Gains
-from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_utils.node import Node
-from crazyflie_utils.parameter_types import FINITE, FRAME, Number
-from crazyflie_utils.parameters import ParameterError
+from crazyflie_controller.flight import GoToFlight
+from crazyflie_controller.go_to import GoToController
+from crazyflie_controller.pid import PidParameters
+from crazyflie_controller.pose_source import PoseParameters, PoseSource, pose
+from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
+from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters import group
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.runtime.transforms import TransformError
-from crazyflie_utils.runtime.transport import ServiceError
-from crazyflie_utils.vectors import is_finite
 
-_GAINS = {
-    "kp": "kp",
-    "kd": "kd",
-    "ki": "ki",
-    "min_output": "minOutput",
-    "max_output": "maxOutput",
-    "integrator_min": "integratorMin",
-    "integrator_max": "integratorMax",
-}
-"""Attribute of `Gains` -> parameter."""
+
+class ControllerParameters(PoseParameters):
+    """Parameters of `ControllerNode`."""
+
+    frequency: float = parameter(Number("Hz", above=0.0), "setpoints a second", 50.0)
+    pid_x: PidParameters = group(PidParameters, "PIDs/X")
+    pid_y: PidParameters = group(PidParameters, "PIDs/Y")
+    pid_z: PidParameters = group(PidParameters, "PIDs/Z")
+    pid_yaw: PidParameters = group(PidParameters, "PIDs/Yaw")
+
+    @property
+    def pids(self) -> dict[str, PidParameters]:
+        """Gains and limits by `go_to.AXES`."""
+        return {"X": self.pid_x, "Y": self.pid_y, "Z": self.pid_z, "Yaw": self.pid_yaw}
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        for axis, pid in self.pids.items():
+            for lower, minimum, upper, maximum in (
+                ("minOutput", pid.min_output, "maxOutput", pid.max_output),
+                ("integratorMin", pid.integrator_min, "integratorMax", pid.integrator_max),
+            ):
+                if minimum > maximum:
+                    yield (
+                        f"parameter PIDs/{axis}/{lower} is {minimum:g}; expected at most "
+                        f"{upper}, {maximum:g}"
+                    )
 
 
 class ControllerNode(Node):
     """Fly the vehicle that tf knows to the goal of a topic."""
 
-    def __init__(self):
-        super().__init__()
-        self._world_frame = None
-        self._frame = None
-        self._period = None
-        self._flight = None
-        self._publisher = None
-        self._lookup = None
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(ControllerParameters, self._reconfigure)
+        self._controller = GoToController(self._parameters.pids)
+        self._flight = GoToFlight(self._controller)
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._world_frame = handle.param("worldFrame", FRAME, "world")
-        self._frame = handle.param("frame", FRAME)
-        self._period = 1.0 / handle.param("frequency", Number("Hz", above=0.0), 50.0)
-        gains = {axis: _load_gains(handle, f"PIDs/{axis}") for axis in AXES}
-        self._flight = Flight(GoToController(gains))
-
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
-        self._lookup = handle.listen_to_transforms()
+        self._source = PoseSource(handle, self._parameters)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)
-        handle.subscribe("goal", PoseStamped, self._on_goal)
-        handle.timer(self._period, self._on_timer)
+        handle.subscribe("goal", PoseStamped, self._on_goal, finite="pose")
+        handle.timer(1.0 / self._parameters.frequency, self._on_timer)
+
+    def _reconfigure(self, parameters):
+        self._controller.reconfigure(parameters.pids)
 
     def _on_takeoff(self, _):
         return self._begin("takeoff", self._flight.take_off)
@@ -70,27 +79,26 @@ class ControllerNode(Node):
         return EmptyResponse()
 
     def _on_goal(self, message):
+        world_frame = self._parameters.world_frame
         frame = message.header.frame_id.lstrip("/")
-        if frame not in ("", self._world_frame):
+        if frame not in ("", world_frame):
             self._handle.warn(
-                f"a goal names the frame {frame}; it is taken as one in {self._world_frame}",
+                f"a goal names the frame {frame}; it is taken as one in {world_frame}",
                 throttle=5.0,
             )
-        position, q = message.pose.position, message.pose.orientation
-        if not is_finite(message.pose):
-            self._handle.warn("ignoring a goal that is not finite", throttle=1.0)
-        elif q.x == q.y == q.z == q.w == 0.0:
+        q = message.pose.orientation
+        if q.x == q.y == q.z == q.w == 0.0:
             self._handle.warn(
                 "ignoring a goal whose orientation is (0, 0, 0, 0); expected a quaternion, "
                 "such as (0, 0, 0, 1)",
                 throttle=1.0,
             )
-        else:
-            self._flight.set_goal(_pose(position, q))
+            return
+        self._flight.set_goal(pose(message.pose.position, q))
 
     def _on_timer(self):
         before = self._flight.state
-        setpoint = self._flight.tick(self._handle.time(), *self._look())
+        setpoint = self._flight.tick(self._handle.time(), *self._source.latest())
         if setpoint is not None:
             self._publisher.publish(
                 Twist(
@@ -98,41 +106,8 @@ class ControllerNode(Node):
                     angular=Vector3(0.0, 0.0, setpoint.yaw_rate),
                 )
             )
-        remark = self._flight.take_remark()
-        if remark is not None:
-            self._handle.warn(remark, throttle=1.0)
+        warning = self._flight.take_warning()
+        if warning is not None:
+            self._handle.warn(warning, throttle=1.0)
         if self._flight.state is not before:
             self._handle.info(self._flight.state.value)
-
-    def _look(self):
-        try:
-            found = self._lookup(self._world_frame, self._frame)
-        except TransformError as error:
-            self._handle.warn(
-                f"no pose of {self._frame} in {self._world_frame}: {error}", throttle=5.0, key="tf"
-            )
-            return None, None
-        transform = found.transform
-        return found.header.stamp.to_sec(), _pose(transform.translation, transform.rotation)
-
-
-def _load_gains(handle, name):
-    gains = Gains(
-        **{key: handle.param(f"{name}/{parameter}", FINITE) for key, parameter in _GAINS.items()}
-    )
-    pairs = {
-        "minOutput": (gains.min_output, gains.max_output, "maxOutput"),
-        "integratorMin": (gains.integrator_min, gains.integrator_max, "integratorMax"),
-    }
-    for lower, (minimum, maximum, upper) in pairs.items():
-        if minimum > maximum:
-            raise ParameterError(
-                f"parameter {handle.resolve(f'~{name}/{lower}')} is {minimum:g}; expected at "
-                f"most {upper}, {maximum:g}"
-            )
-    return gains
-
-
-def _pose(position, q):
-    yaw = rpy_from_quaternion(q.x, q.y, q.z, q.w)[2]
-    return Pose(position.x, position.y, position.z, yaw)

@@ -1,4 +1,4 @@
-"""A flight from the ground to a goal and back, as a state machine that lives by `Flight.tick`.
+"""A flight from the ground to a goal and back, as a state machine driven by `GoToFlight.tick`.
 
 Times are s of any clock that does not run backwards; if it is reset, what was
 under way goes on from there.
@@ -47,8 +47,8 @@ TOUCHDOWN_DURATION = 1.0
 """How long it does, s; zero thrust follows."""
 
 
-_NOWHERE = Pose(0.0, 0.0, 0.0, 0.0)
-"""Stands for a pose that is not known yet; it is not used while the vehicle is blind."""
+_UNKNOWN = Pose(0.0, 0.0, 0.0, 0.0)
+"""Stands for a pose that is not known yet; it is not used while there is none."""
 
 
 class State(Enum):
@@ -60,12 +60,12 @@ class State(Enum):
     LANDING = "landing"
 
 
-class Flight:
+class GoToFlight:
     """One vehicle's flights.
 
-    Without a pose that is new within `HOLD_LIMIT` the vehicle is blind: in the air it
-    is given no setpoints, so that its own watchdog levels it out; when that has
-    lasted for `OFF_AGE` its motors are off, and the flight has ended.
+    Without a pose that is new within `HOLD_LIMIT` a vehicle in the air is given no
+    setpoints, so that its own watchdog levels it out; when that has lasted for
+    `OFF_AGE` its motors are off, and the flight has ended.
 
     Parameters
     ----------
@@ -75,18 +75,18 @@ class Flight:
     def __init__(self, controller: GoToController):
         self._controller = controller
         self._state = State.IDLE
-        self._remark: str | None = None
+        self._warning: str | None = None
         self._goal: Pose | None = None
-        self._hover = _NOWHERE
-        self._pose = _NOWHERE
+        self._hover = _UNKNOWN
+        self._pose = _UNKNOWN
         self._stamp: float | None = None
-        self._seen = -math.inf
+        self._pose_time = -math.inf
         self._time = -math.inf
         self._entered = -math.inf
         self._interval: float | None = None
         self._setpoint: Setpoint | None = Setpoint()
         self._ground = 0.0
-        self._descent_from = _NOWHERE
+        self._descent_from = _UNKNOWN
         self._touchdown: tuple[float, float] | None = None
 
     @property
@@ -94,10 +94,10 @@ class Flight:
         """What the controller is doing."""
         return self._state
 
-    def take_remark(self) -> str | None:
+    def take_warning(self) -> str | None:
         """Return what an operator should know of the last tick, once; or None."""
-        remark, self._remark = self._remark, None
-        return remark
+        warning, self._warning = self._warning, None
+        return warning
 
     def set_goal(self, goal: Pose) -> None:
         """Fly there, now or after the next takeoff."""
@@ -113,7 +113,7 @@ class Flight:
         """
         if self._state is not State.IDLE:
             raise RefusalError(f"the controller is {self._state.value}; land first")
-        if self._is_blind(HOLD_LIMIT):
+        if self._is_pose_older_than(HOLD_LIMIT):
             raise RefusalError(f"there has been no new pose for {HOLD_LIMIT:g} s")
         self._ground = self._pose.z
         self._enter(State.TAKING_OFF)
@@ -152,7 +152,7 @@ class Flight:
             None when the vehicle is better left to its own watchdog.
         """
         self._follow_clock(time)
-        self._look(stamp, pose)
+        self._update_pose(stamp, pose)
         self._setpoint = self._ACTIONS[self._state](self)
         return self._setpoint
 
@@ -163,15 +163,15 @@ class Flight:
 
     def _take_off(self):
         thrust = TAKEOFF_RATE * (self._time - self._entered)
-        if self._is_blind(HOLD_LIMIT):
-            return self._give_up(f"takeoff ended: no new pose for {HOLD_LIMIT:g} s")
+        if self._is_pose_older_than(HOLD_LIMIT):
+            return self._abort(f"takeoff ended: no new pose for {HOLD_LIMIT:g} s")
         if self._pose.z > self._ground + LIFT_OFF_HEIGHT:
             self._hover = self._pose._replace(z=self._ground + HOVER_HEIGHT)
             self._controller.reset(thrust - LIFT_OFF_EXCESS)
             self._enter(State.AUTOMATIC)
             return self._go()
         if thrust >= self._controller.max_thrust:
-            return self._give_up(f"takeoff ended: not lifted off with a thrust of {thrust:.0f} PWM")
+            return self._abort(f"takeoff ended: not lifted off with a thrust of {thrust:.0f} PWM")
         return Setpoint(thrust=thrust)
 
     def _go(self):
@@ -203,20 +203,20 @@ class Flight:
     }
 
     def _fly_to(self, goal):
-        if self._is_blind(OFF_AGE):
-            return self._give_up(
+        if self._is_pose_older_than(OFF_AGE):
+            return self._abort(
                 f"flight ended: no new pose for {OFF_AGE:g} s, so that the vehicle has "
                 "stopped its motors"
             )
-        if self._is_blind(HOLD_LIMIT):
-            self._remark = f"no new pose for {HOLD_LIMIT:g} s: sending no setpoints"
+        if self._is_pose_older_than(HOLD_LIMIT):
+            self._warning = f"no new pose for {HOLD_LIMIT:g} s: sending no setpoints"
             return None
         if self._interval is None:
             return self._setpoint
         return self._controller.update(self._pose, goal, self._interval)
 
-    def _give_up(self, remark):
-        self._remark = remark
+    def _abort(self, warning):
+        self._warning = warning
         self._enter(State.IDLE)
         return Setpoint()
 
@@ -229,9 +229,9 @@ class Flight:
         self._state = state
         self._entered = self._time
 
-    # Eyes and clock.
+    # Poses and clock.
 
-    def _look(self, stamp, pose):
+    def _update_pose(self, stamp, pose):
         self._interval = None
         if pose is None or stamp == self._stamp:
             return
@@ -240,15 +240,15 @@ class Flight:
             self._controller.forget_error()
             interval = 0.0
         self._interval = interval
-        self._stamp, self._pose, self._seen = stamp, pose, self._time
+        self._stamp, self._pose, self._pose_time = stamp, pose, self._time
 
-    def _is_blind(self, limit):
-        return self._time - self._seen > limit
+    def _is_pose_older_than(self, limit):
+        return self._time - self._pose_time > limit
 
     def _follow_clock(self, time):
         if time < self._time:
             step = time - self._time
-            self._seen += step
+            self._pose_time += step
             self._entered += step
             if self._touchdown is not None:
                 self._touchdown = (self._touchdown[0] + step, self._touchdown[1])

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from crazyflie_controller.pid import Gains, Pid
+from crazyflie_controller.pid import PidParameters, SaturatedPid
 from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
 
 AXES = ("X", "Y", "Z", "Yaw")
@@ -40,27 +40,35 @@ class Setpoint(NamedTuple):
 
 
 class GoToController:
-    """Four PID controllers on the error that the vehicle sees.
+    """Four PID controllers on the error in the vehicle's heading frame.
 
-    The position error is that in the heading frame: ahead, to the left, up. The
+    The position error is the goal's position there: ahead, to the left, up. The
     vehicle's tilt is left out of it on purpose: to a vehicle that leans ahead, a goal
     far below would seem to lie ahead, and make it lean even more.
 
     Parameters
     ----------
-    gains : dict of str to Gains
+    parameters : dict of str to PidParameters
         One for each of `AXES`; their outputs are pitch, roll, thrust and yaw rate of
         `Setpoint`, from errors in m and rad.
     """
 
-    def __init__(self, gains: dict[str, Gains]):
-        self._pids = [Pid(gains[axis]) for axis in AXES]
+    def __init__(self, parameters: dict[str, PidParameters]):
+        self._pids = [SaturatedPid(parameters[axis]) for axis in AXES]
         self._error: list[float] | None = None
 
     @property
     def max_thrust(self) -> float:
         """Largest thrust that the controller sets, PWM."""
-        return self._pids[2].gains.max_output
+        return self._pids[2].parameters.max_output
+
+    def reconfigure(self, parameters: dict[str, PidParameters]) -> None:
+        """Take other gains and limits; the integrals' parts in the setpoint stay.
+
+        They change as little as the new limits allow, and vanish where ki is 0.
+        """
+        for axis, pid in zip(AXES, self._pids, strict=True):
+            pid.parameters = parameters[axis]
 
     def reset(self, thrust: float) -> None:
         """Begin anew with the integrals empty but for that of Z, which gives ``thrust`` (PWM)."""
@@ -93,16 +101,19 @@ class GoToController:
             slope = [c / interval for c in change]
         self._error = error
         outputs = [
-            pid.update(seen_error, seen_slope, interval)
-            for pid, seen_error, seen_slope in zip(
-                self._pids, _seen(error, pose.yaw), _seen(slope, pose.yaw), strict=True
+            pid.update(its_error, its_slope, interval)
+            for pid, its_error, its_slope in zip(
+                self._pids,
+                _in_heading_frame(error, pose.yaw),
+                _in_heading_frame(slope, pose.yaw),
+                strict=True,
             )
         ]
         pitch, roll, thrust, yaw_rate = outputs
         return Setpoint(pitch, roll, thrust, yaw_rate)
 
 
-def _seen(error, yaw):
+def _in_heading_frame(error, yaw):
     # The slope is turned after it has been taken, so that the vehicle's own turning
-    # does not pass for a motion of the goal.
+    # is not taken for a motion of the goal.
     return [*rotate_by_yaw(error[0], error[1], -yaw), *error[2:]]

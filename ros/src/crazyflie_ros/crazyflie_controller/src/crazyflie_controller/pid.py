@@ -1,6 +1,7 @@
 """A PID controller with limits on its output and on its integral."""
 
-from dataclasses import dataclass
+from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters import Parameters, parameter
 
 INTEGRATED_ERROR = 0.2
 """What of an error enters the integral at most, m or rad.
@@ -9,47 +10,60 @@ On the way to a goal far away the integral would otherwise gather what it can on
 of beyond the goal. With the gains of Z in config/crazyflie2.yaml a step of 1 m overshoots
 by 0.6 m without this limit and by 0.3 m with it; errors below it are not affected."""
 
-
-@dataclass(frozen=True)
-class Gains:
-    """Gains and limits of a `Pid`.
-
-    Attributes
-    ----------
-    kp, kd, ki : float
-        Output per error, per rate of change of the error, per integral of the error.
-    min_output, max_output : float
-        Limits of the output.
-    integrator_min, integrator_max : float
-        Limits of the integral of the error (not of its part in the output), so
-        that an error that lasts does not wind it up; see also `INTEGRATED_ERROR`.
-    """
-
-    kp: float
-    kd: float
-    ki: float
-    min_output: float
-    max_output: float
-    integrator_min: float
-    integrator_max: float
+_INTEGRAL = Number("m s or rad s")
 
 
-class Pid:
+class PidParameters(Parameters):
+    """Gains and limits of a `SaturatedPid`."""
+
+    kp: float = parameter(Number("output per m or rad"), "gain of the error", live=True)
+    kd: float = parameter(
+        Number("output per m/s or rad/s"), "gain of the error's rate of change", live=True
+    )
+    ki: float = parameter(
+        Number("output per m s or rad s"), "gain of the error's integral", live=True
+    )
+    min_output: float = parameter(
+        Number("output"), "least output, at most maxOutput", name="minOutput", live=True
+    )
+    max_output: float = parameter(Number("output"), "largest output", name="maxOutput", live=True)
+    integrator_min: float = parameter(
+        _INTEGRAL,
+        "least integral of the error, at most integratorMax",
+        name="integratorMin",
+        live=True,
+    )
+    integrator_max: float = parameter(
+        _INTEGRAL, "largest integral of the error", name="integratorMax", live=True
+    )
+
+
+class SaturatedPid:
     """output = kp error + kd slope + ki integral, within limits.
+
+    The limits of the integral, which are those of the integral itself and not of its part
+    in the output, keep an error that lasts from winding it up; see also `INTEGRATED_ERROR`.
 
     Parameters
     ----------
-    gains : Gains
+    parameters : PidParameters
     """
 
-    def __init__(self, gains: Gains):
-        self._gains = gains
+    def __init__(self, parameters: PidParameters):
+        self._parameters = parameters
         self._integral = 0.0
 
     @property
-    def gains(self) -> Gains:
+    def parameters(self) -> PidParameters:
         """Gains and limits."""
-        return self._gains
+        return self._parameters
+
+    @parameters.setter
+    def parameters(self, parameters: PidParameters) -> None:
+        # The integral of Z carries the vehicle's weight: its part in the output has to stay.
+        output = self._parameters.ki * self._integral
+        self._parameters = parameters
+        self.reset(output)
 
     def reset(self, output: float = 0.0) -> None:
         """Forget what has been; the integral is what gives ``output`` without an error.
@@ -58,8 +72,8 @@ class Pid:
         that as it can be.
         """
         self._integral = 0.0
-        if self._gains.ki != 0.0:
-            self._integrate(output / self._gains.ki)
+        if self._parameters.ki != 0.0:
+            self._integrate(output / self._parameters.ki)
 
     def update(self, error: float, slope: float, interval: float) -> float:
         """Return the output.
@@ -73,11 +87,12 @@ class Pid:
         interval : float
             Time since the last update, s, >= 0.
         """
-        gains = self._gains
+        gains = self._parameters
         integrated = min(max(error, -INTEGRATED_ERROR), INTEGRATED_ERROR)
         self._integrate(self._integral + integrated * interval)
         output = gains.kp * error + gains.kd * slope + gains.ki * self._integral
         return min(max(output, gains.min_output), gains.max_output)
 
     def _integrate(self, integral):
-        self._integral = min(max(integral, self._gains.integrator_min), self._gains.integrator_max)
+        limits = self._parameters
+        self._integral = min(max(integral, limits.integrator_min), limits.integrator_max)

@@ -1,20 +1,38 @@
-"""ROS interface of flight by hand: sticks to cmd_vel."""
+"""ROS interface of flight by hand: a joystick's axes to cmd_vel."""
 
 from geometry_msgs.msg import Twist, Vector3
 from sensor_msgs.msg import Joy
+from typing_extensions import override
 
-from crazyflie_demo.sticks import Sticks
+from crazyflie_demo.gamepad import PITCH, ROLL, THRUST, YAW
+from crazyflie_demo.joy_axes import JoyAxes
+from crazyflie_demo.parameters import AXIS, JoyParameters, SetpointParameters
 from crazyflie_model.limits import FULL_PWM, MAX_SETPOINT_PWM
-from crazyflie_utils.node import Node
-from crazyflie_utils.parameter_types import TOPIC, Integer, Number
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameter_types import Number
 
-_AXES = {"pitch": 4, "roll": 3, "yaw_rate": 0, "thrust": 1}
-_RANGES = {
-    "pitch": (30.0, Number("deg", above=0.0, maximum=60.0)),
-    "roll": (30.0, Number("deg", above=0.0, maximum=60.0)),
-    "yaw_rate": (200.0, Number("deg/s", above=0.0)),
-    "thrust": (MAX_SETPOINT_PWM, Number("PWM", above=0.0, maximum=FULL_PWM)),
-}
+_TILT = Number("deg", above=0.0, maximum=60.0)
+
+
+class CmdVelTeleopParameters(JoyParameters, SetpointParameters):
+    """Parameters of `CmdVelTeleopNode`."""
+
+    pitch_axis: int = parameter(AXIS, "number of the axis that pitches", PITCH, "axes/pitch")
+    roll_axis: int = parameter(AXIS, "number of the axis that rolls", ROLL, "axes/roll")
+    yaw_rate_axis: int = parameter(AXIS, "number of the axis that turns", YAW, "axes/yaw_rate")
+    thrust_axis: int = parameter(AXIS, "number of the axis that lifts", THRUST, "axes/thrust")
+    max_pitch: float = parameter(_TILT, "at full deflection", 30.0, "max/pitch", live=True)
+    max_roll: float = parameter(_TILT, "at full deflection", 30.0, "max/roll", live=True)
+    max_yaw_rate: float = parameter(
+        Number("deg/s", above=0.0), "at full deflection", 200.0, "max/yaw_rate", live=True
+    )
+    max_thrust: float = parameter(
+        Number("PWM", above=0.0, maximum=FULL_PWM),
+        "at full deflection",
+        MAX_SETPOINT_PWM,
+        "max/thrust",
+        live=True,
+    )
 
 
 class CmdVelTeleopNode(Node):
@@ -24,53 +42,43 @@ class CmdVelTeleopNode(Node):
     node is silent, and the vehicle's watchdog does the rest.
     """
 
-    def __init__(self):
-        super().__init__()
-        self._period = None
-        self._joy_topic = None
-        self._axes = None
-        self._ranges = None
-        self._sticks = Sticks()
+    def __init__(self) -> None:
+        self._axes = JoyAxes()
         self._is_locked = True
-        self._publisher = None
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._joy_topic = handle.param("joy_topic", TOPIC, "joy")
-        self._period = 1.0 / handle.param("rate", Number("Hz", above=0.0, maximum=500.0), 50.0)
-        self._axes = {
-            name: handle.param(f"axes/{name}", Integer(0, 255), index)
-            for name, index in _AXES.items()
-        }
-        self._ranges = {
-            name: handle.param(f"max/{name}", kind, default)
-            for name, (default, kind) in _RANGES.items()
-        }
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(CmdVelTeleopParameters, self._reconfigure)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
-        handle.subscribe(self._joy_topic, Joy, self._on_joy)
-        handle.timer(self._period, self._on_timer)
+        handle.subscribe(self._parameters.joy_topic, Joy, self._on_joy)
+        handle.timer(1.0 / self._parameters.rate, self._on_timer)
+
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
 
     def _on_joy(self, message):
-        self._sticks.hear(message.axes, self._handle.time())
+        self._axes.update(message.axes, self._handle.time())
 
     def _on_timer(self):
         now = self._handle.time()
-        if not self._sticks.is_fresh(now):
+        parameters = self._parameters
+        if not self._axes.is_fresh(now):
             if not self._is_locked:
-                self._handle.warn(f"nothing comes on {self._joy_topic}: sending no setpoints")
+                self._handle.warn(f"nothing comes on {parameters.joy_topic}: sending no setpoints")
             self._is_locked = True
             return
-        pitch, roll, yaw_rate, thrust = (
-            self._sticks.axis(self._axes[name], now) * self._ranges[name] for name in _AXES
-        )
+        pitch = self._axes.axis(parameters.pitch_axis, now) * parameters.max_pitch
+        roll = self._axes.axis(parameters.roll_axis, now) * parameters.max_roll
+        yaw_rate = self._axes.axis(parameters.yaw_rate_axis, now) * parameters.max_yaw_rate
+        thrust = self._axes.axis(parameters.thrust_axis, now) * parameters.max_thrust
         if thrust <= 0.0:
             self._is_locked = False
         if self._is_locked:
             thrust = 0.0
-        # Sticks are positive to the left, roll and yaw rate of cmd_vel to the right.
+        # Axes are positive to the left, roll and yaw rate of cmd_vel to the right.
         self._publisher.publish(
             Twist(Vector3(pitch, -roll, max(thrust, 0.0)), Vector3(0.0, 0.0, -yaw_rate))
         )

@@ -1,36 +1,43 @@
 """ROS interface of a test of the motors: a thrust that does not change."""
 
 from geometry_msgs.msg import Twist, Vector3
+from typing_extensions import override
 
+from crazyflie_demo.parameters import SetpointParameters
 from crazyflie_model.limits import MAX_SETPOINT_PWM
-from crazyflie_utils.node import Node
+from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameter_types import Number
+
+
+class ConstThrustParameters(SetpointParameters):
+    """Parameters of `ConstThrustNode`."""
+
+    thrust: float = parameter(
+        Number("PWM", minimum=0.0, maximum=MAX_SETPOINT_PWM),
+        "thrust; about 42000 hovers",
+        12000.0,
+        live=True,
+    )
 
 
 class ConstThrustNode(Node):
     """Publish level setpoints with a constant thrust; zero thrust at the end."""
 
-    def __init__(self):
-        super().__init__()
-        self._thrust = None
-        self._period = None
-        self._publisher = None
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(ConstThrustParameters, self._reconfigure)
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._thrust = handle.param(
-            "thrust", Number("PWM", minimum=0.0, maximum=MAX_SETPOINT_PWM), 12000.0
-        )
-        self._period = 1.0 / handle.param("rate", Number("Hz", above=0.0, maximum=500.0), 50.0)
-
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
-        handle.timer(self._period, self._on_timer)
+        handle.timer(1.0 / self._parameters.rate, self._on_timer)
 
+    @override
     def make_safe(self) -> None:
-        """See `Node.make_safe`."""
         self._publisher.publish(Twist())
 
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
+
     def _on_timer(self):
-        self._publisher.publish(Twist(linear=Vector3(0.0, 0.0, self._thrust)))
+        self._publisher.publish(Twist(linear=Vector3(0.0, 0.0, self._parameters.thrust)))

@@ -6,6 +6,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import genpy
+from typing_extensions import override
 
 from crazyflie_driver.srv import (
     Land,
@@ -17,7 +18,7 @@ from crazyflie_driver.srv import (
     UpdateParams,
     UpdateParamsRequest,
 )
-from crazyflie_utils.node import Node
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import Number
 
 _LIMIT = 15.0
@@ -40,7 +41,7 @@ class Step(NamedTuple):
     request : genpy.Message
     duration : float
         How long what it begins takes, s.
-    parameters : dict
+    parameters : dict of str to int
         Set before the call: name in the node's namespace -> value.
     """
 
@@ -48,7 +49,16 @@ class Step(NamedTuple):
     service_type: type
     request: genpy.Message
     duration: float = 0.0
-    parameters: Mapping = MappingProxyType({})
+    parameters: Mapping[str, int] = MappingProxyType({})
+
+
+class FlightPlanParameters(Parameters):
+    """Parameters that all flights by high-level commands have."""
+
+    height: float = parameter(Number("m", above=0.0, maximum=3.0), "how high the takeoff goes", 0.5)
+    duration: float = parameter(
+        Number("s", above=0.0, maximum=60.0), "of takeoff, landing and each go-to", 2.0
+    )
 
 
 class FlightPlanNode(Node):
@@ -57,12 +67,9 @@ class FlightPlanNode(Node):
     If a step fails, and when the process is ended in flight, the vehicle is landed.
     """
 
-    def __init__(self):
-        super().__init__()
-        self._height = None
-        self._duration = None
-        self._steps = None
-        self._timer = None
+    _parameters: FlightPlanParameters
+
+    def __init__(self) -> None:
         self._is_flying = False
 
     def manoeuvres(self) -> list[Step]:
@@ -73,15 +80,11 @@ class FlightPlanNode(Node):
         """Return what is done before the takeoff."""
         return []
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._height = handle.param("height", Number("m", above=0.0, maximum=3.0), 0.5)
-        self._duration = handle.param("duration", Number("s", above=0.0, maximum=60.0), 2.0)
-
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        height, duration = self._parameters.height, self._parameters.duration
         enable = UpdateParamsRequest([_HIGH_LEVEL])
-        takeoff = TakeoffRequest(height=self._height, duration=seconds(self._duration))
+        takeoff = TakeoffRequest(height=height, duration=seconds(duration))
         self._steps = deque(
             [
                 # The first call waits for the driver, which sets all parameters when it has
@@ -89,23 +92,23 @@ class FlightPlanNode(Node):
                 Step("update_params", UpdateParams, UpdateParamsRequest()),
                 Step("update_params", UpdateParams, enable, parameters={_HIGH_LEVEL: 1}),
                 *self.preparations(),
-                Step("takeoff", Takeoff, takeoff, self._duration),
+                Step("takeoff", Takeoff, takeoff, duration),
                 *self.manoeuvres(),
-                Step("land", Land, self._landing(), self._duration),
+                Step("land", Land, self._landing(), duration),
                 Step("stop", Stop, StopRequest()),
             ]
         )
         self._next()
 
+    @override
     def make_safe(self) -> None:
-        """See `Node.make_safe`."""
         if self._is_flying:
             self._is_flying = False
             self._handle.warn("landing")
             self._handle.call_service("land", Land, self._landing(), _LIMIT)
 
     def _landing(self):
-        return LandRequest(height=0.0, duration=seconds(self._duration))
+        return LandRequest(height=0.0, duration=seconds(self._parameters.duration))
 
     def _next(self):
         step = self._steps[0]

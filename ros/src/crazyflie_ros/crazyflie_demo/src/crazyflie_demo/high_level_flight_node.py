@@ -1,30 +1,34 @@
 """ROS interface of a test flight by high-level commands."""
 
 from geometry_msgs.msg import Point
+from typing_extensions import override
 
-from crazyflie_demo.flight_plan_node import FlightPlanNode, Step, seconds
+from crazyflie_demo.flight_plan_node import FlightPlanNode, FlightPlanParameters, Step, seconds
 from crazyflie_driver.srv import GoTo, GoToRequest
+from crazyflie_utils import NodeHandle, parameter
 from crazyflie_utils.parameter_types import METRES
+
+
+class HighLevelFlightParameters(FlightPlanParameters):
+    """Parameters of `HighLevelFlightNode`."""
+
+    distance: float = parameter(METRES, "how far ahead the vehicle goes", 0.5)
 
 
 class HighLevelFlightNode(FlightPlanNode):
     """Take off, go ahead and back again, land."""
 
-    def __init__(self):
-        super().__init__()
-        self._distance = None
+    _parameters: HighLevelFlightParameters
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        super().load_parameters(handle)
-        self._distance = handle.param("distance", METRES, 0.5)
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(HighLevelFlightParameters)
 
+    @override
     def manoeuvres(self) -> list[Step]:
-        """See `FlightPlanNode.manoeuvres`."""
-        return [self._go(self._distance), self._go(-self._distance)]
+        return [self._go(self._parameters.distance), self._go(-self._parameters.distance)]
 
     def _go(self, x):
-        request = GoToRequest(
-            relative=True, goal=Point(x, 0.0, 0.0), duration=seconds(self._duration)
-        )
-        return Step("go_to", GoTo, request, self._duration)
+        duration = self._parameters.duration
+        request = GoToRequest(relative=True, goal=Point(x, 0.0, 0.0), duration=seconds(duration))
+        return Step("go_to", GoTo, request, duration)

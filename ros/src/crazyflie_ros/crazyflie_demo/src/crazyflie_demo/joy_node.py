@@ -4,9 +4,10 @@ import errno
 import os
 
 from sensor_msgs.msg import Joy
+from typing_extensions import override
 
-from crazyflie_demo.joystick import EVENT, Joystick
-from crazyflie_utils.node import Node
+from crazyflie_demo.joystick import EVENT, Joystick, JoystickState
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import TEXT, Number
 
 _POLL_PERIOD = 0.01
@@ -20,58 +21,71 @@ _EVENTS = 512
 
 _HINTS = {
     errno.ENOENT: "is it plugged in, and does the parameter dev name it?",
-    errno.EACCES: "may this user read it? He usually has to be in the group input",
+    errno.EACCES: "may this user read it? Users usually have to be in the group input",
 }
 
 
-class JoyNode(Node):
-    """Publish what a joystick does.
+class JoyNodeParameters(Parameters):
+    """Parameters of `JoyNode`."""
 
-    The device is looked for again and again. When it is unplugged, all axes and
-    buttons are said to be at zero.
+    dev: str = parameter(TEXT, "the joystick's device", "/dev/input/js0")
+    deadzone: float = parameter(
+        Number(minimum=0.0, maximum=0.9),
+        "part of an axis's way about the centre that counts as the centre",
+        0.05,
+        live=True,
+    )
+    autorepeat_rate: float = parameter(
+        Number("Hz", minimum=0.0, maximum=100.0),
+        "how often a message is repeated; 0 for never",
+        20.0,
+    )
+
+
+class JoyNode(Node):
+    """Publish the state of a joystick.
+
+    The device is looked for again and again. When it is unplugged, one message has all
+    axes and buttons at zero.
     """
 
-    def __init__(self):
-        super().__init__()
-        self._dev = None
-        self._repeat_period = None
-        self._joystick = None
-        self._file = None
-        self._tried = None
-        self._said = None
-        self._publisher = None
+    def __init__(self) -> None:
+        self._file: int | None = None
+        self._published: JoystickState | None = None
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._dev = handle.param("dev", TEXT, "/dev/input/js0")
-        deadzone = handle.param("deadzone", Number(minimum=0.0, maximum=0.9), 0.05)
-        rate = handle.param("autorepeat_rate", Number("Hz", minimum=0.0, maximum=100.0), 20.0)
-        self._repeat_period = 1.0 / rate if rate > 0.0 else None
-        self._joystick = Joystick(deadzone)
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(JoyNodeParameters, self._reconfigure)
+        self._joystick = Joystick(self._parameters.deadzone)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("joy", Joy)
-        # Hands do not live by simulated time.
+        # Hands do not follow simulated time.
         handle.timer(_POLL_PERIOD, self._poll, steady=True)
-        if self._repeat_period is not None:
-            handle.timer(self._repeat_period, self._repeat, steady=True)
+        rate = self._parameters.autorepeat_rate
+        if rate > 0.0:
+            handle.timer(1.0 / rate, self._repeat, steady=True)
         self._open()
 
+    @override
     def shutdown(self) -> None:
-        """See `Node.shutdown`."""
         if self._file is not None:
             os.close(self._file)
 
+    def _reconfigure(self, parameters):
+        self._joystick.deadzone = parameters.deadzone
+
     def _open(self):
+        device = self._parameters.dev
         self._tried = self._handle.time()
         try:
-            self._file = os.open(self._dev, os.O_RDONLY | os.O_NONBLOCK)
+            self._file = os.open(device, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
-            hint = _HINTS.get(error.errno, "")
-            self._handle.warn(f"cannot open {self._dev}: {error.strerror}; {hint}", throttle=10.0)
+            hint = _HINTS.get(error.errno or 0, "")
+            self._handle.warn(f"cannot open {device}: {error.strerror}; {hint}", throttle=10.0)
         else:
-            self._handle.info(f"reading {self._dev}")
+            self._handle.info(f"reading {device}")
 
     def _poll(self):
         if self._file is None:
@@ -83,25 +97,27 @@ class JoyNode(Node):
         except BlockingIOError:
             return
         except OSError as error:
-            self._lose(error)
+            self._lose(self._file, error)
             return
         for state in self._joystick.feed(data) if data else []:
             self._publish(state)
 
-    def _lose(self, error):
-        self._handle.error(f"lost {self._dev}: {error.strerror}; all axes are taken for released")
-        os.close(self._file)
+    def _lose(self, file, error):
+        self._handle.error(
+            f"lost {self._parameters.dev}: {error.strerror}; all axes are taken for released"
+        )
+        os.close(file)
         self._file = None
         self._tried = self._handle.time()
         self._publish(self._joystick.release())
 
     def _repeat(self):
         # Silence of the repetition tells others that there is no joystick.
-        if self._file is not None and self._said is not None:
+        if self._file is not None and self._published is not None:
             self._publish(self._joystick.state())
 
     def _publish(self, state):
-        self._said = state
+        self._published = state
         message = Joy(axes=state[0], buttons=state[1])
         message.header.stamp = self._handle.stamp()
         message.header.frame_id = "joy"

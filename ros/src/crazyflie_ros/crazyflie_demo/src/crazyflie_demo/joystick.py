@@ -1,4 +1,4 @@
-"""What Linux says about a joystick, byte by byte (linux/joystick.h)."""
+"""Events of a joystick as Linux encodes them (linux/joystick.h)."""
 
 import struct
 
@@ -15,12 +15,12 @@ _FULL = 32767
 """Value of an axis at its end."""
 
 
-State = tuple[list[float], list[int]]
+JoystickState = tuple[list[float], list[int]]
 """Axes and buttons."""
 
 
 class Joystick:
-    """Axes and buttons of a joystick, as far as they have been heard of.
+    """Axes and buttons of a joystick, as far as there were events of them.
 
     Parameters
     ----------
@@ -33,15 +33,17 @@ class Joystick:
         -1 to 1; left and up are positive.
     buttons : list of int
         1 is pressed.
+    deadzone : float
+        For the events to come.
     """
 
     def __init__(self, deadzone: float = 0.0):
         self.axes: list[float] = []
         self.buttons: list[int] = []
-        self._deadzone = deadzone
+        self.deadzone = deadzone
         self._rest = b""
 
-    def feed(self, data: bytes) -> list[State]:
+    def feed(self, data: bytes) -> list[JoystickState]:
         """Take what has been read from the device.
 
         Returns
@@ -54,34 +56,34 @@ class Joystick:
         whole = len(data) - len(data) % EVENT.size
         self._rest = data[whole:]
         states = []
-        is_told = True
-        for _, value, kind, number in EVENT.iter_unpack(data[:whole]):
-            if kind & ~INITIAL == AXIS:
+        is_complete = True
+        for _, value, event_type, number in EVENT.iter_unpack(data[:whole]):
+            if event_type & ~INITIAL == AXIS:
                 _put(self.axes, number, self._deflection(value), 0.0)
-            elif kind & ~INITIAL == BUTTON:
+            elif event_type & ~INITIAL == BUTTON:
                 _put(self.buttons, number, int(value != 0), 0)
             else:
                 continue
-            is_told = kind == BUTTON
-            if is_told:
+            is_complete = event_type == BUTTON
+            if is_complete:
                 states.append(self.state())
-        return states if is_told else [*states, self.state()]
+        return states if is_complete else [*states, self.state()]
 
-    def release(self) -> State:
+    def release(self) -> JoystickState:
         """Let everything go back to zero, as when the joystick has been unplugged; return it."""
         self.axes = [0.0] * len(self.axes)
         self.buttons = [0] * len(self.buttons)
         self._rest = b""
         return self.state()
 
-    def state(self) -> State:
+    def state(self) -> JoystickState:
         """Return the state (axes, buttons), in new lists."""
         return list(self.axes), list(self.buttons)
 
     def _deflection(self, value):
         # Linux counts right and down positive.
         part = max(-1.0, min(1.0, -value / _FULL))
-        beyond = max(0.0, abs(part) - self._deadzone) / (1.0 - self._deadzone)
+        beyond = max(0.0, abs(part) - self.deadzone) / (1.0 - self.deadzone)
         return beyond if part > 0.0 else -beyond if beyond else 0.0
 
 

@@ -2,13 +2,13 @@
 
 from sensor_msgs.msg import Joy
 from std_srvs.srv import Empty, EmptyRequest
+from typing_extensions import override
 
+from crazyflie_demo.gamepad import EMERGENCY, HEADLIGHT, LAND, TAKEOFF
+from crazyflie_demo.parameters import JoyParameters
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
-from crazyflie_utils.node import Node
-from crazyflie_utils.parameter_types import BOOLEAN, TOPIC, Integer
-
-LAND, EMERGENCY, TAKEOFF, HEADLIGHT = 0, 1, 2, 4
-"""Buttons."""
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameter_types import BOOLEAN, Integer
 
 _HEADLIGHT_PARAMETER = "ring/headlightEnable"
 
@@ -16,27 +16,33 @@ _LIMIT = 5.0
 """How long a service may take, s."""
 
 
+class JoystickControllerParameters(JoyParameters):
+    """Parameters of `JoystickControllerNode`."""
+
+    has_controller: bool = parameter(
+        BOOLEAN,
+        "whether a crazyflie_controller is there to take off and land",
+        False,
+        "use_crazyflie_controller",
+    )
+
+
 class JoystickControllerNode(Node):
     """Land, take off, stop in an emergency, switch the headlight: at the press of a button.
 
-    Takeoff and landing are those of crazyflie_controller, if the parameter
-    ``use_crazyflie_controller`` says that there is one.
+    Takeoff and landing are those of crazyflie_controller, if there is one.
     """
 
-    def __init__(self):
-        super().__init__()
-        self._joy_topic = None
-        self._has_controller = False
-        self._buttons = ()
+    def __init__(self) -> None:
+        self._buttons: tuple[int, ...] = ()
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._joy_topic = handle.param("joy_topic", TOPIC, "joy")
-        self._has_controller = handle.param("use_crazyflie_controller", BOOLEAN, False)
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(JoystickControllerParameters)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
-        handle.subscribe(self._joy_topic, Joy, self._on_joy)
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        handle.subscribe(self._parameters.joy_topic, Joy, self._on_joy)
 
     def _on_joy(self, message):
         before, self._buttons = self._buttons, message.buttons
@@ -48,14 +54,14 @@ class JoystickControllerNode(Node):
     def _press(self, button):
         if button == EMERGENCY:
             self._call("emergency")
-        elif button in (LAND, TAKEOFF) and self._has_controller:
+        elif button in (LAND, TAKEOFF) and self._parameters.has_controller:
             self._call("land" if button == LAND else "takeoff")
         elif button == HEADLIGHT:
             self._switch_headlight()
 
     def _switch_headlight(self):
         name = self._handle.resolve(_HEADLIGHT_PARAMETER)
-        is_on = self._handle.param(name, Integer(0, 255), 0)
+        is_on = self._handle.get_param(name, Integer(0, 255), 0)
         self._handle.set_param(name, 0 if is_on else 1)
         request = UpdateParamsRequest([_HEADLIGHT_PARAMETER])
         self._call("update_params", UpdateParams, request)

@@ -4,7 +4,20 @@ A terminal tells when a key is pressed and, while it is held, repeats it; it doe
 not tell when it is let go. So a deflection lasts until the repetition would have come.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple
+
+from crazyflie_demo.gamepad import (
+    AXES,
+    EMERGENCY,
+    HEADLIGHT,
+    LAND,
+    PITCH,
+    ROLL,
+    TAKEOFF,
+    THRUST,
+    YAW,
+)
 
 FIRST_HOLD = 0.6
 """How long a key counts as held after it was pressed, s: repetition begins late."""
@@ -12,22 +25,13 @@ FIRST_HOLD = 0.6
 REPEAT_HOLD = 0.15
 """How long it does after a repetition, s."""
 
-ROLL, PITCH, YAW, LIFT = 3, 4, 0, 1
-"""Axes, as on a gamepad with the right stick for tilt: left, up and forward are positive."""
-
-LAND, EMERGENCY, TAKEOFF, HEADLIGHT = 0, 1, 2, 4
-"""Buttons."""
-
-AXES, BUTTONS = 8, 11
-"""How many a gamepad has."""
-
 _DEFLECTIONS = {
     "\x1b[A": (PITCH, 1.0),
     "\x1b[B": (PITCH, -1.0),
     "\x1b[D": (ROLL, 1.0),
     "\x1b[C": (ROLL, -1.0),
-    "w": (LIFT, 1.0),
-    "s": (LIFT, -1.0),
+    "w": (THRUST, 1.0),
+    "s": (THRUST, -1.0),
     "a": (YAW, 1.0),
     "d": (YAW, -1.0),
 }
@@ -43,7 +47,7 @@ h  headlight       a d     turn left, right
 x  let all go      space   EMERGENCY STOP          Ctrl-C  end"""
 
 
-class _Held(NamedTuple):
+class _Deflection(NamedTuple):
     value: float
     until: float
 
@@ -58,13 +62,18 @@ class Keyboard:
     lift_step : float
         0: w and s move their axis while they are held, like the others. Otherwise each
         time by this much, and it stays there, from 0 to 1: a thrust.
+
+    Attributes
+    ----------
+    deflection : float
+        For the keys to come.
     """
 
     def __init__(self, deflection: float, lift_step: float = 0.0):
-        self._deflection = deflection
+        self.deflection = deflection
         self._lift_step = lift_step
-        self._lift = 0.0
-        self._held: dict[int, _Held] = {}
+        self._thrust = 0.0
+        self._held: dict[int, _Deflection] = {}
         self._rest = ""
 
     def feed(self, text: str, time: float) -> list[int]:
@@ -75,7 +84,7 @@ class Keyboard:
                 presses.append(_PRESSES[key])
             if key in (_RELEASE, " "):
                 self._held.clear()
-                self._lift = 0.0
+                self._thrust = 0.0
             if key in _DEFLECTIONS:
                 self._deflect(*_DEFLECTIONS[key], time)
         return presses
@@ -87,22 +96,22 @@ class Keyboard:
             if time < held.until:
                 axes[axis] = held.value
         if self._lift_step > 0.0:
-            axes[LIFT] = self._lift
+            axes[THRUST] = self._thrust
         return axes
 
     def _deflect(self, axis, direction, time):
-        if axis == LIFT and self._lift_step > 0.0:
-            self._lift = min(max(self._lift + direction * self._lift_step, 0.0), 1.0)
+        if axis == THRUST and self._lift_step > 0.0:
+            self._thrust = min(max(self._thrust + direction * self._lift_step, 0.0), 1.0)
             return
         before = self._held.get(axis)
-        value = direction * self._deflection
+        value = direction * self.deflection
         if before is not None and time < before.until and before.value == value:
             until = max(time + REPEAT_HOLD, before.until)
         else:
             until = time + FIRST_HOLD
-        self._held[axis] = _Held(value, until)
+        self._held[axis] = _Deflection(value, until)
 
-    def _keys(self, text):
+    def _keys(self, text: str) -> Iterator[str]:
         text = self._rest + text
         self._rest = ""
         while text:

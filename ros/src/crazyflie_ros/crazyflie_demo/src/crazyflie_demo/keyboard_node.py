@@ -1,4 +1,4 @@
-"""ROS interface of a keyboard that stands for a joystick."""
+"""ROS interface of a keyboard in the place of a joystick."""
 
 import os
 import select
@@ -6,30 +6,42 @@ import sys
 import termios
 import tty
 from collections import deque
+from typing import Any
 
 from sensor_msgs.msg import Joy
+from typing_extensions import override
 
-from crazyflie_demo.keyboard import BUTTONS, HELP, Keyboard
-from crazyflie_utils.node import Node
+from crazyflie_demo.gamepad import BUTTONS
+from crazyflie_demo.keyboard import HELP, Keyboard
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import Number
 
 _PERIOD = 0.05
 """Time between two messages, s."""
 
 
+class KeyboardParameters(Parameters):
+    """Parameters of `KeyboardNode`."""
+
+    deflection: float = parameter(
+        Number(above=0.0, maximum=1.0), "how far a key moves an axis", 0.5, live=True
+    )
+    lift_step: float = parameter(
+        Number(minimum=0.0, maximum=1.0),
+        "0: w and s move their axis while held; otherwise each time by so much, and it stays",
+        0.0,
+    )
+
+
 class KeyboardNode(Node):
     """Publish what is typed on the terminal as if a joystick had done it."""
 
-    def __init__(self):
-        super().__init__()
-        self._keyboard = None
-        self._presses = deque()
-        self._terminal = None
-        self._settings = None
-        self._publisher = None
+    def __init__(self) -> None:
+        self._presses: deque[int] = deque()
+        self._settings: list[Any] | None = None
 
-    def initialize(self, handle) -> bool:
-        """See `Node.initialize`."""
+    @override
+    def initialize(self, handle: NodeHandle) -> bool:
         if not sys.stdin.isatty():
             handle.error(
                 "standard input is no terminal; start this node with rosrun, not with roslaunch"
@@ -37,17 +49,15 @@ class KeyboardNode(Node):
             return False
         return super().initialize(handle)
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._keyboard = Keyboard(
-            deflection=handle.param("deflection", Number(above=0.0, maximum=1.0), 0.5),
-            lift_step=handle.param("lift_step", Number(minimum=0.0, maximum=1.0), 0.0),
-        )
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        parameters = handle.load(KeyboardParameters, self._reconfigure)
+        self._keyboard = Keyboard(parameters.deflection, parameters.lift_step)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("joy", Joy)
-        # Hands do not live by simulated time.
+        # Hands do not follow simulated time.
         handle.timer(_PERIOD, self._on_timer, steady=True)
         print(HELP, flush=True)
         self._terminal = sys.stdin.fileno()
@@ -55,10 +65,13 @@ class KeyboardNode(Node):
         # Keys come one by one and are not echoed; Ctrl-C remains what it is.
         tty.setcbreak(self._terminal)
 
+    @override
     def shutdown(self) -> None:
-        """Give the terminal back as it was."""
         if self._settings is not None:
             termios.tcsetattr(self._terminal, termios.TCSADRAIN, self._settings)
+
+    def _reconfigure(self, parameters):
+        self._keyboard.deflection = parameters.deflection
 
     def _on_timer(self):
         now = self._handle.time()

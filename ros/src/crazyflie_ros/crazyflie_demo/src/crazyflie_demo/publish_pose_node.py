@@ -2,88 +2,109 @@
 
 from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import Joy
+from typing_extensions import override
 
+from crazyflie_demo.gamepad import PITCH, ROLL, THRUST, YAW
 from crazyflie_demo.goals import goal_message
-from crazyflie_demo.sticks import Sticks
-from crazyflie_utils.node import Node
-from crazyflie_utils.parameter_types import FINITE, FRAME, METRES, TOPIC, Integer, Number
+from crazyflie_demo.joy_axes import JoyAxes
+from crazyflie_demo.parameters import AXIS, GoalParameters, JoyParameters
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameter_types import METRES, TOPIC, Number
+
+_SPEED = Number("m/s", minimum=0.0)
+
+
+class PublishPoseParameters(GoalParameters):
+    """Parameters of `PublishPoseNode`."""
+
+    topic: str = parameter(TOPIC, "where goals go", "goal", "name")
+    x: float = parameter(METRES, "where the goal is at first")
+    y: float = parameter(METRES, "where the goal is at first")
+    z: float = parameter(METRES, "where the goal is at first")
+    yaw: float = parameter(Number("rad"), "heading of the goal at first", 0.0)
+
+
+class PublishPoseTeleopParameters(PublishPoseParameters, JoyParameters):
+    """Parameters of `PublishPoseTeleopNode`."""
+
+    x_axis: int = parameter(AXIS, "number of the joystick's axis", PITCH, "axes/x")
+    y_axis: int = parameter(AXIS, "number of the joystick's axis", ROLL, "axes/y")
+    z_axis: int = parameter(AXIS, "number of the joystick's axis", THRUST, "axes/z")
+    yaw_axis: int = parameter(AXIS, "number of the joystick's axis", YAW, "axes/yaw")
+    x_speed: float = parameter(_SPEED, "at full deflection", 0.5, "speed/x", live=True)
+    y_speed: float = parameter(_SPEED, "at full deflection", 0.5, "speed/y", live=True)
+    z_speed: float = parameter(_SPEED, "at full deflection", 0.3, "speed/z", live=True)
+    yaw_speed: float = parameter(
+        Number("rad/s", minimum=0.0), "at full deflection", 1.0, "speed/yaw", live=True
+    )
+
+    @property
+    def axes(self) -> tuple[int, int, int, int]:
+        """Axes for x, y, z and yaw."""
+        return (self.x_axis, self.y_axis, self.z_axis, self.yaw_axis)
+
+    @property
+    def speeds(self) -> tuple[float, float, float, float]:
+        """Speeds along x, y, z (m/s) and of yaw (rad/s) at full deflection."""
+        return (self.x_speed, self.y_speed, self.z_speed, self.yaw_speed)
 
 
 class PublishPoseNode(Node):
     """Publish the same goal again and again."""
 
-    def __init__(self):
-        super().__init__()
-        self._frame = None
-        self._topic = None
-        self._period = None
-        self._goal = None
-        self._publisher = None
+    _parameters: PublishPoseParameters
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._frame = handle.param("worldFrame", FRAME, "world")
-        self._topic = handle.param("name", TOPIC, "goal")
-        self._period = 1.0 / handle.param("rate", Number("Hz", above=0.0, maximum=500.0), 30.0)
-        self._goal = [
-            handle.param("x", METRES),
-            handle.param("y", METRES),
-            handle.param("z", METRES),
-            handle.param("yaw", FINITE, 0.0),
-        ]
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(PublishPoseParameters)
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
-        self._publisher = handle.publisher(self._topic, PoseStamped)
-        handle.timer(self._period, self._on_timer)
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._goal = [parameters.x, parameters.y, parameters.z, parameters.yaw]
+        self._publisher = handle.publisher(parameters.topic, PoseStamped)
+        handle.timer(1.0 / parameters.rate, self._on_timer)
 
     def _on_timer(self):
-        self._publisher.publish(goal_message(self._handle.stamp(), self._frame, *self._goal))
-
-
-_AXES = {"x": 4, "y": 3, "z": 1, "yaw": 0}
-_SPEEDS = {"x": 0.5, "y": 0.5, "z": 0.3, "yaw": 1.0}
-_SPEED = Number("m/s or rad/s", minimum=0.0)
+        stamp, frame = self._handle.stamp(), self._parameters.world_frame
+        self._publisher.publish(goal_message(stamp, frame, *self._goal))
 
 
 class PublishPoseTeleopNode(PublishPoseNode):
     """Publish a goal that moves as the sticks are tilted, and stays when they are silent."""
 
-    def __init__(self):
-        super().__init__()
-        self._joy_topic = None
-        self._axes = None
-        self._speeds = None
-        self._sticks = Sticks()
-        self._moved = None
+    _parameters: PublishPoseTeleopParameters
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        super().load_parameters(handle)
-        self._joy_topic = handle.param("joy_topic", TOPIC, "joy")
-        self._axes = [
-            handle.param(f"axes/{name}", Integer(0, 255), index) for name, index in _AXES.items()
-        ]
-        self._speeds = [
-            handle.param(f"speed/{name}", _SPEED, speed) for name, speed in _SPEEDS.items()
-        ]
+    def __init__(self) -> None:
+        self._axes = JoyAxes()
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(PublishPoseTeleopParameters, self._reconfigure)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._moved = handle.time()
-        handle.subscribe(self._joy_topic, Joy, self._on_joy)
+        handle.subscribe(self._parameters.joy_topic, Joy, self._on_joy)
         super().register_callbacks(handle)
 
-    def _on_joy(self, message):
-        self._sticks.hear(message.axes, self._handle.time())
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
 
+    def _on_joy(self, message):
+        self._axes.update(message.axes, self._handle.time())
+
+    @override
     def _on_timer(self):
         now = self._handle.time()
+        parameters = self._parameters
         # After a pause, or a reset of the clock, the goal does not jump.
-        elapsed = min(max(now - self._moved, 0.0), 2.0 * self._period)
+        elapsed = min(max(now - self._moved, 0.0), 2.0 * (1.0 / parameters.rate))
         self._moved = now
         self._goal = [
-            value + speed * self._sticks.axis(axis, now) * elapsed
-            for value, speed, axis in zip(self._goal, self._speeds, self._axes, strict=True)
+            value + speed * self._axes.axis(axis, now) * elapsed
+            for value, speed, axis in zip(
+                self._goal, parameters.speeds, parameters.axes, strict=True
+            )
         ]
         super()._on_timer()

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
+from crazyflie_utils.parameter_types import TEXT, ParameterType
 
 COLUMNS = 1 + 4 * COEFFICIENTS
 """Of a line in a file: duration, then the coefficients of x, y, z and yaw."""
@@ -16,19 +17,29 @@ _GAP = 0.01
 """How far apart two pieces may be where they meet, m or rad."""
 
 
-class TrajectoryError(Exception):
+class TrajectoryError(ValueError):
     """A file holds no trajectory that can be flown; the text says where and why."""
 
 
-def load(path) -> list[PolynomialPiece]:
+class TrajectoryFile(ParameterType):
+    """The name of a CSV file, which is loaded."""
+
+    label = "string"
+
+    def __call__(self, value: object) -> list[PolynomialPiece]:
+        """Return the pieces in the file."""
+        return load(TEXT(value))
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "the name of a CSV file with a trajectory"
+
+
+def load(path: str | Path) -> list[PolynomialPiece]:
     """Return the pieces of a trajectory in a CSV file.
 
     Each line is a piece, with `COLUMNS` numbers; a first line without numbers is a
     heading, and empty lines do not count.
-
-    Parameters
-    ----------
-    path : str or Path
 
     Raises
     ------
@@ -83,7 +94,7 @@ def _is_number(cell):
         return False
 
 
-def save(path, pieces: list[PolynomialPiece]) -> None:
+def save(path: str | Path, pieces: list[PolynomialPiece]) -> None:
     """Write pieces to a file that `load` reads."""
     names = [f"{axis}^{power}" for axis in ("x", "y", "z", "yaw") for power in range(COEFFICIENTS)]
     lines = [",".join(["duration", *names])]

@@ -1,7 +1,9 @@
 """ROS interface of a flight along a trajectory."""
 
-from crazyflie_demo.flight_plan_node import FlightPlanNode, Step, seconds
-from crazyflie_demo.trajectory_file import TrajectoryError, load, summary
+from typing_extensions import override
+
+from crazyflie_demo.flight_plan_node import FlightPlanNode, FlightPlanParameters, Step, seconds
+from crazyflie_demo.trajectory_file import TrajectoryFile, summary
 from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
     StartTrajectory,
@@ -9,48 +11,51 @@ from crazyflie_driver.srv import (
     UploadTrajectory,
     UploadTrajectoryRequest,
 )
-from crazyflie_utils.parameter_types import BOOLEAN, TEXT, Number
-from crazyflie_utils.parameters import ParameterError
+from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_utils import NodeHandle, parameter
+from crazyflie_utils.parameter_types import BOOLEAN, Number
+
+
+class TrajectoryFlightParameters(FlightPlanParameters):
+    """Parameters of `TrajectoryFlightNode`."""
+
+    pieces: list[PolynomialPiece] = parameter(
+        TrajectoryFile(), "CSV file of the trajectory", name="file"
+    )
+    timescale: float = parameter(
+        Number(above=0.0, maximum=100.0), "2 takes twice as long as the file says", 1.0
+    )
+    reversed: bool = parameter(BOOLEAN, "fly from the end to the beginning", False)
 
 
 class TrajectoryFlightNode(FlightPlanNode):
     """Take off, fly along the trajectory of a file from there on, land."""
 
-    def __init__(self):
-        super().__init__()
-        self._pieces = None
-        self._time_scale = None
-        self._is_reversed = None
+    _parameters: TrajectoryFlightParameters
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        super().load_parameters(handle)
-        path = handle.param("file", TEXT)
-        try:
-            self._pieces = load(path)
-        except TrajectoryError as error:
-            raise ParameterError(f"parameter {handle.resolve('~file')}: {error}") from None
-        self._time_scale = handle.param("timescale", Number(above=0.0, maximum=100.0), 1.0)
-        self._is_reversed = handle.param("reversed", BOOLEAN, False)
-        asked = summary(self._pieces)
-        scale = self._time_scale
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(TrajectoryFlightParameters)
+        asked = summary(self._parameters.pieces)
+        scale = self._parameters.timescale
         handle.info(
-            f"{path}: {asked.duration * scale:.1f} s, up to {asked.speed / scale:.2f} m/s and "
-            f"{asked.acceleration / scale**2:.2f} m/s^2"
+            f"the trajectory takes {asked.duration * scale:.1f} s, up to "
+            f"{asked.speed / scale:.2f} m/s and {asked.acceleration / scale**2:.2f} m/s^2"
         )
 
+    @override
     def preparations(self) -> list[Step]:
-        """See `FlightPlanNode.preparations`."""
         pieces = [
             TrajectoryPolynomialPiece(*piece.axes, seconds(piece.duration))
-            for piece in self._pieces
+            for piece in self._parameters.pieces
         ]
         return [Step("upload_trajectory", UploadTrajectory, UploadTrajectoryRequest(pieces=pieces))]
 
+    @override
     def manoeuvres(self) -> list[Step]:
-        """See `FlightPlanNode.manoeuvres`."""
+        parameters = self._parameters
         request = StartTrajectoryRequest(
-            timescale=self._time_scale, reversed=self._is_reversed, relative=True
+            timescale=parameters.timescale, reversed=parameters.reversed, relative=True
         )
-        duration = summary(self._pieces).duration * self._time_scale
+        duration = summary(parameters.pieces).duration * parameters.timescale
         return [Step("start_trajectory", StartTrajectory, request, duration)]

@@ -1,19 +1,42 @@
-"""ROS interface of a tour from waypoint to waypoint, and the tours of the demos."""
+"""ROS interface of a flight from waypoint to waypoint, and the waypoints of the demos."""
 
 from geometry_msgs.msg import PoseStamped
+from typing_extensions import override
 
+from crazyflie_controller.pose_source import PoseParameters, PoseSource
 from crazyflie_demo.goals import goal_message
-from crazyflie_demo.waypoints import Tour, Waypoint, WaypointList
-from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_utils.node import Node
-from crazyflie_utils.parameter_types import FRAME, Number
-from crazyflie_utils.runtime.transforms import TransformError
+from crazyflie_demo.parameters import GoalParameters
+from crazyflie_demo.waypoints import Waypoint, WaypointFollower, WaypointList
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameter_types import Number
+
+
+class WaypointParameters(GoalParameters, PoseParameters):
+    """Parameters of `DemoNode`."""
+
+    waypoints: list[Waypoint] | None = parameter(
+        WaypointList(), "where to fly; by default the demo's own waypoints", None
+    )
+    position_tolerance: float = parameter(
+        Number("m", above=0.0),
+        "distance at which a waypoint is reached",
+        0.3,
+        "tolerance/position",
+        live=True,
+    )
+    yaw_tolerance: float = parameter(
+        Number("rad", above=0.0),
+        "error of the heading at which a waypoint is reached",
+        0.2,
+        "tolerance/yaw",
+        live=True,
+    )
 
 
 class DemoNode(Node):
-    """Publish goals along a tour; this one goes round a square."""
+    """Publish waypoints as goals, one after the other; these are a square."""
 
-    waypoints = (
+    waypoints: tuple[Waypoint, ...] = (
         Waypoint(0.0, 0.0, 0.5, 0.0, 2.0),
         Waypoint(0.5, 0.5, 0.5, 0.0, 1.0),
         Waypoint(0.5, -0.5, 0.5, 0.0, 1.0),
@@ -23,59 +46,43 @@ class DemoNode(Node):
     )
     """Where to go unless the parameter ``waypoints`` says otherwise."""
 
-    def __init__(self):
-        super().__init__()
-        self._world_frame = None
-        self._frame = None
-        self._period = None
-        self._tour = None
-        self._stamp = None
-        self._publisher = None
-        self._lookup = None
+    def __init__(self) -> None:
+        self._stamp: float | None = None
 
-    def load_parameters(self, handle) -> None:
-        """See `Node.load_parameters`."""
-        self._world_frame = handle.param("worldFrame", FRAME, "world")
-        self._frame = handle.param("frame", FRAME)
-        self._period = 1.0 / handle.param("rate", Number("Hz", above=0.0, maximum=500.0), 30.0)
-        self._tour = Tour(
-            handle.param("waypoints", WaypointList(), list(self.waypoints)),
-            handle.param("tolerance/position", Number("m", above=0.0), 0.3),
-            handle.param("tolerance/yaw", Number("rad", above=0.0), 0.2),
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(WaypointParameters, self._reconfigure)
+        self._follower = WaypointFollower(
+            self._parameters.waypoints or list(self.waypoints),
+            self._parameters.position_tolerance,
+            self._parameters.yaw_tolerance,
         )
 
-    def register_callbacks(self, handle) -> None:
-        """See `Node.register_callbacks`."""
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("goal", PoseStamped)
-        self._lookup = handle.listen_to_transforms()
-        handle.timer(self._period, self._on_timer)
+        self._source = PoseSource(handle, self._parameters)
+        handle.timer(1.0 / self._parameters.rate, self._on_timer)
+
+    def _reconfigure(self, parameters):
+        self._follower.position_tolerance = parameters.position_tolerance
+        self._follower.yaw_tolerance = parameters.yaw_tolerance
 
     def _on_timer(self):
-        index, was_finished = self._tour.index, self._tour.is_finished
-        self._look()
-        if self._tour.index != index:
-            self._handle.info(f"goes on to waypoint {self._tour.index}: {list(self._tour.goal)}")
-        if self._tour.is_finished and not was_finished:
-            self._handle.info("the tour is finished; the last waypoint remains the goal")
-        goal = self._tour.goal
+        follower = self._follower
+        index, was_finished = follower.index, follower.is_finished
+        stamp, pose = self._source.latest()
+        if pose is not None and stamp != self._stamp:
+            self._stamp = stamp
+            follower.update(self._handle.time(), pose[:3], pose.yaw)
+        if follower.index != index:
+            self._handle.info(f"goes on to waypoint {follower.index}: {list(follower.goal)}")
+        if follower.is_finished and not was_finished:
+            self._handle.info("finished; the last waypoint remains the goal")
+        x, y, z, yaw, _ = follower.goal
         self._publisher.publish(
-            goal_message(self._handle.stamp(), self._world_frame, goal.x, goal.y, goal.z, goal.yaw)
+            goal_message(self._handle.stamp(), self._parameters.world_frame, x, y, z, yaw)
         )
-
-    def _look(self):
-        try:
-            found = self._lookup(self._world_frame, self._frame)
-        except TransformError as error:
-            self._handle.warn(
-                f"no pose of {self._frame} in {self._world_frame}: {error}", throttle=5.0, key="tf"
-            )
-            return
-        if found.header.stamp == self._stamp:
-            return
-        self._stamp = found.header.stamp
-        t, q = found.transform.translation, found.transform.rotation
-        yaw = rpy_from_quaternion(q.x, q.y, q.z, q.w)[2]
-        self._tour.see(self._handle.time(), (t.x, t.y, t.z), yaw)
 
 
 class Demo1Node(DemoNode):
@@ -92,6 +99,6 @@ class Demo1Node(DemoNode):
 
 
 class Demo2Node(DemoNode):
-    """The second of two vehicles that fly together: x < 0, the first one's tour reflected."""
+    """The second of two vehicles that fly together: x < 0, the first one's way reflected."""
 
     waypoints = tuple(Waypoint(-x, -y, z, yaw, s) for x, y, z, yaw, s in Demo1Node.waypoints)

@@ -1,10 +1,10 @@
-"""A tour from waypoint to waypoint."""
+"""Lists of waypoints, and the way along them."""
 
 import math
 from typing import NamedTuple
 
 from crazyflie_model.angles import wrap_to_pi
-from crazyflie_utils.parameter_types import DURATION, FINITE
+from crazyflie_utils.parameter_types import DURATION, FINITE, ParameterType
 
 
 class Waypoint(NamedTuple):
@@ -17,8 +17,12 @@ class Waypoint(NamedTuple):
     seconds: float
 
 
-class WaypointList:
-    """Kind of a parameter that is a list of waypoints."""
+class WaypointList(ParameterType):
+    """A list of waypoints [x, y, z, yaw, seconds]."""
+
+    label = "list of [x, y, z, yaw, seconds]"
+    unit = "m, rad, s"
+    range = "finite, seconds >= 0"
 
     def __call__(self, value: object) -> list[Waypoint]:
         """Return the waypoints."""
@@ -36,15 +40,16 @@ class WaypointList:
     def _waypoint(number: int, entry: object) -> Waypoint:
         if not isinstance(entry, (list, tuple)) or len(entry) != len(Waypoint._fields):
             raise ValueError(f"waypoint {number} is {entry!r}")
-        kinds = [*[FINITE] * 4, DURATION]
+        *pose, duration = entry
         try:
-            return Waypoint(*(kind(part) for kind, part in zip(kinds, entry, strict=True)))
+            x, y, z, yaw = map(FINITE, pose)
+            return Waypoint(x, y, z, yaw, DURATION(duration))
         except ValueError:
             raise ValueError(f"waypoint {number} is {entry!r}") from None
 
 
-class Tour:
-    """Which waypoint comes next.
+class WaypointFollower:
+    """Which waypoint is the goal.
 
     A waypoint is reached when the vehicle is near enough; after its seconds the next
     one comes. The last one stays.
@@ -52,16 +57,17 @@ class Tour:
     Parameters
     ----------
     waypoints : list of Waypoint
+        At least one.
     position_tolerance : float
-        m.
+        How near to a waypoint it is reached, m.
     yaw_tolerance : float
-        rad.
+        Likewise for the heading, rad.
     """
 
     def __init__(self, waypoints: list[Waypoint], position_tolerance: float, yaw_tolerance: float):
         self._waypoints = waypoints
-        self._position_tolerance = position_tolerance
-        self._yaw_tolerance = yaw_tolerance
+        self.position_tolerance = position_tolerance
+        self.yaw_tolerance = yaw_tolerance
         self._reached: float | None = None
         self.index = 0
         self.is_finished = False
@@ -71,8 +77,8 @@ class Tour:
         """Where to be now."""
         return self._waypoints[self.index]
 
-    def see(self, time: float, position: tuple[float, float, float], yaw: float) -> None:
-        """Go on, knowing where the vehicle is.
+    def update(self, time: float, position: tuple[float, float, float], yaw: float) -> None:
+        """Take the pose of the vehicle, and go on if it is due.
 
         Parameters
         ----------
@@ -96,4 +102,4 @@ class Tour:
     def _is_there(self, position, yaw):
         distance = math.dist(position, self.goal[:3])
         turn = abs(wrap_to_pi(yaw - self.goal.yaw))
-        return distance <= self._position_tolerance and turn <= self._yaw_tolerance
+        return distance <= self.position_tolerance and turn <= self.yaw_tolerance

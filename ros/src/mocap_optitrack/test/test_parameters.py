@@ -1,8 +1,14 @@
-"""What mocap.yaml may say."""
+"""What mocap.yaml may hold."""
 
 import pytest
 
-from mocap_optitrack.settings import Address, RigidBodies, RigidBody, StreamVersion
+from mocap_optitrack.parameters import (
+    Address,
+    RigidBody,
+    RigidBodyDictionary,
+    RigidBodyParameters,
+    StreamVersion,
+)
 
 ROBOT = {
     "pose": "Robot_1/pose",
@@ -12,29 +18,41 @@ ROBOT = {
 }
 
 
+def bodies(value):
+    return RigidBodyDictionary()(value).bodies
+
+
 def test_a_body_by_its_number():
-    (body,) = RigidBodies()({"1": ROBOT})
-    assert body == RigidBody("1", None, *ROBOT.values())
-    assert body.label == "1"
+    (body,) = bodies({"1": ROBOT})
+    assert body == RigidBody("1", RigidBodyParameters(**ROBOT))
+    assert (body.name, body.label) == (None, "1")
 
 
 def test_bodies_by_name():
-    key_is_name, name_apart = RigidBodies()(
+    key_is_name, name_apart = bodies(
         {"cf7": {"pose": "pose7"}, "2": {"name": "My Drone", "child_frame_id": "/drone"}}
     )
-    assert key_is_name == RigidBody("cf7", "cf7", "pose7", None, None, "world")
-    assert name_apart == RigidBody("2", "My Drone", None, None, "drone", "world")
+    assert (key_is_name.name, name_apart.name) == ("cf7", "My Drone")
+    assert key_is_name.parameters == RigidBodyParameters(pose="pose7")
+    assert name_apart.parameters == RigidBodyParameters(name="My Drone", child_frame_id="drone")
     assert (key_is_name.label, name_apart.label) == ("cf7", "2 (My Drone)")
 
 
 def test_a_number_without_quotes_is_a_number_too():
-    assert RigidBodies()({1: ROBOT}) == RigidBodies()({"1": ROBOT})
+    assert bodies({1: ROBOT}) == bodies({"1": ROBOT})
 
 
-def test_what_means_nothing_is_told():
-    kind = RigidBodies()
-    kind({"1": {**ROBOT, "odom": "Robot_1/Odom", "tf": "tf"}})
-    assert kind.unknown == ["1/odom", "1/tf"]
+def test_entries_without_a_meaning_are_named():
+    value = {"1": {**ROBOT, "odom": "Robot_1/Odom", "tf": "tf"}}
+    assert RigidBodyDictionary()(value).unknown == ["1/odom", "1/tf"]
+
+
+def test_all_that_is_wrong_is_named_at_once():
+    value = {"1": {"pose": 3, "pose2d": 4}, "2": None, "a": {"pose": "p"}, "b": {"pose": "p"}}
+    with pytest.raises(ValueError) as error:
+        RigidBodyDictionary()(value)
+    for reason in ("1/pose is 3", "1/pose2d is 4", "2 is None", "a and b share topic 'p'"):
+        assert reason in str(error.value)
 
 
 @pytest.mark.parametrize(
@@ -48,8 +66,8 @@ def test_what_means_nothing_is_told():
         ({"1": {"pose": "not a topic"}}, "1/pose is 'not a topic'"),
         ({"1": {"pose2d": 3}}, "1/pose2d is 3"),
         ({"1": {"child_frame_id": ""}}, "1/child_frame_id is ''"),
-        ({"1": {"pose": "a"}, "2": {"pose": "a"}}, "1 and 2 share pose 'a'"),
-        ({"1": {"pose": "a", "pose2d": "a"}}, "share pose2d 'a'"),
+        ({"1": {"pose": "a"}, "2": {"pose": "a"}}, "1 and 2 share topic 'a'"),
+        ({"1": {"pose": "a", "pose2d": "a"}}, "share topic 'a'"),
         (
             {"1": {"child_frame_id": "a"}, "2": {"child_frame_id": "/a"}},
             "1 and 2 share child_frame_id",
@@ -59,7 +77,7 @@ def test_what_means_nothing_is_told():
 )
 def test_bad_bodies_are_refused(value, reason):
     with pytest.raises(ValueError) as error:
-        RigidBodies()(value)
+        RigidBodyDictionary()(value)
     assert reason in str(error.value)
 
 

@@ -1,27 +1,27 @@
-"""What the sticks of a joystick say at present."""
+"""The axes of a joystick at present."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 JOY_LIMIT = 0.5
 """How long, in s, the last message of a joystick counts: joy_node repeats it all the time."""
 
 
-class Sticks:
-    """The axes that were heard last, as long as they are fresh."""
+class JoyAxes:
+    """The axes that were received last, as long as they are fresh."""
 
     def __init__(self) -> None:
         self._axes: tuple[float, ...] = ()
-        self._heard: float | None = None
+        self._received: float | None = None
 
-    def hear(self, axes: Iterable[float], time: float) -> None:
+    def update(self, axes: Sequence[float], time: float) -> None:
         """Take the axes of a message that has come at ``time`` (s)."""
         self._axes = tuple(axes)
-        self._heard = time
+        self._received = time
 
     def is_fresh(self, time: float) -> bool:
         """Tell whether the joystick is alive at ``time`` (s)."""
-        return self._heard is not None and time - self._heard <= JOY_LIMIT
+        return self._received is not None and time - self._received <= JOY_LIMIT
 
     def axis(self, index: int, time: float) -> float:
         """Return an axis, -1 to 1; 0 if there is none, or the joystick is silent."""

@@ -1,4 +1,4 @@
-"""A motion capture studio in software: processes, and a scene to look at."""
+"""Virtual motion capture: processes, and vehicles for its cameras to see."""
 
 import socket
 import threading
@@ -12,7 +12,7 @@ from crazyflie_virtual.observer import Observation
 LIMIT = 20.0
 
 _PERIOD = 0.05
-"""From one look at the scene to the next, s."""
+"""From one message of the vehicles to the next, s."""
 
 
 def virtual_mocap(command_port, observer_port, latency):
@@ -33,15 +33,15 @@ def mocap_launch(folder, config):
     return running("roslaunch", "mocap_optitrack", "mocap.launch", f"mocap_config_file:={path}")
 
 
-class Scene:
-    """Vehicles that fly straight on, and tell the virtual cameras so.
+class MovingVehicles:
+    """Vehicles that fly straight on, as messages to the virtual cameras.
 
     Parameters
     ----------
     port : int
         Where the cameras listen.
     vehicles : dict of int to tuple
-        Number to name, position (m) when the scene begins, velocity (m/s) and
+        Number to name, position (m) at the beginning, velocity (m/s) and
         quaternion.
     """
 

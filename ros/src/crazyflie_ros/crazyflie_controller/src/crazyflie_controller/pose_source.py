@@ -1,0 +1,58 @@
+"""Where a vehicle is, as tf knows it."""
+
+from geometry_msgs.msg import Point, Quaternion, Vector3
+
+from crazyflie_controller.go_to import Pose
+from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_utils import NodeHandle, Parameters, TransformError, parameter
+from crazyflie_utils.parameter_types import FRAME
+
+
+class WorldFrameParameters(Parameters):
+    """The frame of goals and poses."""
+
+    world_frame: str = parameter(FRAME, "frame of goals and poses", "world", "worldFrame")
+
+
+class PoseParameters(WorldFrameParameters):
+    """Parameters of a `PoseSource`."""
+
+    frame: str = parameter(FRAME, "the vehicle's frame")
+
+
+class PoseSource:
+    """The latest pose of a vehicle; a warning while there is none.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+        The door to tf.
+    parameters : PoseParameters
+    """
+
+    def __init__(self, handle: NodeHandle, parameters: PoseParameters):
+        self._handle = handle
+        self._parameters = parameters
+        self._lookup = handle.listen_to_transforms()
+
+    def latest(self) -> tuple[float, Pose] | tuple[None, None]:
+        """Return the latest pose in the world frame and when it was measured (s of ROS time)."""
+        parameters = self._parameters
+        try:
+            found = self._lookup(parameters.world_frame, parameters.frame)
+        except TransformError as error:
+            self._handle.warn(
+                f"no pose of {parameters.frame} in {parameters.world_frame}: {error}",
+                throttle=5.0,
+                key="tf",
+            )
+            return None, None
+        transform = found.transform
+        return found.header.stamp.to_sec(), pose(transform.translation, transform.rotation)
+
+
+def pose(position: Point | Vector3, orientation: Quaternion) -> Pose:
+    """Return the pose in two messages."""
+    q = orientation
+    yaw = rpy_from_quaternion(q.x, q.y, q.z, q.w)[2]
+    return Pose(position.x, position.y, position.z, yaw)

@@ -1,0 +1,28 @@
+"""Parameters that several demos have."""
+
+from crazyflie_controller.pose_source import WorldFrameParameters
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameter_types import TOPIC, Integer, Number
+
+AXIS = Integer(0, 255)
+"""Number of a joystick's axis."""
+
+_RATE = Number("Hz", above=0.0, maximum=500.0)
+
+
+class JoyParameters(Parameters):
+    """Of nodes that follow a joystick."""
+
+    joy_topic: str = parameter(TOPIC, "where the joystick's messages come from", "joy")
+
+
+class SetpointParameters(Parameters):
+    """Of nodes that publish cmd_vel."""
+
+    rate: float = parameter(_RATE, "setpoints a second", 50.0)
+
+
+class GoalParameters(WorldFrameParameters):
+    """Of nodes that publish goals."""
+
+    rate: float = parameter(_RATE, "goals a second", 30.0)

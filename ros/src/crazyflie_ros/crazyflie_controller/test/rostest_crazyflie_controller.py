@@ -11,8 +11,8 @@ from tf2_msgs.msg import TFMessage
 from crazyflie_utils.testing.peer import LIMIT, listening
 
 
-class Vehicle:
-    """Tells tf where it is, 50 times a second; where that is, the test decides."""
+class TrackedVehicle:
+    """A vehicle whose pose is published on tf 50 times a second; the test sets its height."""
 
     def __init__(self):
         self.z = 0.0
@@ -37,7 +37,7 @@ class Vehicle:
 
 @pytest.fixture
 def vehicle():
-    vehicle = Vehicle()
+    vehicle = TrackedVehicle()
     yield vehicle
     vehicle.stop()
 
@@ -57,7 +57,7 @@ def call(name):
         try:
             return rospy.ServiceProxy(name, Empty)()
         except rospy.ServiceException:
-            # tf may not have heard of the vehicle yet.
+            # The controller may not have a pose yet.
             if rospy.get_time() > end:
                 raise
             rospy.sleep(0.1)

@@ -3,7 +3,7 @@
 import math
 
 from flights import Stick, launched, virtual_vehicle, wait_for_service
-from rostest_hover import Eyes, config, virtual_mocap
+from rostest_hover import Positions, config, virtual_mocap
 
 from crazyflie_demo.gamepad import LAND, TAKEOFF
 from crazyflie_demo.waypoint_node import Demo1Node, Demo2Node
@@ -35,7 +35,7 @@ def test_two_tours(tmp_path):
             mocap_config_file=config(tmp_path / "mocap.yaml", command_port, 2),
         ),
     ):
-        eyes = Eyes("Robot_1/base_link", "Robot_2/base_link")
+        eyes = Positions("Robot_1/base_link", "Robot_2/base_link")
         for prefix in ("crazyflie1", "crazyflie2"):
             wait_for_service(f"/{prefix}/controller/takeoff")
             wait_for_service(f"/{prefix}/emergency")

@@ -79,15 +79,15 @@ def test_hovers_goes_and_lands(tmp_path):
             z=0.6,
         ),
     ):
-        eyes = Positions("Robot_1/base_link")
+        tracked = Positions("Robot_1/base_link")
         wait_for_service("/crazyflie/controller/takeoff")
         wait_for_service("/crazyflie/emergency")
-        assert eyes.positions()[0] == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
+        assert tracked.positions()[0] == pytest.approx((0.0, 0.0, 0.0), abs=0.01)
         stick.press(TAKEOFF)
-        eyes.wait_until(lambda vehicle: vehicle[2] > 0.5)
+        tracked.wait_until(lambda vehicle: vehicle[2] > 0.5)
         stick.tilt(PITCH, 1.0)
-        eyes.wait_until(lambda vehicle: vehicle[0] > 0.4)
+        tracked.wait_until(lambda vehicle: vehicle[0] > 0.4)
         stick.tilt(PITCH, 0.0)
         stick.press(LAND)
-        eyes.wait_until(lambda vehicle: vehicle[2] < 0.01)
-        assert eyes.positions()[0][1] == pytest.approx(0.0, abs=0.1)
+        tracked.wait_until(lambda vehicle: vehicle[2] < 0.01)
+        assert tracked.positions()[0][1] == pytest.approx(0.0, abs=0.1)

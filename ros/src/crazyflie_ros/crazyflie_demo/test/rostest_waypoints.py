@@ -35,11 +35,11 @@ def test_two_tours(tmp_path):
             mocap_config_file=config(tmp_path / "mocap.yaml", command_port, 2),
         ),
     ):
-        eyes = Positions("Robot_1/base_link", "Robot_2/base_link")
+        tracked = Positions("Robot_1/base_link", "Robot_2/base_link")
         for prefix in ("crazyflie1", "crazyflie2"):
             wait_for_service(f"/{prefix}/controller/takeoff")
             wait_for_service(f"/{prefix}/emergency")
-        eyes.positions()
+        tracked.positions()
         stick.press(TAKEOFF)
         remaining = [list(node.waypoints[:VISITED]) for node in (Demo1Node, Demo2Node)]
 
@@ -50,6 +50,6 @@ def test_two_tours(tmp_path):
                     waypoints.pop(0)
             return not any(remaining)
 
-        eyes.wait_until(have_been_everywhere)
+        tracked.wait_until(have_been_everywhere)
         stick.press(LAND)
-        eyes.wait_until(lambda *vehicles: all(position[2] < 0.01 for position in vehicles))
+        tracked.wait_until(lambda *vehicles: all(position[2] < 0.01 for position in vehicles))

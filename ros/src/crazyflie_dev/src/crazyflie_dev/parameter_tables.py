@@ -27,9 +27,10 @@ def table(*classes: type[Parameters]) -> str:
     """
     rows = ["| parameter | type, unit | default | range | |", "|---|---|---|---|---|"]
     declarations = itertools.chain.from_iterable(each.declarations() for each in classes)
-    for cells, group in itertools.groupby(declarations, _cells):
-        names = ", ".join(f"`{declaration.name}`" for declaration in group)
-        rows.append(f"| {' | '.join((names, *cells))} |")
+    names: dict[tuple[str, ...], list[str]] = {}
+    for declaration in declarations:
+        names.setdefault(_cells(declaration), []).append(f"`{declaration.name}`")
+    rows += [f"| {' | '.join((', '.join(alike), *cells))} |" for cells, alike in names.items()]
     return "\n".join(rows) + "\n"
 
 

@@ -9,7 +9,7 @@ from crazyflie_utils.testing import peer
 @pytest.fixture
 def heard(monkeypatch):
     monkeypatch.setattr(peer, "LIMIT", 0.05)
-    heard = peer.Heard()
+    heard = peer.Received()
     for number in range(4):
         heard.put(Float64(number))
     return heard

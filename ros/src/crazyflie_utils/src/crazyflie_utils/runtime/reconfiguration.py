@@ -1,6 +1,6 @@
 """Parameters that may be changed in flight, as dynamic_reconfigure and rqt_reconfigure do it.
 
-The library's own server speaks to rospy, in threads of rospy's; this one speaks
+The library's own server uses rospy, in threads of rospy's; this one goes
 through the node handle, so that a change comes between two callbacks and works
 for many nodes in one process. What goes over the wire is encoded by the library.
 """

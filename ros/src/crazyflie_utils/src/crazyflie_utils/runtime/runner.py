@@ -132,7 +132,7 @@ def ros_process() -> Process:
 
 
 def _wait_for_master():
-    patience = threading.Event()
+    pause = threading.Event()
     waited = 0.0
     while not rosgraph.is_master_online():
         if waited == 0.0:
@@ -142,7 +142,7 @@ def _wait_for_master():
                 f"no ROS master at {rosgraph.get_master_uri()} after {_MASTER_LIMIT:g} s; "
                 "start one with roscore or roslaunch"
             )
-        patience.wait(0.5)
+        pause.wait(0.5)
         waited += 0.5
 
 

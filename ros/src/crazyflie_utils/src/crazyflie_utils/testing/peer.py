@@ -1,4 +1,4 @@
-"""A peer of the node under test, for rostests: it speaks plain rospy, as nodes of others do."""
+"""A peer of the node under test, for rostests: it is plain rospy, as nodes of others are."""
 
 import contextlib
 import queue
@@ -16,7 +16,7 @@ def _anything(message: genpy.Message) -> bool:
     return True
 
 
-class Heard(queue.Queue[genpy.Message]):
+class Received(queue.Queue[genpy.Message]):
     """The messages that have come on a topic, oldest first."""
 
     def next(self, accept: Callable[[genpy.Message], bool] = _anything) -> genpy.Message:
@@ -42,12 +42,12 @@ class Heard(queue.Queue[genpy.Message]):
 
 
 @contextlib.contextmanager
-def listening(topic: str, message_type: type[genpy.Message]) -> Iterator[Heard]:
+def listening(topic: str, message_type: type[genpy.Message]) -> Iterator[Received]:
     """Subscribe to a topic for the time of a with block."""
-    heard = Heard()
-    subscriber = rospy.Subscriber(topic, message_type, heard.put, tcp_nodelay=True)
+    received = Received()
+    subscriber = rospy.Subscriber(topic, message_type, received.put, tcp_nodelay=True)
     try:
-        yield heard
+        yield received
     finally:
         subscriber.unregister()
 

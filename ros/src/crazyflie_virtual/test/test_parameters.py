@@ -8,7 +8,7 @@ import pytest
 from virtual_bench import Bench
 
 from crazyflie_virtual.link.crtp import Port
-from crazyflie_virtual.tables.number_types import FLOAT, U8
+from crazyflie_virtual.tables.number_types import FLOAT, PARAMETER_CODES, U8
 from crazyflie_virtual.tables.parameter_table import parameter_specs
 
 TABLE, READ, WRITE, MISC = 0, 1, 2, 3
@@ -110,7 +110,7 @@ def test_errors(bench):
 def test_set_by_name(bench):
     def by_name(group, name, number_type, value):
         names = b"\0" + group + b"\0" + name + b"\0"
-        data = names + bytes([number_type.parameter_code]) + number_type.pack(value)
+        data = names + bytes([PARAMETER_CODES[number_type]]) + number_type.pack(value)
         answer = bench.ask_one(Port.PARAMETERS, MISC, data)
         assert answer[:-1] == names
         return answer[-1]

@@ -43,7 +43,7 @@ class FlightRecorderNode(Node):
         Notified after every message.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.record = FlightRecord()
         self.received = threading.Condition()
         self._stopped = False

@@ -113,7 +113,7 @@ class GeofenceNode(Node):
     Silent until there is a regular control: without one, the merger is silent too.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._regular: NDArray[np.float64] | None = None
 
     @override

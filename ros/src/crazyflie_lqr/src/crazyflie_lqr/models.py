@@ -55,7 +55,7 @@ class LinearModel:
 class _Builder:
     """Fills in A and B by the names of states and controls."""
 
-    def __init__(self, name, states):
+    def __init__(self, name: str, states: tuple[str, ...]):
         self._name = name
         self._states = states
         self._A = np.zeros((len(states), len(states)))

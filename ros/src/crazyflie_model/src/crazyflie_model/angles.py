@@ -9,19 +9,28 @@ of tf's helpers, so nodes convert with this module only. Quaternions are
 
 import math
 from collections.abc import Sequence
+from typing import overload
 
 import numpy as np
 
-from crazyflie_model.elementwise import Number, clip, functions
+from crazyflie_model.elementwise import Many, Number, clip, functions
 
-Triple = tuple[Number, Number, Number]
-Quaternion = tuple[Number, Number, Number, Number]
+Triple = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 
 _SMALLEST_COSINE = 1e-6
 """Of a pitch from which roll and yaw can still be told apart."""
 
 
-def wrap_to_pi(angle: Number) -> Number:
+@overload
+def wrap_to_pi(angle: float) -> float: ...
+
+
+@overload
+def wrap_to_pi(angle: Many) -> Many: ...
+
+
+def wrap_to_pi(angle: Many) -> Many:
     """Return the angle in [-pi, pi] that points the same way.
 
     Parameters
@@ -108,7 +117,7 @@ def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple[float, float]:
     return c * x - s * y, s * x + c * y
 
 
-def zyx_from_quaternion(quaternion: Sequence[Number]) -> Triple:
+def zyx_from_quaternion(quaternion: Sequence[Number]) -> tuple[Number, Number, Number]:
     """Return (roll, pitch, yaw) with ``R = Rz(yaw) Ry(pitch) Rx(roll)``, rad.
 
     This is the order of the firmware, whose roll and pitch are those in the
@@ -141,7 +150,7 @@ def quaternion_from_zyx(roll: float, pitch: float, yaw: float) -> Quaternion:
     )
 
 
-def rotate(quaternion: Sequence[Number], vector: Sequence[Number]) -> Triple:
+def rotate(quaternion: Sequence[Number], vector: Sequence[Number]) -> tuple[Number, Number, Number]:
     """Return a vector given in the body frame in the fixed frame.
 
     Parameters
@@ -161,7 +170,9 @@ def rotate(quaternion: Sequence[Number], vector: Sequence[Number]) -> Triple:
     )
 
 
-def rotate_back(quaternion: Sequence[Number], vector: Sequence[Number]) -> Triple:
+def rotate_back(
+    quaternion: Sequence[Number], vector: Sequence[Number]
+) -> tuple[Number, Number, Number]:
     """Return a vector given in the fixed frame in the body frame; inverse of `rotate`."""
     x, y, z, w = quaternion
     return rotate((-x, -y, -z, w), vector)

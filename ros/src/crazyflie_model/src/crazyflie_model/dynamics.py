@@ -32,11 +32,11 @@ class Dynamics(ABC):
     u_dim: int = 4
 
     @abstractmethod
-    def initial_state(self, position: Sequence[Number]) -> Vector:
+    def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """Return the state at rest at a position, three components in m."""
 
     @abstractmethod
-    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
+    def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """Return the time derivative of every component of the state.
 
         Parameters
@@ -48,7 +48,7 @@ class Dynamics(ABC):
         """
 
     @abstractmethod
-    def on_ground(self, x: Vector) -> Vector:
+    def on_ground(self, x: Vector[Number]) -> Vector[Number]:
         """Return the state with the ground, z = 0, taken into account.
 
         A vehicle below the ground is put on it and loses its downward speed.
@@ -58,7 +58,7 @@ class Dynamics(ABC):
     def pose(self, x: Sequence[float], u: Sequence[float]) -> tuple[Triple, Quaternion]:
         """Return the position, in m, and the quaternion (x, y, z, w) of one vehicle."""
 
-    def step(self, count: int, x: Vector, u: Vector) -> Vector:
+    def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """Return the state one `STEP` later.
 
         Parameters
@@ -92,17 +92,17 @@ class SevenDimensional(Dynamics):
 
     x_dim = 7
 
-    def initial_state(self, position: Sequence[Number]) -> Vector:
+    def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """See `Dynamics.initial_state`; yaw is 0."""
         x, y, z = position
         return [x, y, z, 0.0, 0.0, 0.0, 0.0]
 
     @override
-    def on_ground(self, x: Vector) -> Vector:
+    def on_ground(self, x: Vector[Number]) -> Vector[Number]:
         z, z_dot = x[2], x[5]
         below = z <= 0.0
         z_dot = where(below & (z_dot < 0.0), 0.0, z_dot)
-        return [*x[:2], where(below, 0.0, z), *x[3:5], z_dot, x[6]]
+        return [x[0], x[1], where(below, 0.0, z), x[3], x[4], z_dot, x[6]]
 
     def pose(self, x: Sequence[float], u: Sequence[float]) -> tuple[Triple, Quaternion]:
         """See `Dynamics.pose`: roll and pitch are those of the control, yaw is the state's."""
@@ -112,7 +112,7 @@ class SevenDimensional(Dynamics):
 class NearHover(SevenDimensional):
     """Small angles about hover, yaw kept apart: tilt does not cost lift."""
 
-    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
+    def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.rates`.
 
         x_ddot = g tan(pitch), y_ddot = -g tan(roll), z_ddot = thrust - g, and
@@ -131,7 +131,7 @@ class NearHover(SevenDimensional):
             yaw_dot,
         ]
 
-    def step(self, count: int, x: Vector, u: Vector) -> Vector:
+    def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.step`: exact, as acceleration and yaw rate are constant, and quick."""
         px, py, pz, _, _, _, yaw = x
         vx, vy, vz, ax, ay, az, yaw_dot = self.rates(count * STEP, x, u)
@@ -152,12 +152,12 @@ class NearHover(SevenDimensional):
 class Coupled7D(SevenDimensional):
     """Tilt in the heading frame, and at the cost of lift: thrust, tilt and yaw are coupled."""
 
-    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
+    def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.rates` and `coupled_acceleration`; the yaw rate is commanded."""
-        return [*x[3:6], *coupled_acceleration(u, x[6]), u[2]]
+        return x[3:6] + coupled_acceleration(u, x[6]) + [u[2]]
 
 
-def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector:
+def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector[Number]:
     """Return the acceleration, m/s^2, fixed frame, of a vehicle that follows a control at once.
 
     The thrust T, tilted by roll and pitch about the heading, and gravity:

@@ -9,18 +9,22 @@ two is in this module.
 import math
 from collections.abc import Sequence
 from types import ModuleType, SimpleNamespace
+from typing import TypeVar, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Number = float | NDArray[np.float64]
-"""A component: of one vehicle, or of many."""
+Many = float | NDArray[np.float64]
+"""A component of many vehicles: an array, or a float that holds for all of them."""
+
+Number = TypeVar("Number", float, Many)
+"""A component of one vehicle or of many: what is made of floats only is a float."""
 
 Vector = list[Number]
-"""The components of a state, a control or a vector."""
+"""The components of a state, a control or a vector: ``Vector[float]`` is one vehicle's."""
 
 
-def split(vectors: ArrayLike) -> Vector:
+def split(vectors: ArrayLike) -> Vector[Many]:
     """Return the components of a vector, or of vectors along the last axis.
 
     Parameters
@@ -36,7 +40,7 @@ def split(vectors: ArrayLike) -> Vector:
     return vectors.tolist() if vectors.ndim == 1 else list(np.moveaxis(vectors, -1, 0))
 
 
-def join(components: Sequence[Number]) -> NDArray[np.float64]:
+def join(components: Sequence[Many]) -> NDArray[np.float64]:
     """Return components as one array, shape (m,) or (..., m); inverse of `split`."""
     return np.stack(np.broadcast_arrays(*components), axis=-1)
 
@@ -53,19 +57,35 @@ _NUMPY = SimpleNamespace(
 """numpy by math's names, which numpy itself knows since version 2 only."""
 
 
-def functions(value: Number) -> ModuleType | SimpleNamespace:
+def functions(value: Many) -> ModuleType | SimpleNamespace:
     """Return math, or numpy under the same names, whose sin, cos, ... take ``value``."""
     return math if isinstance(value, float) else _NUMPY
 
 
-def where(condition: bool | NDArray[np.bool_], value: Number, other: Number) -> Number:
+@overload
+def where(condition: bool, value: float, other: float) -> float: ...
+
+
+@overload
+def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many: ...
+
+
+def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many:
     """Return ``value`` where a condition, bool or array of bool, holds, else ``other``."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, value, other)
     return value if condition else other
 
 
-def clip(value: Number, low: float, high: float) -> Number:
+@overload
+def clip(value: float, low: float, high: float) -> float: ...
+
+
+@overload
+def clip(value: Many, low: float, high: float) -> Many: ...
+
+
+def clip(value: Many, low: float, high: float) -> Many:
     """Return ``value`` limited to [low, high]."""
     if isinstance(value, np.ndarray):
         return np.clip(value, low, high)

@@ -1,16 +1,15 @@
 """The polynomial with given derivatives at both ends."""
 
-from collections.abc import Sequence
-
+from numpy.typing import ArrayLike
 from scipy.interpolate import BPoly, PPoly
 
 
-def hermite(start: Sequence[float], end: Sequence[float], duration: float) -> tuple[float, ...]:
+def hermite(start: ArrayLike, end: ArrayLike, duration: float) -> tuple[float, ...]:
     """Return the coefficients, the constant first, of the polynomial between two ends.
 
     Parameters
     ----------
-    start, end : sequence of float
+    start, end : array_like, shape (n,)
         Value and derivatives by time; four at both ends make a polynomial of the
         7th degree.
     duration : float

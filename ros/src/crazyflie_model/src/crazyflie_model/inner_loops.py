@@ -13,7 +13,6 @@ unlike the firmware, positive pitch is nose down (accelerates forward).
 import math
 from dataclasses import replace
 
-from crazyflie_model.angles import Triple
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
 from crazyflie_model.mixer import limit, mix
 from crazyflie_model.pid import Gains, terms
@@ -57,14 +56,17 @@ _TILT, _HEADING = map(_from_rad_to_rad, (TILT, HEADING))
 _TILT_RATE, _HEADING_RATE = map(_from_rad_to_pwm, (TILT_RATE, HEADING_RATE))
 
 
-def initial_memory(yaw: Number) -> Vector:
+def initial_memory(yaw: Number) -> Vector[Number]:
     """Return the memory of loops that begin at a heading ``yaw`` (rad), at rest."""
     return [0.0] * (MEMORY_DIM - 1) + [yaw]
 
 
 def update(
-    memory: Vector, setpoint: Vector, attitude: Triple, rates: Vector
-) -> tuple[Vector, Vector]:
+    memory: Vector[Number],
+    setpoint: Vector[Number],
+    attitude: tuple[Number, Number, Number],
+    rates: Vector[Number],
+) -> tuple[Vector[Number], Vector[Number]]:
     """Return memory and motor commands after one sample.
 
     Without thrust the motors are off and the loops begin anew.

@@ -2,12 +2,14 @@
 
 from collections.abc import Callable
 
-from crazyflie_model.elementwise import Vector
+from crazyflie_model.elementwise import Number, Vector
 
-Rates = Callable[[float, Vector, Vector], Vector]
+Rates = Callable[[float, Vector[Number], Vector[Number]], Vector[Number]]
 
 
-def rk4_step(rates: Rates, t: float, x: Vector, u: Vector, dt: float) -> Vector:
+def rk4_step(
+    rates: Rates[Number], t: float, x: Vector[Number], u: Vector[Number], dt: float
+) -> Vector[Number]:
     """Return the state one classical Runge-Kutta step (4th order) later.
 
     Parameters

@@ -6,12 +6,13 @@ The motors are numbered as on the Crazyflie, seen from above: 1 front right, 2 b
 """
 
 import math
+from collections.abc import Sequence
 
 from crazyflie_model.elementwise import Number, Vector, clip, where
 from crazyflie_model.limits import FULL_PWM
 
 
-def mix(thrust: Number, about_x: Number, about_y: Number, about_z: Number) -> Vector:
+def mix(thrust: Number, about_x: Number, about_y: Number, about_z: Number) -> Vector[Number]:
     """Return what is asked of motors 1 to 4, PWM, not limited.
 
     Parameters
@@ -30,7 +31,7 @@ def mix(thrust: Number, about_x: Number, about_y: Number, about_z: Number) -> Ve
     ]
 
 
-def limit(requested: Vector, idle: float = 0.0) -> Vector:
+def limit(requested: Sequence[Number], idle: float = 0.0) -> Vector[Number]:
     """Return commands that motors can follow, PWM.
 
     Where one would exceed `FULL_PWM`, all are lowered alike: attitude comes
@@ -38,7 +39,7 @@ def limit(requested: Vector, idle: float = 0.0) -> Vector:
 
     Parameters
     ----------
-    requested : list, 4 components
+    requested : sequence, 4 components
         PWM.
     idle : float
         Least command, PWM.

@@ -4,7 +4,7 @@ import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Generic, NamedTuple
 
 from crazyflie_model.elementwise import Number
 
@@ -17,7 +17,7 @@ PIECE_SIZE = 132
 _PIECE = struct.Struct("<33f")
 
 
-class Goal(NamedTuple):
+class Goal(NamedTuple, Generic[Number]):
     """Where a trajectory is at some moment, or at many.
 
     Attributes
@@ -28,9 +28,9 @@ class Goal(NamedTuple):
         rad, rad/s.
     """
 
-    position: tuple[Number, ...]
-    velocity: tuple[Number, ...]
-    acceleration: tuple[Number, ...]
+    position: tuple[Number, Number, Number]
+    velocity: tuple[Number, Number, Number]
+    acceleration: tuple[Number, Number, Number]
     yaw: Number
     yaw_rate: Number
 
@@ -77,7 +77,7 @@ class PolynomialPiece:
         padded = (c for axis in self.axes for c in [*axis, *[0.0] * (COEFFICIENTS - len(axis))])
         return _PIECE.pack(*padded, self.duration)
 
-    def evaluate(self, time: Number) -> Goal:
+    def evaluate(self, time: Number) -> Goal[Number]:
         """Return the goal ``time`` (s) after the beginning, which is not limited."""
         values = [_evaluate(axis, time) for axis in self.axes]
         position, velocity, acceleration = zip(*values[:3], strict=True)

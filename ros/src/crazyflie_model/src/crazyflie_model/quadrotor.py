@@ -119,7 +119,7 @@ class Airframe:
     def __init__(self, parameters: QuadrotorParameters):
         self.parameters = parameters
 
-    def initial_state(self, position: Sequence[Number]) -> Vector:
+    def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """Return the state at rest and level, heading along x.
 
         On the ground the rotors stand still; in the air they carry the vehicle.
@@ -142,7 +142,7 @@ class Airframe:
             parameters.torque_per_thrust * (f2 + f4 - f1 - f3),
         )
 
-    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
+    def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """Return the time derivative of the state; see the module for x and u."""
         parameters = self.parameters
         _, _, _, vx, vy, vz, qx, qy, qz, qw, p, q, r, w1, w2, w3, w4 = x
@@ -183,7 +183,9 @@ class Airframe:
             lag * (c4 - w4),
         ]
 
-    def step(self, t: float, x: Vector, rotor_speeds: Vector, wind: Triple, dt: float) -> Vector:
+    def step(
+        self, t: float, x: Vector[Number], rotor_speeds: Vector[Number], wind: Triple, dt: float
+    ) -> Vector[Number]:
         """Return the state one step later, with the quaternion of norm 1, on or above ground.
 
         Parameters
@@ -199,14 +201,14 @@ class Airframe:
             Step, s.
         """
         top = self.parameters.max_rotor_speed
-        commands = [clip(speed, 0.0, top) for speed in rotor_speeds]
-        x = rk4_step(self.rates, t, x, [*commands, *wind], dt)
+        commands: Vector[Number] = [clip(speed, 0.0, top) for speed in rotor_speeds]
+        x = rk4_step(self.rates, t, x, commands + [*wind], dt)
         qx, qy, qz, qw = x[6:10]
         norm = functions(qx).sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
         x[6:10] = qx / norm, qy / norm, qz / norm, qw / norm
         return self.on_ground(x)
 
-    def on_ground(self, x: Vector) -> Vector:
+    def on_ground(self, x: Vector[Number]) -> Vector[Number]:
         """Return the state with the ground, z = 0, taken into account.
 
         A vehicle that is not above the ground stands on it, upright and still;
@@ -220,7 +222,12 @@ class Airframe:
         # Upside down, heading is lost.
         lost = norm == 0.0
         norm = where(lost, 1.0, norm)
-        upright = [0.0, 0.0, where(lost, 0.0, qz / norm), where(lost, 1.0, qw / norm)]
+        upright: Vector[Number] = [
+            0.0,
+            0.0,
+            where(lost, 0.0, qz / norm),
+            where(lost, 1.0, qw / norm),
+        ]
         climb = where(x[5] > 0.0, x[5], 0.0)
-        standing = [x[0], x[1], 0.0, 0.0, 0.0, climb, *upright, 0.0, 0.0, 0.0, *x[13:]]
+        standing = [x[0], x[1], 0.0, 0.0, 0.0, climb] + upright + [0.0] * 3 + x[13:]
         return [where(on_ground, after, before) for after, before in zip(standing, x, strict=True)]

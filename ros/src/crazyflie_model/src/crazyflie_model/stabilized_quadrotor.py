@@ -60,17 +60,17 @@ class StabilizedQuadrotor(Dynamics):
         self._nominal = parameters
         self._wind = wind
 
-    def initial_state(self, position: Sequence[Number]) -> Vector:
+    def initial_state(self, position: Sequence[Number]) -> Vector[Number]:
         """See `Dynamics.initial_state`; in the air the rotors carry the vehicle."""
         body = self.airframe.initial_state(position)
         return body + inner_loops.initial_memory(0.0) + body[-4:]
 
-    def rates(self, t: float, x: Vector, u: Vector) -> Vector:
+    def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.rates`: of what is continuous; the rest is constant between samples."""
-        body = self.airframe.rates(t, x[:BODY_DIM], [*x[-4:], *self._wind(t)])
+        body = self.airframe.rates(t, x[:BODY_DIM], x[-4:] + [*self._wind(t)])
         return body + [0.0] * (self.x_dim - BODY_DIM)
 
-    def on_ground(self, x: Vector) -> Vector:
+    def on_ground(self, x: Vector[Number]) -> Vector[Number]:
         """See `Dynamics.on_ground` and `Airframe.on_ground`."""
         return self.airframe.on_ground(x[:BODY_DIM]) + x[BODY_DIM:]
 
@@ -79,7 +79,7 @@ class StabilizedQuadrotor(Dynamics):
         return (x[0], x[1], x[2]), (x[6], x[7], x[8], x[9])
 
     @override
-    def step(self, count: int, x: Vector, u: Vector) -> Vector:
+    def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
         body, memory, commands = x[:BODY_DIM], x[BODY_DIM:-4], x[-4:]
         if count % _STEPS_PER_SAMPLE == 0:
             memory, commands = self._sample(body, memory, u)

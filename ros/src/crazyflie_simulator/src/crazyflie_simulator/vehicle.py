@@ -7,12 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_model.dynamics import STEP, Dynamics
-from crazyflie_model.elementwise import Vector, split
+from crazyflie_model.elementwise import Vector
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 
 _LEVEL_STEPS = round(LEVEL_AGE / STEP)
 _OFF_STEPS = round(OFF_AGE / STEP)
-_OFF: Vector = [0.0, 0.0, 0.0, 0.0]
+_OFF: Vector[float] = [0.0, 0.0, 0.0, 0.0]
 
 
 class SimulatedVehicle:
@@ -36,8 +36,8 @@ class SimulatedVehicle:
 
     def __init__(self, dynamics: Dynamics, position: ArrayLike, time: float):
         self._dynamics = dynamics
-        self._x = dynamics.initial_state(split(position))
-        self._u: Vector = _OFF
+        self._x = dynamics.initial_state(_floats(position))
+        self._u: Vector[float] = _OFF
         self._start = time
         self._steps = 0
         self._control_step: int | None = None
@@ -59,7 +59,7 @@ class SimulatedVehicle:
 
     def command(self, u: ArrayLike) -> None:
         """Take a control, shape (u_dim,), from the present step on."""
-        self._u = split(u)
+        self._u = _floats(u)
         self._control_step = self._steps
 
     def advance_to(self, time: float) -> None:
@@ -88,3 +88,7 @@ class SimulatedVehicle:
         if age < _OFF_STEPS:
             return [0.0, 0.0, 0.0, self._u[3]]
         return _OFF
+
+
+def _floats(vector: ArrayLike) -> Vector[float]:
+    return np.asarray(vector, dtype=float).tolist()

@@ -36,7 +36,7 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
 class TakeoffControlFilterNode(Node):
     """Pass on takeoff control always, and commanded control in flight."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._filter: ControlFilter[ControlStamped] = ControlFilter()
         self._published_state: str | None = None
         self._published_controller: bool | None = None

@@ -73,7 +73,7 @@ class TakeoffServerParameters(FlightTopicParameters):
 class TakeoffServerNode(Node):
     """Let the vehicle take off and land when a service asks for it."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         # None until it is known where the flight stands.
         self._flight: FlightStateMachine | None = None
         self._filter_reported = False

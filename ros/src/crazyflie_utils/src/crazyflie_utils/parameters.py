@@ -168,7 +168,7 @@ class Parameters:
         return parameters
 
     @classmethod
-    def _fields(cls):
+    def _fields(cls) -> Iterator[tuple[str, Declaration | _Group]]:
         for field in dataclasses.fields(cls):  # type: ignore[arg-type]
             declaration = field.metadata[_KEY]
             if isinstance(declaration, Declaration) and not declaration.name:

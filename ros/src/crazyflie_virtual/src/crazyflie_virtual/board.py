@@ -1,5 +1,7 @@
 """The microcontroller: firmware and ports, from power-up on."""
 
+from collections.abc import Callable
+
 from crazyflie_virtual.body.physics import MotorCommands, Physics
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.firmware import Firmware
@@ -69,13 +71,15 @@ class Board:
             LocalizationPort(firmware, settings.address),
             supervisor,
         )
-        self._ports = {port.port: port for port in ports}
+        self._handlers: dict[int, Callable[[Packet], list[Packet]]] = {
+            port.port: port.handle for port in ports
+        }
 
     def receive(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         self.firmware.link_statistics.count_received(self.firmware.time)
-        port = self._ports.get(packet.port)
-        answers = port.handle(packet) if port else []
+        handle = self._handlers.get(packet.port)
+        answers = handle(packet) if handle else []
         self.firmware.link_statistics.count_sent(len(answers))
         return answers
 

@@ -2,13 +2,14 @@
 
 import contextlib
 from collections.abc import Iterator
+from typing import Any
 
 from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 
 
 @contextlib.contextmanager
-def virtual_vehicle(**settings: object) -> Iterator[tuple[VehicleServer, str]]:
+def virtual_vehicle(**settings: Any) -> Iterator[tuple[VehicleServer, str]]:
     """Run a vehicle, on a free port unless given; yield its server and its address.
 
     Parameters

@@ -94,7 +94,8 @@ class VirtualVehicle:
             commands = self.board.step(self.battery.voltage)
         failed = self.faults.motor_failure
         if failed:
-            commands = tuple(0.0 if i + 1 == failed else c for i, c in enumerate(commands))
+            m1, m2, m3, m4 = (0.0 if i + 1 == failed else c for i, c in enumerate(commands))
+            commands = (m1, m2, m3, m4)
         self.physics.step(commands, self.battery.voltage)
         if self._steps % _BATTERY_STEPS == 0:
             self._drain()

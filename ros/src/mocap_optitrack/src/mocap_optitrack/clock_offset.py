@@ -70,7 +70,15 @@ class ClockOffset:
         return is_consistent
 
     def to_local(self, moment: float) -> float:
-        """Return a moment of the server's clock (s) by the local clock (s)."""
+        """Return a moment of the server's clock (s) by the local clock (s).
+
+        Raises
+        ------
+        ValueError
+            Not enough messages have come; see `is_settled`.
+        """
+        if self._offset is None:
+            raise ValueError("the offset of the server's clock has not settled yet")
         return moment + self._offset
 
     def _forget(self):

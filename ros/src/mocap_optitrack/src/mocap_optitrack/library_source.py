@@ -95,7 +95,8 @@ class LibrarySource(Source):
         if self._worker is not None:
             self._worker.kill()
             self._worker.wait()
-            self._worker.stdout.close()
+            if self._worker.stdout is not None:
+                self._worker.stdout.close()
             self._worker = None
 
     def _body(self, name, *pose):
@@ -110,19 +111,21 @@ class LibrarySource(Source):
         return value
 
     def _read_line(self, limit):
-        output = self._worker.stdout
+        worker = self._worker
+        if worker is None or worker.stdout is None:
+            raise SourceError(f"{self._system} at {self._host} is not open")
+        output = worker.stdout
         while b"\n" not in self._received:
             if not select.select([output], [], [], limit)[0]:
                 return None
             chunk = os.read(output.fileno(), _CHUNK)
             if not chunk:
-                raise SourceError(self._why_it_ended())
+                raise SourceError(self._why_it_ended(worker.wait()))
             self._received += chunk
         line, _, self._received = self._received.partition(b"\n")
         return line
 
-    def _why_it_ended(self):
-        status = self._worker.wait()
+    def _why_it_ended(self, status):
         if status == -signal.SIGALRM:
             return self._no_answer()
         return (

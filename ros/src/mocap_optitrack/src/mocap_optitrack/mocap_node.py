@@ -116,7 +116,9 @@ class MocapNode(Node):
     def _make_source(self, handle):
         parameters = self._parameters
         if parameters.backend != NATNET:
-            return LibrarySource(parameters.backend, parameters.library.hostname, handle.time)
+            hostname = parameters.library.hostname
+            assert hostname is not None, "MocapParameters.complaints sees to it"
+            return LibrarySource(parameters.backend, hostname, handle.time)
         return NatNetSource(
             parameters.natnet,
             handle.time,

@@ -225,10 +225,13 @@ class NatNetSource(Source):
         return frame
 
     def _where(self):
-        return f"{self._info.name} at {self._server[0]}:{self._server[1]}"
+        if self._server is None:
+            return self._info.name
+        address, port = self._server
+        return f"{self._info.name} at {address}:{port}"
 
     def _description(self):
-        where = self._info.name if self._server is None else self._where()
+        where = self._where()
         if self._group is None:
             return f"{where}, NatNet {self._info.version}, unicast"
         address, port = self._group

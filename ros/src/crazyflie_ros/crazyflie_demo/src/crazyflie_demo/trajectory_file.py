@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crazyflie_model.elementwise import join
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
 from crazyflie_utils.parameter_types import TEXT, ParameterType
 
@@ -119,5 +120,5 @@ def summary(pieces: list[PolynomialPiece]) -> Summary:
         times = np.linspace(0.0, piece.duration, 100)
         goal = piece.evaluate(times)
         for i, vectors in enumerate((goal.velocity, goal.acceleration)):
-            largest[i] = max(largest[i], float(np.linalg.norm(vectors, axis=0).max()))
+            largest[i] = max(largest[i], float(np.linalg.norm(join(vectors), axis=-1).max()))
     return Summary(sum(piece.duration for piece in pieces), *largest)

@@ -47,7 +47,7 @@ class VisualizerNode(Node):
     RViz that is started late shows all of it.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._path = FlownPath(SPACING, CAPACITY)
         self._reference: LastValid[tuple[float, float, float]] = LastValid()
         self._shown_reference: tuple[float, float, float] | None = None

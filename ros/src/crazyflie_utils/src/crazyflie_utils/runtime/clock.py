@@ -23,7 +23,7 @@ class SteadyClock:
     wall clock.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._offset = time.time_ns() - time.monotonic_ns()
 
     def time(self) -> float:
@@ -46,7 +46,7 @@ class SteadyClock:
 class SimulatedClock:
     """A clock that stands still until it is set: ROS's simulated time."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._time = 0.0
         self._listeners: list[Callable[[float, bool], None]] = []
 

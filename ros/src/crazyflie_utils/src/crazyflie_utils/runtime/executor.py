@@ -23,12 +23,12 @@ class _FairLock:
     over again, before those who wait for it have even woken up.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._guard = threading.Lock()
         self._held = False
         self._waiting: deque[threading.Lock] = deque()
 
-    def __enter__(self):
+    def __enter__(self) -> None:
         with self._guard:
             if not self._held:
                 self._held = True
@@ -38,7 +38,7 @@ class _FairLock:
             self._waiting.append(turn)
         turn.acquire()
 
-    def __exit__(self, *exception):
+    def __exit__(self, *exception: object) -> None:
         with self._guard:
             if self._waiting:
                 self._waiting.popleft().release()
@@ -52,7 +52,7 @@ class Executor:
     Nothing runs before `start`. Work must not raise; `NodeHandle` sees to it.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._queue: deque[Callable[[], None]] = deque()
         self._running = _FairLock()
         self._runner: int | None = None

@@ -2,7 +2,10 @@
 
 import traceback
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from crazyflie_utils.runtime.handle import NodeHandle
 
 
 class Faults:
@@ -16,7 +19,7 @@ class Faults:
         Its ``error`` and ``warn`` are used.
     """
 
-    def __init__(self, log):
+    def __init__(self, log: "NodeHandle"):
         self.make_safe: Callable[[], None] | None = None
         self._log = log
         self._counts: dict[tuple[type, str, int | None], int] = {}

@@ -8,6 +8,7 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
+import genpy
 import rospy
 
 from crazyflie_utils.runtime import rospy_internals
@@ -30,60 +31,68 @@ stands still."""
 
 
 class _RosPublisher(ExternalPublisher):
-    def __init__(self, publisher):
+    def __init__(self, publisher: rospy.Publisher):
         self._publisher = publisher
 
-    def has_subscribers(self):
+    def has_subscribers(self) -> bool:
         return self._publisher.get_num_connections() > 0
 
-    def publish(self, message):
+    def publish(self, message: genpy.Message) -> None:
         self._publisher.publish(message)
 
-    def close(self):
+    def close(self) -> None:
         self._publisher.unregister()
 
 
 class _RosSubscriber(ExternalSubscriber):
-    def __init__(self, subscriber):
+    def __init__(self, subscriber: rospy.Subscriber):
         self._subscriber = subscriber
 
-    def has_publishers(self):
+    def has_publishers(self) -> bool:
         return self._subscriber.get_num_connections() > 0
 
-    def close(self):
+    def close(self) -> None:
         self._subscriber.unregister()
 
 
 class RosTransport(Transport):
     """rospy, for a process that has called ``rospy.init_node``."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         rospy_internals.never_connect_to_oneself()
         self._remappings = rospy_internals.take_over_remappings()
 
-    def remap(self, name):
+    def remap(self, name: str) -> str:
         """Return what the command line maps the name to."""
         return self._remappings.get(name, name)
 
-    def get_param(self, name):
+    def get_param(self, name: str) -> Any:
         """Return a parameter from the parameter server."""
         return rospy.get_param(name)
 
-    def set_param(self, name, value):
+    def set_param(self, name: str, value: Any) -> None:
         """Set a parameter on the parameter server."""
         rospy.set_param(name, value)
 
-    def advertise(self, topic, message_type, latch):
+    def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Register a publisher with the master."""
         return _RosPublisher(
             rospy.Publisher(topic, message_type, latch=latch, queue_size=_QUEUE_SIZE)
         )
 
-    def subscribe(self, topic, message_type, deliver):
+    def subscribe(
+        self, topic: str, message_type: type, deliver: Callable[[Any], None]
+    ) -> ExternalSubscriber:
         """Register a subscriber with the master."""
         return _RosSubscriber(rospy.Subscriber(topic, message_type, deliver, tcp_nodelay=True))
 
-    def advertise_service(self, name, service_type, serve, time):
+    def advertise_service(
+        self,
+        name: str,
+        service_type: type,
+        serve: Callable[[Any], Future[Any]],
+        time: Callable[[], float],
+    ) -> Callable[[], None]:
         """Register a service with the master."""
 
         def answer(request):
@@ -94,7 +103,9 @@ class RosTransport(Transport):
 
         return partial(rospy.Service(name, service_type, answer).shutdown, "no longer offered")
 
-    def call_service(self, name, service_type, request, limit):
+    def call_service(
+        self, name: str, service_type: type, request: Any, limit: float
+    ) -> Future[Any]:
         """Call in a thread of its own, and give up on it after ``limit``."""
         future: Future[Any] = Future()
         threading.Thread(
@@ -108,11 +119,11 @@ class RosTransport(Transport):
         future.add_done_callback(lambda _: timer.cancel())
         return future
 
-    def log(self, level, text):
+    def log(self, level: str, text: str) -> None:
         """Log to the screen, the node's log file and /rosout."""
         _LOGGERS[level](text)
 
-    def clock_was_set(self, stamp):
+    def clock_was_set(self, stamp: genpy.Time) -> None:
         """Set rospy's own clock, which stamps the log."""
         rospy_internals.set_time(stamp)
 

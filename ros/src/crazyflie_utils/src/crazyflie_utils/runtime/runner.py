@@ -176,7 +176,7 @@ def _run(process, make_nodes):
 class _Ending:
     """What a process does before rospy closes its connections."""
 
-    def __init__(self, process, nodes):
+    def __init__(self, process: Process, nodes: list[Node]):
         self._process = process
         self._nodes = nodes
         self.is_stuck = False

@@ -9,7 +9,7 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_utils.runtime.topics import Topics
+from crazyflie_utils.runtime.topics import Publisher, Topics
 from crazyflie_utils.vectors import is_finite
 
 _LATEST = genpy.Time()
@@ -28,7 +28,7 @@ class TransformError(Exception):
 class _Broadcaster(tf2_ros.TransformBroadcaster):
     """tf2's broadcaster on a publisher of this process."""
 
-    def __init__(self, publisher):
+    def __init__(self, publisher: Publisher):
         self.pub_tf = publisher
 
 

@@ -21,30 +21,30 @@ from crazyflie_utils.runtime.transport import (
 
 
 class _Record(ExternalPublisher):
-    def __init__(self):
+    def __init__(self) -> None:
         self.messages: list[genpy.Message] = []
 
-    def has_subscribers(self):
+    def has_subscribers(self) -> bool:
         return True
 
-    def publish(self, message):
+    def publish(self, message: genpy.Message) -> None:
         # What cannot be sent must fail here as it would on a wire.
         message.serialize(io.BytesIO())
         self.messages.append(message)
 
-    def close(self):
+    def close(self) -> None:
         pass
 
 
 class _FakeSubscriber(ExternalSubscriber):
-    def __init__(self, is_published, close):
+    def __init__(self, is_published: Callable[[], bool], close: Callable[[], None]):
         self._is_published = is_published
         self._close = close
 
-    def has_publishers(self):
+    def has_publishers(self) -> bool:
         return self._is_published()
 
-    def close(self):
+    def close(self) -> None:
         self._close()
 
 
@@ -62,11 +62,11 @@ class FakeTransport(Transport):
         self.services: dict[str, Callable[[Any], Future[Any]]] = {}
         self.log_records: list[tuple[str, str]] = []
 
-    def remap(self, name):
+    def remap(self, name: str) -> str:
         """Return ``name``: nothing is remapped."""
         return name
 
-    def get_param(self, name):
+    def get_param(self, name: str) -> Any:
         """Return an entry of ``parameters``, or those below a namespace."""
         if name in self.parameters:
             return self.parameters[name]
@@ -79,7 +79,7 @@ class FakeTransport(Transport):
             raise KeyError(name)
         return _tree(below)
 
-    def set_param(self, name, value):
+    def set_param(self, name: str, value: Any) -> None:
         """Set an entry of ``parameters``; a dictionary is a namespace, as with ROS."""
         if not isinstance(value, dict):
             self.parameters[name] = value
@@ -87,11 +87,13 @@ class FakeTransport(Transport):
         for key, item in value.items():
             self.set_param(f"{name}/{key}", item)
 
-    def advertise(self, topic, message_type, latch):
+    def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Return a publisher that keeps the messages."""
         return self.publishers.setdefault(topic, _Record())
 
-    def subscribe(self, topic, message_type, deliver):
+    def subscribe(
+        self, topic: str, message_type: type, deliver: Callable[[Any], None]
+    ) -> ExternalSubscriber:
         """Keep ``deliver`` for `FakeProcess.publish`."""
         subscribers = self.subscribers.setdefault(topic, [])
         subscribers.append(deliver)
@@ -99,12 +101,24 @@ class FakeTransport(Transport):
             lambda: topic not in self.unpublished, lambda: subscribers.remove(deliver)
         )
 
-    def advertise_service(self, name, service_type, serve, time):
+    def advertise_service(
+        self,
+        name: str,
+        service_type: type,
+        serve: Callable[[Any], Future[Any]],
+        time: Callable[[], float],
+    ) -> Callable[[], None]:
         """Keep ``serve`` for `FakeProcess.call`."""
         self.services[name] = serve
-        return lambda: self.services.pop(name)
 
-    def call_service(self, name, service_type, request, limit):
+        def withdraw() -> None:
+            del self.services[name]
+
+        return withdraw
+
+    def call_service(
+        self, name: str, service_type: type, request: Any, limit: float
+    ) -> Future[Any]:
         """Call a service of this process; fail when there is none."""
         if name in self.services:
             return self.services[name](request)
@@ -112,11 +126,11 @@ class FakeTransport(Transport):
         future.set_exception(ServiceError(f"there is no service {name}"))
         return future
 
-    def log(self, level, text):
+    def log(self, level: str, text: str) -> None:
         """Keep the record."""
         self.log_records.append((level, text))
 
-    def clock_was_set(self, stamp):
+    def clock_was_set(self, stamp: genpy.Time) -> None:
         """Do nothing."""
 
 

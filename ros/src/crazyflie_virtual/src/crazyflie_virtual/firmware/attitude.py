@@ -38,7 +38,7 @@ class AttitudeController:
         no limit.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.roll = FirmwarePid(TILT, PERIOD)
         self.pitch = FirmwarePid(TILT, PERIOD)
         self.yaw = FirmwarePid(HEADING, PERIOD)

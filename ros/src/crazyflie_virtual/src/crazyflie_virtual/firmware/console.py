@@ -14,7 +14,7 @@ class Console:
     What is printed before there is a client is kept, the latest of it.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._pieces: deque[bytes] = deque(maxlen=_KEPT)
 
     def write_line(self, line: str) -> None:

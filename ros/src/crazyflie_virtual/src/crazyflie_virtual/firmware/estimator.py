@@ -148,7 +148,8 @@ class Estimator:
         pitch = math.asin(max(-1.0, min(1.0, -sensors.acc_x / norm)))
         level = quaternion_from_zyx(roll, pitch, math.radians(e.yaw))
         if sum(a * b for a, b in zip(level, (e.qx, e.qy, e.qz, e.qw), strict=True)) < 0.0:
-            level = tuple(-part for part in level)
+            x, y, z, w = level
+            level = (-x, -y, -z, -w)
         self._blend(*level, dt / _LEVELLING_TIME)
 
     def _blend(self, x, y, z, w, gain):

@@ -7,7 +7,11 @@ from enum import Enum
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece
 from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Modes, Setpoint
-from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece, straight_piece
+from crazyflie_virtual.firmware.trajectory import (
+    Trajectory,
+    smooth_piece,
+    straight_piece,
+)
 
 MEMORY_SIZE = 4096
 """Bytes of the trajectory memory."""
@@ -51,7 +55,7 @@ class Planner:
         Where a command gives none, m/s.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.memory = bytearray(MEMORY_SIZE)
         self.phase = Phase.STOPPED
         self.blocked = False
@@ -135,7 +139,9 @@ class Planner:
         """Fly to a position (m) and heading (rad), or by them, in ``duration`` (s)."""
         start = self._last
         if relative:
-            position = tuple(a + b for a, b in zip(position, start.position, strict=True))
+            dx, dy, dz = position
+            x, y, z = start.position
+            position = (dx + x, dy + y, dz + z)
             yaw += start.yaw
         plan = straight_piece if linear else smooth_piece
         return self._fly(time, plan, start, position, yaw, duration, Phase.FLYING)

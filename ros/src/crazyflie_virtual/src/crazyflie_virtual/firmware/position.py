@@ -43,7 +43,7 @@ class PositionController:
         Estimate in the heading frame, for the log.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.x = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)
         self.y = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)
         self.z = FirmwarePid(Gains(2.0, 0.5, 0.0), DT)

@@ -27,7 +27,7 @@ class PowerMonitor:
         The voltage has been critical for too long: the vehicle turns off.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.voltage = 4.1
         self.level = 90
         self.state = ON_BATTERY

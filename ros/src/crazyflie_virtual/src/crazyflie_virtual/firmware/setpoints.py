@@ -35,7 +35,7 @@ class AttitudeDecoder:
     is_locked : bool
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.roll_mode = self.pitch_mode = 1
         self.yaw_mode = _RATE_MODE
         self.is_locked = True
@@ -168,14 +168,14 @@ def _full_state(data):
         return None
     *motion, word, p, q, r = values
     # mm and milliradians on the wire.
-    motion = [part / 1000.0 for part in motion]
+    x, y, z, vx, vy, vz, ax, ay, az = (part / 1000.0 for part in motion)
     return Setpoint(
         mode=Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, quaternion=ABSOLUTE),
         quaternion=decompress_quaternion(word),
         roll_rate=math.degrees(p / 1000.0),
         pitch_rate=math.degrees(q / 1000.0),
         yaw_rate=math.degrees(r / 1000.0),
-    ).with_motion(motion[0:3], motion[3:6], motion[6:9])
+    ).with_motion((x, y, z), (vx, vy, vz), (ax, ay, az))
 
 
 def _manual(data):

@@ -32,7 +32,7 @@ class MotorOverride:
         PWM.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.enable = 0
         self.m1 = self.m2 = self.m3 = self.m4 = 0
 
@@ -63,7 +63,7 @@ class Stabilizer:
         Least command of an armed motor, PWM.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.attitude = AttitudeController()
         self.position = PositionController()
         self.override = MotorOverride()
@@ -107,14 +107,18 @@ class Stabilizer:
         else:
             self._control_attitude(setpoint, estimate, sensors)
             # The mixer's pitch is positive nose down.
-            self.requested = tuple(
-                mix(self.thrust, self.command_roll, -self.command_pitch, self.command_yaw)
+            m1, m2, m3, m4 = mix(
+                self.thrust, self.command_roll, -self.command_pitch, self.command_yaw
             )
+            self.requested = (m1, m2, m3, m4)
         override = self.override.commands()
         if override is not None:
             self.requested = override
-        idle = float(self.idle_thrust)
-        self.commands = tuple(limit(self.requested, idle)) if may_run else _OFF
+        if may_run:
+            m1, m2, m3, m4 = limit(self.requested, float(self.idle_thrust))
+            self.commands = (m1, m2, m3, m4)
+        else:
+            self.commands = _OFF
         return self.commands
 
     def _reset(self, estimate):

@@ -87,9 +87,10 @@ class Setpoint(_Motion):
 
     def with_motion(self, position: Triple, velocity: Triple, acceleration: Triple) -> "Setpoint":
         """Return the setpoint with a position (m), a velocity (m/s) and an acceleration (m/s^2)."""
-        names = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
-        values = (*position, *velocity, *acceleration)
-        return replace(self, **dict(zip(names, values, strict=True)))
+        x, y, z = position
+        vx, vy, vz = velocity
+        ax, ay, az = acceleration
+        return replace(self, x=x, y=y, z=z, vx=vx, vy=vy, vz=vz, ax=ax, ay=ay, az=az)
 
     def leveled(self) -> "Setpoint":
         """Return the setpoint made level, with the heading kept; height stays as it is."""

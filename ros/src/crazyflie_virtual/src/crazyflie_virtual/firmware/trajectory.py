@@ -8,7 +8,9 @@ from crazyflie_model.hermite import hermite
 from crazyflie_model.polynomials import Goal, PolynomialPiece
 
 
-def smooth_piece(start: Goal, position: Triple, yaw: float, duration: float) -> PolynomialPiece:
+def smooth_piece(
+    start: Goal[float], position: Triple, yaw: float, duration: float
+) -> PolynomialPiece:
     """Return the piece from a goal to rest at a position (m) and heading (rad).
 
     Each axis is the polynomial of the 7th degree that meets position, velocity,
@@ -38,7 +40,9 @@ def smooth_piece(start: Goal, position: Triple, yaw: float, duration: float) -> 
     return PolynomialPiece(duration, *axes)
 
 
-def straight_piece(start: Goal, position: Triple, yaw: float, duration: float) -> PolynomialPiece:
+def straight_piece(
+    start: Goal[float], position: Triple, yaw: float, duration: float
+) -> PolynomialPiece:
     """Return the piece that goes there at constant speed; see `smooth_piece`."""
     turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
     ends = (*position, start.yaw + turn)
@@ -83,7 +87,7 @@ class Trajectory:
         turn = 0.0 if yaw is None else math.remainder(yaw - start.yaw, 2.0 * math.pi)
         return Trajectory(self.pieces, self.time_scale, self.backwards, shift, turn)
 
-    def evaluate(self, time: float) -> Goal:
+    def evaluate(self, time: float) -> Goal[float]:
         """Return the goal ``time`` (s) after the beginning."""
         goal = self._unmoved(time)
         pivot = self._unmoved(0.0).position if self.turn else (0.0, 0.0, 0.0)

@@ -17,7 +17,7 @@ class LinkStatistics:
         Packets per second, over the last second.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.is_connected = False
         self.received = 0
         self.received_rate = self.sent_rate = 0.0

@@ -90,7 +90,7 @@ class Scene:
             camera = self._cameras[body_id]
             camera.measure(time, *_extrapolate(observation, time))
             _, position, quaternion = camera.arrivals(time)[-1]
-            self._seen[body_id] = (tuple(position), tuple(quaternion))
+            self._seen[body_id] = (position, quaternion)
         never = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))
         position, quaternion = self._seen.get(body_id, never)
         return BodyPose(body_id, name, position, quaternion, not lost)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.tables.log_table import log_variables
-from crazyflie_virtual.tables.number_types import LOG_TYPES, NumberType
+from crazyflie_virtual.tables.number_types import LOG_CODES, LOG_TYPES, NumberType
 from crazyflie_virtual.tables.toc import Entry, Table
 
 MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
@@ -21,7 +21,7 @@ _PERIOD_UNIT = 10
 
 
 class _Block:
-    def __init__(self):
+    def __init__(self) -> None:
         self.variables: list[tuple[Callable[[Firmware], float], NumberType]] = []
         self.size = 0
         self.period = 0
@@ -46,7 +46,7 @@ class LogPort:
     def __init__(self, firmware: Firmware):
         self._firmware = firmware
         self._variables = log_variables()
-        entries = [Entry(v.group, v.name, v.number_type.log_code) for v in self._variables]
+        entries = [Entry(v.group, v.name, LOG_CODES[v.number_type]) for v in self._variables]
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
         self._blocks: dict[int, _Block] = {}
         self._due: int | None = None

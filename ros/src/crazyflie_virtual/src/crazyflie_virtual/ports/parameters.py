@@ -7,7 +7,7 @@ from operator import attrgetter
 
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
-from crazyflie_virtual.tables.number_types import PARAMETER_TYPES
+from crazyflie_virtual.tables.number_types import PARAMETER_CODES, PARAMETER_TYPES
 from crazyflie_virtual.tables.parameter_table import ParameterSpec, parameter_specs
 from crazyflie_virtual.tables.toc import Entry, Table
 
@@ -59,9 +59,8 @@ class Parameter:
         """Type and flags in the table."""
         spec = self.spec
         extended = _EXTENDED if spec.persistent else 0
-        return (
-            spec.number_type.parameter_code | extended | (_READ_ONLY if spec.read_only else _CORE)
-        )
+        access = _READ_ONLY if spec.read_only else _CORE
+        return PARAMETER_CODES[spec.number_type] | extended | access
 
 
 class ParameterPort:

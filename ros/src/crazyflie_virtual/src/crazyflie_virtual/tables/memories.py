@@ -53,7 +53,7 @@ class MemoryTester:
         Bytes that were not as they should have been.
     """
 
-    def __init__(self):
+    def __init__(self) -> None:
         self.errors = 0
 
     @property

@@ -15,15 +15,10 @@ class NumberType:
         As in C.
     format : str
         As in the module struct, without byte order.
-    log_code, parameter_code : int or None
-        Code in the table of log variables and of parameters; None where the
-        firmware has none.
     """
 
     name: str
     format: str
-    log_code: int | None
-    parameter_code: int | None
 
     @property
     def size(self) -> int:
@@ -52,18 +47,30 @@ class NumberType:
 
 _LARGEST = {"f": 3.4028234e38, "e": 65504.0}
 
-U8 = NumberType("uint8_t", "B", 1, 0x8)
-U16 = NumberType("uint16_t", "H", 2, 0x9)
-U32 = NumberType("uint32_t", "I", 3, 0xA)
-I8 = NumberType("int8_t", "b", 4, 0x0)
-I16 = NumberType("int16_t", "h", 5, 0x1)
-I32 = NumberType("int32_t", "i", 6, 0x2)
-FLOAT = NumberType("float", "f", 7, 0x6)
-FP16 = NumberType("FP16", "e", 8, None)
-U64 = NumberType("uint64_t", "Q", None, 0xB)
+U8 = NumberType("uint8_t", "B")
+U16 = NumberType("uint16_t", "H")
+U32 = NumberType("uint32_t", "I")
+I8 = NumberType("int8_t", "b")
+I16 = NumberType("int16_t", "h")
+I32 = NumberType("int32_t", "i")
+FLOAT = NumberType("float", "f")
+FP16 = NumberType("FP16", "e")
+U64 = NumberType("uint64_t", "Q")
 
-LOG_TYPES = {t.log_code: t for t in (U8, U16, U32, I8, I16, I32, FLOAT, FP16)}
-"""Code on the wire -> type."""
+LOG_TYPES = {1: U8, 2: U16, 3: U32, 4: I8, 5: I16, 6: I32, 7: FLOAT, 8: FP16}
+"""Code of a log variable on the wire -> type."""
 
-PARAMETER_TYPES = {t.parameter_code: t for t in (U8, U16, U32, U64, I8, I16, I32, FLOAT)}
-"""Code on the wire -> type."""
+PARAMETER_TYPES = {
+    0x8: U8,
+    0x9: U16,
+    0xA: U32,
+    0xB: U64,
+    0x0: I8,
+    0x1: I16,
+    0x2: I32,
+    0x6: FLOAT,
+}
+"""Code of a parameter on the wire -> type."""
+
+LOG_CODES = {number_type: code for code, number_type in LOG_TYPES.items()}
+PARAMETER_CODES = {number_type: code for code, number_type in PARAMETER_TYPES.items()}

@@ -114,7 +114,9 @@ def test_code_stands_so_in_its_file(path):
             source = (TOP / block.comment.removeprefix("from: ")).read_text()
             assert is_in(block.lines, source.splitlines()), where
         else:
-            assert block.language in ("sh", "text", "diff"), f"{where}: say from which file the code is"
+            assert block.language in ("sh", "text", "diff"), (
+                f"{where}: say from which file the code is"
+            )
 
 
 @named([*PAGES, *PACKAGE_PAGES])

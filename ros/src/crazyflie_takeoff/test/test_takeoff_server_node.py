@@ -9,7 +9,11 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import EmptyRequest, EmptyResponse
 from takeoff_helpers import BARE, GRAVITY, SERVER, state
 
-from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
+from crazyflie_takeoff.takeoff_server_node import (
+    RECOVERY_LIMIT,
+    START_LIMIT,
+    TakeoffServerNode,
+)
 from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
@@ -337,11 +341,51 @@ def test_takeoff_without_a_state_that_is_finite_is_refused():
 
 def test_takeoff_without_a_controller_is_refused():
     process = on_ground(SERVER)
-    process.publish("/in_flight_controller", Bool(False))
+    for is_there in (True, False):
+        process.publish("/in_flight_controller", Bool(is_there))
     with pytest.raises(ServiceError, match="is the controller running"):
         call(process, "/takeoff")
     process.publish("/in_flight_controller", Bool(True))
     assert not call(process, "/takeoff").done()
+
+
+def started(parameters=SERVER):
+    """Return a process with a server that knows the flight state, but has no state yet."""
+    process = launch(parameters)
+    process.publish("/in_flight_filter", String("on_ground"))
+    process.advance(RECOVERY_LIMIT)
+    assert states(process) == ["on_ground"]
+    return process
+
+
+def test_takeoff_waits_for_the_first_state():
+    process = started()
+    answer = call(process, "/takeoff")
+    process.advance(2.0)
+    assert states(process) == ["on_ground"]
+    process.publish("/state", state(0.0))
+    process.advance(0.02)
+    assert (states(process)[-1], answer.done()) == ("taking_off", False)
+
+
+def test_takeoff_waits_for_a_controller():
+    process = on_ground(SERVER)
+    process.publish("/in_flight_controller", Bool(False))
+    call(process, "/takeoff")
+    process.publish("/in_flight_controller", Bool(True))
+    process.publish("/state", state(0.0))
+    process.advance(0.02)
+    assert states(process)[-1] == "taking_off"
+
+
+def test_takeoff_does_not_wait_for_ever():
+    process = started()
+    answer = call(process, "/takeoff")
+    process.advance(START_LIMIT)
+    with pytest.raises(ServiceError, match="no state has come on /state"):
+        answer.result(0)
+    with pytest.raises(ServiceError, match="no state has come on /state"):
+        call(process, "/takeoff")
 
 
 def test_landing_needs_neither():

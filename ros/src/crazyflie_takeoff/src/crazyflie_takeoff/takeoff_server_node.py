@@ -32,6 +32,10 @@ STATE_LIMIT = 0.5
 RECOVERY_LIMIT = 1.0
 """How long a server that has started looks for the state of the flight, s."""
 
+START_LIMIT = 5.0
+"""How long after the server's start a takeoff waits for the first state and for a
+controller, s: nodes that are launched together need a while to find each other."""
+
 
 class TakeoffServerParameters(FlightTopicParameters):
     """Parameters of `TakeoffServerNode`."""
@@ -76,8 +80,10 @@ class TakeoffServerNode(Node):
     def __init__(self) -> None:
         # None until it is known where the flight stands.
         self._flight: FlightStateMachine | None = None
+        self._is_starting = True
         self._filter_reported = False
         self._has_controller = True
+        self._had_controller = False
         self._remembered: FlightState | None = None
         self._is_commanded = True
         self._position: tuple[float, float, float] | None = None
@@ -118,6 +124,7 @@ class TakeoffServerNode(Node):
         handle.timer(TIME_STEP, self._on_timer)
         # Whether connections come about has nothing to do with simulated time.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover_state, steady=True)
+        self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
 
     def make_safe(self) -> None:
         """End a takeoff with a landing, let a landing go on, and tell the callers."""
@@ -143,11 +150,29 @@ class TakeoffServerNode(Node):
 
     def _serve(self, service):
         future: Future[EmptyResponse] = Future()
-        if self._flight is None:
-            self._waiting.append((service, future))
-        else:
-            self._begin(self._flight, service, future)
+        self._waiting.append((service, future))
+        self._serve_waiting()
         return future.result() if future.done() else future
+
+    def _serve_waiting(self):
+        if self._flight is None:
+            return
+        waiting, self._waiting = self._waiting, []
+        for service, future in waiting:
+            if service == self._parameters.takeoff_service and self._lacks_what_may_come():
+                self._waiting.append((service, future))
+            else:
+                self._begin(self._flight, service, future)
+
+    def _lacks_what_may_come(self):
+        # What was there and is gone is no matter of waiting.
+        lacks_state = self._parameters.state_topic is not None and self._position is None
+        lacks_controller = not self._has_controller and not self._had_controller
+        return self._is_starting and (lacks_state or lacks_controller)
+
+    def _end_start(self):
+        self._start_timer.stop()
+        self._is_starting = False
 
     def _begin(self, flight, service, future):
         try:
@@ -191,6 +216,7 @@ class TakeoffServerNode(Node):
 
     def _on_controller(self, message):
         self._has_controller = message.data
+        self._had_controller = self._had_controller or message.data
 
     def _on_state(self, message):
         self._position = (message.state.x, message.state.y, message.state.z)
@@ -224,15 +250,15 @@ class TakeoffServerNode(Node):
         recovered = recover_state(self._remembered, height, can_descend, self._is_commanded)
         self._handle.info(f"begins {recovered.state.value}: {recovered.reason}")
         self._flight = FlightStateMachine(plan, recovered.state, recovered.announced)
-        waiting, self._waiting = self._waiting, []
-        for service, future in waiting:
-            self._begin(self._flight, service, future)
+        self._serve_waiting()
 
     # The flight.
 
     def _on_timer(self):
         if self._flight is None and self._has_all_evidence():
             self._recover_state()
+        if self._waiting:
+            self._serve_waiting()
         if self._flight is not None:
             self._publish(self._flight.tick(self._handle.time(), self._known_position()))
 

@@ -7,6 +7,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from genpy import Duration
 from geometry_msgs.msg import Twist, Vector3
 
+from crazyflie_dev.programs import free_port
 from crazyflie_driver.srv import TakeoffRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.peer import wait_until
@@ -73,6 +74,16 @@ def test_errors_that_an_operator_can_act_on(server, uri, text):
     with pytest.raises(ServiceError, match=text):
         server.add(uri)
     assert any(uri in line for line in server.process.logged("error"))
+
+
+def test_a_vehicle_whose_port_opens_a_little_later(server):
+    port = free_port()
+    answer = server.begin_adding(f"udp://127.0.0.1:{port}")
+    wait_until(lambda: "connecting" in status(server).message, "the first attempt")
+    assert not answer.done()
+    server.make_vehicle(port=port)
+    answer.result(timeout=LIMIT)
+    assert server.process.logged("error") == []
 
 
 def test_a_silent_port(server):

@@ -1,6 +1,7 @@
 """One vehicle of the server: its link, topics and services, from adding to removing."""
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TypeVar
@@ -14,11 +15,18 @@ from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_driver.worker import Worker
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
-from crazyflie_py.errors import CrazyflieError
+from crazyflie_py.errors import CrazyflieError, NoAnswerError
 from crazyflie_py.high_level import HighLevel
 from crazyflie_utils import NodeHandle, ServiceError
 
 Result = TypeVar("Result")
+
+CONNECT_LIMIT = 3.0
+"""How long it is tried to connect to a vehicle that does not answer, s: one that is
+switched on or launched together with the driver needs a while."""
+
+CONNECT_PAUSE = 0.2
+"""Between two attempts, s."""
 
 
 class DriverVehicle:
@@ -109,7 +117,7 @@ class DriverVehicle:
 
     def _connect(self):
         try:
-            self.crazyflie.connect()
+            self._connect_link()
             with self._announcing:
                 if self.is_leaving:
                     raise ServiceError("removed while connecting")
@@ -124,6 +132,16 @@ class DriverVehicle:
             self._end()
             raise
         self._server.info(f"{self.parameters.tf_prefix}: connected to {self.parameters.uri}")
+
+    def _connect_link(self):
+        end = time.monotonic() + CONNECT_LIMIT
+        while True:
+            try:
+                return self.crazyflie.connect()
+            except NoAnswerError:
+                if self.is_leaving or time.monotonic() > end:
+                    raise
+            time.sleep(CONNECT_PAUSE)
 
     def _leave(self):
         try:

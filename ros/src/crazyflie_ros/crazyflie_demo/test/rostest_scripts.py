@@ -1,5 +1,6 @@
 """Scripts that users start or write, each flying a virtual vehicle."""
 
+import signal
 import subprocess
 import sys
 
@@ -79,6 +80,19 @@ def test_position(observer):
     path = fly(observer, "Position.py", "__ns:=crazyflie", f"_x:={x:.3f}", f"_y:={y:.3f}")
     np.testing.assert_allclose(path.max(axis=0), [x + 0.2, y + 0.2, 0.4], atol=0.1)
     np.testing.assert_allclose(path[-1, :2], [x, y], atol=0.1)
+
+
+def test_a_stream_that_is_interrupted_ends_with_a_landing(observer):
+    x, y, _ = at_rest(observer)
+    where = ("__ns:=crazyflie", f"_x:={x:.3f}", f"_y:={y:.3f}")
+    with node("crazyflie_demo", "Position.py", *where) as flight:
+        observer.track_until(lambda truth: truth.position[2] > 0.3)
+        flight.send_signal(signal.SIGINT)
+        track = observer.track_until(lambda truth: truth.position[2] < 0.02)
+        assert flight.wait(LIMIT) == 0
+    # A fall from there would take a quarter of a second.
+    highest = max(track, key=lambda truth: truth.position[2])
+    assert track[-1].time - highest.time > 0.8
 
 
 def test_a_streamed_trajectory(observer, tmp_path):

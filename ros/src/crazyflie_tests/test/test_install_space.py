@@ -65,6 +65,10 @@ def test_modules_and_launch_files_are_complete(terminal, install_space):
     terminal.run(f"python3 {INSPECT} {install_space} {' '.join(PACKAGES)}")
 
 
+def test_users_scripts_find_their_modules(terminal):
+    terminal.run("python3 -c 'import crazyflie, uav_trajectory; crazyflie.Crazyflie'")
+
+
 @pytest.mark.parametrize("package", PACKAGES)
 def test_programs_and_data_are_installed(package, install_space):
     programs = {path.name: path for path in (install_space / "lib" / package).glob("*")}

@@ -7,7 +7,7 @@ from workspaces import TOP
 
 SOURCES = TOP / "ros" / "src"
 PACKAGES = {
-    path.parents[1].name: path
+    path.name: path
     for pattern in ("*/src/*/__init__.py", "crazyflie_ros/*/src/*/__init__.py")
     for path in (init.parent for init in SOURCES.glob(pattern))
 }
@@ -29,9 +29,13 @@ LAYERS = [
     },
     {"crazyflie_driver", "crazyflie_tools", "crazyflie_virtual"},
     {"crazyflie_demo", "crazyflie_examples"},
-    {"crazyflie_dev"},
+    {"uav_trajectory"},
+    {"crazyflie", "crazyflie_dev"},
 ]
 """From the bottom: a package imports from lower layers only."""
+
+SPEAK_TO_ROSPY = {"crazyflie_utils", "crazyflie"}
+"""Beside the node handle, the module with which users' own nodes command a vehicle."""
 
 
 def imported(package):
@@ -61,7 +65,7 @@ def test_imports_come_from_lower_layers(package):
     assert {name for name in own if layer_of(name) >= layer_of(package)} == set()
 
 
-@pytest.mark.parametrize("package", sorted(set(PACKAGES) - {"crazyflie_utils"}))
+@pytest.mark.parametrize("package", sorted(set(PACKAGES) - SPEAK_TO_ROSPY))
 def test_only_the_node_handle_speaks_to_rospy(package):
     assert "rospy" not in imported(package)
 

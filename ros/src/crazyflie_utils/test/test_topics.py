@@ -213,6 +213,18 @@ def test_what_another_has_latched_stays(topics):
     assert [message.data for message in received] == ["of the first"]
 
 
+def test_a_publisher_knows_of_subscribers_here_and_outside(topics, world):
+    publisher = topics.publisher("/a", String, latch=False)
+    world.wires[0].heard = False
+    assert not publisher.has_subscribers()
+    subscriber = topics.subscribe("/a", String, lambda message: None)
+    assert publisher.has_subscribers()
+    subscriber.close()
+    assert not publisher.has_subscribers()
+    world.wires[0].heard = True
+    assert publisher.has_subscribers()
+
+
 def test_a_subscriber_knows_of_publishers_here_and_outside(topics, world):
     subscriber = topics.subscribe("/a", String, lambda message: None)
     assert not subscriber.has_publishers()

@@ -3,8 +3,10 @@
 import pytest
 from live import reconfigure
 from sensor_msgs.msg import Joy
+from std_msgs.msg import Header
 
 from crazyflie_demo.cmd_vel_teleop_node import CmdVelTeleopNode
+from crazyflie_demo.joy_axes import REPEATED
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
@@ -18,12 +20,12 @@ def launch(**parameters):
     return process
 
 
-def tilt(process, count=8, **sticks):
+def tilt(process, count=8, frame_id=REPEATED, **sticks):
     """Have the joystick say where its sticks are, and a setpoint follow."""
     axes = [0.0] * count
     for name, value in sticks.items():
         axes[{"pitch": PITCH, "roll": ROLL, "yaw": YAW, "thrust": THRUST}[name]] = value
-    process.publish("/cf/joy", Joy(axes=axes))
+    process.publish("/cf/joy", Joy(Header(frame_id=frame_id), axes, []))
     process.advance(0.02)
 
 
@@ -88,11 +90,29 @@ def test_falls_silent_with_the_joystick_and_locks_the_thrust():
     process.advance(1.0)
     count = len(process.published("/cf/cmd_vel"))
     assert count == pytest.approx(27, abs=2)
-    assert "nothing comes on joy" in process.logged("warn")[0]
+    assert "no joystick on joy" in process.logged("warn")[0]
     process.advance(1.0)
     assert len(process.published("/cf/cmd_vel")) == count
     assert len(process.logged("warn")) == 1
     tilt(process, thrust=0.7)
+    assert last(process)[2] == 0.0
+
+
+def test_a_joystick_that_only_tells_changes_may_be_held_still():
+    process = launch()
+    tilt(process, frame_id="")
+    tilt(process, frame_id="", thrust=0.7)
+    process.advance(10.0)
+    assert len(process.published("/cf/cmd_vel")) == 502
+    assert last(process)[2] == pytest.approx(42000.0)
+    # Its node dies, and another one comes: what the first one said does not count any more.
+    process.transport.unpublished.add("/cf/joy")
+    process.advance(1.0)
+    process.transport.unpublished.clear()
+    process.advance(1.0)
+    assert len(process.published("/cf/cmd_vel")) == 502
+    assert "no joystick on joy" in process.logged("warn")[0]
+    tilt(process, frame_id="", thrust=0.7)
     assert last(process)[2] == 0.0
 
 

@@ -8,6 +8,7 @@ from live import reconfigure
 from sensor_msgs.msg import Joy
 from test_joystick import axis, button
 
+from crazyflie_demo.joy_axes import REPEATED
 from crazyflie_demo.joy_node import JoyNode
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
@@ -52,6 +53,7 @@ def test_replays_a_stream_of_events(fifo):
     message = process.published("/crazyflie/joy")[0]
     assert isinstance(message, Joy)
     assert message.header.stamp.to_sec() == pytest.approx(100.0, abs=0.02)
+    assert message.header.frame_id == ""
     process.node.shutdown()
 
 
@@ -64,6 +66,7 @@ def test_repeats_itself(fifo):
         process.advance(1.0)
         assert len(states(process)) == pytest.approx(11, abs=1)
         assert set(map(str, states(process))) == {"([1.0], [])"}
+    assert process.published("/crazyflie/joy")[0].header.frame_id == REPEATED
     process.node.shutdown()
 
 

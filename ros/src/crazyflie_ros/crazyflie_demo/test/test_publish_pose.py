@@ -6,8 +6,10 @@ import pytest
 from geometry_msgs.msg import Twist
 from live import reconfigure
 from sensor_msgs.msg import Joy
+from std_msgs.msg import Header
 
 from crazyflie_demo.const_thrust_node import ConstThrustNode
+from crazyflie_demo.joy_axes import REPEATED
 from crazyflie_demo.publish_pose_node import PublishPoseNode, PublishPoseTeleopNode
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils import ServiceError
@@ -38,7 +40,7 @@ def move(process, duration, **sticks):
     for name, value in sticks.items():
         axes[{"x": X, "y": Y, "z": Z, "yaw": YAW}[name]] = value
     for _ in range(round(duration * 20.0)):
-        process.publish("/cf/joy", Joy(axes=axes))
+        process.publish("/cf/joy", Joy(Header(frame_id=REPEATED), axes, []))
         process.advance(0.05)
 
 
@@ -68,6 +70,17 @@ def test_stays_when_the_joystick_is_silent():
     process.advance(10.0)
     # Half a second by the stick, and another one until its last message is too old.
     assert last(process)[0] == pytest.approx(2.0, abs=0.1)
+
+
+def test_goes_on_while_a_joystick_that_only_tells_changes_is_held_still():
+    process = launch(PublishPoseTeleopNode(), **{"speed/x": 1.0})
+    axes = [0.0] * 8
+    axes[X] = 1.0
+    process.publish("/cf/joy", Joy(axes=axes))
+    process.advance(3.0)
+    process.transport.unpublished.add("/cf/joy")
+    process.advance(3.0)
+    assert last(process)[0] == pytest.approx(4.0, abs=0.1)
 
 
 def test_does_not_jump_after_a_pause():

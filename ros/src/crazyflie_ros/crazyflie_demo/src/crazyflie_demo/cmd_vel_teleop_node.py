@@ -1,7 +1,6 @@
 """ROS interface of flight by hand: a joystick's axes to cmd_vel."""
 
 from geometry_msgs.msg import Twist, Vector3
-from sensor_msgs.msg import Joy
 from typing_extensions import override
 
 from crazyflie_demo.gamepad import PITCH, ROLL, THRUST, YAW
@@ -43,7 +42,6 @@ class CmdVelTeleopNode(Node):
     """
 
     def __init__(self) -> None:
-        self._axes = JoyAxes()
         self._is_locked = True
 
     @override
@@ -53,27 +51,23 @@ class CmdVelTeleopNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
-        handle.subscribe(self._parameters.joy_topic, Joy, self._on_joy)
+        self._axes = JoyAxes(handle, self._parameters.joy_topic)
         handle.timer(1.0 / self._parameters.rate, self._on_timer)
 
     def _reconfigure(self, parameters):
         self._parameters = parameters
 
-    def _on_joy(self, message):
-        self._axes.update(message.axes, self._handle.time())
-
     def _on_timer(self):
-        now = self._handle.time()
         parameters = self._parameters
-        if not self._axes.is_fresh(now):
+        if not self._axes.are_alive():
             if not self._is_locked:
-                self._handle.warn(f"nothing comes on {parameters.joy_topic}: sending no setpoints")
+                self._handle.warn(f"no joystick on {parameters.joy_topic}: sending no setpoints")
             self._is_locked = True
             return
-        pitch = self._axes.axis(parameters.pitch_axis, now) * parameters.max_pitch
-        roll = self._axes.axis(parameters.roll_axis, now) * parameters.max_roll
-        yaw_rate = self._axes.axis(parameters.yaw_rate_axis, now) * parameters.max_yaw_rate
-        thrust = self._axes.axis(parameters.thrust_axis, now) * parameters.max_thrust
+        pitch = self._axes.axis(parameters.pitch_axis) * parameters.max_pitch
+        roll = self._axes.axis(parameters.roll_axis) * parameters.max_roll
+        yaw_rate = self._axes.axis(parameters.yaw_rate_axis) * parameters.max_yaw_rate
+        thrust = self._axes.axis(parameters.thrust_axis) * parameters.max_thrust
         if thrust <= 0.0:
             self._is_locked = False
         if self._is_locked:

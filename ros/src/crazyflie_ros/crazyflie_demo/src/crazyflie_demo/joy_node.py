@@ -6,6 +6,7 @@ import os
 from sensor_msgs.msg import Joy
 from typing_extensions import override
 
+from crazyflie_demo.joy_axes import JOY_LIMIT, REPEATED
 from crazyflie_demo.joystick import EVENT, Joystick, JoystickState
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import TEXT, Number
@@ -120,5 +121,6 @@ class JoyNode(Node):
         self._published = state
         message = Joy(axes=state[0], buttons=state[1])
         message.header.stamp = self._handle.stamp()
-        message.header.frame_id = "joy"
+        if self._parameters.autorepeat_rate > 2.0 / JOY_LIMIT:
+            message.header.frame_id = REPEATED
         self._publisher.publish(message)

@@ -12,6 +12,7 @@ from sensor_msgs.msg import Joy
 from typing_extensions import override
 
 from crazyflie_demo.gamepad import BUTTONS
+from crazyflie_demo.joy_axes import REPEATED
 from crazyflie_demo.keyboard import HELP, Keyboard
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import Number
@@ -82,7 +83,7 @@ class KeyboardNode(Node):
             buttons[self._presses.popleft()] = 1
         message = Joy(axes=self._keyboard.axes(now), buttons=buttons)
         message.header.stamp = self._handle.stamp()
-        message.header.frame_id = "keyboard"
+        message.header.frame_id = REPEATED
         self._publisher.publish(message)
 
     def _read(self):

@@ -7,7 +7,8 @@ from crazyflie_utils.parameter_types import TOPIC, Integer, Number
 AXIS = Integer(0, 255)
 """Number of a joystick's axis."""
 
-_RATE = Number("Hz", above=0.0, maximum=500.0)
+RATE = Number("Hz", above=0.0, maximum=500.0)
+"""How often something is published."""
 
 
 class JoyParameters(Parameters):
@@ -19,10 +20,10 @@ class JoyParameters(Parameters):
 class SetpointParameters(Parameters):
     """Of nodes that publish cmd_vel."""
 
-    rate: float = parameter(_RATE, "setpoints a second", 50.0)
+    rate: float = parameter(RATE, "setpoints a second", 50.0)
 
 
 class GoalParameters(WorldFrameParameters):
     """Of nodes that publish goals."""
 
-    rate: float = parameter(_RATE, "goals a second", 30.0)
+    rate: float = parameter(RATE, "goals a second", 30.0)

@@ -1,7 +1,6 @@
 """ROS interface of a goal that stays where it is, and of one that is moved by hand."""
 
 from geometry_msgs.msg import PoseStamped
-from sensor_msgs.msg import Joy
 from typing_extensions import override
 
 from crazyflie_demo.gamepad import PITCH, ROLL, THRUST, YAW
@@ -71,12 +70,9 @@ class PublishPoseNode(Node):
 
 
 class PublishPoseTeleopNode(PublishPoseNode):
-    """Publish a goal that moves as the sticks are tilted, and stays when they are silent."""
+    """Publish a goal that moves as the sticks are tilted, and stays when there are none."""
 
     _parameters: PublishPoseTeleopParameters
-
-    def __init__(self) -> None:
-        self._axes = JoyAxes()
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -85,14 +81,11 @@ class PublishPoseTeleopNode(PublishPoseNode):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._moved = handle.time()
-        handle.subscribe(self._parameters.joy_topic, Joy, self._on_joy)
+        self._axes = JoyAxes(handle, self._parameters.joy_topic)
         super().register_callbacks(handle)
 
     def _reconfigure(self, parameters):
         self._parameters = parameters
-
-    def _on_joy(self, message):
-        self._axes.update(message.axes, self._handle.time())
 
     @override
     def _on_timer(self):
@@ -102,7 +95,7 @@ class PublishPoseTeleopNode(PublishPoseNode):
         elapsed = min(max(now - self._moved, 0.0), 2.0 * (1.0 / parameters.rate))
         self._moved = now
         self._goal = [
-            value + speed * self._axes.axis(axis, now) * elapsed
+            value + speed * self._axes.axis(axis) * elapsed
             for value, speed, axis in zip(
                 self._goal, parameters.speeds, parameters.axes, strict=True
             )

@@ -52,6 +52,10 @@ class Publisher:
         """Name of the topic, absolute."""
         return self._topic.name
 
+    def has_subscribers(self) -> bool:
+        """Tell whether anyone, here or outside, is connected and receives."""
+        return bool(self._topic.receivers) or self._external.has_subscribers()
+
     def publish(self, message: genpy.Message) -> None:
         """Send a message; it must not be changed afterwards.
 

@@ -1,0 +1,104 @@
+#!/usr/bin/env python
+"""Takeoff, a short way and landing by cmd_hover; needs a flow deck, or a position from outside.
+
+Usage: Hover.py [PREFIX ...], one for each vehicle; by default crazyflie. It is plain rospy, as a
+script of one's own is: copy it, and change what `fly` does.
+"""
+
+import math
+import sys
+import threading
+
+import rospy
+from std_msgs.msg import Empty
+
+from crazyflie_driver.msg import Hover
+
+SPEED = 0.2
+"""Of all ways, m/s."""
+
+RATE = 20.0
+"""Setpoints a second; the firmware gives up after 0.5 s without one."""
+
+
+class Crazyflie:
+    """A vehicle that is told velocities and a height.
+
+    Every method blocks until the vehicle should be there, and repeats its setpoints meanwhile. If
+    the next one does not follow at once, and when the script is ended in flight, the vehicle falls.
+
+    Parameters
+    ----------
+    prefix : str
+        Its namespace; waits until the driver listens there.
+    """
+
+    def __init__(self, prefix: str):
+        self._rate = rospy.Rate(RATE)
+        self._height = 0.0
+        self._setpoints = rospy.Publisher(f"{prefix}/cmd_hover", Hover, queue_size=1)
+        self._stops = rospy.Publisher(f"{prefix}/cmd_stop", Empty, queue_size=1)
+        while not (self._setpoints.get_num_connections() and self._stops.get_num_connections()):
+            self._rate.sleep()
+
+    def goTo(self, x: float, y: float, zDistance: float, yaw: float) -> None:  # noqa: N802, N803
+        """Fly straight to a point at `SPEED`, keeping the heading.
+
+        Parameters
+        ----------
+        x, y : float
+            Where it is from here, ahead and to the left, m.
+        zDistance : float
+            Height above what is below, m.
+        yaw : float
+            Not used: the yaw rate is 0.
+        """
+        start, climb = self._height, zDistance - self._height
+        count = math.ceil(math.hypot(x, y, climb) / SPEED * RATE)
+        for k in range(1, count + 1):
+            self._height = start + climb * k / count
+            self._send(x * RATE / count, y * RATE / count)
+
+    def takeOff(self, zDistance: float) -> None:  # noqa: N802, N803
+        """Climb to a height, m."""
+        self.goTo(0.0, 0.0, zDistance, 0.0)
+
+    def land(self) -> None:
+        """Sink to the ground and stop the motors."""
+        self.goTo(0.0, 0.0, 0.0, 0.0)
+        self._stops.publish(Empty())
+
+    def hold(self, seconds: float) -> None:
+        """Stay for a while, s."""
+        for _ in range(math.ceil(seconds * RATE)):
+            self._send(0.0, 0.0)
+
+    def _send(self, vx, vy):
+        setpoint = Hover(vx=vx, vy=vy, yawrate=0.0, zDistance=self._height)
+        setpoint.header.stamp = rospy.Time.now()
+        self._setpoints.publish(setpoint)
+        self._rate.sleep()
+
+
+def fly(prefix: str) -> None:
+    """Take one vehicle up, ahead and to the left, and down."""
+    vehicle = Crazyflie(prefix)
+    vehicle.takeOff(0.4)
+    vehicle.hold(1.0)
+    vehicle.goTo(0.4, 0.2, 0.3, 0.0)
+    vehicle.hold(1.0)
+    vehicle.land()
+
+
+if __name__ == "__main__":
+    rospy.init_node("hover", anonymous=True)
+    threads = [
+        threading.Thread(target=fly, args=(prefix,))
+        for prefix in rospy.myargv(sys.argv)[1:] or ["crazyflie"]
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    # What was published last is still on its way.
+    rospy.sleep(0.2)

@@ -1,0 +1,167 @@
+"""A Crazyflie as scripts see it: the driver's services as methods.
+
+The module that users' scripts import by this name. Such a script is a node of its own and
+calls rospy.init_node first; so this is plain rospy, and its methods block.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import rospy
+import tf2_ros
+from geometry_msgs.msg import Point
+from numpy.typing import NDArray
+from uav_trajectory import Trajectory
+
+from crazyflie_driver import srv
+from crazyflie_driver.msg import TrajectoryPolynomialPiece
+
+_WORLD = "world"
+_TF_LIMIT = 10.0
+
+_SERVICES = {
+    "update_params": srv.UpdateParams,
+    "set_group_mask": srv.SetGroupMask,
+    "takeoff": srv.Takeoff,
+    "land": srv.Land,
+    "stop": srv.Stop,
+    "go_to": srv.GoTo,
+    "upload_trajectory": srv.UploadTrajectory,
+    "start_trajectory": srv.StartTrajectory,
+}
+
+
+class Crazyflie:
+    """A vehicle that the driver flies; waits until it is connected.
+
+    A command returns when the vehicle has got it, not when it has been carried out.
+
+    Parameters
+    ----------
+    prefix : str
+        The vehicle's namespace, its tf_prefix.
+    tf : str or tf.TransformListener or tf2_ros.Buffer
+        For `position` only: the vehicle's tf frame; or who answers for the frame ``prefix``.
+
+    Raises
+    ------
+    rospy.ServiceException
+        By every method: the driver refuses.
+    """
+
+    # The names of arguments, here and below, are those of scripts that exist.
+
+    def __init__(self, prefix: str, tf: Any):
+        self.prefix = prefix.rstrip("/")
+        self.tf = tf
+        self._buffer: tf2_ros.Buffer | None = None
+        self._services = {}
+        for name, service_type in _SERVICES.items():
+            full_name = f"{self.prefix}/{name}"
+            rospy.loginfo("waiting for %s", rospy.resolve_name(full_name))
+            rospy.wait_for_service(full_name)
+            self._services[name] = rospy.ServiceProxy(full_name, service_type)
+        # Answered when the driver has read the parameters; what is set earlier is overwritten.
+        self._call("update_params", [])
+
+    def _call(self, service, *arguments):
+        self._services[service](*arguments)
+
+    def setGroupMask(self, groupMask: int) -> None:  # noqa: N802, N803
+        """Make the vehicle a member of groups, one for each bit."""
+        self._call("set_group_mask", groupMask)
+
+    def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:  # noqa: N803
+        """Climb to a height (m) within a duration (s)."""
+        self._call("takeoff", groupMask, targetHeight, rospy.Duration.from_sec(duration))
+
+    def land(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:  # noqa: N803
+        """Sink to a height (m) within a duration (s)."""
+        self._call("land", groupMask, targetHeight, rospy.Duration.from_sec(duration))
+
+    def stop(self, groupMask: int = 0) -> None:  # noqa: N803
+        """Stop the motors."""
+        self._call("stop", groupMask)
+
+    def goTo(  # noqa: N802
+        self,
+        goal: Sequence[float],
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        groupMask: int = 0,  # noqa: N803
+    ) -> None:
+        """Fly to a point x, y, z (m) and a yaw (rad) within a duration (s)."""
+        period = rospy.Duration.from_sec(duration)
+        self._call("go_to", groupMask, relative, Point(*goal), yaw, period)
+
+    def uploadTrajectory(self, trajectoryId: int, pieceOffset: int, trajectory: Trajectory) -> None:  # noqa: N802, N803
+        """Write a trajectory into the vehicle's memory.
+
+        Parameters
+        ----------
+        trajectoryId : int
+            What to call it.
+        pieceOffset : int
+            Pieces in the memory before it.
+        trajectory : uav_trajectory.Trajectory
+        """
+        pieces = [
+            TrajectoryPolynomialPiece(
+                *(axis.p.tolist() for axis in (piece.px, piece.py, piece.pz, piece.pyaw)),
+                rospy.Duration.from_sec(piece.duration),
+            )
+            for piece in trajectory.polynomials
+        ]
+        self._call("upload_trajectory", trajectoryId, pieceOffset, pieces)
+
+    def startTrajectory(  # noqa: N802
+        self,
+        trajectoryId: int,  # noqa: N803
+        timescale: float = 1.0,
+        reverse: bool = False,
+        relative: bool = True,
+        groupMask: int = 0,  # noqa: N803
+    ) -> None:
+        """Fly along a trajectory; with ``timescale`` 2 it takes twice as long."""
+        self._call("start_trajectory", groupMask, trajectoryId, timescale, reverse, relative)
+
+    def position(self) -> NDArray[np.float64]:
+        """Return where tf has the vehicle, shape (3,), m in the frame world.
+
+        Raises
+        ------
+        tf2_ros.TransformException, tf.Exception
+            It has not been seen for 10 s.
+        """
+        now, limit = rospy.Time(), rospy.Duration(_TF_LIMIT)
+        if hasattr(self.tf, "lookupTransform"):
+            self.tf.waitForTransform(_WORLD, self.prefix, now, limit)
+            return np.array(self.tf.lookupTransform(_WORLD, self.prefix, now)[0])
+        frame, buffer = self.prefix, self.tf
+        if isinstance(self.tf, str):
+            frame, buffer = self.tf, self._listening_buffer()
+        transform = buffer.lookup_transform(_WORLD, frame.strip("/"), now, limit)
+        p = transform.transform.translation
+        return np.array([p.x, p.y, p.z])
+
+    def _listening_buffer(self):
+        if self._buffer is None:
+            self._buffer = tf2_ros.Buffer()
+            self._listener = tf2_ros.TransformListener(self._buffer)
+        return self._buffer
+
+    def getParam(self, name: str) -> Any:  # noqa: N802
+        """Return a firmware parameter GROUP/NAME."""
+        return rospy.get_param(f"{self.prefix}/{name}")
+
+    def setParam(self, name: str, value: float) -> None:  # noqa: N802
+        """Set a firmware parameter GROUP/NAME."""
+        self.setParams({name: value})
+
+    def setParams(self, params: Mapping[str, float]) -> None:  # noqa: N802
+        """Set firmware parameters, GROUP/NAME -> value."""
+        for name, value in params.items():
+            rospy.set_param(f"{self.prefix}/{name}", value)
+        self._call("update_params", list(params))

@@ -1,0 +1,84 @@
+"""ROS interface between motion capture of others and a vehicle's estimator."""
+
+from collections.abc import Callable
+from typing import Any
+
+from geometry_msgs.msg import Point, PointStamped, PoseStamped, TransformStamped
+from typing_extensions import override
+
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameter_types import TOPIC
+
+
+class ExternalParameters(Parameters):
+    """Parameters of the nodes that pass a measurement on."""
+
+    topic: str = parameter(TOPIC, "where motion capture publishes the vehicle")
+
+
+class _ExternalNode(Node):
+    """Pass a measurement on to ``output``, with its stamp and frame; drop what is not finite."""
+
+    input_type: type
+    finite: str
+    output: str
+    output_type: type
+    convert: Callable[[Any], Any]
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(ExternalParameters)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._publisher = handle.publisher(self.output, self.output_type)
+        handle.subscribe(
+            self._parameters.topic, self.input_type, self._on_measurement, finite=self.finite
+        )
+
+    def _on_measurement(self, message):
+        self._publisher.publish(self.convert(message))
+
+
+class ExternalPoseViconNode(_ExternalNode):
+    """Vicon's transform of a vehicle, as the pose that its estimator is told."""
+
+    input_type, finite = TransformStamped, "transform"
+    output, output_type = "external_pose", PoseStamped
+
+    @staticmethod
+    def convert(message: TransformStamped) -> PoseStamped:
+        """Return the pose that a transform is."""
+        pose = PoseStamped(header=message.header)
+        pose.pose.position = _point(message)
+        pose.pose.orientation = message.transform.rotation
+        return pose
+
+
+class ExternalPositionViconNode(_ExternalNode):
+    """Vicon's transform of a vehicle, as the position that its estimator is told."""
+
+    input_type, finite = TransformStamped, "transform"
+    output, output_type = "external_position", PointStamped
+
+    @staticmethod
+    def convert(message: TransformStamped) -> PointStamped:
+        """Return the position in a transform."""
+        return PointStamped(message.header, _point(message))
+
+
+class ExternalPositionVrpnNode(_ExternalNode):
+    """A vehicle's pose from VRPN, as the position that its estimator is told."""
+
+    input_type, finite = PoseStamped, "pose"
+    output, output_type = "external_position", PointStamped
+
+    @staticmethod
+    def convert(message: PoseStamped) -> PointStamped:
+        """Return the position in a pose."""
+        return PointStamped(message.header, message.pose.position)
+
+
+def _point(message):
+    t = message.transform.translation
+    return Point(t.x, t.y, t.z)

@@ -1,0 +1,80 @@
+"""What flights by a stream of setpoints have in common: a clock that starts with a listener."""
+
+import genpy
+from typing_extensions import override
+
+from crazyflie_demo.flight_plan_node import seconds
+from crazyflie_driver.srv import Land, LandRequest
+from crazyflie_utils import Node, NodeHandle
+
+_LANDING = 2.0
+"""How long a landing takes that ends an interrupted flight, s."""
+
+_LIMIT = 15.0
+"""How long the driver may take to answer, s."""
+
+
+class StreamNode(Node):
+    """Stream the setpoints of a flight, from when the driver listens; then end the process.
+
+    If it is ended in flight, the vehicle is landed.
+
+    Attributes
+    ----------
+    topic : str
+    message_type : type
+    duration : float
+        Of the flight, s.
+    rate : float
+        Setpoints a second, Hz. A subclass sets all of them, at the latest in `load_parameters`.
+    """
+
+    topic: str
+    message_type: type
+    duration: float
+    rate: float
+
+    def __init__(self) -> None:
+        self._start: float | None = None
+        self._is_flying = False
+
+    def setpoint(self, time: float) -> genpy.Message:
+        """Return the setpoint of a time (s), 0 to `duration`."""
+        raise NotImplementedError
+
+    def finish(self) -> None:
+        """Do what follows the last setpoint."""
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._publisher = handle.publisher(self.topic, self.message_type)
+        self._timer = handle.timer(1.0 / self.rate, self._on_timer)
+        handle.info(f"waiting for {handle.resolve(self.topic)}")
+
+    @override
+    def make_safe(self) -> None:
+        if self._is_flying:
+            self._is_flying = False
+            self._handle.warn("landing")
+            prefix = self._handle.resolve(self.topic).rpartition("/")[0]
+            request = LandRequest(height=0.0, duration=seconds(_LANDING))
+            self._handle.call_service(f"{prefix}/land", Land, request, _LIMIT)
+
+    def _on_timer(self):
+        now = self._handle.time()
+        if self._start is None:
+            # What is published to nobody is lost, and the flight would begin on its way.
+            if not self._publisher.has_subscribers():
+                return
+            self._start = now
+            self._is_flying = True
+            self._handle.info(f"flying, {self.duration:g} s")
+        elapsed = now - self._start
+        message = self.setpoint(min(elapsed, self.duration))
+        message.header.stamp = self._handle.stamp()
+        self._publisher.publish(message)
+        if elapsed >= self.duration:
+            self._is_flying = False
+            self._timer.stop()
+            self.finish()
+            self._handle.end(0)

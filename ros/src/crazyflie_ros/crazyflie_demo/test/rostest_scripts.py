@@ -1,0 +1,130 @@
+"""Scripts that users start or write, each flying a virtual vehicle."""
+
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from flights import LIMIT, Observer, launched, node, virtual_vehicle, wait_for_service
+
+from crazyflie_demo.trajectory_file import save
+from crazyflie_model.hermite import hermite
+from crazyflie_model.polynomials import PolynomialPiece
+
+SCRIPT = """
+import sys
+import numpy as np
+import rospy
+import uav_trajectory
+from crazyflie import Crazyflie
+
+rospy.init_node("script")
+cf = Crazyflie("crazyflie", "/crazyflie")
+cf.setParam("commander/enHighLevel", 1)
+assert cf.getParam("commander/enHighLevel") == 1
+trajectory = uav_trajectory.Trajectory()
+trajectory.loadcsv(sys.argv[1])
+cf.uploadTrajectory(0, 0, trajectory)
+cf.takeoff(targetHeight=0.5, duration=1.5)
+rospy.sleep(2.0)
+cf.goTo(goal=[0.4, 0.0, 0.0], yaw=0.0, duration=1.5, relative=True)
+rospy.sleep(2.0)
+cf.startTrajectory(0, timescale=1.0)
+rospy.sleep(trajectory.duration + 0.5)
+cf.land(targetHeight=0.0, duration=1.5)
+rospy.sleep(2.0)
+cf.stop()
+"""
+
+
+@pytest.fixture(scope="module")
+def observer():
+    """Return an observer of a vehicle that the driver knows as /crazyflie."""
+    with (
+        Observer() as observer,
+        virtual_vehicle(**{"observer/port": observer.port}) as uri,
+        launched("crazyflie_demo", "customLogBlocks.launch", uri=uri),
+    ):
+        wait_for_service("/crazyflie/takeoff")
+        yield observer
+
+
+def piece(duration, *ends):
+    """Return a piece from rest to rest; for each axis where it begins and ends."""
+    axes = [hermite([begin, 0.0, 0.0, 0.0], [end, 0.0, 0.0, 0.0], duration) for begin, end in ends]
+    return PolynomialPiece(duration, *axes, [0.0] * 8)
+
+
+def flown(observer, flight):
+    """Return the positions of a flight, from 0.2 m up to the ground again."""
+    observer.track_until(lambda truth: truth.position[2] > 0.2)
+    track = observer.track_until(lambda truth: truth.position[2] < 0.02)
+    assert flight.wait(LIMIT) == 0
+    return np.array([truth.position for truth in track])
+
+
+def fly(observer, script, *arguments):
+    with node("crazyflie_demo", script, *arguments) as flight:
+        return flown(observer, flight)
+
+
+def test_hover(observer):
+    path = fly(observer, "Hover.py")
+    assert path[:, 2].max() == pytest.approx(0.4, abs=0.08)
+    np.testing.assert_allclose(path[-1, :2] - path[0, :2], [0.4, 0.2], atol=0.15)
+
+
+def test_position(observer):
+    x, y, _ = at_rest(observer)
+    path = fly(observer, "Position.py", "__ns:=crazyflie", f"_x:={x:.3f}", f"_y:={y:.3f}")
+    np.testing.assert_allclose(path.max(axis=0), [x + 0.2, y + 0.2, 0.4], atol=0.1)
+    np.testing.assert_allclose(path[-1, :2], [x, y], atol=0.1)
+
+
+def test_a_stream_that_is_interrupted_ends_with_a_landing(observer):
+    x, y, _ = at_rest(observer)
+    where = ("__ns:=crazyflie", f"_x:={x:.3f}", f"_y:={y:.3f}")
+    with node("crazyflie_demo", "Position.py", *where) as flight:
+        observer.track_until(lambda truth: truth.position[2] > 0.3)
+        flight.send_signal(signal.SIGINT)
+        track = observer.track_until(lambda truth: truth.position[2] < 0.02)
+        assert flight.wait(LIMIT) == 0
+    # A fall from there would take a quarter of a second.
+    highest = max(track, key=lambda truth: truth.position[2])
+    assert track[-1].time - highest.time > 0.8
+
+
+def test_a_streamed_trajectory(observer, tmp_path):
+    x, y, _ = at_rest(observer)
+    pieces = [
+        piece(2.0, (x, x), (y, y), (0.0, 0.6)),
+        piece(2.0, (x, x), (y, y - 0.5), (0.6, 0.6)),
+        piece(2.5, (x, x), (y - 0.5, y - 0.5), (0.6, 0.0)),
+    ]
+    save(tmp_path / "flight.csv", pieces)
+    path = fly(observer, "execute_trajectory.py", tmp_path / "flight.csv")
+    assert path[:, 2].max() == pytest.approx(0.6, abs=0.08)
+    np.testing.assert_allclose(path[-1, :2], [x, y - 0.5], atol=0.1)
+
+
+def test_a_script_of_a_user(observer, tmp_path):
+    x, y, _ = at_rest(observer)
+    (tmp_path / "script.py").write_text(SCRIPT)
+    save(tmp_path / "aside.csv", [piece(2.0, (0.0, 0.0), (0.0, 0.4), (0.0, 0.0))])
+    command = [sys.executable, tmp_path / "script.py", tmp_path / "aside.csv"]
+    with subprocess.Popen(command, cwd=tmp_path) as flight:
+        try:
+            path = flown(observer, flight)
+        finally:
+            flight.kill()
+    assert path[:, 2].max() == pytest.approx(0.5, abs=0.08)
+    np.testing.assert_allclose(path[-1, :2], [x + 0.4, y + 0.4], atol=0.1)
+
+
+def at_rest(observer):
+    """Return where the vehicle stands."""
+    truths = observer.track_until(
+        lambda truth: truth.position[2] < 0.01 and np.linalg.norm(truth.velocity) < 0.01
+    )
+    return truths[-1].position

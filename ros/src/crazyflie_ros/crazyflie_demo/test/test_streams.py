@@ -1,0 +1,85 @@
+"""Flights by streams of setpoints, of a trajectory and of positions."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_driver import FakeDriver
+
+from crazyflie_demo.position_flight_node import PositionFlightNode
+from crazyflie_demo.trajectory_stream_node import TrajectoryStreamNode
+from crazyflie_demo.uav_trajectory import Trajectory
+from crazyflie_utils.testing import FakeProcess
+
+FIGURE8 = Path(__file__).parents[1] / "data" / "figure8.csv"
+
+
+def launch(node, **parameters):
+    process = FakeProcess()
+    assert process.launch(node, "/cf/flight", parameters)
+    return process
+
+
+def test_a_trajectory_is_streamed_as_it_is():
+    process = launch(TrajectoryStreamNode(str(FIGURE8)))
+    process.advance(12.0)
+    assert process.exit_status == 0
+    setpoints = process.published("/crazyflie/cmd_full_state")
+    assert len(setpoints) == pytest.approx(1001, abs=1)
+    trajectory = Trajectory()
+    trajectory.loadcsv(FIGURE8)
+    for k, setpoint in list(enumerate(setpoints))[::50]:
+        goal = trajectory.eval(min(k / 100.0, 10.0))
+        p, v, a, w = (
+            setpoint.pose.position,
+            setpoint.twist.linear,
+            setpoint.acc,
+            setpoint.twist.angular,
+        )
+        sent = [[each.x, each.y, each.z] for each in (p, v, a, w)]
+        np.testing.assert_allclose(sent, goal[:4], atol=1e-6)
+        assert setpoint.pose.orientation.w == 1.0
+    assert setpoints[0].header.frame_id == "world"
+
+
+def test_a_bad_file_ends_the_node():
+    process = FakeProcess()
+    assert not process.launch(TrajectoryStreamNode("/none.csv"), "/flight")
+    assert "cannot read /none.csv" in process.logged("error")[0]
+
+
+def test_begins_when_somebody_listens():
+    process = FakeProcess()
+    node = TrajectoryStreamNode(str(FIGURE8))
+    assert process.launch(node, "/flight")
+    node._publisher.has_subscribers = lambda: False
+    process.advance(5.0)
+    assert process.published("/crazyflie/cmd_full_state") == []
+    node._publisher.has_subscribers = lambda: True
+    process.advance(1.0)
+    first = process.published("/crazyflie/cmd_full_state")[0]
+    assert (first.pose.position.x, first.twist.linear.x) == (0.0, 0.0)
+
+
+def test_positions_go_up_to_the_side_back_and_down():
+    process = launch(PositionFlightNode(), x=1.0, height=0.5, distance=0.3, speed=0.25)
+    process.advance(30.0)
+    assert process.exit_status == 0
+    places = np.array([[p.x, p.y, p.z] for p in process.published("/cf/cmd_position")])
+    np.testing.assert_allclose(places[[0, -1]], [[1.0, 0.0, 0.0]] * 2, atol=1e-6)
+    np.testing.assert_allclose(places.max(axis=0), [1.3, 0.3, 0.5], atol=1e-6)
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) * 50.0
+    assert speeds.max() == pytest.approx(0.25, abs=1e-4)
+    assert len(process.published("/cf/cmd_stop")) == 1
+
+
+@pytest.mark.parametrize(("after", "calls"), [(2.0, ["land"]), (30.0, [])])
+def test_lands_when_it_is_interrupted(after, calls):
+    process = launch(PositionFlightNode())
+    driver = FakeDriver()
+    assert process.launch(driver, "/driver")
+    node = PositionFlightNode()
+    assert process.launch(node, "/cf/second")
+    process.advance(after)
+    node.shutdown()
+    assert driver.names() == calls

@@ -91,7 +91,7 @@ class SampledFlight:
     @property
     def time(self) -> NDArray[np.float64]:
         """Time of the samples, s, shape (n,)."""
-        return PERIOD * np.arange(len(self.yaw))
+        return PERIOD * np.arange(len(self.yaw), dtype=float)
 
 
 def fly(vehicle: ModelError, duration: float, seed: int = 0) -> SampledFlight:
@@ -114,8 +114,9 @@ def fly(vehicle: ModelError, duration: float, seed: int = 0) -> SampledFlight:
     follow = 1.0
     if vehicle.response_time > 0.0:
         follow = 1.0 - np.exp(-_STEP / vehicle.response_time)
-    position, velocity, yaw = _WAYPOINTS[0].copy(), np.zeros(3), 0.0
-    acting = np.array([0.0, 0.0, 0.0, GRAVITY])
+    position, yaw = _WAYPOINTS[0].copy(), 0.0
+    velocity: NDArray[np.float64] = np.zeros(3)
+    acting: NDArray[np.float64] = np.array([0.0, 0.0, 0.0, GRAVITY])
     log = []
     for k in range(samples):
         control = _control(k * PERIOD, position, velocity, yaw)
@@ -123,7 +124,7 @@ def fly(vehicle: ModelError, duration: float, seed: int = 0) -> SampledFlight:
         target = control * [1.0, 1.0, 1.0, vehicle.thrust_factor]
         for i in range(steps):
             acting = acting + follow * (target - acting)
-            acceleration = np.array(coupled_acceleration(acting, yaw))
+            acceleration = np.array(coupled_acceleration(acting.tolist(), yaw))
             acceleration += gusts[k * steps + i] - vehicle.drag * velocity
             position = position + _STEP * velocity + 0.5 * _STEP**2 * acceleration
             velocity = velocity + _STEP * acceleration

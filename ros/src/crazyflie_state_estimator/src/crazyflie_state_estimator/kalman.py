@@ -58,8 +58,8 @@ class ConstantAccelerationFilter(RateFilter):
 
     def __init__(self, noise: float, acceleration_walk: float):
         self.tune(noise, acceleration_walk)
-        self._state = np.zeros((3, 0))
-        self._covariance = np.zeros((3, 3))
+        self._state: NDArray[np.float64] = np.zeros((3, 0))
+        self._covariance: NDArray[np.float64] = np.zeros((3, 3))
         self._acceleration: NDArray[np.float64] | None = None
 
     def tune(self, noise: float, acceleration_walk: float) -> None:

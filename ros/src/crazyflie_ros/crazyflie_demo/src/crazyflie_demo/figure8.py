@@ -61,7 +61,7 @@ def sine(amplitude: float, multiple: int, time: float) -> NDArray[np.float64]:
 
 def figure8() -> list[PolynomialPiece]:
     """Return the pieces of the figure eight."""
-    knots = np.arange(0.0, DURATION + PIECE / 2.0, PIECE)
+    knots: list[float] = np.arange(0.0, DURATION + PIECE / 2.0, PIECE).tolist()
     pieces = []
     for begin, end in zip(knots, knots[1:], strict=False):
         x, y = (

@@ -117,7 +117,7 @@ def summary(pieces: list[PolynomialPiece]) -> Summary:
     """Return what a trajectory asks of a vehicle, from 100 points a piece."""
     largest = [0.0, 0.0]
     for piece in pieces:
-        times = np.linspace(0.0, piece.duration, 100)
+        times = np.linspace(0.0, piece.duration, 100, dtype=np.float64)
         goal = piece.evaluate(times)
         for i, vectors in enumerate((goal.velocity, goal.acceleration)):
             largest[i] = max(largest[i], float(np.linalg.norm(join(vectors), axis=-1).max()))

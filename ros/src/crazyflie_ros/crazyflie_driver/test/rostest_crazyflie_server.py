@@ -140,3 +140,8 @@ def test_an_emergency_and_a_new_beginning(added):
     assert f"added {added}" in launch(f"uri:={added}", "tf_prefix:=/cf2/")
     with pytest.raises(rospy.ServiceException, match="cannot fly, its state is: .*locked"):
         call("/cf2/takeoff", Takeoff, 0, 0.4, Duration(1))
+    call("/remove_crazyflie", RemoveCrazyflie, added)
+    assert f"added {added} as /" in launch(f"uri:={added}", "tf_prefix:=")
+    rospy.wait_for_message("/imu", Imu, LIMIT)
+    assert rospy.get_param("/ring/effect") == 6
+    call("/remove_crazyflie", RemoveCrazyflie, added)

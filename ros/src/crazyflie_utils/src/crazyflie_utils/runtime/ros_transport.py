@@ -8,6 +8,7 @@ from functools import partial
 from time import monotonic
 from typing import Any
 
+import rosgraph
 import rospy
 
 from crazyflie_utils.runtime import rospy_internals
@@ -107,6 +108,11 @@ class RosTransport(Transport):
         timer.start()
         future.add_done_callback(lambda _: timer.cancel())
         return future
+
+    def service_nodes(self):
+        """Ask the master."""
+        _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
+        return {name: nodes[0] for name, nodes in services}
 
     def log(self, level, text):
         """Log to the screen, the node's log file and /rosout."""

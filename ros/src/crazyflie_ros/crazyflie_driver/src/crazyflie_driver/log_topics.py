@@ -76,8 +76,7 @@ class LogTopics:
         groups, missing = telemetry.packed(wanted, known)
         for name, variables in missing.items():
             self._handle.warn(
-                f"{parameters.name}: no topic {name}: the firmware has no "
-                + ", ".join(variables)
+                f"{parameters.name}: no topic {name}: the firmware has no " + ", ".join(variables)
             )
         for group in groups:
             self._start_standard(group)

@@ -76,9 +76,7 @@ STANDARD = (
         MagneticField,
         SLOW_MS,
         ("mag.x", "mag.y", "mag.z"),
-        lambda header, values: MagneticField(
-            header=header, magnetic_field=Vector3(*values)
-        ),
+        lambda header, values: MagneticField(header=header, magnetic_field=Vector3(*values)),
     ),
     StandardTopic(
         "temperature",

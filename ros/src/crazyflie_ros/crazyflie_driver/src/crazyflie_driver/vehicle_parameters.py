@@ -122,7 +122,7 @@ class VehicleParameters(Parameters):
     use_ros_time: bool = parameter(
         BOOLEAN, "stamps are ROS time, or else the time since the vehicle was switched on", True
     )
-    enable_logging: bool = parameter(BOOLEAN, "publish log data at all, except rssi and packets", True)
+    enable_logging: bool = parameter(BOOLEAN, "publish log data at all, except rssi", True)
     enable_logging_imu: bool = parameter(BOOLEAN, "publish this standard topic", True)
     enable_logging_temperature: bool = parameter(BOOLEAN, "publish this standard topic", True)
     enable_logging_magnetic_field: bool = parameter(BOOLEAN, "publish this standard topic", True)

@@ -8,7 +8,6 @@ from crazyflie_py.address import Address
 from crazyflie_py.backend import init_drivers
 from crazyflie_py.errors import RefusedError, explain
 
-
 MODES = {
     "firmware": "reboot_to_fw",
     "bootloader": "reboot_to_bootloader",

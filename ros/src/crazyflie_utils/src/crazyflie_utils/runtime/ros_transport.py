@@ -109,7 +109,7 @@ class RosTransport(Transport):
         future.add_done_callback(lambda _: timer.cancel())
         return future
 
-    def service_nodes(self):
+    def service_nodes(self) -> dict[str, str]:
         """Ask the master."""
         _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
         return {name: nodes[0] for name, nodes in services}

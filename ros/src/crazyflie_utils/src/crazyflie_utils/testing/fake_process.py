@@ -114,7 +114,7 @@ class FakeTransport(Transport):
         future.set_exception(ServiceError(f"there is no service {name}"))
         return future
 
-    def service_nodes(self):
+    def service_nodes(self) -> dict[str, str]:
         """Return the services of this process and ``foreign_services``."""
         return dict.fromkeys(self.services, "/this_process") | self.foreign_services
 

@@ -113,6 +113,13 @@ def test_service_answers(handle):
     assert call("~answer").message == "yes"
 
 
+def test_services_are_known_with_their_nodes(handle, outsiders):
+    handle.advertise_service("~known", Trigger, lambda request: TriggerResponse())
+    nodes = handle.service_nodes()
+    assert nodes[rospy.resolve_name("~known")] == rospy.get_name()
+    assert nodes["/outsiders/get_loggers"] == "/outsiders"
+
+
 def test_service_refuses_with_its_text(handle):
     def refuse(request):
         raise ServiceError("already in flight, at 1.0 m")

@@ -16,6 +16,7 @@ from std_srvs.srv import Empty
 from crazyflie_driver.msg import GenericLogData, crtpPacket
 from crazyflie_driver.srv import (
     Land,
+    NotifySetpointsStop,
     RemoveCrazyflie,
     Takeoff,
     UpdateParams,
@@ -26,7 +27,11 @@ from crazyflie_virtual.testing import virtual_vehicle
 
 def launch(*arguments):
     """Run crazyflie_add.launch to its end; return what it printed."""
-    command = ["roslaunch", "--screen", "crazyflie_driver", "crazyflie_add.launch", *arguments]
+    return launch_file("crazyflie_driver", "crazyflie_add.launch", *arguments)
+
+
+def launch_file(*arguments):
+    command = ["roslaunch", "--screen", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     # roslaunch ends its nodes when it is interrupted, not when it is killed.
     interrupt = threading.Timer(LIMIT, process.send_signal, [signal.SIGINT])
@@ -140,3 +145,25 @@ def test_an_emergency_and_a_new_beginning(added):
     assert f"added {added}" in launch(f"uri:={added}", "tf_prefix:=/cf2/")
     with pytest.raises(rospy.ServiceException, match="cannot fly, its state is: .*locked"):
         call("/cf2/takeoff", Takeoff, 0, 0.4, Duration(1))
+    call("/remove_crazyflie", RemoveCrazyflie, added)
+
+
+WITHOUT_PREFIX = """
+<launch>
+  <include file="$(find crazyflie_driver)/launch/crazyflie_add.launch">
+    <arg name="uri" value="{uri}" />
+    <arg name="tf_prefix" value="" />
+  </include>
+</launch>
+"""
+
+
+def test_a_vehicle_without_a_prefix(added, tmp_path):
+    path = tmp_path / "add.launch"
+    path.write_text(WITHOUT_PREFIX.format(uri=added))
+    text = launch_file(path)
+    assert f"/crazyflie_add: added {added} as /\n" in text
+    assert rospy.wait_for_message("/imu", Imu, LIMIT).header.frame_id == "base_link"
+    assert "effect" in rospy.get_param("/ring")
+    call("/notify_setpoints_stop", NotifySetpointsStop, 0, 0)
+    call("/remove_crazyflie", RemoveCrazyflie, added)

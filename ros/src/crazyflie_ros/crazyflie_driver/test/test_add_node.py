@@ -41,6 +41,13 @@ def test_defaults_are_those_of_the_cpp_driver():
     assert launch.process.exit_status == 0
 
 
+def test_a_vehicle_may_have_no_prefix():
+    for parameters in ({"uri": "usb://0"}, {"uri": "usb://0", "tf_prefix": ""}):
+        launch = Launch(parameters)
+        assert [request.tf_prefix for request in launch.requests] == [""]
+        assert "/add: added usb://0 as /" in launch.process.logged("info")
+
+
 def test_all_parameters_arrive():
     changes = {
         "roll_trim": 1,
@@ -74,11 +81,12 @@ def test_a_refusal_ends_the_process_with_status_1():
     ("changes", "name"),
     [
         ({"uri": None}, "uri"),
-        ({"tf_prefix": None}, "tf_prefix"),
+        ({"tf_prefix": "my vehicle"}, "tf_prefix"),
         ({"roll_trim": "left"}, "roll_trim"),
         ({"enable_logging_imu": 1}, "enable_logging_imu"),
         ({"genericLogTopics": "a"}, "genericLogTopics"),
         ({"genericLogTopics": ["imu"]}, "genericLogTopics"),
+        ({"genericLogTopics": ["/"]}, "genericLogTopics"),
         ({"genericLogTopicFrequencies": [5]}, "genericLogTopicFrequencies"),
         (
             {"genericLogTopics": ["a"], "genericLogTopicFrequencies": [10]},

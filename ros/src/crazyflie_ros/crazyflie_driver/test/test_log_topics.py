@@ -22,7 +22,7 @@ def logging(server):
     return vehicle
 
 
-def test_standard_topics_in_ros_units(server, logging):
+def test_standard_topics_are_those_of_the_cpp_driver(server, logging):
     imu = published(server, "/cf1/imu")[0]
     assert (imu.header.frame_id, imu.header.stamp.to_sec()) == ("cf1/base_link", 100.0)
     acceleration, rate = imu.linear_acceleration, imu.angular_velocity
@@ -39,7 +39,7 @@ def test_standard_topics_in_ros_units(server, logging):
     )
 
     field = published(server, "/cf1/magnetic_field")[0].magnetic_field
-    assert (field.x, field.y, field.z) == pytest.approx((5e-5, -2.5e-5, 1e-4))
+    assert (field.x, field.y, field.z) == (0.5, -0.25, 1.0)
     assert published(server, "/cf1/temperature")[0].temperature == 25.5
     assert published(server, "/cf1/pressure")[0].data == 1013.25
     assert published(server, "/cf1/battery")[0].data == 3.75
@@ -58,8 +58,18 @@ def test_packets_of_others(server, logging):
     count = len(server.process.published("/cf1/packets"))
     logging.say(13, 2, b"app data")
     packet = published(server, "/cf1/packets", count + 1)[count]
-    assert (packet.size, packet.header) == (8, 13 << 4 | 2)
+    assert (packet.size, packet.header) == (9, 0xDE)
     assert bytes(packet.data) == b"app data".ljust(30, b"\0")
+
+
+def test_packets_of_the_largest_size_and_without_logging(server):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, enable_logging_packets=True)
+    for port, channel in ((0, 0), (2, 1), (4, 1), (5, 1), (8, 0), (9, 0), (15, 3)):
+        vehicle.say(port, channel, b"the driver's own")
+    vehicle.say(14, 3, bytes(range(30)))
+    packet = published(server, "/cf1/packets")[0]
+    assert (packet.size, packet.header, bytes(packet.data)) == (31, 0xEF, bytes(range(30)))
 
 
 def test_the_frequency_of_a_custom_block_is_a_period_in_ms(server, log_block):
@@ -90,11 +100,15 @@ def test_stamps_of_the_vehicle(server, log_block):
     assert stamps[-1] > stamps[0]
 
 
-def test_without_logging_there_is_only_the_status(server, log_block):
+def test_without_logging_there_are_only_status_and_packets(server, log_block):
     vehicle = server.make_vehicle()
     server.add(vehicle.uri, log_blocks=[log_block("test", 10, "mag.x")], **ALL)
     assert len([data for data in vehicle.packets(5, 1) if data[0] == 6]) == 1
-    assert set(server.process.transport.publishers) == {"/diagnostics", "/cf1/rssi"}
+    assert set(server.process.transport.publishers) == {
+        "/diagnostics",
+        "/cf1/rssi",
+        "/cf1/packets",
+    }
 
 
 def test_topics_that_the_firmware_cannot_fill_are_left_out(server):

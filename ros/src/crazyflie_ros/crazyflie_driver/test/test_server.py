@@ -96,10 +96,9 @@ def test_a_silent_port(server):
 @pytest.mark.parametrize(
     ("changes", "text"),
     [
-        ({"prefix": ""}, "tf_prefix is ''"),
         ({"prefix": "my vehicle"}, "tf_prefix is 'my vehicle'"),
         ({"roll_trim": float("nan")}, "roll_trim is nan"),
-        ({"prefix": "", "pitch_trim": float("inf")}, "tf_prefix is .*pitch_trim is inf"),
+        ({"prefix": "my vehicle", "pitch_trim": float("inf")}, "tf_prefix is .*pitch_trim is inf"),
     ],
 )
 def test_requests_that_make_no_sense(server, changes, text):
@@ -112,8 +111,24 @@ def test_requests_that_make_no_sense(server, changes, text):
 def test_nothing_is_added_twice(server, vehicle):
     with pytest.raises(ServiceError, match="has been added already, as cf1"):
         server.add(vehicle.uri, "cf2")
-    with pytest.raises(ServiceError, match="tf_prefix cf1 is in use"):
+    with pytest.raises(ServiceError, match="tf_prefix 'cf1' is in use"):
         server.add("udp://127.0.0.1:1", "/cf1/")
+
+
+def test_without_a_prefix_everything_is_at_the_root(server):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, "", enable_logging=True, enable_logging_imu=True)
+    transport = server.process.transport
+    assert {"/takeoff", "/emergency"} < set(transport.services)
+    assert {"/rssi", "/imu"} < set(transport.publishers)
+    vehicle.received.clear()
+    server.process.publish("/cmd_vel", Twist(Vector3(0, 0, 1000.0), Vector3()))
+    assert len(vehicle.wait_for_packets(3, 0)) == 1
+    wait_until(lambda: server.process.published("/imu"), "the imu")
+    assert server.process.published("/imu")[0].header.frame_id == "base_link"
+    assert status(server, vehicle.uri).level == DiagnosticStatus.OK
+    with pytest.raises(ServiceError, match="tf_prefix '' is in use"):
+        server.add("udp://127.0.0.1:1", "/")
 
 
 def test_a_vehicle_that_is_removed_leaves_nothing_and_can_come_again(server, vehicle):

@@ -56,17 +56,18 @@ def test_full_state(flying):
 
 
 def test_velocities_positions_and_stop(flying):
+    """The bytes of the C++ driver."""
     server, vehicle = flying
     sends = [
         (
             "cmd_velocity_world",
             VelocityWorld(vel=Vector3(0.5, -0.25, 1.0), yawRate=30.0),
-            struct.pack("<Bffff", 8, 0.5, -0.25, 1.0, 30.0),
+            struct.pack("<Bffff", 1, 0.5, -0.25, 1.0, 30.0),
         ),
         (
             "cmd_hover",
             Hover(vx=0.5, vy=-0.25, yawrate=30.0, zDistance=1.5),
-            struct.pack("<Bffff", 10, 0.5, -0.25, 30.0, 1.5),
+            struct.pack("<Bffff", 5, 0.5, -0.25, 30.0, 1.5),
         ),
         (
             "cmd_position",

@@ -15,7 +15,7 @@ from crazyflie_py.address import Address
 from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.errors import AddressError, LinkLostError, NoAnswerError, NoDongleError
 from crazyflie_py.link import Limits, Link
-from crazyflie_py.reboot import reboot
+from crazyflie_py.reboot import MODES, reboot
 
 # cflib warns of one of its own attributes when a mock takes stock of them.
 pytestmark = pytest.mark.filterwarnings("ignore:link_quality_updated:DeprecationWarning")
@@ -115,6 +115,13 @@ def test_restarting():
         switch.assert_called_once_with(URI)
         switch.return_value.reboot_to_fw.assert_called_once_with()
         switch.return_value.close.assert_called_once_with()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_switching_a_vehicle(mode):
+    with patch("crazyflie_py.reboot.PowerSwitch", spec=PowerSwitch) as switch:
+        Crazyflie(URI).reboot(mode)
+        getattr(switch.return_value, MODES[mode]).assert_called_once_with()
 
 
 def test_restarting_a_vehicle_that_is_off():

@@ -2,6 +2,7 @@
 
 import queue
 import threading
+import time
 
 import pytest
 
@@ -83,6 +84,26 @@ def test_a_flight_by_commands_after_setpoints(client):
     link.trajectories.upload(1, 3, [PolynomialPiece(1.0, (0.0, 0.3), (), (), ())])
     link.high_level.start_trajectory(1, relative=True)
     client.wait_until(lambda x, z, *_: x > 0.2 and z > 0.3)
+    link.high_level.land(0.0, 1.0)
+    client.wait_until(lambda x, z, *_: z < 0.05)
+
+
+def test_positive_yaw_rates_turn_clockwise(client):
+    link = client.link
+    yaws = queue.Queue()
+    link.add_log_block(
+        LogBlock("yaw", 20, ("stateEstimate.yaw",), lambda _, values: yaws.put(values[0]))
+    )
+    link.setpoints.zeros()
+    for send, arguments, turned in (
+        (link.setpoints.hover, (0.0, 0.0, 60.0, 0.4), lambda yaw: -60.0 < yaw < -30.0),
+        (link.setpoints.velocity_world, (0.0, 0.0, 0.0, -60.0), lambda yaw: -20.0 < yaw < 30.0),
+    ):
+        end = time.monotonic() + LIMIT
+        while not turned(yaws.get(timeout=LIMIT)):
+            send(*arguments)
+            assert time.monotonic() < end
+    link.setpoints.hand_over()
     link.high_level.land(0.0, 1.0)
     client.wait_until(lambda x, z, *_: z < 0.05)
 

@@ -39,25 +39,22 @@ def test_attitude_setpoint_has_its_pitch_negated(vehicle, flying):
     assert sent(vehicle, 3, 0) == struct.pack("<fffH", 1.5, -10.0, -20.0, 42000)
 
 
-@pytest.mark.filterwarnings("ignore:Using legacy:DeprecationWarning")
-@pytest.mark.parametrize(("protocol", "velocity_type", "hover_type"), [(12, 8, 10), (8, 1, 5)])
-def test_generic_setpoints(make_vehicle, make_link, protocol, velocity_type, hover_type):
+@pytest.mark.parametrize("protocol", [8, 12])
+def test_generic_setpoints_are_those_of_crazyflie_cpp(make_vehicle, make_link, protocol):
     vehicle = make_vehicle(protocol=protocol)
     link = make_link(vehicle.uri)
     link.connect()
-    # Before protocol 9 the firmware turned the yaw rate's sign, and cflib turns it back.
-    sign = 1.0 if protocol > 8 else -1.0
     numbers = (0.5, -0.25, 0.125, 30.0)
     calls = [
         (
             link.setpoints.velocity_world,
             numbers,
-            struct.pack("<Bffff", velocity_type, 0.5, -0.25, 0.125, sign * 30.0),
+            struct.pack("<Bffff", 1, 0.5, -0.25, 0.125, 30.0),
         ),
         (
             link.setpoints.hover,
             (0.5, -0.25, 30.0, 1.5),
-            struct.pack("<Bffff", hover_type, 0.5, -0.25, sign * 30.0, 1.5),
+            struct.pack("<Bffff", 5, 0.5, -0.25, 30.0, 1.5),
         ),
         (
             link.setpoints.position,

@@ -148,23 +148,31 @@ def test_only_a_radio_can_restart_a_vehicle(answer, vehicle):
     assert not vehicle.received
 
 
-def test_the_radio_restarts_the_vehicle(monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("arguments", "called"),
+    [
+        ((), "reboot_to_fw"),
+        (("--mode", "firmware"), "reboot_to_fw"),
+        (("--mode", "bootloader"), "reboot_to_bootloader"),
+        (("--mode", "sysoff"), "stm_power_down"),
+        (("--mode", "syson"), "stm_power_up"),
+        (("--mode", "alloff"), "platform_power_down"),
+    ],
+)
+def test_the_radio_restarts_the_vehicle(monkeypatch, arguments, called):
     calls = []
 
     class Switch:
         def __init__(self, uri):
             calls.append(uri)
 
-        def reboot_to_fw(self):
-            calls.append("reboot")
-
-        def close(self):
-            calls.append("close")
+        def __getattr__(self, name):
+            return lambda: calls.append(name)
 
     monkeypatch.setattr("crazyflie_py.reboot.PowerSwitch", Switch)
     uri = "radio://0/25/2M/E7E7E7E701"
-    assert tools.reboot(["--uri", uri]) == 0
-    assert calls == [uri, "reboot", "close"]
+    assert tools.reboot(["--uri", uri, *arguments]) == 0
+    assert calls == [uri, called, "close"]
 
 
 @pytest.fixture

@@ -21,7 +21,7 @@ class CrazyflieAddNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        handle.info(f"adding {parameters.uri} as {parameters.tf_prefix}")
+        handle.info(f"adding {parameters.uri} as {parameters.tf_prefix or '/'}")
         answer = handle.call_service(ADD, AddCrazyflie, parameters.request(), _LIMIT)
         answer.add_done_callback(self._on_answer)
 
@@ -29,7 +29,7 @@ class CrazyflieAddNode(Node):
         parameters = self._parameters
         error = done.exception()
         if error is None:
-            self._handle.info(f"added {parameters.uri} as {parameters.tf_prefix}")
+            self._handle.info(f"added {parameters.uri} as {parameters.tf_prefix or '/'}")
         else:
             self._handle.error(f"cannot add {parameters.uri}: {error}")
         self._handle.end(0 if error is None else 1)

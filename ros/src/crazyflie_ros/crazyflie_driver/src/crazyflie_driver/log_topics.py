@@ -16,8 +16,12 @@ STATUS_PERIOD_MS = 500
 """Period of the log block that the diagnostics rest on, ms."""
 
 _MOST_DATA = 30
-_OWN_PORTS = frozenset({(0, 0), (5, 2), (15, 0), (15, 1), (15, 2), (15, 3)})
-"""Ports and channels of console, log data and pings, which are no packets for users."""
+_LINK = 3 << 2
+"""Bits of the header that belong to the link; cflib sets them."""
+
+_OWN_PORTS = frozenset({0, 2, 4, 5, 8, 9, 15})
+"""Ports of console, parameters, memory, log, high-level commands, supervisor and pings: what
+comes from there is for the driver."""
 
 
 class LogTopics:
@@ -72,8 +76,7 @@ class LogTopics:
         groups, missing = telemetry.packed(wanted, known)
         for name, variables in missing.items():
             self._handle.warn(
-                f"{parameters.tf_prefix}: no topic {name}: the firmware has no "
-                + ", ".join(variables)
+                f"{parameters.name}: no topic {name}: the firmware has no " + ", ".join(variables)
             )
         for group in groups:
             self._start_standard(group)
@@ -84,11 +87,11 @@ class LogTopics:
     def publish_packet(self, port: int, channel: int, data: bytes) -> None:
         """Publish a packet from the vehicle, if it is not one of the driver's own."""
         publisher = self._packets
-        if publisher is None or (port, channel) in _OWN_PORTS:
+        if publisher is None or port in _OWN_PORTS:
             return
         message = crtpPacket(
-            size=len(data),
-            header=port << 4 | channel,
+            size=1 + len(data),
+            header=port << 4 | _LINK | channel,
             data=data[:_MOST_DATA].ljust(_MOST_DATA, b"\0"),
         )
         self._handle.submit(publisher.publish, message)
@@ -158,5 +161,5 @@ class LogTopics:
         return genpy.Time(*divmod(time_ms * 1_000_000, 1_000_000_000))
 
     def _header(self, stamp, in_world):
-        frame = self._fixed_frame if in_world else f"{self._parameters.tf_prefix}/base_link"
+        frame = self._fixed_frame if in_world else self._parameters.frame
         return Header(stamp=stamp, frame_id=frame)

@@ -61,18 +61,18 @@ class CrazyflieServerNode(Node):
         wanted = VehicleParameters.from_request(request)
         for other in (vehicle.parameters for vehicle in self._vehicles.values()):
             if other.uri == wanted.uri:
-                raise ServiceError(f"{other.uri} has been added already, as {other.tf_prefix}")
+                raise ServiceError(f"{other.uri} has been added already, as {other.name}")
             if other.tf_prefix == wanted.tf_prefix:
                 raise ServiceError(
-                    f"tf_prefix {other.tf_prefix} is in use by {other.uri}; choose another"
+                    f"tf_prefix {other.tf_prefix!r} is in use by {other.uri}; choose another"
                 )
         try:
             vehicle = DriverVehicle(self._handle, wanted, self._parameters.fixed_frame)
         except CrazyflieError as error:
-            self._handle.error(f"{wanted.tf_prefix}: {error}")
+            self._handle.error(f"{wanted.name}: {error}")
             raise ServiceError(str(error)) from None
         self._vehicles[wanted.uri] = vehicle
-        self._handle.info(f"{wanted.tf_prefix}: connecting to {wanted.uri}")
+        self._handle.info(f"{wanted.name}: connecting to {wanted.uri}")
         return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
 
     def _finish_adding(self, vehicle, error):
@@ -91,7 +91,7 @@ class CrazyflieServerNode(Node):
 
     def _finish_removing(self, vehicle, error):
         self._forget(vehicle)
-        self._handle.info(f"{vehicle.parameters.tf_prefix}: removed")
+        self._handle.info(f"{vehicle.parameters.name}: removed")
         return RemoveCrazyflieResponse()
 
     def _forget(self, vehicle: DriverVehicle) -> None:
@@ -121,7 +121,7 @@ class CrazyflieServerNode(Node):
                 header=Header(stamp=self._handle.stamp()),
                 status=[
                     vehicle.status(now).message(
-                        f"{component}: {vehicle.parameters.tf_prefix}", vehicle.parameters.uri
+                        f"{component}: {vehicle.parameters.name}", vehicle.parameters.uri
                     )
                     for vehicle in self._vehicles.values()
                 ],

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
 
 from crazyflie_driver import srv
+from crazyflie_driver.service_names import ServiceNames
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.errors import CrazyflieError
 from crazyflie_utils import NodeHandle, ServiceError
@@ -29,10 +30,13 @@ class VehicleServices:
     Attributes
     ----------
     are_advertised : bool
+    names : ServiceNames
+        Where they are.
     """
 
     def __init__(self, handle: NodeHandle, vehicle: DriverVehicle):
         self.are_advertised = False
+        self.names = ServiceNames(handle, vehicle.parameters.prefix)
         self._handle = handle
         self._vehicle = vehicle
 
@@ -55,10 +59,9 @@ class VehicleServices:
         ]
         if vehicle.crazyflie.address.is_radio:
             offered.append(("reboot", Empty, self._reboot))
+        names = self.names.free(name for name, *_ in offered)
         for name, service_type, callback in offered:
-            self._handle.advertise_service(
-                f"{vehicle.parameters.prefix}/{name}", service_type, callback
-            )
+            self._handle.advertise_service(names[name], service_type, callback)
         self.are_advertised = True
 
     # At once.
@@ -68,9 +71,9 @@ class VehicleServices:
             self._vehicle.stop_in_emergency()
         except CrazyflieError as error:
             text = f"emergency stop not sent, it will be once the link is back: {error}"
-            self._handle.error(f"{self._vehicle.parameters.tf_prefix}: {text}")
+            self._handle.error(f"{self._vehicle.parameters.name}: {text}")
             raise ServiceError(text) from None
-        self._handle.error(f"{self._vehicle.parameters.tf_prefix}: emergency stop")
+        self._handle.error(f"{self._vehicle.parameters.name}: emergency stop")
         return EmptyResponse()
 
     def _notify_setpoints_stop(self, request):

@@ -132,7 +132,7 @@ class SetpointTopics:
         return callback
 
     def _warn(self, text, key):
-        name = self._parameters.tf_prefix
+        name = self._parameters.name
         self._handle.warn(f"{name}: {text}", throttle=_THROTTLE, key=(name, key))
 
     # One message each. Signs: the link's pitch is the negative of cmd_vel's, and

@@ -16,9 +16,6 @@ from crazyflie_py.log import quaternion_from_compressed
 FAST_MS, SLOW_MS = 10, 100
 """Periods of imu and pose, and of the rest, ms: those of the C++ driver."""
 
-TESLA = 1e-4
-"""Tesla in a gauss, in which the firmware measures the magnetic field."""
-
 _UNKNOWN = -1.0
 """First element of a covariance: there is no such measurement (sensor_msgs/Imu)."""
 
@@ -79,9 +76,7 @@ STANDARD = (
         MagneticField,
         SLOW_MS,
         ("mag.x", "mag.y", "mag.z"),
-        lambda header, values: MagneticField(
-            header=header, magnetic_field=Vector3(*(TESLA * value for value in values))
-        ),
+        lambda header, values: MagneticField(header=header, magnetic_field=Vector3(*values)),
     ),
     StandardTopic(
         "temperature",

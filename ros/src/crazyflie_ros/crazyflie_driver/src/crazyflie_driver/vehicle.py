@@ -68,10 +68,10 @@ class DriverVehicle:
             parameters.uri,
             reconnect=True,
             on_state=self._on_link_state,
-            on_console=lambda line: self._handle.info(f"{parameters.tf_prefix}: {line}"),
+            on_console=lambda line: self._handle.info(f"{parameters.name}: {line}"),
             on_packet=self._on_packet,
         )
-        self._worker = Worker(parameters.tf_prefix)
+        self._worker = Worker(parameters.name)
         self._announcing = threading.Lock()
         self._log = LogTopics(self._handle, parameters, self.crazyflie, fixed_frame)
         self._setpoints = SetpointTopics(self._handle, parameters, self.crazyflie, self._log)
@@ -95,7 +95,7 @@ class DriverVehicle:
         """
         self.is_leaving = True
         self._setpoints.is_blocked = True
-        worker = Worker(f"{self.parameters.tf_prefix}-leave")
+        worker = Worker(f"{self.parameters.name}-leave")
         done = worker.submit(self._leave)
         worker.close()
         return done
@@ -110,7 +110,7 @@ class DriverVehicle:
             try:
                 return work()
             except (CrazyflieError, ServiceError) as error:
-                self._server.error(f"{self.parameters.tf_prefix}: {what} failed: {error}")
+                self._server.error(f"{self.parameters.name}: {what} failed: {error}")
                 raise ServiceError(str(error)) from None
 
         return self._worker.submit(job)
@@ -118,6 +118,7 @@ class DriverVehicle:
     def _connect(self):
         try:
             self._connect_link()
+            self._services.names.wait_for_controllers(lambda: self.is_leaving)
             with self._announcing:
                 if self.is_leaving:
                     raise ServiceError("removed while connecting")
@@ -131,7 +132,7 @@ class DriverVehicle:
             self.is_leaving = True
             self._end()
             raise
-        self._server.info(f"{self.parameters.tf_prefix}: connected to {self.parameters.uri}")
+        self._server.info(f"{self.parameters.name}: connected to {self.parameters.uri}")
 
     def _connect_link(self):
         end = time.monotonic() + CONNECT_LIMIT
@@ -148,7 +149,7 @@ class DriverVehicle:
             if self.crazyflie.state is LinkState.CONNECTED:
                 self._setpoints.zeros()
         except CrazyflieError as error:
-            self._server.warn(f"{self.parameters.tf_prefix}: cannot stop the motors: {error}")
+            self._server.warn(f"{self.parameters.name}: cannot stop the motors: {error}")
         self._end()
 
     def _end(self):
@@ -165,7 +166,7 @@ class DriverVehicle:
         is_flying = not is_new if state is None else SupervisorState.FLYING in state
         if is_flying:
             self._server.warn(
-                f"{self.parameters.tf_prefix}: the vehicle may be flying: its thrust stays locked "
+                f"{self.parameters.name}: the vehicle may be flying: its thrust stays locked "
                 "until a setpoint of zero thrust comes"
             )
         else:
@@ -283,9 +284,9 @@ class DriverVehicle:
 
     def _report_state(self, state, text):
         if state is LinkState.LOST:
-            self._handle.error(f"{self.parameters.tf_prefix}: {text}; trying to connect again")
+            self._handle.error(f"{self.parameters.name}: {text}; trying to connect again")
         elif state is LinkState.CONNECTED and self._services.are_advertised:
-            self._handle.warn(f"{self.parameters.tf_prefix}: {text}")
+            self._handle.warn(f"{self.parameters.name}: {text}")
             self.do("taking up the link again", self._resume)
 
     def _resume(self):

@@ -57,20 +57,20 @@ class EachLogBlock(ListOf):
 
 
 class Namespace(ParameterType):
-    """The name of a namespace; slashes around it are dropped."""
+    """The name of a namespace, empty for the root; slashes around it are dropped."""
 
     label = "string"
 
     @override
     def __call__(self, value: object) -> str:
-        name = value.strip("/ ") if isinstance(value, str) else ""
-        if not name or not rosgraph.names.is_legal_name("/" + name):
+        name = value.strip("/ ") if isinstance(value, str) else None
+        if name is None or not rosgraph.names.is_legal_name("/" + name):
             raise ValueError
         return name
 
     def __str__(self) -> str:
         """Return what is expected."""
-        return "the name of a namespace, such as crazyflie1"
+        return "the name of a namespace, such as crazyflie1, or nothing for the root"
 
 
 class LogTopic(Namespace):
@@ -79,6 +79,8 @@ class LogTopic(Namespace):
     @override
     def __call__(self, value: object) -> str:
         name = super().__call__(value)
+        if not name:
+            raise ValueError
         if name in (*STANDARD_TOPICS, "rssi"):
             raise ValueError(f"the driver itself has a topic {name!r}")
         return name
@@ -112,7 +114,7 @@ class VehicleParameters(Parameters):
         TEXT, "`radio://DONGLE/CHANNEL/RATE/ADDRESS`, `udp://HOST:PORT` or `usb://NUMBER`"
     )
     tf_prefix: str = parameter(
-        Namespace(), "namespace of the vehicle's topics, services and parameters"
+        Namespace(), "namespace of the vehicle's topics, services and parameters", ""
     )
     roll_trim: float = parameter(Number("degrees"), "added to cmd_vel", 0.0)
     pitch_trim: float = parameter(Number("degrees"), "added to cmd_vel", 0.0)
@@ -159,8 +161,18 @@ class VehicleParameters(Parameters):
 
     @property
     def prefix(self) -> str:
-        """Absolute namespace of the vehicle, such as /crazyflie1."""
-        return "/" + self.tf_prefix
+        """Absolute namespace of the vehicle, such as /crazyflie1; empty for the root."""
+        return f"/{self.tf_prefix}" if self.tf_prefix else ""
+
+    @property
+    def name(self) -> str:
+        """What messages call the vehicle."""
+        return self.tf_prefix or self.uri
+
+    @property
+    def frame(self) -> str:
+        """Frame of the vehicle's sensors."""
+        return f"{self.tf_prefix}/base_link".lstrip("/")
 
     @property
     def topics(self) -> frozenset[str]:
@@ -168,7 +180,7 @@ class VehicleParameters(Parameters):
         return frozenset(
             name
             for name in STANDARD_TOPICS
-            if self.enable_logging and getattr(self, _SWITCH + name)
+            if (self.enable_logging or name == "packets") and getattr(self, _SWITCH + name)
         )
 
     @property

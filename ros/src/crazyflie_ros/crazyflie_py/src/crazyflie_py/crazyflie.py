@@ -193,17 +193,22 @@ class Crazyflie:
         """Return the age of the last sign of life, s."""
         return self.link().liveness.age(time.monotonic())
 
-    def reboot(self) -> None:
-        """Restart the vehicle's firmware; only by radio. Blocks.
+    def reboot(self, mode: str = "firmware") -> None:
+        """Restart the vehicle, or switch it off; only by radio. Blocks.
 
         The link is lost by that: it is taken up again if `reconnect` is set.
+
+        Parameters
+        ----------
+        mode : str
+            One of `crazyflie_py.reboot.MODES`.
 
         Raises
         ------
         CrazyflieError
             Not a radio link, or the vehicle has not acknowledged it.
         """
-        reboot(self.address, before=lambda: self._drop("the vehicle is restarted"))
+        reboot(self.address, lambda: self._drop("the vehicle is restarted"), mode)
 
     def close(self) -> None:
         """End the connection; safe to call twice and while connecting."""

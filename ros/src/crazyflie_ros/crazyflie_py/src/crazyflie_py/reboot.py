@@ -8,15 +8,29 @@ from crazyflie_py.address import Address
 from crazyflie_py.backend import init_drivers
 from crazyflie_py.errors import RefusedError, explain
 
+MODES = {
+    "firmware": "reboot_to_fw",
+    "bootloader": "reboot_to_bootloader",
+    "sysoff": "stm_power_down",
+    "syson": "stm_power_up",
+    "alloff": "platform_power_down",
+}
+"""What can be done -> cflib's name of it: restart into the firmware or the boot loader, switch
+the main processor and the decks off or on again, switch everything off."""
 
-def reboot(address: Address, before: Callable[[], None] = lambda: None) -> None:
-    """Restart a vehicle's firmware, without a connection; only by radio. Blocks.
+
+def reboot(
+    address: Address, before: Callable[[], None] = lambda: None, mode: str = "firmware"
+) -> None:
+    """Restart a vehicle or switch it off, without a connection; only by radio. Blocks.
 
     Parameters
     ----------
     address : Address
     before : callable
         Called once it is clear that the link can do it.
+    mode : str
+        One of `MODES`.
 
     Raises
     ------
@@ -32,7 +46,7 @@ def reboot(address: Address, before: Callable[[], None] = lambda: None) -> None:
     try:
         switch = PowerSwitch(address.uri)
         try:
-            switch.reboot_to_fw()
+            getattr(switch, MODES[mode])()
         finally:
             switch.close()
     except Exception as error:

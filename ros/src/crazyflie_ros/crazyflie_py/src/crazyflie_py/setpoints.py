@@ -5,11 +5,15 @@ their descriptions, since that is what counts.
 """
 
 import math
+import struct
 import threading
 import time
 from collections.abc import Sequence
 
+from cflib.crtp.crtpstack import CRTPPort
+
 from crazyflie_model.limits import FULL_PWM
+from crazyflie_py.backend import packet
 from crazyflie_py.checks import check_finite
 from crazyflie_py.errors import ValueRangeError
 from crazyflie_py.subsystem import Subsystem
@@ -20,6 +24,13 @@ ZEROS = 100
 _SENT_LIMIT = 1.0
 _STREAM = "setpoint"
 _MOST_MILLI = 32.767
+
+_VELOCITY_WORLD, _HOVER = 1, 5
+"""Types of generic setpoints whose yaw rate the firmware negates. They are what
+crazyflie_cpp sends, and all firmware knows them; 8 and 10, which cflib sends from protocol
+9 on, are the same without the negation."""
+
+_FOUR_FLOATS = struct.Struct("<Bffff")
 
 
 class Setpoints(Subsystem):
@@ -73,14 +84,14 @@ class Setpoints(Subsystem):
         )
 
     def velocity_world(self, vx: float, vy: float, vz: float, yaw_rate: float) -> None:
-        """Velocity in the world (m/s) and yaw rate (degrees/s, counter-clockwise)."""
+        """Velocity in the world (m/s) and yaw rate (degrees/s, positive clockwise)."""
         check_finite("velocity setpoint", vx, vy, vz, yaw_rate)
-        self._stream(lambda c: c.send_velocity_world_setpoint(vx, vy, vz, yaw_rate))
+        self._stream_generic(_VELOCITY_WORLD, vx, vy, vz, yaw_rate)
 
     def hover(self, vx: float, vy: float, yaw_rate: float, height: float) -> None:
-        """Velocity in the body's heading (m/s), yaw rate (degrees/s, ccw) and height (m)."""
+        """Velocity in the heading (m/s), yaw rate (degrees/s, positive clockwise), height (m)."""
         check_finite("hover setpoint", vx, vy, yaw_rate, height)
-        self._stream(lambda c: c.send_hover_setpoint(vx, vy, yaw_rate, height))
+        self._stream_generic(_HOVER, vx, vy, yaw_rate, height)
 
     def position(self, x: float, y: float, z: float, yaw: float) -> None:
         """Position in the world (m) and yaw (degrees)."""
@@ -124,3 +135,12 @@ class Setpoints(Subsystem):
     def _stream(self, send):
         link = self._current_link()
         link.stream(_STREAM, lambda: send(link.cflib.commander))
+
+    def _stream_generic(self, kind, *values):
+        link = self._current_link()
+
+        def send():
+            data = _FOUR_FLOATS.pack(kind, *values)
+            link.cflib.send_packet(packet(CRTPPort.COMMANDER_GENERIC, 0, data))
+
+        link.stream(_STREAM, send)

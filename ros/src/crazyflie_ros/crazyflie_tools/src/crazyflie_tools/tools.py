@@ -1,7 +1,7 @@
 """The tools: each reads its arguments, prints what was asked for and returns its exit status.
 
 Their arguments are by default those of the process. What needs cflib is loaded when the
-arguments are right.
+arguments are right, or where they depend on it.
 """
 
 import argparse
@@ -100,12 +100,22 @@ def _set_param(vehicle, options):
 
 
 def reboot(arguments: list[str] | None = None) -> int:
-    """Restart the firmware of a vehicle."""
-    parser = make_parser("reboot", "Restart the firmware of a vehicle; only by radio.")
+    """Restart a vehicle, or switch it off."""
+    from crazyflie_py.reboot import MODES
+
+    parser = make_parser("reboot", "Restart a vehicle, or switch it off; only by radio.")
+    parser.add_argument(
+        "--mode",
+        choices=MODES,
+        default="firmware",
+        help="restart into the firmware (default) or the boot loader; switch the main processor "
+        "and the decks off or on; switch everything off",
+    )
     add_uri(parser)
     add_timeout(parser)
     options = parser.parse_args(arguments)
-    return run(parser.prog, crazyflie_py.Crazyflie(options.uri.uri).reboot, options.timeout)
+    vehicle = crazyflie_py.Crazyflie(options.uri.uri)
+    return run(parser.prog, lambda: vehicle.reboot(options.mode), options.timeout)
 
 
 def console(arguments: list[str] | None = None) -> int:

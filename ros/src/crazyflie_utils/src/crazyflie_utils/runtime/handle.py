@@ -273,6 +273,10 @@ class NodeHandle:
         reply.add_done_callback(lambda reply: submit(partial(pass_on, reply, outcome, self)))
         return outcome
 
+    def service_nodes(self) -> dict[str, str]:
+        """Return every service that is offered now -> its node; blocks for a few milliseconds."""
+        return self._process.transport.service_nodes()
+
     # Time.
 
     @property

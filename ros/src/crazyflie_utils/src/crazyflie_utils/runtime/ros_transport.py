@@ -9,6 +9,7 @@ from time import monotonic
 from typing import Any
 
 import genpy
+import rosgraph
 import rospy
 
 from crazyflie_utils.runtime import rospy_internals
@@ -118,6 +119,11 @@ class RosTransport(Transport):
         timer.start()
         future.add_done_callback(lambda _: timer.cancel())
         return future
+
+    def service_nodes(self) -> dict[str, str]:
+        """Ask the master."""
+        _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
+        return {name: nodes[0] for name, nodes in services}
 
     def log(self, level: str, text: str) -> None:
         """Log to the screen, the node's log file and /rosout."""

@@ -94,6 +94,10 @@ class Transport(ABC):
         """Call a service and return at once; see `NodeHandle.call_service`."""
 
     @abstractmethod
+    def service_nodes(self) -> dict[str, str]:
+        """Return every service that is offered by anybody -> the name of its node."""
+
+    @abstractmethod
     def log(self, level: str, text: str) -> None:
         """Log at ``level``: debug, info, warn, error or fatal."""
 

@@ -52,6 +52,7 @@ class FakeTransport(Transport):
     """An outside world that remembers everything and does nothing by itself.
 
     Every topic that is subscribed has publishers there, but for those in ``unpublished``.
+    ``foreign_services`` are those of other processes, name -> node.
     """
 
     def __init__(self, parameters: dict[str, object]):
@@ -60,6 +61,7 @@ class FakeTransport(Transport):
         self.subscribers: dict[str, list[Callable[[Any], None]]] = {}
         self.unpublished: set[str] = set()
         self.services: dict[str, Callable[[Any], Future[Any]]] = {}
+        self.foreign_services: dict[str, str] = {}
         self.log_records: list[tuple[str, str]] = []
 
     def remap(self, name: str) -> str:
@@ -125,6 +127,10 @@ class FakeTransport(Transport):
         future: Future[Any] = Future()
         future.set_exception(ServiceError(f"there is no service {name}"))
         return future
+
+    def service_nodes(self) -> dict[str, str]:
+        """Return the services of this process and ``foreign_services``."""
+        return dict.fromkeys(self.services, "/this_process") | self.foreign_services
 
     def log(self, level: str, text: str) -> None:
         """Keep the record."""

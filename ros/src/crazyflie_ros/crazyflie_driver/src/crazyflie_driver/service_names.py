@@ -1,0 +1,96 @@
+"""Names for a vehicle's services, such that no service of another node is taken away.
+
+rosmaster gives a name to whoever comes last, and the callers of the other node are then told
+that the md5 sums differ. A controller in the vehicle's namespace, such as crazyflie_controller,
+has services takeoff and land as well.
+"""
+
+import time
+from collections.abc import Callable, Iterable
+
+from typing_extensions import override
+
+from crazyflie_utils import NodeHandle
+from crazyflie_utils.parameter_types import ParameterType
+
+PAUSE, LIMIT = 0.1, 3.0
+"""How often, and how long at most, in s, a controller that has parameters is waited for."""
+
+ASIDE = "driver"
+"""Below the vehicle's namespace: where services go whose names belong to other nodes."""
+
+_SHARED = {"takeoff", "land"}
+"""What controllers call their services, unless they are remapped."""
+
+
+class ServiceNames:
+    """Find names for a vehicle's services; all methods block.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    prefix : str
+        Absolute namespace of the vehicle; empty for the root.
+    """
+
+    def __init__(self, handle: NodeHandle, prefix: str):
+        self._handle = handle
+        self._prefix = prefix
+
+    def wait_for_controllers(self, is_over: Callable[[], bool]) -> None:
+        """Wait for the services of controllers that are about to come.
+
+        Their parameters are set before they start. They may also have been left by
+        controllers that ended long ago: therefore the wait has a limit.
+
+        Parameters
+        ----------
+        is_over : callable
+            Whether nobody waits any more.
+        """
+        names = self._handle.get_param(self._prefix or "/", _Controllers(), frozenset())
+        awaited = {f"{self._prefix}/{name}" for name in names}
+        end = time.monotonic() + LIMIT
+        while awaited and not is_over() and time.monotonic() < end:
+            awaited = {node for node in awaited if not self._is_ready(node)}
+            if awaited:
+                time.sleep(PAUSE)
+
+    def _is_ready(self, node):
+        offered = {
+            service.rpartition("/")[2]
+            for service, owner in self._handle.service_nodes().items()
+            if owner == node
+        }
+        return _SHARED <= offered
+
+    def free(self, names: Iterable[str]) -> dict[str, str]:
+        """Return the name, such as "takeoff", of each service -> the absolute name that it gets."""
+        nodes = self._handle.service_nodes()
+        found = {}
+        for name in names:
+            wanted = found[name] = f"{self._prefix}/{name}"
+            if wanted in nodes:
+                found[name] = f"{self._prefix}/{ASIDE}/{name}"
+                self._handle.warn(
+                    f"{wanted} is a service of {nodes[wanted]}: the driver's is {found[name]}"
+                )
+        return found
+
+
+class _Controllers(ParameterType):
+    """A namespace; as a value, the names of the nodes in it that have gains of controllers."""
+
+    label = "dictionary"
+
+    @override
+    def __call__(self, value: object) -> frozenset[str]:
+        if not isinstance(value, dict):
+            raise ValueError
+        return frozenset(
+            name for name, below in value.items() if isinstance(below, dict) and "PIDs" in below
+        )
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "a namespace"

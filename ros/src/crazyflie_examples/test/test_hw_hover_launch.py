@@ -29,8 +29,8 @@ ARGUMENTS = {
     "estimator_dt": 0.01,
     "x_dim": 7,
     "u_dim": 4,
-    "uri": "radio://0/25/2M/E7E7E7E701",
-    "mocap_frame": "vicon/cf7/cf7",
+    "uri": "$(arg HY5)",
+    "mocap_frame": "HY5/base_link",
     "joy_dev": "/dev/input/js0",
 }
 
@@ -42,7 +42,6 @@ def test_arguments_of_hw_hover():
         assert defaults[name] is not None
         if expected is not None:
             assert type(expected)(defaults[name]) == expected
-    assert not [name for name in defaults if name.startswith(("sim_", "simulator_"))]
 
 
 @pytest.mark.parametrize("composed", ["true", "false"])
@@ -55,7 +54,7 @@ def test_names_of_one_vehicle_reach_all_nodes(composed):
         robot_frame="cf3",
         final_control_topic="/control/cf3",
     )
-    added = "/crazyflie/crazyflie_add_cf3"
+    added = "/crazyflie/crazyflie_add"
     assert parameters[f"{added}/uri"] == "udp://127.0.0.1:19999"
     assert parameters[f"{added}/tf_prefix"] == "cf3"
     assert parameters["/cmd_vel_converter/topics/cmd_vel"] == "/cf3/cmd_vel"
@@ -91,7 +90,7 @@ def test_arguments_of_hw_hover_can_be_given_to_the_virtual_one():
         mocap_frame="cf7/body",
         robot_frame="cf7",
     )
-    assert parameters["/crazyflie/crazyflie_add_cf7/uri"] == "udp://127.0.0.1:19999"
+    assert parameters["/crazyflie/crazyflie_add/uri"] == "udp://127.0.0.1:19999"
     assert parameters["/takeoff_server/hover/z"] == 0.5
     body = "/mocap_node/rigid_bodies/cf7"
     assert parameters[f"{body}/parent_frame_id"] == parameters["/state_estimator/frames/fixed"]

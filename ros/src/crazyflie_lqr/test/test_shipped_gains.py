@@ -10,6 +10,7 @@ from scipy.linalg import expm
 from crazyflie_lqr.gain_file import load_matrix, load_vector
 
 CONFIG = Path(__file__).parents[1] / "config"
+REFERENCES = Path(__file__).parents[1] / "references"
 G = 9.81
 FULL = load_matrix(str(CONFIG / "K_full_state.txt"), 4, 12)
 
@@ -57,6 +58,39 @@ def test_quadrotor_gains_have_the_closed_form_of_their_weights():
 
 def test_reference_control_is_hover():
     np.testing.assert_array_equal(load_vector(str(CONFIG / "u_ref_hover.txt"), 4), [0, 0, 0, G])
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("K_lqr", (10.0, 1.74, 100.0, 200.0, 28.28)),
+        ("K_manual", (0.25, 1.0, 3.5, 1.5, 1.0)),
+        ("K_poor", (0.5, 0.5, 3.5, 1.0, 1.0)),
+    ],
+)
+def test_reference_gains_are_the_documented_ones(name, numbers):
+    K = load_matrix(str(REFERENCES / f"{name}.txt"), 4, 7)
+    np.testing.assert_array_equal(K, gains(*numbers))
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"),
+    [
+        ("u_ref_hover", [0, 0, 0, G]),
+        ("x_ref_hover", [0, 0, 0.7, 0, 0, 0]),
+        ("x_ref_hover_sim", [0, 0, 5, 0, 0, 0]),
+    ],
+)
+def test_reference_vectors_are_the_documented_ones(name, numbers):
+    vector = load_vector(str(REFERENCES / f"{name}.txt"), len(numbers))
+    np.testing.assert_array_equal(vector, numbers)
+
+
+@pytest.mark.parametrize("file", [*CONFIG.glob("*.txt"), *REFERENCES.glob("*.txt")], ids=str)
+def test_numbers_come_before_comments(file):
+    # The reader of the C++ workspace stops at the first comment.
+    lines = [line.startswith("#") for line in file.read_text().splitlines()]
+    assert lines == sorted(lines)
 
 
 def attitude_loop(rate_bandwidth):

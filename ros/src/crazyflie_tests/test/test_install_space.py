@@ -78,7 +78,7 @@ def test_programs_and_data_are_installed(package, install_space):
         # catkin chooses the interpreter.
         assert code_of(programs[source.name]) == code_of(source)
     share = install_space / "share" / package
-    for folder in ("launch", "config", "urdf", "msg", "srv"):
+    for folder in ("launch", "config", "references", "rviz", "urdf", "msg", "srv"):
         for source in (PACKAGES[package] / folder).rglob("*.*"):
             installed = share / source.relative_to(PACKAGES[package])
             assert installed.read_bytes() == source.read_bytes()

@@ -230,7 +230,7 @@ def test_the_shipped_configuration():
     assert len(process.published("/mocap_node/Robot_1/pose")) == 1
     assert len(process.published("/mocap_node/Robot_1/ground_pose")) == 1
     (transform,) = process.published("/tf")[0].transforms
-    assert (transform.header.frame_id, transform.child_frame_id) == ("world", "vicon/cf7/cf7")
+    assert (transform.header.frame_id, transform.child_frame_id) == ("world", "HY5/base_link")
 
 
 def test_what_means_nothing_is_warned_of():

@@ -32,6 +32,9 @@ def test_two_tours(tmp_path):
             uri1=uri1,
             uri2=uri2,
             joy_dev=tmp_path / "js0",
+            mocap="true",
+            frame1="Robot_1/base_link",
+            frame2="Robot_2/base_link",
             mocap_config_file=config(tmp_path / "mocap.yaml", command_port, 2),
         ),
     ):

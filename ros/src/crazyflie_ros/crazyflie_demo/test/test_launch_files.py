@@ -17,7 +17,7 @@ LAUNCH_FILES = sorted((PACKAGE / "launch").glob("*.launch"))
 OWN = ("crazyflie_controller", "crazyflie_demo", "crazyflie_driver")
 
 DRIVER = {"/crazyflie_server": "crazyflie_server"}
-ONE = {**DRIVER, "/crazyflie/crazyflie_add_crazyflie": "crazyflie_add"}
+ONE = {**DRIVER, "/crazyflie/crazyflie_add": "crazyflie_add"}
 JOYSTICK = {"joy": "joy_node"}
 
 
@@ -34,10 +34,11 @@ def types(nodes):
 def controlled(prefix, goal_type):
     """Return what is expected for a vehicle with a controller."""
     return {
-        f"/{prefix}/crazyflie_add_{prefix}": "crazyflie_add",
+        f"/{prefix}/baselink_broadcaster": "static_transform_publisher",
+        f"/{prefix}/crazyflie_add": "crazyflie_add",
         f"/{prefix}/controller": "crazyflie_controller",
         f"/{prefix}/joystick_controller": "controller.py",
-        f"/{prefix}/goal_source": goal_type,
+        f"/{prefix}/pose": goal_type,
     }
 
 
@@ -51,19 +52,19 @@ def test_teleop(pad):
         "/crazyflie/teleop": "teleop.py",
     }
     assert parameters["/crazyflie/joy/dev"] == "/dev/js7"
-    assert parameters["/crazyflie/crazyflie_add_crazyflie/uri"] == "udp://127.0.0.1:1"
+    assert parameters["/crazyflie/crazyflie_add/uri"] == "udp://127.0.0.1:1"
 
 
 @pytest.mark.parametrize("system", ["mocap", "vicon", "vrpn"])
 def test_hover(system):
-    nodes, parameters = expand(f"hover_{system}.launch", z=0.8)
+    nodes, parameters = expand(f"hover_{system}.launch", z=0.8, mocap="true")
     assert types(nodes) == {
         **DRIVER,
-        **controlled("crazyflie", "publish_pose_teleop.py"),
+        **controlled("crazyflie", "publish_pose.py"),
         "/crazyflie/joy": "joy_node",
         "/mocap_node": "mocap_node",
     }
-    assert parameters["/crazyflie/goal_source/z"] == 0.8
+    assert parameters["/crazyflie/pose/z"] == 0.8
 
 
 @pytest.mark.parametrize("system", ["mocap", "vicon", "vrpn"])
@@ -75,7 +76,7 @@ def test_hover(system):
     ],
 )
 def test_two_vehicles(system, what, goals):
-    nodes, parameters = expand(f"multi_{what}_{system}.launch")
+    nodes, parameters = expand(f"multi_{what}_{system}.launch", mocap="true")
     assert types(nodes) == {
         **DRIVER,
         **controlled("crazyflie1", goals[0]),
@@ -83,17 +84,28 @@ def test_two_vehicles(system, what, goals):
         "/joy": "joy_node",
         "/mocap_node": "mocap_node",
     }
-    uris = [parameters[f"/crazyflie{i}/crazyflie_add_crazyflie{i}/uri"] for i in (1, 2)]
+    uris = [parameters[f"/crazyflie{i}/crazyflie_add/uri"] for i in (1, 2)]
     assert len(set(uris)) == 2
 
 
+@pytest.mark.parametrize("pad", ["xbox360", "ps3"])
+def test_two_joysticks(pad):
+    nodes, parameters = expand(f"multi_teleop_{pad}.launch")
+    assert list(types(nodes).values()).count("teleop.py") == 2
+    assert parameters["/crazyflie1/joy/dev"] != parameters["/crazyflie2/joy/dev"]
+
+
 def motion_capture_files():
-    return [path.name for path in LAUNCH_FILES if path.stem.endswith(("_mocap", "_vicon", "_vrpn"))]
+    return [
+        path.name
+        for path in LAUNCH_FILES
+        if path.stem.endswith(("_mocap", "_vicon", "_vrpn")) and "external" not in path.name
+    ]
 
 
 @pytest.mark.parametrize("file", motion_capture_files())
 def test_motion_capture_publishes_the_frames_that_are_flown_by(file):
-    _, parameters = expand(file)
+    _, parameters = expand(file, mocap="true")
     published = {value for name, value in parameters.items() if name.endswith("child_frame_id")}
     flown = {value for name, value in parameters.items() if name.endswith("/controller/frame")}
     assert flown
@@ -106,9 +118,48 @@ def test_joystick_and_motion_capture_can_be_left_out(file):
     assert not {"joy_node", "mocap_node"} & set(types(nodes).values())
 
 
-@pytest.mark.parametrize("file", ["hover_vicon.launch", "multi_waypoint_vrpn.launch"])
-def test_the_server_of_motion_capture(file):
-    _, parameters = expand(file, hostname="10.0.0.3")
+@pytest.mark.parametrize("system", ["vicon", "vrpn"])
+def test_bodies_have_the_names_that_the_server_knows(system):
+    _, parameters = expand(f"hover_{system}.launch", frame="/vicon/cf9/cf9")
+    assert parameters["/mocap_node/rigid_bodies/cf9/child_frame_id"] == "/vicon/cf9/cf9"
+
+
+def test_a_configuration_of_ones_own_holds_all_bodies(tmp_path):
+    config = tmp_path / "mocap.yaml"
+    config.write_text("rigid_bodies: {'5': {child_frame_id: HY5/base_link}}")
+    _, parameters = expand("hover_mocap.launch", mocap="true", mocap_config_file=str(config))
+    bodies = tree(parameters, "/mocap_node/rigid_bodies/")
+    assert bodies == {"5": {"child_frame_id": "HY5/base_link"}}
+
+
+@pytest.mark.parametrize("mocap", ["true", "false"])
+@pytest.mark.parametrize("what", ["pose", "position"])
+def test_external_poses_reach_the_driver(what, mocap):
+    nodes, parameters = expand(f"external_{what}_vicon.launch", mocap=mocap)
+    published = parameters["/mocap_node/rigid_bodies/cf/pose"]
+    if mocap == "false":
+        assert nodes["/crazyflie/pose"].type == f"publish_external_{what}_vicon.py"
+        assert parameters["/crazyflie/pose/topic"] == "/vicon/cf/cf"
+    elif what == "position":
+        assert nodes["/crazyflie/pose"].type == "publish_external_position_vrpn.py"
+        assert parameters["/crazyflie/pose/topic"] == published
+    else:
+        assert published == "/crazyflie/external_pose"
+        assert "/crazyflie/pose" not in nodes
+
+
+@pytest.mark.parametrize("file", ["hover_mocap.launch", "multi_hover_vrpn.launch"])
+def test_rviz_on_request(file):
+    nodes, parameters = expand(file, rviz="true")
+    assert Path(nodes["/rviz"].args.split()[1]).exists()
+    assert "<robot" in parameters["/robot_description"]
+
+
+@pytest.mark.parametrize(
+    ("file", "argument"), [("hover_vicon.launch", "hostname"), ("multi_waypoint_vrpn.launch", "ip")]
+)
+def test_the_server_of_motion_capture(file, argument):
+    _, parameters = expand(file, **{argument: "10.0.0.3"})
     assert parameters["/mocap_node/motioncapture_config/hostname"] == "10.0.0.3"
     assert parameters["/mocap_node/backend"] in ("vicon", "vrpn")
 
@@ -125,8 +176,8 @@ def test_buttons_call_the_controller_and_not_the_driver():
 
 def test_custom_log_blocks():
     nodes, parameters = expand("customLogBlocks.launch")
-    assert types(nodes) == {**DRIVER, "/crazyflie_add_crazyflie": "crazyflie_add"}
-    prefix = "/crazyflie_add_crazyflie"
+    assert types(nodes) == {**DRIVER, "/crazyflie_add": "crazyflie_add"}
+    prefix = "/crazyflie_add"
     topics = parameters[f"{prefix}/genericLogTopics"]
     assert len(parameters[f"{prefix}/genericLogTopicFrequencies"]) == len(topics)
     for topic in topics:

@@ -38,7 +38,7 @@ class LibrarySource(Source):
     system : str
         One of `SYSTEMS`.
     host : str
-        Name or address of the server.
+        Name or address of the server; for VRPN also with a port, ``vicon:3884``.
     clock : callable
         Returns the local time, s.
     """
@@ -53,9 +53,10 @@ class LibrarySource(Source):
 
     @override
     def open(self) -> str:
+        name, colon, port = self._host.partition(":")
         try:
             # The package does not take names.
-            address = socket.gethostbyname(self._host)
+            address = socket.gethostbyname(name) + colon + port
         except OSError as error:
             raise SourceError(
                 f"motioncapture_config/hostname {self._host!r} is unknown: {error}"

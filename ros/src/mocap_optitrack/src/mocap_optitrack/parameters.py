@@ -223,7 +223,10 @@ class LibraryParameters(Parameters):
     """How to find a server of another system, ``motioncapture_config``."""
 
     hostname: str | None = parameter(
-        TEXT, "the other systems, which require it: host name or address of the server", None
+        TEXT,
+        "the other systems, which require it: host name or address of the server; for VRPN also "
+        "with a port, `vicon:3884`",
+        None,
     )
 
 

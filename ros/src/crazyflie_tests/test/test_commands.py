@@ -33,5 +33,6 @@ def test_the_picture_of_the_graph_shows_the_graph_that_runs(workspace):
     # Whatever graphviz has drawn anew when the page of the graph was tested.
     drawn = workspace / "docs" / "images" / "sw_hover_graph.svg"
     shipped = TOP / "docs" / "images" / "sw_hover_graph.svg"
-    titles = [re.findall("<title>(.*)</title>", path.read_text()) for path in (drawn, shipped)]
+    # Some versions of graphviz give the whole drawing a title, too.
+    titles = [re.findall("<title>([^%].*)</title>", path.read_text()) for path in (drawn, shipped)]
     assert sorted(titles[0]) == sorted(titles[1])

@@ -7,5 +7,5 @@ function(crazyflie_add_pytest path)
   string(REPLACE "/" "_" name "${path}")
   set(report "${CATKIN_TEST_RESULTS_DIR}/${PROJECT_NAME}/pytest-${name}.xml")
   catkin_run_tests_target("pytest" "${name}" "pytest-${name}.xml"
-    COMMAND "${PYTHON_EXECUTABLE} -m pytest ${CMAKE_CURRENT_SOURCE_DIR}/${path} -q -p no:cacheprovider -p crazyflie_utils.testing.hypothesis_profile --junit-xml=${report}")
+    COMMAND "${PYTHON_EXECUTABLE} -m pytest ${CMAKE_CURRENT_SOURCE_DIR}/${path} -q -p no:cacheprovider -p crazyflie_utils.testing.pytest_plugin --junit-xml=${report}")
 endfunction()

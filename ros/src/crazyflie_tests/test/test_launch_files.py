@@ -174,13 +174,16 @@ def test_xacro_finds_packages(tmp_path):
     assert 'link name="base_link"' in made
 
 
-@pytest.mark.parametrize(("name", "is_there"), [("joy", True), ("other", False)])
-def test_stand_ins_give_way(tmp_path, name, is_there):
+@pytest.mark.parametrize(
+    ("place", "is_there"),
+    [("theirs/joy", True), ("theirs/other", False), ("own/install/share/joy", False)],
+)
+def test_stand_ins_give_way(tmp_path, place, is_there):
     # What the top-level CMakeLists.txt does, in a workspace with one stand-in.
     text = (TOP / "ros" / "src" / "CMakeLists.txt").read_text()
     loop = re.search(r"foreach\(name joy xacro\).*?endforeach\(\)", text, re.DOTALL).group()
     stand_in = tmp_path / "own" / "src" / "stand_ins" / "joy"
-    real = tmp_path / "theirs" / name
+    real = tmp_path / place
     for folder in (stand_in, real):
         folder.mkdir(parents=True)
         (folder / "package.xml").write_text(
@@ -189,7 +192,7 @@ def test_stand_ins_give_way(tmp_path, name, is_there):
         )
     script = tmp_path / "loop.cmake"
     script.write_text(f'set(WORKSPACE "{tmp_path}/own")\n' + loop.replace("joy xacro", "joy"))
-    path = f"{tmp_path}/own/src:{tmp_path}/theirs"
+    path = f"{tmp_path}/own/src:{real.parent}"
     environment = {**os.environ, "ROS_PACKAGE_PATH": path, "ROS_HOME": str(tmp_path)}
     subprocess.run(["cmake", "-P", script], env=environment, timeout=60, check=True)
     assert (stand_in / "CATKIN_IGNORE").exists() == is_there

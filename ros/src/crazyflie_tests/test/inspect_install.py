@@ -31,6 +31,8 @@ def wrong_modules(space: Path, packages: list[str]) -> list[str]:
             if name.endswith("__main__"):
                 continue  # It would run.
             home = importlib.import_module(name).__file__
+            if Path(home).is_relative_to(sys.prefix):
+                continue  # PyPI's; the package of this name stands in for it and has no modules.
             if not home.startswith(f"{space}/"):
                 complaints.append(f"{name} is {home}")
     return complaints

@@ -35,12 +35,12 @@ def table(*classes: type[Parameters]) -> str:
 
 
 def _cells(declaration: Declaration) -> tuple[str, ...]:
-    kind = declaration.type
+    parameter_type = declaration.type
     live = " *(live)*" if declaration.live else ""
     return (
-        ", ".join(filter(None, [kind.label, kind.unit])),
+        ", ".join(filter(None, [parameter_type.label, parameter_type.unit])),
         _default(declaration.default),
-        kind.range.replace("|", "\\|"),
+        parameter_type.range.replace("|", "\\|"),
         declaration.help.replace("|", "\\|") + live,
     )
 

@@ -1,0 +1,19 @@
+"""What the real firmware did, as it was recorded: release 2026.08 in the loop, over cflib."""
+
+import functools
+import json
+import pathlib
+from typing import Any
+
+_FILE = pathlib.Path(__file__).parent / "recorded/firmware_2026_08.json"
+
+
+@functools.cache
+def scenarios() -> dict[str, Any]:
+    """Return all scenarios by name: their steps in words, and what the firmware did."""
+    return json.loads(_FILE.read_text())["scenarios"]
+
+
+def recorded(name: str) -> dict[str, Any]:
+    """Return what the firmware did in a scenario. Positions in m, angles in deg, times in s."""
+    return scenarios()[name]["firmware"]

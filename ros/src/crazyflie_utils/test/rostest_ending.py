@@ -8,6 +8,7 @@ import rospy
 from processes import composed, small_node
 from small_nodes import SAFE
 from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
 
 from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
@@ -72,3 +73,60 @@ def test_callback_that_never_returns_does_not_keep_the_process():
         process.signal(signal.SIGINT)
         assert process.wait() == 1
     assert "a callback has not returned within 2 s" in process.output
+
+
+def wait_for_notice(process):
+    wait_until(lambda: "in flight; ends after the landing" in process.output, "the notice")
+
+
+@pytest.fixture
+def flight():
+    """Return a pilot in flight at /cf/pilot, its instrument, and both processes, as heard."""
+    with (
+        listening("/cf/pilot/time", Float64) as ticks,
+        listening("/cf/sensors/instrument/time", Float64) as measurements,
+        small_node("Pilot", "pilot", "__ns:=/cf", "_time_step:=0.01") as pilot,
+        small_node("Instrument", "instrument", "__ns:=/cf/sensors", "_time_step:=0.01") as other,
+    ):
+        ticks.get(timeout=LIMIT)
+        measurements.get(timeout=LIMIT)
+        yield pilot, other
+
+
+def test_processes_that_are_needed_in_flight_end_after_the_landing(flight):
+    for process in flight:
+        interrupt(process, "")
+    for process in flight:
+        wait_for_notice(process)
+    wait_until(lambda: "asked to land" in flight[0].output, "the pilot's leaving")
+    with listening("/cf/sensors/instrument/time", Float64) as measurements:
+        assert measurements.get(timeout=LIMIT).data != SAFE
+        assert rospy.ServiceProxy("/cf/pilot/land", Trigger)().success
+        assert last_word(measurements) == SAFE
+    assert [process.wait() for process in flight] == [0, 0]
+
+
+def test_second_interrupt_ends_at_once_and_safely(flight):
+    for process in flight:
+        interrupt(process, "")
+        wait_for_notice(process)
+        interrupt(process, "")
+        assert process.wait() == 0
+
+
+def test_termination_does_not_wait_for_flights(flight):
+    for process in flight:
+        terminate(process, "")
+        assert process.wait() == 0
+        assert "in flight; ends after" not in process.output
+
+
+def test_flights_in_another_namespace_are_not_waited_for(flight):
+    with (
+        listening("/cf2/instrument/time", Float64) as measurements,
+        small_node("Instrument", "instrument", "__ns:=/cf2", "_time_step:=0.01") as process,
+    ):
+        measurements.get(timeout=LIMIT)
+        interrupt(process, "")
+        assert process.wait() == 0
+    assert "in flight; ends after" not in process.output

@@ -85,6 +85,31 @@ class Ticker(Node):
         self._publisher.publish(Float64(SAFE))
 
 
+class Pilot(Ticker):
+    """A ticker in flight, which lands at ~land only; ~time_step is that of the ticks."""
+
+    needed_in_flight = True
+
+    def register_callbacks(self, handle):
+        self._tell = handle.announce_flights()
+        self._tell(True)
+        super().register_callbacks(handle)
+        handle.advertise_service("~land", Trigger, self._land)
+
+    def leave(self):
+        self._handle.info("asked to land")
+
+    def _land(self, request):
+        self._tell(False)
+        return TriggerResponse(True, "")
+
+
+class Instrument(Ticker):
+    """A ticker that pilots need."""
+
+    needed_in_flight = True
+
+
 class Clockwork(Node):
     """Moves simulated time by 10 ms every millisecond."""
 

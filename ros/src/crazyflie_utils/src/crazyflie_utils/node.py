@@ -1,6 +1,7 @@
 """The anatomy that all nodes share."""
 
 import traceback
+from typing import ClassVar
 
 from crazyflie_utils.parameters import ParameterError
 from crazyflie_utils.runtime.handle import NodeHandle
@@ -22,6 +23,9 @@ class Node:
     Callbacks never run before `initialize` is through and never at the same
     time, so a node needs no locks.
     """
+
+    needed_in_flight: ClassVar[bool] = False
+    """Whether a process with this node lives on after SIGINT until flights have ended."""
 
     _handle: NodeHandle
 
@@ -69,6 +73,9 @@ class Node:
 
         By default the node falls silent; the vehicle's watchdog does the rest.
         """
+
+    def leave(self) -> None:
+        """End what needs time, such as a flight: called at SIGINT, when all goes on for a while."""
 
     def shutdown(self) -> None:
         """End: called once, when timers no longer fire and topics still work."""

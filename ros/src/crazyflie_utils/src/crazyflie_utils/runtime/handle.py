@@ -14,6 +14,7 @@ from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.parameter_types import ParameterType
 from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_parameter
+from crazyflie_utils.runtime import flights
 from crazyflie_utils.runtime.faults import Faults
 from crazyflie_utils.runtime.services import pass_on, serve
 from crazyflie_utils.runtime.timers import Timer
@@ -323,6 +324,15 @@ class NodeHandle:
             publisher.publish(Clock(stamp))
 
         return set_clock
+
+    def announce_flights(self) -> Callable[[bool], None]:
+        """Return ``tell(in_flight)``, which tells every process of flights that this node ends.
+
+        Processes with nodes that are needed in flight do not end at SIGINT before it.
+        """
+        tell, close = flights.announce(self._process, self._name)
+        self._undo.append(close)
+        return tell
 
     # tf.
 

@@ -85,6 +85,17 @@ class Process:
         self._steady.stop()
         self._simulated.stop()
 
+    def leave(self, nodes: dict[str, Node]) -> None:
+        """Have every node begin to end what needs time.
+
+        Parameters
+        ----------
+        nodes : dict of str to Node
+            By absolute name.
+        """
+        for name, node in nodes.items():
+            self.executor.submit(self.handle(name).guard(node.leave))
+
     def shut_down(self, nodes: dict[str, Node]) -> None:
         """Let no timer fire again, and every node leave its vehicle safe.
 

@@ -17,6 +17,7 @@ import rospy
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import BOOLEAN, GraphName, ParameterType
 from crazyflie_utils.parameters import ParameterError, Parameters, parameter
+from crazyflie_utils.runtime.flights import Flights
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.ros_transport import RosTransport
 
@@ -25,6 +26,10 @@ _MASTER_LIMIT = 10.0
 
 _SHUTDOWN_LIMIT = 2.0
 """How long, in s, shutdown waits for a callback that does not return."""
+
+_FLIGHT_LIMIT = 10.0
+"""How long, in s, a process lives on for a flight that is to end: less than the 15 s
+that roslaunch gives it."""
 
 _FLUSH_TIME = 0.2
 """How long, in s, the last messages have to be sent by rospy's threads and to be
@@ -162,11 +167,14 @@ def _run(process, make_nodes):
         _fail()
     ending = _Ending(process, nodes)
     rospy.on_shutdown(ending.run)
+    flights = _flights(process, nodes)
     signals = _catch_signals()
     # Not in this thread, which must stay free to end a callback that does not.
     threading.Thread(target=process.start, name="start", daemon=True).start()
     while not signals and process.exit_status is None and not rospy.is_shutdown():
         time.sleep(0.1)
+    if signals == [signal.SIGINT] and flights is not None:
+        _let_flights_end(process, nodes, flights, signals)
     rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
     if ending.is_stuck:
         _exit_at_once(1)
@@ -193,15 +201,37 @@ class _Ending:
         time.sleep(_FLUSH_TIME)
 
 
+def _flights(process, nodes):
+    needed = [name for name, node in nodes.items() if node.needed_in_flight]
+    return Flights(process, needed) if needed else None
+
+
+def _let_flights_end(process, nodes, flights, signals):
+    if not flights.in_flight:
+        return
+    process.transport.log(
+        "warn",
+        f"{', '.join(flights.in_flight)}: in flight; ends after the landing, or in "
+        f"{_FLIGHT_LIMIT:g} s; a second SIGINT ends at once",
+    )
+    # Not in this thread: a callback may never return.
+    threading.Thread(target=process.leave, args=(nodes,), name="leave", daemon=True).start()
+    end = time.monotonic() + _FLIGHT_LIMIT
+    while flights.in_flight and len(signals) == 1 and time.monotonic() < end:
+        time.sleep(0.05)
+
+
 def _catch_signals():
     # rospy's own handlers shut down inside the handler, where any lock may be
-    # held by the very code that was interrupted. A second signal kills.
+    # held by the very code that was interrupted.
     caught = []
 
     def note(number, _frame):
         caught.append(number)
-        for each in ends:
-            signal.signal(each, signal.SIG_DFL)
+        # After a first SIGINT a flight may have to end; the next signal ends that.
+        if len(caught) > 1 or number != signal.SIGINT:
+            for each in ends:
+                signal.signal(each, signal.SIG_DFL)
 
     ends = (signal.SIGINT, signal.SIGTERM)
     for each in ends:

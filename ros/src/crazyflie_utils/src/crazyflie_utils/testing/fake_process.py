@@ -149,13 +149,20 @@ class FakeProcess(Process):
         Full name to raw value, such as {"/simulator/time_step": 0.01}.
     start : float
         Simulated time at the beginning, s.
+    transport : FakeTransport, optional
+        In the place of one with ``parameters``.
     """
 
     transport: FakeTransport
     clock: SimulatedClock
 
-    def __init__(self, parameters: dict[str, object] | None = None, start: float = 100.0):
-        super().__init__(FakeTransport(parameters or {}), use_sim_time=True)
+    def __init__(
+        self,
+        parameters: dict[str, object] | None = None,
+        start: float = 100.0,
+        transport: FakeTransport | None = None,
+    ):
+        super().__init__(transport or FakeTransport(parameters or {}), use_sim_time=True)
         self.clock.set(start)
         self.executor.start()
 

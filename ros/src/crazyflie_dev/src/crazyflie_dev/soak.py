@@ -1,0 +1,225 @@
+"""Flies the software example for hours while things go wrong, and watches what has to hold.
+
+The nodes and their parameters are those of sw_hover.launch, each node in a fake process of
+its own, so that it can be killed and frozen; time is moved by hand, as fast as it goes. Run
+``python3 -m crazyflie_dev.soak --duration 3600 --seed 1``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections import Counter
+from concurrent.futures import Future
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import rospkg
+from std_srvs.srv import EmptyRequest
+from tqdm import tqdm
+
+from crazyflie_dev.launch_files import composed_nodes, expand
+from crazyflie_dev.soak_faults import FAULTS, Fault, Flight
+from crazyflie_dev.soak_watch import Watch
+from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.testing import FakeGraph
+
+HOVER_HEIGHT = 1.0
+"""Of the launch file, m."""
+
+_STEP = 0.05
+"""How often the operator looks, s."""
+
+_PATIENCE = 30.0
+"""How long the operator waits for a call, or for the vehicle to come to rest, s."""
+
+
+class Soak:
+    """Flights one after the other, with a fault in each.
+
+    Parameters
+    ----------
+    seed : int
+        Of the faults, and of everything else that is random.
+    **arguments
+        Of sw_hover.launch.
+
+    Attributes
+    ----------
+    watch : Watch
+    faults : collections.Counter
+        Fault -> how often.
+    refused, answered : int
+        Takeoffs that were refused, and those that were not.
+    """
+
+    def __init__(self, seed: int, **arguments: object):
+        launch_file = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/sw_hover.launch"
+        given = {"composed": True, "rviz": False, "simulator_dt": 0.005, **arguments}
+        _, parameters = expand(launch_file, **given)
+        self._classes = {
+            f"/{name}": node for name, node in NodeClasses()(composed_nodes(parameters)).items()
+        }
+        self.graph = FakeGraph({**parameters, "/simulator/seed": seed})
+        self.random = Random(seed)
+        self.watch = Watch(self.graph)
+        self.faults: Counter[str] = Counter()
+        self.refused = self.answered = 0
+        self._flight = Flight(self.graph, self.random, self._start)
+        self.watch.begin()
+        for name in self._classes:
+            self._start(name)
+        self.graph.advance(2.0)
+
+    def _start(self, name):
+        if not self.graph.is_alive(name):
+            self.graph.start(name, self._classes[name]())
+
+    def fly(self, fault: Fault) -> None:
+        """Take off, refer, land; let ``fault`` happen at some moment of it."""
+        self.watch.renew()
+        self.faults[fault.name] += 1
+        begin = self.graph.time + self.random.uniform(0.0, 18.0)
+        timeline = _Fault(fault, begin, self.random, self._flight, self.watch)
+        self._call("/takeoff", timeline, allow=HOVER_HEIGHT)
+        for _ in range(self.random.randint(0, 3)):
+            self._refer(self.random.uniform(-1, 1), self.random.uniform(-1, 1))
+            self._wait(self.random.uniform(0.5, 2.5), timeline)
+        self._call("/land", timeline)
+        # What has not happened yet happens on the ground.
+        while not timeline.is_over:
+            self._wait(_STEP, timeline)
+        self._come_to_rest(timeline)
+
+    def _refer(self, x, y):
+        height = self.random.uniform(0.6, 1.4)
+        self.watch.allow(height)
+        message = PositionVelocityStateStamped()
+        message.header.stamp = self.graph.stamp()
+        message.state.x, message.state.y, message.state.z = x, y, height
+        self.graph.publish("/ref", message)
+
+    def _call(self, service, timeline, allow=None):
+        if allow is not None:
+            self.watch.may_fly = True
+            self.watch.allow(allow)
+        outcome: Future[Any] = self.graph.call(service, EmptyRequest())
+        end = self.graph.time + _PATIENCE
+        # A server that is killed never answers.
+        while not outcome.done() and self.graph.time < end and self.graph.is_alive("/takeoff_server"):
+            self._wait(_STEP, timeline)
+        if allow is not None and outcome.done():
+            if outcome.exception() is None:
+                self.answered += 1
+            else:
+                self.refused += 1
+
+    def _come_to_rest(self, timeline):
+        end = self.graph.time + _PATIENCE
+        while self.watch.height > 0.01 or self.watch.state != "on_ground":
+            self._wait(0.5, timeline)
+            if self.watch.state == "flying":
+                self._call("/land", timeline)
+            if self.graph.time > end:
+                self.watch.say(f"not at rest: {self.watch.state}, {self.watch.height:.2f} m")
+                break
+        self._wait(1.0, timeline)
+        self.watch.may_fly = False
+        # Nothing may begin by itself now.
+        self._wait(2.0, timeline)
+
+    def _wait(self, duration, timeline):
+        end = self.graph.time + duration
+        while self.graph.time < end - 1e-9:
+            timeline.update()
+            self.graph.advance(min(_STEP, end - self.graph.time))
+
+
+class _Fault:
+    """One fault on its way: not yet, now, over."""
+
+    def __init__(self, fault, begin, random, flight, watch):
+        self._fault = fault
+        self._begin = begin
+        self._end = begin + random.uniform(fault.shortest, fault.longest)
+        self._flight = flight
+        self._watch = watch
+        self._undo = None
+        self.is_over = False
+
+    def update(self):
+        now = self._flight.graph.time
+        if self._undo is None and not self.is_over and now >= self._begin:
+            self._watch.is_blind = self._fault.blinds
+            self._undo = self._fault.begin(self._flight)
+        if self._undo is not None and now >= self._end:
+            self._undo()
+            self._undo = None
+            self._watch.is_blind = False
+            self.is_over = True
+
+
+def soak(duration: float, seed: int, progress: bool = False, **arguments: object) -> dict[str, Any]:
+    """Fly for ``duration`` (s, simulated) and return what was seen, as JSON knows it.
+
+    Parameters
+    ----------
+    duration : float
+    seed : int
+    progress : bool
+        Whether to show a bar on the terminal.
+    **arguments
+        Of sw_hover.launch.
+    """
+    began = time.monotonic()
+    run = Soak(seed, **arguments)
+    start = run.graph.time
+    names = []
+    with tqdm(total=round(duration), unit="s", disable=not progress) as bar:
+        while run.graph.time - start < duration:
+            before = len(run.watch.violations)
+            # Each fault once, in a new order, before any comes again.
+            names = names or run.random.sample(FAULTS, len(FAULTS))
+            fault = names.pop()
+            run.fly(fault)
+            new = run.watch.violations[before:]
+            run.watch.violations[before:] = [f"{fault.name}: {each}" for each in new]
+            bar.update(round(run.graph.time - start) - bar.n)
+    flown = run.graph.time - start
+    return {
+        "seed": seed,
+        "arguments": {name: str(value) for name, value in arguments.items()},
+        "simulated, s": round(flown, 1),
+        "times real time": round(flown / (time.monotonic() - began), 1),
+        "takeoffs answered, refused": [run.answered, run.refused],
+        "faults": dict(sorted(run.faults.items())),
+        "highest above reference, m": round(run.watch.highest, 3),
+        "farthest from start, m": round(run.watch.farthest, 3),
+        "hardest landing, m/s": round(run.watch.hardest, 2),
+        "errors logged": sum(level in ("error", "fatal") for level, _ in run.graph.log),
+        "violations": run.watch.violations,
+    }
+
+
+def main() -> int:
+    """Run a soak; print what was seen; exit with 1 when anything did not hold."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--duration", type=float, default=3600.0, help="s, simulated")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--dynamics", default="near_hover", help="of sw_hover.launch")
+    parser.add_argument("--output", type=Path, help="JSON file")
+    options = parser.parse_args()
+    result = soak(options.duration, options.seed, progress=True, dynamics=options.dynamics)
+    text = json.dumps(result, indent=2)
+    print(text)
+    if options.output is not None:
+        options.output.write_text(text + "\n")
+    return 1 if result["violations"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,156 @@
+"""What goes wrong in a soak: faults on topics, of nodes and by people."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from random import Random
+from typing import Any
+
+import genpy
+from crazyflie_msgs.msg import PositionVelocityStateStamped
+
+from crazyflie_utils.testing import FakeGraph
+
+CONTROLLER, ESTIMATOR, SERVER, FILTER = (
+    "/lqr_controller",
+    "/state_estimator",
+    "/takeoff_server",
+    "/takeoff_control_filter",
+)
+_NODES = (CONTROLLER, ESTIMATOR, SERVER, FILTER)
+
+_RESPAWN = 1.0
+"""From the end of a node until roslaunch has started it anew, s."""
+
+Undo = Callable[[], None]
+
+
+@dataclass
+class Flight:
+    """What faults act on.
+
+    Attributes
+    ----------
+    graph : FakeGraph
+    random : Random
+    respawn : callable
+        ``respawn(name)`` starts a node's process anew.
+    """
+
+    graph: FakeGraph
+    random: Random
+    respawn: Callable[[str], None]
+
+
+@dataclass
+class Fault:
+    """A fault: how it begins, how long it lasts.
+
+    Attributes
+    ----------
+    name : str
+    begin : callable
+        ``begin(flight)`` returns what ends it.
+    shortest, longest : float
+        s.
+    blinds : bool
+        Whether there is no good pose while it lasts.
+    """
+
+    name: str
+    begin: Callable[[Flight], Undo]
+    shortest: float
+    longest: float
+    blinds: bool = False
+
+
+def _on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Undo]:
+    def begin(flight):
+        flight.graph.faults["/tf"] = lambda message: change(message, flight)
+        return lambda: flight.graph.faults.pop("/tf")
+
+    return begin
+
+
+def _with_each(edit: Callable[[Any, Flight], None]) -> Callable[[Flight], Undo]:
+    def change(message, flight):
+        changed = copy.deepcopy(message)
+        for transform in changed.transforms:
+            edit(transform, flight)
+        return [changed]
+
+    return _on_tf(change)
+
+
+def _nan(transform, _):
+    transform.transform.translation.x = math.nan
+
+
+def _flat_quaternion(transform, _):
+    transform.transform.rotation.w = 0.0
+
+
+def _jump(transform, flight):
+    translation = transform.transform.translation
+    translation.x += flight.random.uniform(-3.0, 3.0)
+    translation.z += flight.random.uniform(-1.0, 3.0)
+
+
+def _shift(offset: float) -> Callable[[Any, Flight], None]:
+    def edit(transform, _):
+        stamp = max(0.0, transform.header.stamp.to_sec() + offset)
+        transform.header.stamp = genpy.Time.from_sec(stamp)
+
+    return edit
+
+
+def _dropout(message, flight):
+    return [] if flight.random.random() < 0.5 else [message]
+
+
+def _kill(name: str) -> Callable[[Flight], Undo]:
+    def begin(flight):
+        if flight.graph.is_alive(name):
+            flight.graph.kill(name)
+        return lambda: flight.respawn(name)
+
+    return begin
+
+
+def _freeze(name: str) -> Callable[[Flight], Undo]:
+    def begin(flight):
+        flight.graph.freeze(name)
+        return lambda: flight.graph.thaw(name)
+
+    return begin
+
+
+def _refer_to(x: float, y: float, z: float, age: float = 0.0) -> Callable[[Flight], Undo]:
+    def begin(flight):
+        message = PositionVelocityStateStamped()
+        message.header.stamp = genpy.Time.from_sec(flight.graph.time - age)
+        message.state.x, message.state.y, message.state.z = x, y, z
+        flight.graph.publish("/ref", message)
+        return lambda: None
+
+    return begin
+
+
+FAULTS = [
+    Fault("poses stop for a moment", _on_tf(lambda *_: []), 0.05, 0.45, blinds=True),
+    Fault("poses stop", _on_tf(lambda *_: []), 0.7, 9.0, blinds=True),
+    Fault("every second pose is lost", _on_tf(_dropout), 1.0, 5.0),
+    Fault("poses are not finite", _with_each(_nan), 0.3, 4.0, blinds=True),
+    Fault("quaternions are no rotations", _with_each(_flat_quaternion), 0.3, 4.0, blinds=True),
+    Fault("poses jump", _with_each(_jump), 0.3, 4.0, blinds=True),
+    Fault("stamps are 3 s old", _with_each(_shift(-3.0)), 0.3, 4.0, blinds=True),
+    Fault("stamps are 8 s ahead", _with_each(_shift(8.0)), 0.3, 4.0, blinds=True),
+    *(Fault(f"{name} is killed", _kill(name), _RESPAWN, _RESPAWN) for name in _NODES),
+    *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0) for name in _NODES),
+    Fault("reference is not a number", _refer_to(math.nan, 0.0, 1.0), 0.1, 0.1),
+    Fault("reference is far away", _refer_to(50.0, -50.0, 20.0), 0.1, 0.1),
+    Fault("reference is old", _refer_to(0.5, 0.5, 0.3, age=30.0), 0.1, 0.1),
+]

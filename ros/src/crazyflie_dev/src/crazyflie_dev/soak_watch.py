@@ -1,0 +1,151 @@
+"""What has to hold at every step of a soak, whatever fails."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from crazyflie_model.units import GRAVITY
+from crazyflie_utils.testing import FakeGraph
+
+MOST_THRUST = 16.0
+"""Of a final control, m/s^2: the controller's limit."""
+
+MOST_TILT = math.radians(15.1)
+"""Of a final control, rad: the controller's limit."""
+
+OVERSHOOT = 0.2
+"""How far above its highest reference a vehicle may be, m."""
+
+BLIND_LIMIT = 8.0
+"""How long a vehicle may be in the air without a good pose, s: 0.1 s until it is level,
+0.5 s in which the pose may come back, 5 s of descent, and what it falls then."""
+
+FLY_AWAY = 4.0
+"""How far from its start a vehicle may be, m; no reference is further than 1 m."""
+
+HARD_LANDING = 2.0
+"""Most speed at which it may meet the ground unless its motors were switched off, m/s."""
+
+_AIRBORNE = 0.05
+"""Height from which on a vehicle is in the air, m."""
+
+_LEGAL = {
+    "on_ground": {"taking_off"},
+    "taking_off": {"flying", "descending", "landing", "on_ground"},
+    "flying": {"descending", "landing", "on_ground"},
+    "descending": {"landing", "on_ground", "flying"},
+    "landing": {"on_ground"},
+}
+
+
+@dataclass
+class Watch:
+    """Compares everything that happens with what has to hold.
+
+    Attributes
+    ----------
+    graph : FakeGraph
+    violations : list of str
+        With the time of each.
+    highest, hardest, farthest : float
+        Largest height above the highest reference, m; speed at which the ground was met
+        with motors on, m/s; distance from the start, m.
+    is_blind : bool
+        Whether a fault keeps good poses away.
+    may_fly : bool
+        Whether a takeoff has been asked for since the vehicle was last on the ground.
+    is_emergency : bool
+        Whether motors have to stand still.
+    """
+
+    graph: FakeGraph
+    violations: list[str] = field(default_factory=list)
+    highest: float = -math.inf
+    hardest: float = 0.0
+    farthest: float = 0.0
+    is_blind: bool = False
+    may_fly: bool = False
+    is_emergency: bool = False
+    height: float = 0.0
+    state: str = ""
+    _reference: float = 0.0
+    _blind_since: float = math.inf
+    _last: tuple[float, float] | None = None
+    _speed: float = 0.0
+    _told: set[str] = field(default_factory=set)
+
+    def begin(self) -> None:
+        """Begin to listen."""
+        self.graph.listen("/tf", self._on_tf)
+        self.graph.listen("/control/final", self._on_control)
+        self.graph.listen("/in_flight_state", self._on_state)
+
+    def allow(self, height: float) -> None:
+        """Take note of a reference at ``height`` (m)."""
+        self._reference = max(self._reference, height)
+
+    def renew(self) -> None:
+        """Begin another flight."""
+        self._told.clear()
+        self._reference = 0.0
+
+    def say(self, text: str) -> None:
+        """Note a violation; the same one once in a flight."""
+        kind = text.split(":")[0]
+        if kind not in self._told:
+            self._told.add(kind)
+            self.violations.append(f"{self.graph.time:.2f} s: {text}")
+
+    def _on_tf(self, message):
+        time = self.graph.time
+        position = message.transforms[0].transform.translation
+        height = self.height = position.z
+        if self._last is not None and time > self._last[0]:
+            speed = (height - self._last[1]) / (time - self._last[0])
+            if height <= 0.001 < self._last[1]:
+                self._touch_down(-self._speed)
+            self._speed = speed
+        self._last = (time, height)
+        self.highest = max(self.highest, height - self._reference)
+        distance = math.hypot(position.x, position.y)
+        self.farthest = max(self.farthest, distance)
+        if height > self._reference + OVERSHOOT and self.may_fly:
+            self.say(f"too high: {height:.2f} m, reference {self._reference:.2f} m")
+        if height > 0.1 and not self.may_fly:
+            self.say(f"in the air unasked: {height:.2f} m")
+        if distance > FLY_AWAY:
+            self.say(f"flown away: {distance:.2f} m")
+        self._watch_blindness(time, height)
+
+    def _touch_down(self, speed):
+        if self.is_emergency:
+            return
+        self.hardest = max(self.hardest, speed)
+        if speed > HARD_LANDING:
+            self.say(f"hard landing: {speed:.2f} m/s")
+
+    def _watch_blindness(self, time, height):
+        if not (self.is_blind and height > _AIRBORNE):
+            self._blind_since = time
+        elif time - self._blind_since > BLIND_LIMIT:
+            self.say(f"in the air without a pose: for {time - self._blind_since:.1f} s")
+
+    def _on_control(self, message):
+        control = message.control
+        numbers = (control.roll, control.pitch, control.yaw_dot, control.thrust)
+        if not all(map(math.isfinite, numbers)):
+            self.say(f"control is not finite: {numbers}")
+        if not 0.0 <= control.thrust <= MOST_THRUST:
+            self.say(f"thrust out of limits: {control.thrust:.2f} m/s^2")
+        if max(abs(control.roll), abs(control.pitch)) > MOST_TILT:
+            self.say(f"tilt out of limits: {control.roll:.2f}, {control.pitch:.2f} rad")
+        if self.is_emergency and control.thrust > 0.0:
+            self.say(f"thrust in emergency: {control.thrust:.2f} m/s^2")
+        if control.thrust > 1.2 * GRAVITY and not self.may_fly:
+            self.say(f"thrust without a takeoff: {control.thrust:.2f} m/s^2")
+
+    def _on_state(self, message):
+        before, self.state = self.state, message.data
+        if before and self.state != before and self.state not in _LEGAL.get(before, ()):
+            self.say(f"flight state went from {before} to {self.state}")

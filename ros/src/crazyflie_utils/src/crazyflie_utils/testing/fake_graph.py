@@ -1,0 +1,252 @@
+"""A whole graph without ROS: processes that are killed, frozen and started anew; time by hand."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import genpy
+
+from crazyflie_utils.node import Node
+from crazyflie_utils.runtime.transport import (
+    ExternalPublisher,
+    ExternalSubscriber,
+    ServiceError,
+)
+from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
+
+Deliver = Callable[[Any], None]
+
+_MOST_WAITING = 100
+"""Messages that wait for a frozen process on one connection; of later ones the last counts."""
+
+
+class FakeGraph:
+    """Processes with a node each, and the connections between them.
+
+    Parameters
+    ----------
+    parameters : dict
+        Full name to raw value, for all processes.
+    start : float
+        Time at the beginning, s.
+
+    Attributes
+    ----------
+    time : float
+        Now, s.
+    faults : dict of str to callable
+        What a fault makes of the messages on a topic: ``fault(message)`` returns those
+        that arrive in its place.
+    log : list of (str, str)
+        Level and text of what nodes have logged.
+    """
+
+    def __init__(self, parameters: dict[str, object], start: float = 100.0):
+        self.time = start
+        self.faults: dict[str, Callable[[Any], list[Any]]] = {}
+        self.log: list[tuple[str, str]] = []
+        self._parameters = parameters
+        self._processes: dict[str, _GraphProcess] = {}
+        self._listeners: dict[str, list[Deliver]] = {}
+        self._latched: dict[tuple[str, str], Any] = {}
+
+    # The processes.
+
+    def start(self, name: str, node: Node) -> None:
+        """Start a process with one node.
+
+        Raises
+        ------
+        RuntimeError
+            The node could not be initialized.
+        """
+        process = self._processes[name] = _GraphProcess(name, self, self._parameters)
+        if not process.launch(node, name):
+            raise RuntimeError(f"{name} was not initialized: {self.log[-1:]}")
+
+    def kill(self, name: str) -> None:
+        """Kill a process as SIGKILL does: it says nothing more."""
+        del self._processes[name]
+        for publication in [each for each in self._latched if each[0] == name]:
+            del self._latched[publication]
+
+    def freeze(self, name: str) -> None:
+        """Stop a process as SIGSTOP does: messages wait for it."""
+        self._processes[name].is_frozen = True
+
+    def thaw(self, name: str) -> None:
+        """Let a frozen process go on, with the messages that have waited."""
+        process = self._processes[name]
+        process.is_frozen = False
+        process.clock.set(self.time)
+        while process.waiting:
+            deliver, message = process.waiting.popleft()
+            deliver(message)
+
+    def is_alive(self, name: str) -> bool:
+        """Return whether a process exists, frozen or not."""
+        return name in self._processes
+
+    # The outside.
+
+    def stamp(self) -> genpy.Time:
+        """Return the ROS time of now."""
+        return genpy.Time.from_sec(self.time)
+
+    def publish(self, topic: str, message: genpy.Message) -> None:
+        """Publish from outside."""
+        self._route("", topic, message)
+
+    def listen(self, topic: str, callback: Deliver) -> None:
+        """Have ``callback(message)`` called with what is published on a topic, faults aside."""
+        self._listeners.setdefault(topic, []).append(callback)
+
+    def call(self, service: str, request: genpy.Message) -> Future[Any]:
+        """Call a service; the future may never be done when its process dies."""
+        for process in self._processes.values():
+            if service in process.transport.services and not process.is_frozen:
+                return process.transport.services[service](request)
+        outcome: Future[Any] = Future()
+        outcome.set_exception(ServiceError(f"there is no service {service}"))
+        return outcome
+
+    def advance(self, duration: float) -> None:
+        """Let time pass (s), stopping at every timer's deadline."""
+        end = self.time + duration
+        while True:
+            awake = [each for each in self._processes.values() if not each.is_frozen]
+            deadline = min((each.next_simulated_deadline() for each in awake), default=math.inf)
+            if deadline > end + 1e-9:
+                break
+            self._move_to(max(deadline, self.time))
+        self._move_to(max(end, self.time))
+
+    def _move_to(self, time):
+        self.time = time
+        for process in list(self._processes.values()):
+            if not process.is_frozen and process.name in self._processes:
+                process.clock.set(time)
+
+    # What the transports need.
+
+    def publishes(self, topic: str, besides: str) -> bool:
+        """Return whether another process than ``besides`` publishes a topic."""
+        return any(
+            topic in process.transport.advertised
+            for name, process in self._processes.items()
+            if name != besides
+        )
+
+    def subscribes(self, topic: str, besides: str) -> bool:
+        """Return whether anyone but ``besides`` receives a topic."""
+        return topic in self._listeners or any(
+            process.transport.subscribers.get(topic)
+            for name, process in self._processes.items()
+            if name != besides
+        )
+
+    def latched(self, topic: str, besides: str) -> list[Any]:
+        """Return what other processes than ``besides`` have latched on a topic."""
+        return [
+            message
+            for (name, latched_topic), message in self._latched.items()
+            if latched_topic == topic and name != besides
+        ]
+
+    def send(self, name: str, topic: str, message: genpy.Message, latch: bool) -> None:
+        """Send a message of process ``name`` to all others."""
+        if latch:
+            self._latched[name, topic] = message
+        self._route(name, topic, message)
+
+    def _route(self, sender, topic, message):
+        for listener in self._listeners.get(topic, ()):
+            listener(message)
+        fault = self.faults.get(topic)
+        for arriving in [message] if fault is None else fault(message):
+            for name, process in list(self._processes.items()):
+                if name != sender:
+                    for deliver in tuple(process.transport.subscribers.get(topic, ())):
+                        process.receive(deliver, arriving)
+
+
+class _GraphProcess(FakeProcess):
+    """One process of the graph."""
+
+    transport: _GraphTransport
+
+    def __init__(self, name: str, graph: FakeGraph, parameters: dict[str, object]):
+        super().__init__(transport=_GraphTransport(name, graph, parameters), start=graph.time)
+        self.name = name
+        self.is_frozen = False
+        self.waiting: deque[tuple[Deliver, Any]] = deque(maxlen=_MOST_WAITING)
+
+    def receive(self, deliver: Deliver, message: Any) -> None:
+        """Deliver a message, or keep it until the process goes on."""
+        if self.is_frozen:
+            self.waiting.append((deliver, message))
+        else:
+            deliver(message)
+
+
+class _Publication(ExternalPublisher):
+    def __init__(self, transport: _GraphTransport, topic: str, latch: bool):
+        self._transport = transport
+        self._topic = topic
+        self._latch = latch
+
+    def has_subscribers(self) -> bool:
+        return self._transport.graph.subscribes(self._topic, self._transport.name)
+
+    def publish(self, message: genpy.Message) -> None:
+        self._transport.graph.send(self._transport.name, self._topic, message, self._latch)
+
+    def close(self) -> None:
+        self._transport.advertised.remove(self._topic)
+
+
+class _Subscription(ExternalSubscriber):
+    def __init__(self, transport: _GraphTransport, topic: str, deliver: Deliver):
+        self._transport = transport
+        self._topic = topic
+        self._deliver = deliver
+
+    def has_publishers(self) -> bool:
+        return self._transport.graph.publishes(self._topic, self._transport.name)
+
+    def close(self) -> None:
+        self._transport.subscribers[self._topic].remove(self._deliver)
+
+
+class _GraphTransport(FakeTransport):
+    """The outside world of one process: the others."""
+
+    def __init__(self, name: str, graph: FakeGraph, parameters: dict[str, object]):
+        super().__init__(parameters)
+        # All processes have one parameter server.
+        self.parameters = parameters
+        self.name = name
+        self.graph = graph
+        self.advertised: list[str] = []
+
+    def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
+        self.advertised.append(topic)
+        return _Publication(self, topic, latch)
+
+    def subscribe(self, topic: str, message_type: type, deliver: Deliver) -> ExternalSubscriber:
+        self.subscribers.setdefault(topic, []).append(deliver)
+        for message in self.graph.latched(topic, self.name):
+            deliver(message)
+        return _Subscription(self, topic, deliver)
+
+    def call_service(
+        self, name: str, service_type: type, request: Any, limit: float
+    ) -> Future[Any]:
+        return self.graph.call(name, request)
+
+    def log(self, level: str, text: str) -> None:
+        self.graph.log.append((level, text))

@@ -9,6 +9,7 @@ import functools
 import genpy
 import rospy
 from rospy import rostime
+from rospy.impl import registration
 
 
 @functools.cache
@@ -43,3 +44,17 @@ def take_over_remappings() -> dict[str, str]:
 def set_time(stamp: genpy.Time) -> None:
     """Set rospy's simulated clock, which stamps the log."""
     rostime._set_rostime(stamp)
+
+
+def register_again() -> None:
+    """Register all topics and services of this process with the master, which knows none."""
+    listeners = registration.get_registration_listeners()
+    topics, services = registration.get_topic_manager(), registration.get_service_manager()
+    kinds = registration.Registration
+    for kind, registered in (
+        (kinds.PUB, topics.get_publications()),
+        (kinds.SUB, topics.get_subscriptions()),
+        (kinds.SRV, services.get_services()),
+    ):
+        for name, type_or_uri in registered:
+            listeners.notify_added(name, type_or_uri, kind)

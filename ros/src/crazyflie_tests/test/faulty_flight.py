@@ -76,6 +76,8 @@ def fly(core_command, arguments, log):
     seen = {}
     with log.open("w") as output, running(*core_command, stdout=output, stderr=output) as core:
         wait_until(rosgraph.is_master_online, "a master", LIMIT)
+        # roslaunch waits for what roscore says of itself.
+        rosgraph.Master("/flight").setParam("/run_id", "faulty_flight")
         launch = ["roslaunch", "--wait", "crazyflie_examples", "sw_hover.launch", "rviz:=false"]
         with running(*launch, *arguments, stdout=output, stderr=output) as roslaunch:
             observer = Observer()

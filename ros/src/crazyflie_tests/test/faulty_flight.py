@@ -5,6 +5,7 @@ Prints what was seen as JSON. Usage: faulty_flight.py [ARGUMENT:=VALUE ...]
 
 import json
 import os
+import resource
 import signal
 import socket
 import sys
@@ -23,6 +24,14 @@ from crazyflie_utils.testing.peer import wait_until
 
 LIMIT = 20.0
 
+NODES = (
+    "/simulator",
+    "/state_estimator",
+    "/lqr_controller",
+    "/takeoff_server",
+    "/takeoff_control_filter",
+)
+
 
 class Observer:
     """Looks at a flight from outside, whether there is a master or not."""
@@ -32,7 +41,7 @@ class Observer:
         self._operator = FlightOperator(self._process)
         self._operator.wait_until_ready()
         self.takeoff, self.land = self._operator.takeoff, self._operator.land
-        self.hover = self._operator.hover
+        self.hover, self.refer_to = self._operator.hover, self._operator.refer_to
         self.record = self._operator.finish
         self._state = self._operator._recorder.record.state
 
@@ -83,6 +92,14 @@ def fly(core_command, arguments, log):
             observer = Observer()
             observer.takeoff()
             controller = node_process("/lqr_controller")
+
+            begin = observer.now
+            for node in NODES:
+                resource.prlimit(node_process(node), resource.RLIMIT_FSIZE, (0, 0))
+            for _ in range(10):
+                observer.refer_to((np.nan, 0.0, 1.0))
+                observer.hover(0.2)
+            seen["heights with a full disk"] = observer.range_since(begin)
 
             begin = observer.now
             os.killpg(core.pid, signal.SIGKILL)

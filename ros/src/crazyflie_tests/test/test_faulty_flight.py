@@ -1,4 +1,4 @@
-"""A flight from which master, controller and finally everything is taken away."""
+"""A flight from which disk, master, controller and finally everything is taken away."""
 
 import json
 import subprocess
@@ -18,6 +18,11 @@ def seen():
     )
     assert flight.returncode == 0, flight.stderr[-5000:]
     return json.loads(flight.stdout)
+
+
+def test_flies_on_when_the_disk_is_full(seen):
+    # The limit of a file's size is what a process sees of a full disk.
+    assert seen["heights with a full disk"] == pytest.approx([1.0, 1.0], abs=0.05)
 
 
 def test_flies_on_without_a_master(seen):

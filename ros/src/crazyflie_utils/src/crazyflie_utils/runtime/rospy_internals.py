@@ -4,9 +4,11 @@ Each of these is needed because a process may hold many nodes, which rospy does
 not provide for. The rostests of this package notice when a rospy differs.
 """
 
+import contextlib
 import functools
 
 import genpy
+import rosgraph.roslogging
 import rospy
 from rospy import rostime
 from rospy.impl import registration
@@ -26,6 +28,22 @@ def never_connect_to_oneself() -> None:
         return endpoint_id == rospy.get_node_uri() or has_connection(self, endpoint_id)
 
     implementation.has_connection = has_connection_or_is_own
+
+
+@functools.cache
+def never_fail_to_log() -> None:
+    """Keep a full disk, or a screen that is gone, from failing whoever logs.
+
+    Python's own handlers do so; rospy's, for the screen, does not.
+    """
+    handler = rosgraph.roslogging.RosStreamHandler
+    emit = handler.emit
+
+    def emit_if_possible(self, record):
+        with contextlib.suppress(OSError):
+            emit(self, record)
+
+    handler.emit = emit_if_possible
 
 
 @functools.cache

@@ -197,8 +197,9 @@ def read_parameter(
         ) from None
     try:
         return expected(raw)
-    except ValueError as error:
-        reason = f" ({error})" if str(error) else ""
+    except (ValueError, TypeError, OverflowError) as error:
+        # The latter two are Python's own words about a number that is none.
+        reason = f" ({error})" if isinstance(error, ValueError) and str(error) else ""
         raise ParameterError(
             f"parameter {full_name(declaration.name)} is {raw!r}; expected {expected}{reason}"
         ) from None

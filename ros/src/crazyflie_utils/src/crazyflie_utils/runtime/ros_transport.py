@@ -61,6 +61,7 @@ class RosTransport(Transport):
 
     def __init__(self) -> None:
         rospy_internals.never_connect_to_oneself()
+        rospy_internals.never_fail_to_log()
         self._remappings = rospy_internals.take_over_remappings()
 
     def remap(self, name: str) -> str:

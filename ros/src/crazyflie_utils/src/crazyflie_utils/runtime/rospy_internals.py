@@ -4,11 +4,14 @@ Each of these is needed because a process may hold many nodes, which rospy does
 not provide for. The rostests of this package notice when a rospy differs.
 """
 
+import contextlib
 import functools
 
 import genpy
+import rosgraph.roslogging
 import rospy
 from rospy import rostime
+from rospy.impl import registration
 
 
 @functools.cache
@@ -28,6 +31,22 @@ def never_connect_to_oneself() -> None:
 
 
 @functools.cache
+def never_fail_to_log() -> None:
+    """Keep a full disk, or a screen that is gone, from failing whoever logs.
+
+    Python's own handlers do so; rospy's, for the screen, does not.
+    """
+    handler = rosgraph.roslogging.RosStreamHandler
+    emit = handler.emit
+
+    def emit_if_possible(self, record):
+        with contextlib.suppress(OSError):
+            emit(self, record)
+
+    handler.emit = emit_if_possible
+
+
+@functools.cache
 def take_over_remappings() -> dict[str, str]:
     """Return the launch file's remappings, absolute name to absolute name.
 
@@ -43,3 +62,17 @@ def take_over_remappings() -> dict[str, str]:
 def set_time(stamp: genpy.Time) -> None:
     """Set rospy's simulated clock, which stamps the log."""
     rostime._set_rostime(stamp)
+
+
+def register_again() -> None:
+    """Register all topics and services of this process with the master, which knows none."""
+    listeners = registration.get_registration_listeners()
+    topics, services = registration.get_topic_manager(), registration.get_service_manager()
+    kinds = registration.Registration
+    for kind, registered in (
+        (kinds.PUB, topics.get_publications()),
+        (kinds.SUB, topics.get_subscriptions()),
+        (kinds.SRV, services.get_services()),
+    ):
+        for name, type_or_uri in registered:
+            listeners.notify_added(name, type_or_uri, kind)

@@ -18,6 +18,7 @@ from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import BOOLEAN, GraphName, ParameterType
 from crazyflie_utils.parameters import ParameterError, Parameters, parameter
 from crazyflie_utils.runtime.flights import Flights
+from crazyflie_utils.runtime.master_watch import MasterWatch
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.ros_transport import RosTransport
 
@@ -167,6 +168,8 @@ def _run(process, make_nodes):
         _fail()
     ending = _Ending(process, nodes)
     rospy.on_shutdown(ending.run)
+    watch = MasterWatch()
+    watch.start()
     flights = _flights(process, nodes)
     signals = _catch_signals()
     # Not in this thread, which must stay free to end a callback that does not.
@@ -175,6 +178,7 @@ def _run(process, make_nodes):
         time.sleep(0.1)
     if signals == [signal.SIGINT] and flights is not None:
         _let_flights_end(process, nodes, flights, signals)
+    watch.stop()
     rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
     if ending.is_stuck:
         _exit_at_once(1)

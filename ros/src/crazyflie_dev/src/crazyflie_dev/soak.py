@@ -22,7 +22,7 @@ from std_srvs.srv import EmptyRequest
 from tqdm import tqdm
 
 from crazyflie_dev.launch_files import composed_nodes, expand
-from crazyflie_dev.soak_faults import FAULTS, Fault, Flight
+from crazyflie_dev.soak_faults import EMERGENCY, FAULTS, Fault, Flight
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.runtime.runner import NodeClasses
@@ -128,7 +128,7 @@ class Soak:
                 self.watch.say(f"not at rest: {self.watch.state}, {self.watch.height:.2f} m")
                 break
         self._wait(1.0, timeline)
-        self.watch.may_fly = False
+        self.watch.may_fly = self.watch.may_fall = False
         # Nothing may begin by itself now.
         self._wait(2.0, timeline)
 
@@ -155,11 +155,16 @@ class _Fault:
         now = self._flight.graph.time
         if self._undo is None and not self.is_over and now >= self._begin:
             self._watch.is_blind = self._fault.blinds
+            self._watch.may_fall = self._fault.drops
             self._undo = self._fault.begin(self._flight)
-        if self._undo is not None and now >= self._end:
+            self._watch.is_emergency = self._fault.name == EMERGENCY
+        if self._undo is None or self.is_over:
+            return
+        self._fault.again(self._flight)
+        if now >= self._end:
+            self._watch.is_blind = self._watch.is_emergency = False
             self._undo()
             self._undo = None
-            self._watch.is_blind = False
             self.is_over = True
 
 

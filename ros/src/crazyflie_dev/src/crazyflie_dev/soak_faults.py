@@ -10,8 +10,9 @@ from random import Random
 from typing import Any
 
 import genpy
-from crazyflie_msgs.msg import PositionVelocityStateStamped
+from std_srvs.srv import EmptyRequest
 
+from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.testing import FakeGraph
 
 CONTROLLER, ESTIMATOR, SERVER, FILTER = (
@@ -21,6 +22,8 @@ CONTROLLER, ESTIMATOR, SERVER, FILTER = (
     "/takeoff_control_filter",
 )
 _NODES = (CONTROLLER, ESTIMATOR, SERVER, FILTER)
+
+EMERGENCY = "emergency"
 
 _RESPAWN = 1.0
 """From the end of a node until roslaunch has started it anew, s."""
@@ -58,6 +61,11 @@ class Fault:
         s.
     blinds : bool
         Whether there is no good pose while it lasts.
+    drops : bool
+        Whether the vehicle may fall: nothing passes the last node before it, or its motors
+        are to stand still.
+    again : callable, optional
+        ``again(flight)`` is called twenty times a second while it lasts.
     """
 
     name: str
@@ -65,6 +73,8 @@ class Fault:
     shortest: float
     longest: float
     blinds: bool = False
+    drops: bool = False
+    again: Callable[[Flight], None] = lambda _: None
 
 
 def _on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Undo]:
@@ -128,15 +138,28 @@ def _freeze(name: str) -> Callable[[Flight], Undo]:
     return begin
 
 
-def _refer_to(x: float, y: float, z: float, age: float = 0.0) -> Callable[[Flight], Undo]:
-    def begin(flight):
+def _nothing(_: Flight) -> Undo:
+    return lambda: None
+
+
+def _refer_to(x: float, y: float, z: float, age: float = 0.0) -> Callable[[Flight], None]:
+    def publish(flight):
         message = PositionVelocityStateStamped()
         message.header.stamp = genpy.Time.from_sec(flight.graph.time - age)
         message.state.x, message.state.y, message.state.z = x, y, z
         flight.graph.publish("/ref", message)
-        return lambda: None
 
-    return begin
+    return publish
+
+
+def _call_everything(flight: Flight) -> None:
+    for _ in range(20):
+        flight.graph.call(flight.random.choice(("/takeoff", "/land")), EmptyRequest())
+
+
+def _stop_motors(flight: Flight) -> Undo:
+    flight.graph.call("/emergency", EmptyRequest())
+    return lambda: flight.graph.call("/emergency_reset", EmptyRequest())
 
 
 FAULTS = [
@@ -149,8 +172,14 @@ FAULTS = [
     Fault("stamps are 3 s old", _with_each(_shift(-3.0)), 0.3, 4.0, blinds=True),
     Fault("stamps are 8 s ahead", _with_each(_shift(8.0)), 0.3, 4.0, blinds=True),
     *(Fault(f"{name} is killed", _kill(name), _RESPAWN, _RESPAWN) for name in _NODES),
-    *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0) for name in _NODES),
-    Fault("reference is not a number", _refer_to(math.nan, 0.0, 1.0), 0.1, 0.1),
-    Fault("reference is far away", _refer_to(50.0, -50.0, 20.0), 0.1, 0.1),
-    Fault("reference is old", _refer_to(0.5, 0.5, 0.3, age=30.0), 0.1, 0.1),
+    *(
+        Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER)
+        for name in _NODES
+    ),
+    Fault("references are not finite", _nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
+    Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 20.0)),
+    Fault("references are old", _nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),
+    Fault("somebody streams references", _nothing, 3.0, 9.0, again=_refer_to(0.3, 0.2, 1.0)),
+    Fault("services are hammered", _nothing, 0.1, 3.0, again=_call_everything),
+    Fault(EMERGENCY, _stop_motors, 0.2, 3.0, drops=True),
 ]

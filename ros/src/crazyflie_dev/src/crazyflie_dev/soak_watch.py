@@ -55,8 +55,14 @@ class Watch:
         Whether a fault keeps good poses away.
     may_fly : bool
         Whether a takeoff has been asked for since the vehicle was last on the ground.
+    may_fall : bool
+        Whether the vehicle may meet the ground at any speed.
     is_emergency : bool
         Whether motors have to stand still.
+    height : float
+        Of the vehicle now, m.
+    state : str
+        Of the flight, as the server tells it.
     """
 
     graph: FakeGraph
@@ -66,6 +72,7 @@ class Watch:
     farthest: float = 0.0
     is_blind: bool = False
     may_fly: bool = False
+    may_fall: bool = False
     is_emergency: bool = False
     height: float = 0.0
     state: str = ""
@@ -119,7 +126,7 @@ class Watch:
         self._watch_blindness(time, height)
 
     def _touch_down(self, speed):
-        if self.is_emergency:
+        if self.may_fall:
             return
         self.hardest = max(self.hardest, speed)
         if speed > HARD_LANDING:

@@ -189,8 +189,11 @@ class _GraphProcess(FakeProcess):
         """Deliver a message, or keep it until the process goes on."""
         if self.is_frozen:
             self.waiting.append((deliver, message))
-        else:
-            deliver(message)
+            return
+        # Whose turn it is to wake up at this moment is chance.
+        if self.clock.time() != self.transport.graph.time:
+            self.clock.set(self.transport.graph.time)
+        deliver(message)
 
 
 class _Publication(ExternalPublisher):

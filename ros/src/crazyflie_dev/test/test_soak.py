@@ -1,0 +1,114 @@
+"""A short soak, and what its watch complains of."""
+
+import math
+
+import pytest
+from geometry_msgs.msg import TransformStamped
+from std_msgs.msg import String
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_dev.soak import soak
+from crazyflie_dev.soak_faults import FAULTS
+from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
+from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_utils.testing import FakeGraph
+
+
+@pytest.fixture(scope="module")
+def result():
+    """Return what was seen in a soak with every fault."""
+    return soak(600.0, seed=7)
+
+
+def test_every_fault_has_its_turn(result):
+    assert set(result["faults"]) == {fault.name for fault in FAULTS}
+
+
+def test_nothing_makes_the_vehicle_fly_away(result):
+    assert result["violations"] == []
+    assert result["errors logged"] == 0
+    assert result["takeoffs answered, refused"][0] > 0
+
+
+def test_nothing_makes_the_quadrotor_fly_away():
+    assert soak(100.0, seed=8, dynamics="quadrotor")["violations"] == []
+
+
+@pytest.fixture
+def watch():
+    graph = FakeGraph({})
+    watch = Watch(graph)
+    watch.begin()
+    return watch
+
+
+def is_at(watch, height, x=0.0, after=0.01):
+    watch.graph.advance(after)
+    transform = TransformStamped()
+    transform.transform.translation.x = x
+    transform.transform.translation.z = height
+    watch.graph.publish("/tf", TFMessage([transform]))
+
+
+def command(watch, thrust=9.81, roll=0.0):
+    watch.graph.publish("/control/final", ControlStamped(control=Control(thrust=thrust, roll=roll)))
+
+
+def test_a_flight_as_it_should_be(watch):
+    watch.may_fly = True
+    watch.allow(1.0)
+    for state in ("on_ground", "taking_off", "flying"):
+        watch.graph.publish("/in_flight_state", String(state))
+    for height in (0.0, 0.5, 1.1):
+        is_at(watch, height)
+        command(watch)
+    assert watch.violations == []
+    assert watch.highest == pytest.approx(0.1)
+
+
+def test_complaints(watch):
+    watch.may_fly = True
+    watch.allow(1.0)
+    is_at(watch, 1.3)
+    is_at(watch, 1.3, x=4.5)
+    command(watch, thrust=math.nan)
+    command(watch, thrust=17.0)
+    command(watch, roll=0.5)
+    watch.graph.publish("/in_flight_state", String("on_ground"))
+    watch.graph.publish("/in_flight_state", String("flying"))
+    watch.is_blind = True
+    is_at(watch, 0.5)
+    is_at(watch, 0.5, after=BLIND_LIMIT + 1.0)
+    is_at(watch, 0.5, after=BLIND_LIMIT + 1.0)
+    is_at(watch, 0.1)
+    is_at(watch, 0.05)
+    is_at(watch, 0.0)
+    watch.is_emergency = True
+    command(watch)
+    watch.may_fly = False
+    command(watch, thrust=12.0)
+    is_at(watch, 0.2)
+    kinds = {text.split(": ")[1].split(":")[0] for text in watch.violations}
+    assert kinds == {
+        "too high",
+        "flown away",
+        "control is not finite",
+        "thrust out of limits",
+        "tilt out of limits",
+        "flight state went from on_ground to flying",
+        "in the air without a pose",
+        "hard landing",
+        "thrust in emergency",
+        "thrust without a takeoff",
+        "in the air unasked",
+    }
+
+
+def test_a_complaint_comes_once_in_a_flight(watch):
+    watch.may_fly = True
+    command(watch, thrust=17.0)
+    command(watch, thrust=18.0)
+    assert len(watch.violations) == 1
+    watch.renew()
+    command(watch, thrust=17.0)
+    assert len(watch.violations) == 2

@@ -122,9 +122,7 @@ def test_comes_down_blindly(height, impact):
 
 
 @settings(max_examples=60, deadline=None)
-@given(
-    st.floats(0.3, 2.0), st.floats(0.8 * G, 1.2 * G), st.floats(-0.8, 1.0), st.booleans()
-)
+@given(st.floats(0.3, 2.0), st.floats(0.8 * G, 1.2 * G), st.floats(-0.8, 1.0), st.booleans())
 def test_comes_down_whatever_it_weighs_and_however_it_moved(height, hover, speed, pose):
     # A speed that was held would have taken the vehicle elsewhere: only its end is played.
     flight = Flight(height, hover).run(8.0)

@@ -21,9 +21,7 @@ class AllEmergencyParameters(Parameters):
     topic: str = parameter(
         TOPIC, "what every takeoff control filter hears", "/all/emergency", "topics/all_emergency"
     )
-    service: str = parameter(
-        SERVICE, "stops all vehicles", "/all/emergency", "srv/all_emergency"
-    )
+    service: str = parameter(SERVICE, "stops all vehicles", "/all/emergency", "srv/all_emergency")
 
 
 class AllEmergencyNode(Node):

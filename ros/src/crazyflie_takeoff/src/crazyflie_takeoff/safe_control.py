@@ -59,8 +59,8 @@ class HoverThrust:
     """The thrust at which a vehicle hovers: a running mean of what is commanded in flight.
 
     Both the vertical part of the thrust and the vertical speed v are filtered with the time
-    constant T (`AVERAGING`). As (v - mean v) / T is the filtered acceleration, subtracting it leaves
-    the thrust that carries the weight, also while the vehicle climbs or has just been stopped.
+    constant T (`AVERAGING`). As (v - mean v) / T is the filtered acceleration, subtracting it
+    leaves the thrust that carries the weight, also while the vehicle climbs or has just stopped.
     """
 
     def __init__(self) -> None:

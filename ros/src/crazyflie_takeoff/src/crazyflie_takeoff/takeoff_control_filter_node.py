@@ -13,7 +13,7 @@ from crazyflie_msgs.msg import Control, ControlStamped, PositionVelocityYawState
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.flight_state import COMMANDED, ORIGIN, UNKNOWN, FlightState
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
-from crazyflie_takeoff.limits import Limits, tilt_of
+from crazyflie_takeoff.limits import Box, Limits, tilt_of
 from crazyflie_takeoff.safe_control import Setpoint
 from crazyflie_takeoff.safe_filter import Mode, Patience, SafeFilter
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
@@ -89,7 +89,9 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
 
     def limits(self) -> Limits:
         """Return where the motors are stopped."""
-        return Limits(self.box, self.outside, self.floor, math.radians(self.tilt))
+        # A takeoff begins below many a fence; the floor is a limit of its own.
+        lower = (*self.box.lower[:2], -math.inf)
+        return Limits(Box(lower, self.box.upper), self.outside, self.floor, math.radians(self.tilt))
 
 
 class TakeoffControlFilterNode(Node):

@@ -18,7 +18,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.battery import Charge
 from crazyflie_takeoff.calls import Calls
-from crazyflie_takeoff.filter_report import NO_FILTER, FilterReport, parse
+from crazyflie_takeoff.filter_report import NO_FILTER, parse
 from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.flight_state import SEPARATOR, FlightState, Takeover
 from crazyflie_takeoff.recovery import recover_state
@@ -194,7 +194,7 @@ class TakeoffServerNode(Node):
         if self._flight is not None:
             self._follow_filter(self._flight, report)
 
-    def _follow_filter(self, flight: FlightStateMachine, report: FilterReport):
+    def _follow_filter(self, flight, report):
         flight.is_held = report.is_held
         if report.takeover is None:
             flight.regain()

@@ -57,7 +57,9 @@ class TakeoffServerParameters(FlightTopicParameters):
         Number("V", minimum=0.0), "with less /takeoff is refused", 3.2, "battery/low"
     )
     battery_critical: float = parameter(
-        Number("V", minimum=0.0), "with less in flight the vehicle is landed", 3.0,
+        Number("V", minimum=0.0),
+        "with less in flight the vehicle is landed",
+        3.0,
         "battery/critical",
     )
     battery_duration: float = parameter(

@@ -101,6 +101,7 @@ class VehicleNode(Node):
         super().__init__()
         self.vehicle = PointMass()
         self.sees = True
+        self.offset = 0.0
         self._state = None
 
     def load_parameters(self, handle):
@@ -117,7 +118,7 @@ class VehicleNode(Node):
     def _on_timer(self):
         self.vehicle.advance(0.01)
         if self.sees:
-            self._state.publish(state(self.vehicle.z, self.vehicle.z_dot))
+            self._state.publish(state(self.vehicle.z + self.offset, self.vehicle.z_dot))
 
 
 class ControllerNode(Node):
@@ -158,12 +159,14 @@ class Network:
     def __init__(self):
         self.time = 100.0
         self.heard = []
+        self.unpublished = set()
         self._processes = {}
         self._sent = {}
 
     def start(self, name, node, parameters=None):
         """Start a node in a process of its own; return the node."""
         process = FakeProcess(start=self.time)
+        process.transport.unpublished |= self.unpublished
         assert process.launch(node, f"/{name}", parameters), process.logged("error")
         for other in self._processes.values():
             for topic in self.LATCHED:
@@ -249,7 +252,7 @@ class HoverNetwork(Network):
 
     def start_filter(self):
         """Start a filter."""
-        self.start("filter", TakeoffControlFilterNode(), FILTER)
+        self.start("filter", TakeoffControlFilterNode(), {**FILTER, "topics/state": "/state"})
 
     def start_server(self):
         """Start a server."""

@@ -7,7 +7,12 @@ import pytest
 from std_msgs.msg import Empty, String
 from takeoff_helpers import BARE, FILTER, SERVER, HoverNetwork, Network, control, state
 
-from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
+from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_takeoff.takeoff_control_filter_node import (
+    FRESH_TIME,
+    LISTENING_TIME,
+    TakeoffControlFilterNode,
+)
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.runtime.transport import ServiceError
 
@@ -221,7 +226,8 @@ def test_filter_during_takeoff_and_landing(network):
     assert thrusts(network, "/control/final", 0.0)[-1] == 0.0
 
 
-def test_both_in_flight_when_the_height_is_known(seeing):
+def test_both_at_once_are_a_fresh_launch(seeing):
+    """Nobody remembers the flight: a vehicle on a table must not take off because of its height."""
     seeing.take_off()
     begun = seeing.time
     seeing.kill("server")
@@ -230,9 +236,21 @@ def test_both_in_flight_when_the_height_is_known(seeing):
     seeing.start_filter()
     seeing.start_server()
     seeing.advance(2.0)
-    assert seeing.last("/in_flight_state") == "flying"
-    assert 0.0 not in thrusts(seeing, "/control/final", begun)
-    assert seeing.vehicle.z == pytest.approx(1.0, abs=0.02)
+    assert seeing.last("/in_flight_state") == "on_ground"
+    assert set(thrusts(seeing, "/control/final", begun)) == {0.0}
+
+
+def test_on_a_table_at_launch_with_a_reference():
+    """A controller that is told at once where to go does not lift the vehicle off."""
+    network = HoverNetwork(SERVER)
+    network.vehicle_node.offset = 0.7
+    reference = PositionVelocityStateStamped()
+    reference.state.z = 1.5
+    network.process("controller").publish("/ref", reference)
+    network.advance(5.0)
+    assert network.last("/in_flight_state") == "on_ground"
+    assert len(network.on("/control/lqr")) > 400
+    assert set(thrusts(network, "/control/final", 0.0)) == {0.0}
 
 
 def test_server_with_a_foreign_filter_in_flight():
@@ -250,6 +268,7 @@ def test_server_with_a_foreign_filter_in_flight():
 def test_filter_with_a_foreign_server():
     """Toggles alone decide, and a restart in flight costs the time of listening."""
     network = Network()
+    network.unpublished.add("/in_flight_state")
     network.start("filter", TakeoffControlFilterNode(), FILTER)
     process = network.process("filter")
     for _ in range(50):
@@ -262,6 +281,8 @@ def test_filter_with_a_foreign_server():
     assert network.last("/in_flight_filter") == "flying"
     process.publish("/in_flight", Empty())
     network.advance(0.01)
+    assert network.last("/in_flight_filter") == "unknown"
+    network.advance(FRESH_TIME)
     assert network.last("/in_flight_filter") == "commanded"
 
 
@@ -272,6 +293,7 @@ def test_server_takes_the_place_of_a_foreign_one_in_flight():
     network.kill("filter")
     network.start_filter()
     network.process("filter").publish("/in_flight", Empty())
+    network.process("controller").publish("/ref", PositionVelocityStateStamped())
     network.start_server()
     network.advance(2.0)
     assert network.last("/in_flight_state") == "flying"

@@ -13,6 +13,7 @@ from crazyflie_utils.testing import FakeProcess
 def launch():
     """Return a process with a filter in it that has just started."""
     process = FakeProcess()
+    process.transport.unpublished.add("/in_flight_state")
     assert process.launch(TakeoffControlFilterNode(), "/filter", FILTER)
     return process
 
@@ -54,7 +55,7 @@ def test_contract_with_toggles(process):
     process.publish("/control/takeoff", control(10.0))
     process.publish("/control/lqr", control(2.0))
     assert thrusts(process) == [1.0, 10.0, 10.0]
-    process.advance(0.51)
+    process.advance(0.505)
     process.publish("/control/lqr", control(3.0))
     process.publish("/in_flight", Empty())
     process.publish("/control/takeoff", control(11.0))
@@ -89,7 +90,7 @@ def test_a_takeoff_control_that_is_not_finite_does_not_keep_the_controller_out(p
     process.publish("/control/takeoff", control(10.0))
     process.advance(0.4)
     process.publish("/control/takeoff", control(math.nan))
-    process.advance(0.2)
+    process.advance(0.105)
     process.publish("/control/lqr", control(2.0))
     assert thrusts(process) == [10.0, 2.0]
 

@@ -47,6 +47,33 @@ class ControlFilter(Generic[Control]):
         """Whether the vehicle is in flight, as far as is known."""
         return self._toggled if self._state is None else self._state.in_flight
 
+    def is_controllers(self, time: float, tolerance: float) -> bool:
+        """Tell whether the vehicle would fall at ``time`` (s) without the controller.
+
+        So it is in flight, unless a takeoff control has come in the last ``tolerance`` (s); and
+        between takeoff and flight, or when the server has died above the ground, once the last
+        takeoff control is older than `TAKEOFF_CONTROL_LIMIT`.
+        """
+        self._takeoff_time = min(self._takeoff_time, time)
+        age = math.inf if self._takeoff_control is None else time - self._takeoff_time
+        if self.in_flight:
+            return age > tolerance
+        return not self.is_on_ground and age > TAKEOFF_CONTROL_LIMIT
+
+    @property
+    def is_on_ground(self) -> bool:
+        """Whether nothing says that the vehicle is off the ground."""
+        if self.in_flight or self._takeoff_thrust > 0.0:
+            return False
+        # A landing that has come to zero thrust is one of a vehicle on the ground.
+        return self._state is not FlightState.TAKING_OFF
+
+    @property
+    def stands(self) -> bool:
+        """Whether the server says by zero thrust that the vehicle is on the ground."""
+        is_told = self._takeoff_control is not None and self._takeoff_thrust <= 0.0
+        return is_told and not self.in_flight and self._state in (None, FlightState.ON_GROUND)
+
     @property
     def is_commanded(self) -> bool:
         """Whether a commanded control has ever come."""
@@ -62,6 +89,11 @@ class ControlFilter(Generic[Control]):
         if self._state is None and self._toggled:
             return FlightState.FLYING
         return self._state
+
+    def end_flight(self) -> None:
+        """Take note that the vehicle is on the ground, whatever toggles have said."""
+        self._toggled = False
+        self._takeoff_thrust = 0.0
 
     def toggle(self) -> None:
         """Take note of a toggle of in_flight."""

@@ -36,6 +36,9 @@ PRESS_DEPTH = 0.3
 """How far below the ground a descent's reference goes, m, so that the vehicle
 meets the ground with its speed also when it hangs above the reference."""
 
+FILTER_LIMIT = 60.0
+"""How long the filter may take to bring a vehicle down, s."""
+
 _ROUNDING = 1e-6
 """Tolerance of comparisons between times, s."""
 
@@ -101,6 +104,9 @@ class FlightStateMachine:
     ----------
     plan : Plan
         May be replaced at any time; what has begun already goes on as it was planned.
+    is_held : bool
+        Whether the filter keeps the vehicle level because no control comes. A descent then
+        waits for the state: either it comes back, or the filter brings the vehicle down.
 
     Parameters
     ----------
@@ -110,6 +116,8 @@ class FlightStateMachine:
     announced : bool, optional
         Whether the world has been told (by toggles) that the vehicle is in
         flight. By default it has been told the truth.
+    is_lost : bool, optional
+        Whether the filter is bringing the vehicle down; see `lose`.
     """
 
     def __init__(
@@ -117,8 +125,10 @@ class FlightStateMachine:
         plan: Plan,
         state: FlightState = FlightState.ON_GROUND,
         announced: bool | None = None,
+        is_lost: bool = False,
     ):
         self.plan = plan
+        self.is_held = False
         self._state = state
         self._announced = state.in_flight if announced is None else announced
         self._ground = 0.0
@@ -127,11 +137,17 @@ class FlightStateMachine:
         self._hover_sent = False
         self._descent: _Descent | None = None
         self._zero_sent = -math.inf
+        self._is_lost = is_lost
 
     @property
     def state(self) -> FlightState:
         """Where the flight stands."""
         return self._state
+
+    def check_takeoff(self) -> None:
+        """Raise a `RefusalError` when the vehicle is not on the ground."""
+        if self._state is not FlightState.ON_GROUND:
+            raise RefusalError(_REFUSALS[self._state])
 
     def takeoff(self) -> None:
         """Begin to take off.
@@ -141,8 +157,7 @@ class FlightStateMachine:
         RefusalError
             The vehicle is not on the ground.
         """
-        if self._state is not FlightState.ON_GROUND:
-            raise RefusalError(_REFUSALS[self._state])
+        self.check_takeoff()
         self._enter(FlightState.TAKING_OFF)
 
     def land(self) -> None:
@@ -151,9 +166,9 @@ class FlightStateMachine:
         Raises
         ------
         RefusalError
-            The vehicle is not flying, or is landing or taking off already.
+            The vehicle is on the ground, or landing already.
         """
-        if self._state is not FlightState.FLYING:
+        if self._state not in (FlightState.FLYING, FlightState.TAKING_OFF):
             raise RefusalError(_REFUSALS[self._state])
         self._enter(self._way_down())
 
@@ -161,6 +176,22 @@ class FlightStateMachine:
         """Turn a takeoff into a landing; anything else goes on as it is."""
         if self._state is FlightState.TAKING_OFF:
             self._enter(self._way_down())
+
+    def lose(self) -> None:
+        """Leave a vehicle that is not on the ground to the filter, which brings it down."""
+        if self._state is not FlightState.ON_GROUND and not self._is_lost:
+            self._enter(FlightState.LANDING)
+            self._is_lost = True
+
+    def regain(self) -> None:
+        """Go on with the landing of a vehicle that the filter has given up."""
+        if self._is_lost:
+            self._enter(FlightState.LANDING)
+
+    def end(self) -> None:
+        """Take note that the motors are off."""
+        if self._state is not FlightState.ON_GROUND:
+            self._enter(FlightState.ON_GROUND)
 
     def tick(self, time: float, position: Position | None = None) -> Output:
         """Go on.
@@ -209,7 +240,10 @@ class FlightStateMachine:
             self._descent = _Descent(position, self._ground, self.plan.descent_speed)
         descent = self._descent
         elapsed = time - self._entered
-        if descent is None or self._is_down(position) or elapsed > descent.limit:
+        limit = DESCENT_MARGIN if descent is None else descent.limit
+        if position is None and self.is_held and elapsed < limit:
+            return None, None
+        if descent is None or self._is_down(position) or elapsed > limit:
             self._enter(FlightState.LANDING)
             self._follow_clock(time)
             return self._ramp_down(time, position)
@@ -217,6 +251,8 @@ class FlightStateMachine:
 
     def _ramp_down(self, time, position):
         elapsed = time - self._entered + _ROUNDING
+        if self._is_lost and elapsed < FILTER_LIMIT:
+            return None, None
         if elapsed < RAMP_DURATION:
             return GRAVITY - RAMP_RATE * (time - self._entered), None
         if self._is_down(position) or elapsed > RAMP_DURATION + TOUCHDOWN_LIMIT:
@@ -237,6 +273,7 @@ class FlightStateMachine:
         self._hover_sent = False
         self._descent = None
         self._zero_sent = -math.inf
+        self._is_lost = False
 
     def _follow_clock(self, time):
         if self._entered is None:

@@ -33,3 +33,20 @@ UNKNOWN = "unknown"
 
 COMMANDED = "commanded"
 """The same, when a controller sends commands: there may be a flight under way."""
+
+SEPARATOR = ": "
+"""Between the word that a filter publishes and the reason in plain words, if there is one."""
+
+ORIGIN = " from "
+"""Between what a filter has done and the flight state that it heard last."""
+
+
+class Takeover(enum.Enum):
+    """What a filter publishes before the flight state when it has taken the vehicle over.
+
+    Such as "sinking from flying". Nobody gets the vehicle back: a flight ends with either.
+    """
+
+    SINKING = "sinking"
+    DOWN = "down"
+    EMERGENCY = "emergency"

@@ -1,7 +1,23 @@
-"""The topics on which server and filter tell each other about a flight."""
+"""What server and filter are both told: their topics, and where the vehicle may be."""
 
+import math
+
+from crazyflie_takeoff.limits import Box
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_utils.parameter_types import METRES, TOPIC
+from crazyflie_utils.parameters import group
+
+
+class CornerParameters(Parameters):
+    """A corner of the geofence's box, named as the geofence names it."""
+
+    x: float | None = parameter(METRES, "corner of the geofence; without it there is no wall", None)
+    y: float | None = parameter(METRES, "corner of the geofence; without it there is no wall", None)
+    z: float | None = parameter(METRES, "corner of the geofence; without it there is no wall", None)
+
+    def vector(self, missing: float) -> tuple[float, ...]:
+        """Return x, y, z in m, and what stands for a missing one."""
+        return tuple(missing if value is None else value for value in (self.x, self.y, self.z))
 
 
 class FlightTopicParameters(Parameters):
@@ -19,6 +35,14 @@ class FlightTopicParameters(Parameters):
     own_controller_topic: str | None = parameter(
         TOPIC, "by default the name of in_flight + `_controller`", None, "topics/controller"
     )
+
+    lower: CornerParameters = group(CornerParameters, "box/min")
+    upper: CornerParameters = group(CornerParameters, "box/max")
+
+    @property
+    def box(self) -> Box:
+        """The geofence."""
+        return Box(self.lower.vector(-math.inf), self.upper.vector(math.inf))
 
     @property
     def flight_state_topic(self) -> str:

@@ -3,13 +3,14 @@
 It may be the first on the ground, or take the place of one that died at any moment.
 There are two sources: the control filter, which keeps the flight state that the former
 server published, or else tells whether a controller sends commands; and the measured
-height.
+height. A filter that has only just started, too, is evidence of a fresh launch, whatever a
+controller commands: it does not tell of commands in its first seconds.
 """
 
 from dataclasses import dataclass
 
 from crazyflie_takeoff.flight import TOUCHDOWN_HEIGHT
-from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.flight_state import FlightState, Takeover
 
 FLYING_HEIGHT = 0.15
 """A vehicle above this height is flying if nobody knows better, m."""
@@ -27,11 +28,14 @@ class RecoveredState:
         Whether the world has been told (by toggles) that the vehicle is in flight.
     reason : str
         For the log.
+    is_lost : bool
+        Whether the filter is bringing the vehicle down.
     """
 
     state: FlightState
     announced: bool
     reason: str
+    is_lost: bool = False
 
 
 def recover_state(
@@ -39,6 +43,7 @@ def recover_state(
     height: float | None,
     can_descend: bool = True,
     is_commanded: bool = True,
+    takeover: Takeover | None = None,
 ) -> RecoveredState:
     """Return where the flight stands.
 
@@ -57,16 +62,28 @@ def recover_state(
         Whether landings begin with a descent.
     is_commanded : bool
         Whether a controller sends commands, or may do so.
+    takeover : Takeover or None
+        What the filter has done by itself.
 
     Returns
     -------
     RecoveredState
     """
+    if takeover is not None:
+        return _after(takeover, remembered)
     seen = "the height is not known" if height is None else f"the height is {height:.2f} m"
     said = "nothing is remembered" if remembered is None else f"{remembered.value} is remembered"
     state = _conclude(remembered, height, can_descend, is_commanded)
     announced = state.in_flight if remembered is None else remembered.in_flight
     return RecoveredState(state, announced, f"{said}, {seen}")
+
+
+def _after(takeover, remembered):
+    announced = remembered is not None and remembered.in_flight
+    said = f"the filter says {takeover.value}"
+    if takeover is Takeover.SINKING:
+        return RecoveredState(FlightState.LANDING, announced, said, is_lost=True)
+    return RecoveredState(FlightState.ON_GROUND, announced, said)
 
 
 def _conclude(remembered, height, can_descend, is_commanded):

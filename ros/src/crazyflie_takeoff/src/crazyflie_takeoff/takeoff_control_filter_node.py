@@ -1,19 +1,38 @@
 """ROS interface of the choice between takeoff control and commanded control."""
 
+import math
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Bool, Empty, String
+from std_srvs.srv import Empty as EmptyService
+from std_srvs.srv import EmptyResponse
 from typing_extensions import override
 
-from crazyflie_msgs.msg import ControlStamped
-from crazyflie_takeoff.control_filter import ControlFilter
-from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
+from crazyflie_msgs.msg import Control, ControlStamped, PositionVelocityYawStateStamped
+from crazyflie_takeoff import diagnostics
+from crazyflie_takeoff.flight_state import COMMANDED, ORIGIN, UNKNOWN, FlightState
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
-from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_takeoff.limits import Box, Limits, tilt_of
+from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.safe_filter import Mode, Patience, SafeFilter
+from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
+from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_utils.refusal import RefusalError
+
+TIME_STEP = 0.01
+"""Period of the controls that the filter makes itself, s."""
 
 LISTENING_TIME = 0.4
 """How long a filter that has started listens before it passes a controller, s: some
 periods of the zero thrust on the ground, and less than a vehicle flies on without
 controls."""
+
+SERVER_LIMIT = 2.0
+"""How long it waits for the word of a server that is there but still finds out, s."""
+
+FRESH_TIME = 5.0
+"""How long after its start a filter does not take commands for a sign of flight, s."""
 
 CONTROLLER_POLL_PERIOD = 0.1
 """How often it is looked whether there is a controller, s."""
@@ -31,19 +50,64 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
     final_control_topic: str = parameter(
         TOPIC, "the one that is passed on", name="topics/final_control"
     )
+    state_topic: str | None = parameter(
+        TOPIC, "where the vehicle is; without it the limits are not watched", None, "topics/state"
+    )
+    pose_topic: str | None = parameter(
+        TOPIC,
+        "how the vehicle lies, such as motion capture's pose; without it tilt is not watched",
+        None,
+        "topics/pose",
+    )
+    all_emergency_topic: str = parameter(
+        TOPIC, "stops the motors of all vehicles", "/all/emergency", "topics/all_emergency"
+    )
+    emergency_service: str = parameter(SERVICE, "stops the motors", "/emergency", "srv/emergency")
+    reset_service: str = parameter(
+        SERVICE, "ends an emergency", "/emergency_reset", "srv/emergency_reset"
+    )
+    hold: float = parameter(
+        DURATION, "control that is older in flight is replaced", 0.1, "loss/hold_after"
+    )
+    recovery: float = parameter(
+        DURATION, "how long it may then stay away before the descent", 0.5, "loss/return_limit"
+    )
+    descent: float = parameter(
+        DURATION,
+        "the motors are stopped this long after the descent has begun; later by the time to "
+        "sink when the height is known",
+        5.0,
+        "loss/descent_limit",
+    )
+    floor: float = parameter(METRES, "lower is below the ground", -0.5, "limits/floor")
+    tilt: float = parameter(
+        Number("deg", above=0.0, maximum=180.0), "more is a crash", 60.0, "limits/tilt"
+    )
+    outside: float = parameter(
+        Number("m", minimum=0.0), "further outside the geofence is too far", 0.5, "limits/outside"
+    )
+
+    def limits(self) -> Limits:
+        """Return where the motors are stopped."""
+        # A takeoff begins below many a fence; the floor is a limit of its own.
+        lower = (*self.box.lower[:2], -math.inf)
+        return Limits(Box(lower, self.box.upper), self.outside, self.floor, math.radians(self.tilt))
 
 
 class TakeoffControlFilterNode(Node):
-    """Pass on takeoff control always, and commanded control in flight."""
+    """Pass on takeoff control always, and commanded control in flight; see `SafeFilter`."""
 
     def __init__(self) -> None:
-        self._filter: ControlFilter[ControlStamped] = ControlFilter()
         self._published_state: str | None = None
         self._published_controller: bool | None = None
+        self._is_fresh = True
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(TakeoffControlFilterParameters)
+        parameters = handle.load(TakeoffControlFilterParameters)
+        self._parameters = parameters
+        patience = Patience(parameters.hold, parameters.recovery, parameters.descent)
+        self._filter: SafeFilter[ControlStamped] = SafeFilter(patience, parameters.limits())
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -51,9 +115,16 @@ class TakeoffControlFilterNode(Node):
         self._final = handle.publisher(parameters.final_control_topic, ControlStamped)
         self._filter_state = handle.publisher(parameters.filter_state_topic, String, latch=True)
         self._controller = handle.publisher(parameters.controller_topic, Bool, latch=True)
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._publish_state()
-        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        self._advertise(handle, parameters.emergency_service, self._on_emergency)
+        self._advertise(handle, parameters.reset_service, self._on_reset)
+        handle.subscribe(parameters.all_emergency_topic, Empty, self._on_all_emergency)
+        self._server = handle.subscribe(
+            parameters.flight_state_topic, String, self._on_flight_state
+        )
         handle.subscribe(parameters.in_flight_topic, Empty, self._on_toggle)
+        self._subscribe_measurements(handle)
         handle.subscribe(
             parameters.takeoff_control_topic,
             ControlStamped,
@@ -66,9 +137,44 @@ class TakeoffControlFilterNode(Node):
             self._on_commanded_control,
             finite="control",
         )
+        self._register_timers(handle)
+
+    def _advertise(self, handle, service, callback):
+        name = handle.resolve(service)
+        others = handle.service_nodes()
+        if others.get(name, handle.name) != handle.name:
+            handle.warn(
+                f"{name} is also a service of {others[name]}: the last one to start answers; give "
+                "this vehicle a name of its own for it"
+            )
+        try:
+            handle.advertise_service(service, EmptyService, callback)
+        except ServiceError:
+            # Two vehicles in one process. What stops all of them still works.
+            handle.warn(f"{name} stops another vehicle, not this one")
+
+    def _subscribe_measurements(self, handle):
+        parameters = self._parameters
+        if parameters.state_topic is not None:
+            handle.subscribe(
+                parameters.state_topic,
+                PositionVelocityYawStateStamped,
+                self._on_measured_state,
+                finite="state",
+            )
+        if parameters.pose_topic is not None:
+            handle.subscribe(parameters.pose_topic, PoseStamped, self._on_pose, finite="pose")
+
+    def _register_timers(self, handle):
+        handle.timer(TIME_STEP, self._on_timer)
         # Whether connections come about has nothing to do with simulated time.
         self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
+        self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)
+        self._fresh_timer = handle.timer(FRESH_TIME, self._end_freshness, steady=True)
         handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True)
+        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True)
+
+    # What it hears.
 
     def _on_flight_state(self, message):
         try:
@@ -86,34 +192,113 @@ class TakeoffControlFilterNode(Node):
         self._filter.toggle()
         self._publish_state()
 
+    def _on_measured_state(self, message):
+        state = message.state
+        self._filter.set_height((state.x, state.y, state.z), state.z_dot)
+
+    def _on_pose(self, message):
+        q = message.pose.orientation
+        self._filter.set_tilt(tilt_of((q.x, q.y, q.z, q.w)))
+
     def _on_takeoff_control(self, message):
         now = self._handle.time()
-        self._final.publish(self._filter.takeoff(now, message, message.control.thrust))
+        self._publish(self._filter.takeoff(now, message, message.control.thrust))
+        self._publish_state()
 
     def _on_commanded_control(self, message):
-        self._pass_on(self._filter.commanded(self._handle.time(), message))
+        control = message.control
+        setpoint = Setpoint(control.roll, control.pitch, control.yaw_dot, control.thrust)
+        self._publish(self._filter.commanded(self._handle.time(), message, setpoint))
+        self._publish_state()
+
+    # Emergencies.
+
+    def _on_emergency(self, _):
+        self._stop(f"{self._handle.resolve(self._parameters.emergency_service)} was called")
+        return EmptyResponse()
+
+    def _on_all_emergency(self, _):
+        self._stop("all vehicles were stopped")
+
+    def _stop(self, reason):
+        self._filter.stop(reason)
+        self._on_timer()
+
+    def _on_reset(self, _):
+        try:
+            self._filter.reset()
+        except RefusalError as reason:
+            name = self._handle.resolve(self._parameters.reset_service)
+            raise ServiceError(f"{name} refused: {reason}") from None
+        self._publish_state()
+        return EmptyResponse()
+
+    # What time brings.
+
+    def _on_timer(self):
+        self._publish(self._filter.tick(self._handle.time()))
         self._publish_state()
 
     def _stop_listening(self):
-        self._listening_timer.stop()
-        self._pass_on(self._filter.stop_listening(self._handle.time()))
+        # A server that is there, and looks where the flight stands, soon tells.
+        if self._filter.remembered is not None or not self._server.has_publishers():
+            self._stop_waiting()
 
-    def _pass_on(self, message):
-        if message is not None:
-            self._final.publish(message)
+    def _stop_waiting(self):
+        self._listening_timer.stop()
+        self._server_timer.stop()
+        self._publish(self._filter.stop_listening(self._handle.time()))
+
+    def _end_freshness(self):
+        self._fresh_timer.stop()
+        self._is_fresh = False
+        self._publish_state()
+
+    # What it says.
+
+    def _publish(self, control):
+        if isinstance(control, Setpoint):
+            control = ControlStamped(control=Control(*control))
+            control.header.stamp = self._handle.stamp()
+        if control is not None:
+            self._final.publish(control)
 
     def _publish_controller(self):
-        has_controller = self._commands.has_publishers()
+        is_there = self._commands.has_publishers()
+        if not is_there:
+            self._filter.controller_left()
+        has_controller = is_there and not self._filter.lacks_control
         if has_controller != self._published_controller:
             self._published_controller = has_controller
             self._controller.publish(Bool(has_controller))
 
     def _publish_state(self):
-        remembered = self._filter.remembered
-        if remembered is not None:
-            state = remembered.value
-        else:
-            state = COMMANDED if self._filter.is_commanded else UNKNOWN
+        state = self._word() + self._filter.explanation
         if state != self._published_state:
             self._published_state = state
             self._filter_state.publish(String(state))
+            if self._filter.explanation:
+                self._handle.warn(state)
+
+    def _word(self):
+        told = [each.value for each in (self._filter.takeover, self._filter.remembered) if each]
+        if told:
+            return ORIGIN.join(told)
+        # Commands that come right after a launch say nothing about the vehicle.
+        return COMMANDED if self._filter.is_commanded and not self._is_fresh else UNKNOWN
+
+    def _publish_diagnostics(self):
+        mode = self._filter.mode
+        level = diagnostics.ERROR if mode.is_final else diagnostics.WARN
+        figures = {
+            "takeovers": str(self._filter.takeovers),
+            "hover thrust (m/s^2)": f"{self._filter.hover_thrust:.2f}",
+            "age of the commanded control (s)": f"{self._filter.control_age:.2f}",
+        }
+        is_acknowledged = self._filter.remembered is FlightState.ON_GROUND
+        is_good = mode is Mode.PASSING or (mode is Mode.DOWN and is_acknowledged)
+        text = self._word() + self._filter.explanation
+        report = diagnostics.report(
+            self._handle, diagnostics.OK if is_good else level, text, figures
+        )
+        self._diagnostics.publish(report)

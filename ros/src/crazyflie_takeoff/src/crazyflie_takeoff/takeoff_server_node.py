@@ -2,7 +2,8 @@
 
 from concurrent.futures import Future
 
-from std_msgs.msg import Bool, Empty, String
+from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import Bool, Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
@@ -14,17 +15,23 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_takeoff.flight import FlightStateMachine, Plan
-from crazyflie_takeoff.flight_state import COMMANDED, UNKNOWN, FlightState
-from crazyflie_takeoff.flight_topics import FlightTopicParameters
-from crazyflie_takeoff.recovery import FLYING_HEIGHT, recover_state
-from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
-from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_takeoff import diagnostics
+from crazyflie_takeoff.battery import Charge
+from crazyflie_takeoff.calls import Calls
+from crazyflie_takeoff.filter_report import NO_FILTER, parse
+from crazyflie_takeoff.flight import FlightStateMachine
+from crazyflie_takeoff.flight_state import SEPARATOR, FlightState, Takeover
+from crazyflie_takeoff.recovery import recover_state
+from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters
+from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector
 
 TIME_STEP = 0.01
 """Period of the server, s."""
+
+STATUS_PERIOD = 0.1
+"""How often it is looked whether there is anything new to tell people, s."""
 
 STATE_LIMIT = 0.5
 """A measured state older than this is not used, s."""
@@ -37,43 +44,6 @@ START_LIMIT = 5.0
 controller, s: nodes that are launched together need a while to find each other."""
 
 
-class TakeoffServerParameters(FlightTopicParameters):
-    """Parameters of `TakeoffServerNode`."""
-
-    control_topic: str = parameter(
-        TOPIC, "thrust of takeoff and landing goes here", name="topics/control"
-    )
-    reference_topic: str = parameter(
-        TOPIC, "hover point and descent go here", name="topics/reference"
-    )
-    state_topic: str | None = parameter(
-        TOPIC, "where the vehicle is; without it nothing is known", None, "topics/state"
-    )
-    takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
-    land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
-    hover_x: float = parameter(METRES, "hover point after takeoff", name="hover/x", live=True)
-    hover_y: float = parameter(METRES, "hover point after takeoff", name="hover/y", live=True)
-    hover_z: float = parameter(METRES, "hover point after takeoff", name="hover/z", live=True)
-    open_loop: float = parameter(
-        DURATION, "how long thrust g + 0.2 lifts off", 1.0, "duration/open_loop"
-    )
-    settle: float = parameter(
-        DURATION, "how long the controller has to reach the hover point", 5.0, "duration/hover"
-    )
-    descent_speed: float = parameter(
-        Number("m/s", minimum=0.0),
-        "how fast a landing sinks before the ramp; 0 for the bare ramp",
-        0.3,
-        "landing/descent_speed",
-        live=True,
-    )
-
-    def plan(self) -> Plan:
-        """Return how to take off and land."""
-        hover = (self.hover_x, self.hover_y, self.hover_z)
-        return Plan(hover, self.open_loop, self.settle, self.descent_speed)
-
-
 class TakeoffServerNode(Node):
     """Let the vehicle take off and land when a service asks for it."""
 
@@ -82,19 +52,20 @@ class TakeoffServerNode(Node):
         self._flight: FlightStateMachine | None = None
         self._is_starting = True
         self._filter_reported = False
+        self._filter = NO_FILTER
         self._has_controller = True
         self._had_controller = False
-        self._remembered: FlightState | None = None
-        self._is_commanded = True
         self._position: tuple[float, float, float] | None = None
         self._position_time = 0.0
         self._published_state: FlightState | None = None
-        self._pending: Future[EmptyResponse] | None = None
-        self._waiting: list[tuple[str, Future[EmptyResponse]]] = []
+        self._published_status = ""
+        self._cause = ""
+        self._calls: Calls[EmptyResponse] = Calls()
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(TakeoffServerParameters, self._reconfigure)
+        self._battery = self._parameters.battery()
 
     def _reconfigure(self, parameters):
         self._parameters = parameters
@@ -108,12 +79,17 @@ class TakeoffServerNode(Node):
         self._reference = handle.publisher(
             parameters.reference_topic, PositionVelocityStateStamped, latch=True
         )
+        self._descent = handle.publisher(parameters.descent_topic, PositionVelocityStateStamped)
         self._in_flight = handle.publisher(parameters.in_flight_topic, Empty)
         self._flight_state = handle.publisher(parameters.flight_state_topic, String, latch=True)
+        self._status = handle.publisher(parameters.status_topic, String, latch=True)
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
         handle.subscribe(parameters.filter_state_topic, String, self._on_filter_state)
         handle.subscribe(parameters.controller_topic, Bool, self._on_controller)
+        if parameters.battery_topic is not None:
+            handle.subscribe(parameters.battery_topic, Float32, self._on_battery)
         if parameters.state_topic is not None:
             handle.subscribe(
                 parameters.state_topic,
@@ -125,20 +101,16 @@ class TakeoffServerNode(Node):
         # Whether connections come about has nothing to do with simulated time.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover_state, steady=True)
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
+        handle.timer(STATUS_PERIOD, self._publish_status, steady=True)
+        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True)
 
+    @override
     def make_safe(self) -> None:
         """End a takeoff with a landing, let a landing go on, and tell the callers."""
         if self._flight is not None:
             self._flight.abort()
-        calls = [future for _, future in self._waiting]
-        if self._pending is not None:
-            calls.append(self._pending)
-        self._waiting = []
-        self._pending = None
-        for future in calls:
-            future.set_exception(
-                ServiceError(f"{self._handle.name} has failed or is shutting down; see its log")
-            )
+        name = self._handle.name
+        self._calls.fail_all(ServiceError(f"{name} has failed or is shutting down; see its log"))
 
     # Services.
 
@@ -150,17 +122,16 @@ class TakeoffServerNode(Node):
 
     def _serve(self, service):
         future: Future[EmptyResponse] = Future()
-        self._waiting.append((service, future))
+        self._calls.wait(service, future)
         self._serve_waiting()
         return future.result() if future.done() else future
 
     def _serve_waiting(self):
         if self._flight is None:
             return
-        waiting, self._waiting = self._waiting, []
-        for service, future in waiting:
+        for service, future in self._calls.take_waiting():
             if service == self._parameters.takeoff_service and self._lacks_what_may_come():
-                self._waiting.append((service, future))
+                self._calls.wait(service, future)
             else:
                 self._begin(self._flight, service, future)
 
@@ -175,34 +146,41 @@ class TakeoffServerNode(Node):
         self._is_starting = False
 
     def _begin(self, flight, service, future):
+        name = self._handle.resolve(service)
         try:
             if service == self._parameters.takeoff_service:
-                self._refuse_without_feedback()
+                flight.check_takeoff()
+                if reason := self._takeoff_refusal():
+                    raise RefusalError(reason)
                 flight.takeoff()
             else:
                 flight.land()
         except RefusalError as reason:
-            name = self._handle.resolve(service)
             future.set_exception(ServiceError(f"{name} refused: {reason}"))
         else:
-            self._pending = future
+            self._cause = ""
+            self._calls.begin(future, ServiceError(f"takeoff aborted: {name} was called"))
 
-    def _refuse_without_feedback(self):
+    def _takeoff_refusal(self):
         topic = self._parameters.state_topic
+        if self._filter.takeover is Takeover.EMERGENCY:
+            return f"emergency, {self._filter.reason}; it has to be reset first"
         if topic is not None and self._known_position() is None:
-            raise RefusalError(
+            return (
                 f"no state has come on {self._handle.resolve(topic)} for {STATE_LIMIT:g} s; are "
                 "the estimator and the source of /tf running?"
             )
         if not self._has_controller:
-            raise RefusalError("nobody publishes commanded controls; is the controller running?")
+            return "no commanded controls come; is the controller running?"
+        if self._charge() in (Charge.LOW, Charge.CRITICAL):
+            return f"the battery is low, {self._battery.voltage:.2f} V"
+        return ""
 
     # Where the flight stands.
 
     def _on_filter_state(self, message):
         try:
-            knows_nothing = message.data in (UNKNOWN, COMMANDED)
-            self._remembered = None if knows_nothing else FlightState(message.data)
+            report = parse(message.data)
         except ValueError:
             self._handle.warn(
                 f"ignoring {message.data!r}, which is no flight state, on "
@@ -210,9 +188,29 @@ class TakeoffServerNode(Node):
                 throttle=1.0,
                 key="flight state",
             )
-        else:
-            self._filter_reported = True
-            self._is_commanded = message.data != UNKNOWN
+            return
+        self._filter_reported = True
+        self._filter = report
+        if self._flight is not None:
+            self._follow_filter(self._flight, report)
+
+    def _follow_filter(self, flight, report):
+        flight.is_held = report.is_held
+        if report.takeover is None:
+            flight.regain()
+            return
+        if flight.state is FlightState.ON_GROUND:
+            return
+        self._cause = report.reason
+        why = ServiceError(f"the flight was ended by the filter: {report.reason}")
+        if report.takeover is Takeover.SINKING:
+            if flight.state is FlightState.TAKING_OFF:
+                self._calls.fail(why)
+            flight.lose()
+            return
+        if report.takeover is Takeover.EMERGENCY:
+            self._calls.fail(why)
+        flight.end()
 
     def _on_controller(self, message):
         self._has_controller = message.data
@@ -231,13 +229,8 @@ class TakeoffServerNode(Node):
         return self._position if now - self._position_time < STATE_LIMIT else None
 
     def _has_all_evidence(self):
-        position = self._known_position()
-        sees_enough = self._parameters.state_topic is None or position is not None
-        if not (self._filter_reported and sees_enough):
-            return False
-        # A filter that has only just started may get controls yet.
-        is_high = position is not None and position[2] > FLYING_HEIGHT
-        return self._is_commanded or not is_high
+        sees_enough = self._parameters.state_topic is None or self._known_position() is not None
+        return self._filter_reported and sees_enough
 
     def _recover_state(self):
         self._recovery_timer.stop()
@@ -247,25 +240,52 @@ class TakeoffServerNode(Node):
         position = self._known_position()
         height = None if position is None else position[2]
         can_descend = plan.descent_speed > 0.0
-        recovered = recover_state(self._remembered, height, can_descend, self._is_commanded)
+        told = self._filter
+        recovered = recover_state(
+            told.remembered, height, can_descend, told.is_commanded, told.takeover
+        )
         self._handle.info(f"begins {recovered.state.value}: {recovered.reason}")
-        self._flight = FlightStateMachine(plan, recovered.state, recovered.announced)
+        self._flight = FlightStateMachine(
+            plan, recovered.state, recovered.announced, recovered.is_lost
+        )
         self._serve_waiting()
+
+    # The battery.
+
+    def _on_battery(self, message):
+        if message.data == message.data:
+            self._battery.measure(self._handle.time(), message.data)
+
+    def _charge(self):
+        return self._battery.charge(self._handle.time())
+
+    def _watch_battery(self, flight):
+        charge = self._charge()
+        text = f"the battery is low, {self._battery.voltage:.2f} V"
+        if charge in (Charge.LOW, Charge.CRITICAL):
+            self._handle.warn(text, throttle=30.0, key="battery")
+        is_up = flight.state in (FlightState.FLYING, FlightState.TAKING_OFF)
+        if charge is Charge.CRITICAL and is_up:
+            self._calls.fail(ServiceError(f"takeoff aborted: {text}"))
+            flight.land()
+            self._cause = text
 
     # The flight.
 
     def _on_timer(self):
         if self._flight is None and self._has_all_evidence():
             self._recover_state()
-        if self._waiting:
+        if self._calls.has_waiting:
             self._serve_waiting()
         if self._flight is not None:
+            self._watch_battery(self._flight)
             self._publish(self._flight.tick(self._handle.time(), self._known_position()))
 
     def _publish(self, output):
         if output.state is not self._published_state:
             self._published_state = output.state
             self._flight_state.publish(String(output.state.value))
+            self._publish_status()
         if output.toggle:
             self._in_flight.publish(Empty())
         if output.reference is not None:
@@ -273,10 +293,46 @@ class TakeoffServerNode(Node):
             message.header.stamp = self._handle.stamp()
             message.state = from_vector(PositionVelocityState, output.reference)
             self._reference.publish(message)
+            if output.state is FlightState.DESCENDING:
+                self._descent.publish(message)
         if output.thrust is not None:
             message = ControlStamped(control=Control(thrust=output.thrust))
             message.header.stamp = self._handle.stamp()
             self._control.publish(message)
-        if self._pending is not None and output.state.is_settled:
-            future, self._pending = self._pending, None
-            future.set_result(EmptyResponse())
+        if output.state.is_settled:
+            self._calls.finish(EmptyResponse())
+
+    # What people are told.
+
+    def _status_text(self):
+        if self._flight is None:
+            return "looking where the flight stands"
+        state = self._flight.state
+        reasons = [self._cause]
+        if state is FlightState.ON_GROUND:
+            refusal = self._takeoff_refusal()
+            reasons.append(f"takeoff refused: {refusal}" if refusal else "")
+        elif self._filter.is_held:
+            reasons.append(self._filter.reason)
+        words = state.value.replace("_", " ")
+        return SEPARATOR.join(filter(None, [words, "; ".join(filter(None, reasons))]))
+
+    def _publish_status(self):
+        status = self._status_text()
+        if status != self._published_status:
+            self._published_status = status
+            self._status.publish(String(status))
+
+    def _publish_diagnostics(self):
+        status = self._status_text()
+        takeover = self._filter.takeover
+        has_trouble = SEPARATOR in status
+        level = diagnostics.WARN if has_trouble else diagnostics.OK
+        if takeover in (Takeover.SINKING, Takeover.EMERGENCY):
+            level = diagnostics.ERROR
+        figures = {
+            "state is fresh": str(self._known_position() is not None),
+            "controller": str(self._has_controller),
+            "battery (V)": f"{self._battery.voltage:.2f}",
+        }
+        self._diagnostics.publish(diagnostics.report(self._handle, level, status, figures))

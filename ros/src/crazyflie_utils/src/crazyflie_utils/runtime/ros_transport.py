@@ -95,7 +95,13 @@ class RosTransport(Transport):
         serve: Callable[[Any], Future[Any]],
         time: Callable[[], float],
     ) -> Callable[[], None]:
-        """Register a service with the master."""
+        """Register a service with the master.
+
+        Raises
+        ------
+        ServiceError
+            This process offers one of that name already.
+        """
 
         def answer(request):
             try:
@@ -103,7 +109,11 @@ class RosTransport(Transport):
             except ServiceError as error:
                 raise rospy.ServiceException(str(error)) from None
 
-        return partial(rospy.Service(name, service_type, answer).shutdown, "no longer offered")
+        try:
+            service = rospy.Service(name, service_type, answer)
+        except rospy.ServiceException as error:
+            raise ServiceError(str(error)) from None
+        return partial(service.shutdown, "no longer offered")
 
     def call_service(
         self, name: str, service_type: type, request: Any, limit: float

@@ -1,0 +1,60 @@
+"""What a battery's voltage means for a flight."""
+
+import enum
+import math
+
+
+class Charge(enum.Enum):
+    """How much is left."""
+
+    UNKNOWN = enum.auto()
+    GOOD = enum.auto()
+    LOW = enum.auto()
+    CRITICAL = enum.auto()
+
+
+FRESHNESS = 5.0
+"""A voltage that is older does not count, s; the driver sends one a second."""
+
+_LONGEST_STEP = 1.5
+"""Voltages that are further apart count as this far, s."""
+
+
+class Battery:
+    """The charge of a battery, by how long its voltage has been below two levels.
+
+    In flight a voltage sags with every burst of thrust; so it has to stay low.
+
+    Parameters
+    ----------
+    low, critical : float
+        V.
+    duration : float
+        How long it has to be lower, s.
+    """
+
+    def __init__(self, low: float, critical: float, duration: float):
+        self._levels = (critical, low)
+        self._duration = duration
+        self._lasted = [0.0, 0.0]
+        self.voltage = math.nan
+        self._time = math.nan
+
+    def measure(self, time: float, voltage: float) -> None:
+        """Take a voltage (V) that was measured at ``time`` (s)."""
+        elapsed = time - self._time
+        step = min(max(elapsed, 0.0), _LONGEST_STEP) if math.isfinite(elapsed) else 0.0
+        self._lasted = [
+            lasted + step if voltage < level else 0.0
+            for lasted, level in zip(self._lasted, self._levels, strict=True)
+        ]
+        self.voltage, self._time = voltage, time
+
+    def charge(self, time: float) -> Charge:
+        """Return what is left at ``time`` (s)."""
+        if not abs(time - self._time) < FRESHNESS:
+            return Charge.UNKNOWN
+        critical, low = (lasted >= self._duration for lasted in self._lasted)
+        if critical:
+            return Charge.CRITICAL
+        return Charge.LOW if low else Charge.GOOD

@@ -1,0 +1,104 @@
+"""The parameters of the takeoff server."""
+
+from collections.abc import Iterator
+
+from typing_extensions import override
+
+from crazyflie_takeoff.battery import Battery
+from crazyflie_takeoff.flight import Plan
+from crazyflie_takeoff.flight_topics import FlightTopicParameters
+from crazyflie_utils import parameter
+from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
+
+
+class TakeoffServerParameters(FlightTopicParameters):
+    """Parameters of `TakeoffServerNode`."""
+
+    control_topic: str = parameter(
+        TOPIC, "thrust of takeoff and landing goes here", name="topics/control"
+    )
+    reference_topic: str = parameter(
+        TOPIC, "hover point and descent go here", name="topics/reference"
+    )
+    own_descent_topic: str | None = parameter(
+        TOPIC,
+        "the descent goes here, too; by default the name of reference + `_descent`",
+        None,
+        "topics/descent_reference",
+    )
+    own_status_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_status`", None, "topics/status"
+    )
+    state_topic: str | None = parameter(
+        TOPIC, "where the vehicle is; without it nothing is known", None, "topics/state"
+    )
+    battery_topic: str | None = parameter(
+        TOPIC, "the battery's voltage; without it none is watched", None, "topics/battery"
+    )
+    takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
+    land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
+    hover_x: float = parameter(METRES, "hover point after takeoff", name="hover/x", live=True)
+    hover_y: float = parameter(METRES, "hover point after takeoff", name="hover/y", live=True)
+    hover_z: float = parameter(METRES, "hover point after takeoff", name="hover/z", live=True)
+    open_loop: float = parameter(
+        DURATION, "how long thrust g + 0.2 lifts off", 1.0, "duration/open_loop"
+    )
+    settle: float = parameter(
+        DURATION, "how long the controller has to reach the hover point", 5.0, "duration/hover"
+    )
+    descent_speed: float = parameter(
+        Number("m/s", minimum=0.0),
+        "how fast a landing sinks before the ramp; 0 for the bare ramp",
+        0.3,
+        "landing/descent_speed",
+        live=True,
+    )
+    battery_low: float = parameter(
+        Number("V", minimum=0.0), "with less /takeoff is refused", 3.2, "battery/low"
+    )
+    battery_critical: float = parameter(
+        Number("V", minimum=0.0),
+        "with less in flight the vehicle is landed",
+        3.0,
+        "battery/critical",
+    )
+    battery_duration: float = parameter(
+        DURATION, "how long the voltage has to be lower", 5.0, "battery/duration"
+    )
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        excess = self.box.excess(self.hover)
+        if excess > 0.0:
+            yield (
+                f"hover/x, y, z is {self.hover}, {excess:.2f} m outside the geofence; expected a "
+                "point in the box"
+            )
+        if self.battery_critical > self.battery_low:
+            yield (
+                f"battery/critical is {self.battery_critical:g}; expected at most battery/low, "
+                f"which is {self.battery_low:g} V"
+            )
+
+    @property
+    def hover(self) -> tuple[float, float, float]:
+        """The hover point, m."""
+        return self.hover_x, self.hover_y, self.hover_z
+
+    @property
+    def descent_topic(self) -> str:
+        """Where only the server speaks, for controllers that let a descent go before others."""
+        return self.own_descent_topic or f"{self.reference_topic}_descent"
+
+    @property
+    def status_topic(self) -> str:
+        """What people read."""
+        return self.own_status_topic or f"{self.in_flight_topic}_status"
+
+    def plan(self) -> Plan:
+        """Return how to take off and land."""
+        return Plan(self.hover, self.open_loop, self.settle, self.descent_speed)
+
+    def battery(self) -> Battery:
+        """Return what judges the battery."""
+        return Battery(self.battery_low, self.battery_critical, self.battery_duration)

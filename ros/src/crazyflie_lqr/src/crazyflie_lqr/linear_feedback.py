@@ -184,17 +184,13 @@ class IntegralStateFeedback(LinearFeedback):
         `MAX_GAP` after it, adds nothing to the integral.
         """
         dt = self._time_since_last(time)
-        feedforward = self._follow_climb(x, x_ref, dt)
-        if feedforward is not None:
-            x_ref = x_ref.copy()
-            x_ref[2], x_ref[5] = self._climb.z, self._climb.z_dot
+        x_ref, climb_thrust = self._follow_climb(x, x_ref, dt)
         e = heading_error(x, x_ref, self.yaw_index)
         linear = self.u_ref + self.K @ e
         if not self._is_resting:
             self._integrate(e[:3], dt, linear)
         u = linear + self._integrator_K @ self._integral
-        if feedforward is not None:
-            u[THRUST] += feedforward
+        u[THRUST] += climb_thrust
         u = np.minimum(np.maximum(u, _LEAST), _MOST)
         self._thrust = float(u[THRUST])
         return u
@@ -216,16 +212,18 @@ class IntegralStateFeedback(LinearFeedback):
         return dt if 0.0 < dt <= MAX_GAP else 0.0
 
     def _follow_climb(self, x, x_ref, dt):
-        """Return the thrust of the reference's acceleration; None when there is no climb."""
+        """Return the reference, and the thrust of its acceleration, while there is a climb."""
         climb = self._climb
         if climb is None:
-            return None
+            return x_ref, 0.0
         climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self.u_ref[THRUST])
         self._integral[2] = -climb.disturbance / self._integrator_k[2]
         if climb.has_arrived:
             self._climb = None
-            return None
-        return climb.z_ddot
+            return x_ref, 0.0
+        x_ref = x_ref.copy()
+        x_ref[2], x_ref[5] = climb.z, climb.z_dot
+        return x_ref, climb.z_ddot
 
     def _integrate(self, error, dt, linear):
         # An error that overflowed must not stay in the integral.
@@ -238,7 +236,7 @@ class IntegralStateFeedback(LinearFeedback):
         grows = ~at_limit[_INTEGRATED]
         if self._climb is not None:
             grows[2] = False
-        self._integral = np.where(grows, integral, self._integral)
+        self._integral[grows] = integral[grows]
 
     def _within_limits(self, integral):
         limit = self._integrator_limit

@@ -50,8 +50,9 @@ def test_touchdown_speed():
         flight(sink=0.01).touchdown_speed()
 
 
-def test_a_good_flight_has_no_complaints():
-    report = FlightReport.of(flight(), HOVER)
+@pytest.mark.parametrize("overshoot", [0.0, 0.09])
+def test_a_good_flight_has_no_complaints(overshoot):
+    report = FlightReport.of(flight(overshoot=overshoot), HOVER)
     assert report.complaints() == []
     assert "touchdown speed" in report.table()
 
@@ -60,6 +61,7 @@ def test_a_good_flight_has_no_complaints():
     ("change", "complaint"),
     [
         ({"hover_offset": 0.02}, "strayed 20.0 mm"),
+        ({"overshoot": 0.12}, "rose 120 mm above the hover point"),
         ({"sink": 0.8}, "touched down at 0.80 m/s"),
         ({"sink": 0.01}, "above the ground"),
     ],

@@ -94,10 +94,6 @@ def test_integral_state_feedback_is_limited_linear_feedback(x, x_ref):
     np.testing.assert_array_equal(u, np.minimum(np.maximum(linear, low), high))
 
 
-def test_limits():
-    assert (MAX_TILT, MIN_THRUST, MAX_THRUST) == (0.2618, 4.0, 16.0)
-
-
 def test_integrator_acts_on_pitch_roll_and_thrust():
     controller = integral(k=(-0.01, 0.02, -0.3), limit=(9.0, 9.0, 9.0), K=np.zeros((4, 7)))
     x = state(x=1.0, y=2.0, z=3.0)
@@ -169,3 +165,109 @@ def test_an_integral_that_had_no_effect_begins_at_zero():
     after = integral(k=(0.0, 0.0, 1.0), limit=(0.0, 0.0, 5.0), K=np.zeros((4, 7)))
     after.take_over(before)
     np.testing.assert_allclose(after.control(state(), np.zeros(7), 0.3), U_REF)
+
+
+# What the integral does while the control is not what moves the vehicle.
+
+
+def lifting(k=-1.0, limit=9.0, K=GENTLE):
+    return integral(k=(0.0, 0.0, k), limit=(0.0, 0.0, limit), K=K)
+
+
+def test_on_the_ground_the_integral_is_zero_and_stays_so():
+    controller = lifting(K=np.zeros((4, 7)))
+    for time in np.arange(0.0, 3.0, 0.1):
+        u = controller.control(state(z=-1.0), np.zeros(7), time)
+    assert u[3] == pytest.approx(9.81 + 2.9)
+    controller.rest()
+    for time in np.arange(3.0, 33.0, 0.1):
+        u = controller.control(state(z=-1.0), np.zeros(7), time)
+    assert u[3] == 9.81
+    controller.fly()
+    u = controller.control(state(z=-1.0), np.zeros(7), time + 0.1)
+    assert u[3] == pytest.approx(9.81 + 0.1)
+
+
+@pytest.mark.parametrize(("axis", "k", "u_index"), [(0, -0.1, 1), (1, 0.1, 0), (2, -1.0, 3)])
+def test_the_integral_does_not_grow_into_a_limit(axis, k, u_index):
+    gains, limits = np.zeros(3), np.full(3, 100.0)
+    gains[axis] = k
+    K = np.zeros((4, 7))
+    K[u_index, axis] = 20.0 * k
+    controller = integral(k=gains, limit=limits, K=K)
+    far, near = np.zeros(7), np.zeros(7)
+    far[axis], near[axis] = -5.0, 0.1
+    for time in np.arange(0.0, 20.0, 0.1):
+        controller.control(far, np.zeros(7), time)
+    u = controller.control(near, np.zeros(7), time + 0.1)
+    # Nothing is left over from the 20 s at the limit.
+    expected = 20.0 * k * 0.1 + 0.1 * k * 0.1
+    assert u[u_index] - U_REF[u_index] == pytest.approx(expected)
+
+
+def test_an_integral_at_the_limit_may_shrink():
+    controller = integral(k=(0.0, 0.0, -1.0), limit=(0.0, 0.0, 9.0), K=np.zeros((4, 7)))
+    for time in np.arange(0.0, 20.0, 0.1):
+        controller.control(state(z=-1.0), np.zeros(7), time)
+    u = controller.control(state(z=1.0), np.zeros(7), time + 0.1)
+    assert 15.7 < u[3] < 16.0
+    assert controller.control(state(z=1.0), np.zeros(7), time + 0.2)[3] < u[3]
+
+
+SOFT = np.zeros((4, 7))
+SOFT[3, [2, 5]] = -1.5, -1.0
+
+
+def heights(controller, lift, goal=1.0, duration=20.0, start=0.0):
+    """Return the height, 100 a second, of a vehicle whose thrust is ``lift`` times what is asked.
+
+    It takes the control 40 ms late, and the first half second of the takeoff's thrust.
+    """
+    controller.take_off()
+    z, z_dot, late, course = start, 0.0, [10.01] * 4, []
+    for time in np.arange(0.0, duration, 0.01):
+        thrust = controller.control(state(z=z, z_dot=z_dot), state(z=goal), time)[3]
+        late.append(10.01 if time < 0.5 and start == 0.0 else thrust)
+        z_dot += 0.01 * (lift * late.pop(0) - 9.81)
+        z += 0.01 * z_dot
+        if z <= 0.0:
+            z, z_dot = 0.0, max(z_dot, 0.0)
+        course.append(z)
+    return np.array(course)
+
+
+@pytest.mark.parametrize("lift", [0.9, 0.95 / 1.05, 0.98, 1.0, 1.02])
+@pytest.mark.parametrize("goal", [0.5, 1.0, 2.5])
+def test_a_soft_height_loop_takes_off_without_overshoot(lift, goal):
+    course = heights(lifting(k=-0.5, limit=6.0, K=SOFT), lift, goal)
+    assert course.max() < goal + 0.1
+    assert np.abs(course[1000:] - goal).max() < 0.05
+
+
+def test_a_controller_that_takes_over_in_flight_learns_what_the_vehicle_weighs():
+    course = heights(lifting(k=-0.5, limit=6.0, K=SOFT), 0.95 / 1.05, start=1.0)
+    assert np.abs(course - 1.0).max() < 0.35
+    # With the integrator alone it sinks by more.
+    plain = lifting(k=-0.5, limit=6.0, K=SOFT)
+    plain.take_off = lambda: None
+    assert heights(plain, 0.95 / 1.05, start=1.0).min() < 0.45
+
+
+def test_without_an_integrator_of_the_height_a_takeoff_is_linear_feedback():
+    controller = integral(k=(0.1, 0.1, 0.0), limit=(1.0, 1.0, 1.0))
+    controller.take_off()
+    u = controller.control(state(z=0.1), np.zeros(7), 0.0)
+    np.testing.assert_array_equal(u, U_REF + GENTLE @ state(z=0.1))
+
+
+def test_a_change_of_gains_does_not_end_a_takeoff():
+    changed, unchanged = (lifting(k=-0.5, limit=6.0, K=SOFT) for _ in range(2))
+    for controller in (changed, unchanged):
+        controller.take_off()
+        for time in np.arange(0.0, 1.0, 0.01):
+            controller.control(state(), state(z=1.0), time)
+    after = lifting(k=-0.5, limit=6.0, K=SOFT)
+    after.take_over(changed)
+    for time in np.arange(1.0, 1.5, 0.01):
+        u = [each.control(state(), state(z=1.0), time) for each in (after, unchanged)]
+        np.testing.assert_array_equal(*u)

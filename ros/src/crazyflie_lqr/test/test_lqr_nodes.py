@@ -89,7 +89,7 @@ def test_control_is_k_times_the_error_in_the_heading_frame(process, variant, gai
     _, x_dim, yaw = variant
     rng = np.random.default_rng(6)
     for _ in range(10):
-        x, x_ref = rng.uniform(-1.5, 1.5, size=(2, x_dim))
+        x, x_ref = rng.uniform(-0.8, 0.8, size=(2, x_dim))
         send(process, variant, "/ref", x_ref)
         send(process, variant, "/state", x)
         c, s = math.cos(x[yaw]), math.sin(x[yaw])

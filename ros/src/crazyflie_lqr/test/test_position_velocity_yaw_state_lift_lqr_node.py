@@ -3,10 +3,12 @@
 import math
 from pathlib import Path
 
+import genpy
 import numpy as np
 import pytest
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
+from std_msgs.msg import String
 
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
@@ -188,9 +190,145 @@ def test_a_bad_first_reference_does_not_start_it(process):
 
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_a_control_that_overflows_is_not_sent(process):
-    refer(process, x=-1.7e308)
-    assert answer(process, x=1.7e308) == []
+    refer(process)
+    assert answer(process, x_dot=1.7e308, y_dot=1.7e308, yaw=0.8) == []
     assert "not finite" in process.logged("warn")[0]
+
+
+# Who may say where to fly.
+
+
+def stamped_reference(x, stamp):
+    message = PositionVelocityStateStamped(state=PositionVelocityState(x=x))
+    message.header.stamp = genpy.Time.from_sec(stamp)
+    return message
+
+
+def test_of_two_latched_references_the_younger_one_counts_in_either_order(process):
+    for first, second in ((90.0, 80.0), (91.0, 95.0)):
+        process.publish("/ref", stamped_reference(first / 100.0, first))
+        process.publish("/ref", stamped_reference(second / 100.0, second))
+        goal = max(first, second) / 100.0
+        assert answer(process, x=goal)[0][1] == pytest.approx(0.0)
+    (warning,) = process.logged("warn")
+    assert "/ref" in warning and "older" in warning
+
+
+def test_a_descent_cannot_be_disturbed(process):
+    refer(process, x=0.5)
+    for _ in range(10):
+        process.publish("/ref_descent", stamped_reference(0.1, 0.0))
+        process.advance(0.1)
+        refer(process, x=0.5)
+        assert answer(process, x=0.1)[0][1] == pytest.approx(0.0)
+    process.advance(0.3)
+    assert answer(process, x=0.1)[0][1] == pytest.approx(0.1)
+
+
+def test_bad_references_of_a_descent_are_ignored(process):
+    refer(process, x=0.5)
+    process.publish("/ref_descent", stamped_reference(math.nan, 0.0))
+    assert answer(process, x=0.5)[0][1] == pytest.approx(0.0)
+
+
+def test_the_topic_of_the_descent_can_be_chosen():
+    process = FakeProcess()
+    parameters = {**PARAMETERS, "topics/descent_reference": "/down"}
+    assert process.launch(PositionVelocityYawStateLiftLqrNode(), "/lqr_controller", parameters)
+    assert "/down" in process.transport.subscribers
+    assert "/ref_descent" not in process.transport.subscribers
+
+
+@pytest.mark.parametrize(("size", "seen"), [(2.9, 2.9), (50.0, 3.0), (1.7e308, 3.0)])
+def test_a_reference_far_away_is_moved_nearer(process, size, seen):
+    refer(process, z=size)
+    process.advance(0.01)
+    [control] = answer(process)
+    assert control[3] == pytest.approx(9.81 + 1.5 * seen)
+    assert len(process.logged("warn")) == (size != seen)
+    refer(process, z=1.0)
+    assert answer(process)[0][3] == pytest.approx(9.81 + 1.5)
+
+
+def test_states_that_are_old_are_not_answered(process):
+    refer(process, z=1.0)
+    message = PositionVelocityYawStateStamped()
+    for age, is_answered in ((0.4, True), (0.6, False), (30.0, False), (90.0, True)):
+        before = len(process.published("/control/lqr"))
+        message.header.stamp = process.clock.stamp(process.clock.time() - age)
+        process.publish("/state", message)
+        assert len(process.published("/control/lqr")) - before == is_answered
+    assert "/lqr_controller: ignoring a state that is 0.6 s old" in process.logged("warn")[0]
+
+
+# When it integrates.
+
+LIFT = {"integrator/k/z": -0.5, "integrator/thresh/z": 6.0}
+
+
+def lifting(**changes):
+    process = FakeProcess()
+    node = PositionVelocityYawStateLiftLqrNode()
+    assert process.launch(node, "/lqr_controller", {**PARAMETERS, **LIFT, **changes})
+    return process
+
+
+def thrusts(process, duration, **state):
+    """Return the thrusts that answer a state for some seconds."""
+    return [
+        answer(process, **state)[0][3]
+        for _ in range(round(duration / 0.1))
+        if process.advance(0.1) is None
+    ]
+
+
+def tell(process, state, topic="/in_flight_state"):
+    process.publish(topic, String(state))
+
+
+def test_on_the_ground_nothing_is_integrated_and_a_takeoff_begins_from_zero():
+    process = lifting()
+    tell(process, "on_ground")
+    refer(process, z=1.0)
+    assert thrusts(process, 30.0) == pytest.approx([9.81 + 1.5] * 300)
+    tell(process, "taking_off")
+    assert thrusts(process, 1.0) == pytest.approx([9.81 + 1.5] * 10)
+    refer(process, z=1.0)
+    course = thrusts(process, 1.5)
+    assert course[0] == pytest.approx(9.81)
+    # It grows until the vehicle lifts off, without a step.
+    assert course[-1] > course[0] + 1.5
+    assert max(np.abs(np.diff(course))) < 0.6
+    tell(process, "on_ground")
+    assert thrusts(process, 1.0) == pytest.approx([9.81 + 1.5] * 10)
+
+
+def test_in_flight_it_integrates():
+    process = lifting()
+    tell(process, "flying")
+    refer(process, z=1.0)
+    thrusts(process, 3.0, z=1.0)
+    course = thrusts(process, 1.0, z=0.9)
+    assert course[-1] - course[0] == pytest.approx(0.9 * 0.1 * 0.5)
+    tell(process, "landing")
+    assert thrusts(process, 1.0, z=0.9) == pytest.approx([9.81 + 0.15] * 10)
+
+
+def test_without_a_flight_state_it_integrates_in_the_air_and_while_it_may_lift_off():
+    process = lifting()
+    refer(process, z=1.0)
+    standing = thrusts(process, 30.0)
+    assert standing[20] > standing[0] + 0.9
+    assert standing[-1] == pytest.approx(9.81 + 1.5)
+    flying = thrusts(process, 1.0, z=0.5)
+    assert flying[-1] - flying[0] == pytest.approx(0.9 * 0.5 * 0.5)
+
+
+def test_the_topic_of_the_flight_state_can_be_chosen():
+    process = lifting(**{"topics/flight_state": "/cf1/in_flight_state"})
+    tell(process, "on_ground", "/cf1/in_flight_state")
+    refer(process, z=1.0)
+    assert thrusts(process, 2.0) == pytest.approx([9.81 + 1.5] * 20)
 
 
 # Changes in flight.

@@ -47,3 +47,68 @@ def test_a_valid_one_is_followed_again_and_the_next_hold_point_is_elsewhere():
     assert followed(reference, 12.0) == list(2.0 * GOAL)
     reference.invalidate(13.0)
     assert followed(reference, 14.0, np.ones(7)) == [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+
+
+# Whose reference counts.
+
+
+def test_an_older_one_does_not_count():
+    reference = GuardedReference(6)
+    assert reference.update(GOAL, stamp=50.0, now=60.0)
+    assert not reference.update(2.0 * GOAL, stamp=49.9, now=60.0)
+    assert followed(reference, 60.0) == list(GOAL)
+    assert reference.update(3.0 * GOAL, stamp=50.0, now=60.0)
+    assert followed(reference, 60.0) == list(3.0 * GOAL)
+
+
+def test_one_without_a_stamp_counts_always_and_leaves_the_order_of_the_others():
+    reference = GuardedReference(6)
+    reference.update(GOAL, stamp=50.0, now=60.0)
+    assert reference.update(2.0 * GOAL, stamp=0.0, now=60.0)
+    assert not reference.update(GOAL, stamp=49.0, now=60.0)
+    assert followed(reference, 60.0) == list(2.0 * GOAL)
+
+
+def test_a_stamp_from_the_future_does_not_shut_the_others_out():
+    reference = GuardedReference(6)
+    assert reference.update(GOAL, stamp=1000.0, now=60.0)
+    assert reference.update(2.0 * GOAL, stamp=60.1, now=60.1)
+
+
+def test_after_a_reset_of_the_clock_the_order_begins_anew():
+    reference = GuardedReference(6)
+    reference.update(GOAL, stamp=60.0, now=60.0)
+    assert reference.update(2.0 * GOAL, stamp=1.0, now=1.0)
+
+
+def test_a_descent_counts_alone_while_it_is_fresh():
+    reference = GuardedReference(6)
+    reference.update(GOAL)
+    reference.descend(2.0 * GOAL, 10.0)
+    reference.update(3.0 * GOAL)
+    assert followed(reference, 10.29) == list(2.0 * GOAL)
+    reference.descend(4.0 * GOAL, 10.29)
+    assert followed(reference, 10.5) == list(4.0 * GOAL)
+    assert followed(reference, 10.6) == list(3.0 * GOAL)
+    # The clock was reset.
+    assert followed(reference, 1.0) == list(3.0 * GOAL)
+
+
+def test_a_distant_one_is_moved_nearer_once():
+    reports = []
+    reference = GuardedReference(6, 3.0, reports.append)
+    x = np.array([1.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.2])
+    reference.update(np.array([1.0, 8.0, 7.0, 1.0, 1.0, 1.0, 0.3]))
+    cut = [1.0, 2.4, 2.8, 0.0, 0.0, 0.0, 0.3]
+    np.testing.assert_allclose(followed(reference, 0.0, x), cut)
+    np.testing.assert_allclose(followed(reference, 1.0, x + 1.0), cut)
+    assert reports == ["the reference is 10.0 m away; going 3 m in its direction"]
+    reference.update(np.array([1.0, 2.9, 1.0, 1.0, 0.0, 0.0, 0.3]))
+    assert followed(reference, 2.0, x) == [1.0, 2.9, 1.0, 1.0, 0.0, 0.0, 0.3]
+
+
+def test_one_that_was_near_when_it_came_is_not_moved_when_the_vehicle_drifts():
+    reference = GuardedReference(6, 3.0)
+    reference.update(np.ones(7))
+    assert followed(reference, 0.0, np.zeros(7)) == [1.0] * 7
+    assert followed(reference, 1.0, np.full(7, -9.0)) == [1.0] * 7

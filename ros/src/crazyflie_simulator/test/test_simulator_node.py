@@ -7,7 +7,9 @@ import pytest
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 from simulators import NODES, PARAMETERS, command, heights, launch, refusal, transforms
+from std_srvs.srv import EmptyRequest
 
+from crazyflie_model.dynamics import NearHover
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_simulator.simulator_node import (
@@ -257,3 +259,42 @@ def test_bad_changes_are_refused(name, value):
         reconfigure(process, **{name: value})
     process.advance(0.1)
     assert len(transforms(process)) == 10
+
+
+def test_a_clock_that_jumps_forward_is_not_simulated_step_by_step(monkeypatch):
+    process = launch()
+    command(process, 9.81)
+    process.advance(0.1)
+    steps = []
+    step = NearHover.step
+    monkeypatch.setattr(NearHover, "step", lambda *a: steps.append(1) or step(*a))
+    process.clock.set(process.clock.time() + 3600.0)
+    process.advance(0.02)
+    assert len(steps) <= 1030
+    (warning,) = process.logged("warn")
+    assert "the vehicle skips that" in warning
+    stamps = [transform.header.stamp for transform in transforms(process)]
+    assert stamps[-1].to_sec() == pytest.approx(process.clock.time(), abs=2e-3)
+    assert stamps == sorted(stamps)
+
+
+def test_a_quadrotor_that_tips_over_falls_until_it_is_reset():
+    process = launch(QuadrotorSimulatorNode, **{"init/z": 50.0})
+    for _ in range(150):
+        command(process, 9.81, roll=1.4)
+        process.advance(0.01)
+    (warning,) = process.logged("warn")
+    assert "60 degrees" in warning and "/simulator/reset" in warning
+    falling = heights(process)[-10:]
+    command(process, 16.0)
+    process.advance(0.3)
+    assert heights(process)[-1] < falling[-1] - 0.3
+    for _ in range(1000):
+        command(process, 16.0)
+        process.advance(0.01)
+    assert heights(process)[-1] == 0.0
+    process.call("/simulator/reset", EmptyRequest())
+    for _ in range(100):
+        command(process, 12.0)
+        process.advance(0.01)
+    assert heights(process)[-1] > 0.3

@@ -109,3 +109,36 @@ def test_a_time_just_past_changes_nothing():
     vehicle.advance_to(0.0999)
     np.testing.assert_array_equal(vehicle.state, state)
     assert vehicle.time == pytest.approx(0.1)
+
+
+def test_a_vehicle_that_has_tipped_over_stops_its_motors_until_it_is_told_otherwise():
+    vehicle = SimulatedVehicle(NearHover(), [0.0, 0.0, 100.0], time=0.0, max_tilt=1.0)
+    vehicle.command([0.9, 0.0, 0.0, GRAVITY])
+    vehicle.advance_to(0.1)
+    assert not vehicle.has_crashed
+    vehicle.command([0.0, 1.1, 0.0, GRAVITY])
+    vehicle.advance_to(0.2)
+    vehicle.command(HOVER)
+    vehicle.advance_to(1.2)
+    assert vehicle.has_crashed
+    assert vehicle.state[5] == pytest.approx(-1.1 * GRAVITY, rel=0.01)
+    vehicle.recover()
+    # What was commanded before does not count any more.
+    vehicle.advance_to(1.3)
+    assert vehicle.state[5] == pytest.approx(-1.2 * GRAVITY, rel=0.01)
+    falling = vehicle.state[5]
+    vehicle.command(HOVER)
+    vehicle.advance_to(1.4)
+    assert vehicle.state[5] == pytest.approx(falling)
+
+
+def test_what_is_skipped_has_not_happened():
+    flown, skipped = (SimulatedVehicle(NearHover(), [0.0, 0.0, 100.0], time=0.0) for _ in range(2))
+    for vehicle in (flown, skipped):
+        vehicle.command([0.1, 0.1, 0.0, 11.0])
+        vehicle.advance_to(0.2)
+    skipped.skip(1e6)
+    flown.advance_to(0.3)
+    skipped.advance_to(1e6 + 0.3)
+    np.testing.assert_array_equal(skipped.state, flown.state)
+    assert skipped.time == pytest.approx(1e6 + 0.3)

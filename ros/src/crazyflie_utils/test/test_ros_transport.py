@@ -1,13 +1,15 @@
 """How long the caller of a service waits."""
 
 import itertools
+import threading
 from concurrent.futures import Future
 
 import pytest
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from crazyflie_utils import ServiceError
 from crazyflie_utils.runtime import ros_transport
-from crazyflie_utils.runtime.ros_transport import wait_for_answer
+from crazyflie_utils.runtime.ros_transport import RosTransport, wait_for_answer
 
 
 def test_an_answer_is_returned():
@@ -33,3 +35,38 @@ def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(monkeypatch):
     monkeypatch.setattr(ros_transport, "_STALL_LIMIT", 0.05)
     with pytest.raises(ServiceError, match="/go: /clock stands still"):
         wait_for_answer(Future(), "/go", lambda: 7.0)
+
+
+def test_calls_that_nobody_answers_do_not_pile_up(monkeypatch):
+    answered = threading.Event()
+
+    class SlowProxy:
+        def __init__(self, name, service_type):
+            pass
+
+        def __call__(self, request):
+            answered.wait(20.0)
+            return EmptyResponse()
+
+    monkeypatch.setattr("rospy.wait_for_service", lambda name, timeout: None)
+    monkeypatch.setattr("rospy.ServiceProxy", SlowProxy)
+    transport = RosTransport()
+
+    def call(name="/slow"):
+        return transport.call_service(name, Empty, EmptyRequest(), 0.01)
+
+    before = threading.active_count()
+    futures = [call() for _ in range(50)]
+    for future in futures:
+        assert isinstance(future.exception(timeout=20.0), ServiceError)
+    assert "/slow has not answered 8 earlier calls" in str(futures[-1].exception())
+    assert threading.active_count() <= before + 8
+    # A service that is alive is none the worse for it.
+    other = call("/other")
+    answered.set()
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread() and thread.daemon:
+            thread.join(5.0)
+    assert other.done()
+    revived = transport.call_service("/slow", Empty, EmptyRequest(), 20.0)
+    assert revived.result(timeout=20.0) == EmptyResponse()

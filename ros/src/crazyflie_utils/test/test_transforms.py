@@ -50,7 +50,7 @@ def test_latest_transform_with_its_own_stamp(process, lookup):
 
 @given(st.integers(1, 2_000_000_000), st.integers(0, 999_999_999))
 def test_stamps_come_back_to_the_nanosecond(seconds, nanoseconds):
-    process = FakeProcess()
+    process = FakeProcess(start=seconds + 1.0)
     lookup = process.handle("/node").listen_to_transforms()
     message = transform("world", "crazyflie", 0.0)
     message.header.stamp = genpy.Time(seconds, nanoseconds)
@@ -60,6 +60,7 @@ def test_stamps_come_back_to_the_nanosecond(seconds, nanoseconds):
 
 def test_transforms_of_many_threads(process, lookup, monkeypatch):
     monkeypatch.setattr("crazyflie_utils.runtime.transforms._MOST_STAMPS", 3)
+    process.clock.set(103.0)
     failures = []
 
     def broadcast(child):
@@ -173,3 +174,72 @@ def test_nodes_share_one_buffer_and_one_broadcaster(process):
     assert len(process.transport.subscribers["/tf"]) == 1
     for lookup in lookups:
         assert lookup("cf1", "cf2").header.stamp.to_sec() == 100.0
+
+
+# Stamps that cannot be.
+
+
+def x_of(lookup):
+    return lookup("world", "crazyflie").transform.translation.x
+
+
+def test_a_pose_from_the_future_does_not_stop_the_present(process, lookup):
+    hear(process, transform("world", "crazyflie", 100.0, x=1.0))
+    hear(process, transform("world", "crazyflie", 108.0, x=9.0))
+    assert x_of(lookup) == 1.0
+    process.clock.set(100.1)
+    hear(process, transform("world", "crazyflie", 100.1, x=2.0))
+    assert x_of(lookup) == 2.0
+    (warning,) = process.logged("warn")
+    assert warning == "/tf: ignoring a transform world -> crazyflie that is stamped in the future"
+    assert process.handle("/node").rejected_transforms() == {"is stamped in the future": 1}
+
+
+def test_a_clock_that_is_set_back_is_followed_after_two_poses(process, lookup):
+    hear(process, transform("crazyflie", "base", 0.0, x=0.1), topic="/tf_static")
+    hear(process, transform("world", "crazyflie", 100.0, x=1.0))
+    for count, seen in enumerate((1.0, 1.0, 4.0, 5.0)):
+        hear(process, transform("world", "crazyflie", 97.0 + 0.01 * count, x=2.0 + count))
+        assert x_of(lookup) == seen
+    assert lookup("world", "base").header.stamp.to_sec() == pytest.approx(97.03)
+
+
+def test_poses_that_overtake_each_other_are_no_step_back(process, lookup):
+    for count in range(20):
+        hear(process, transform("world", "crazyflie", 100.0 + 0.01 * (count ^ 1), x=count ^ 1))
+        # The old ones of a second source never take over.
+        hear(process, transform("world", "crazyflie", 90.0 + 0.01 * count, x=-9.0))
+    assert x_of(lookup) == 19.0
+
+
+def test_a_pose_that_repeats_is_not_kept(process, lookup, monkeypatch):
+    stored = []
+    for x in (1.0, 2.0, 3.0):
+        hear(process, transform("world", "crazyflie", 100.0, x=x))
+        stored.append(x_of(lookup))
+    assert stored == [1.0, 1.0, 1.0]
+    assert process.logged("warn") == []
+
+
+@pytest.mark.parametrize(
+    ("parent", "child"), [("", "crazyflie"), ("world", ""), ("/", "crazyflie"), ("", "")]
+)
+@pytest.mark.parametrize("topic", ["/tf", "/tf_static"])
+def test_frames_without_a_name_are_ignored(process, lookup, capfd, parent, child, topic):
+    for count in range(100):
+        hear(process, transform(parent, child, 100.0 + 0.01 * count), topic=topic)
+    (warning,) = process.logged("warn")
+    assert "does not name its frames" in warning
+    assert capfd.readouterr().err == ""
+    assert process.handle("/node").rejected_transforms() == {"does not name its frames": 100}
+
+
+def test_frames_without_end_are_not_kept_without_end(process, lookup):
+    hear(process, transform("world", "crazyflie", 100.0, x=1.0))
+    for count in range(3000):
+        hear(process, transform("world", f"junk{count}", 100.0))
+    with pytest.raises(TransformError):
+        lookup("world", "junk2999")
+    assert len(process.logged("warn")) < 100
+    hear(process, transform("world", "crazyflie", 100.1, x=2.0))
+    assert x_of(lookup) == 2.0

@@ -11,6 +11,9 @@ HOVER_TOLERANCE = 0.01
 HOVER_WINDOW = 5.0
 """How long before /land the hover is judged, s."""
 
+OVERSHOOT_LIMIT = 0.1
+"""How far a good flight may rise above the hover point, m."""
+
 TOUCHDOWN_LIMIT = 0.5
 """Fastest touchdown of a good flight, m/s."""
 
@@ -68,6 +71,11 @@ class FlightReport:
                 self.hover_error_max <= HOVER_TOLERANCE,
                 f"it strayed {self.hover_error_max * 1000:.1f} mm from the hover point "
                 f"(limit {HOVER_TOLERANCE * 1000:.0f} mm)",
+            ),
+            (
+                self.overshoot <= OVERSHOOT_LIMIT,
+                f"it rose {self.overshoot * 1000:.0f} mm above the hover point "
+                f"(limit {OVERSHOOT_LIMIT * 1000:.0f} mm)",
             ),
             (
                 self.touchdown_speed <= TOUCHDOWN_LIMIT,

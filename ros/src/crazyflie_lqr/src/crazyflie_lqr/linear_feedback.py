@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import override
 
+from crazyflie_lqr.climb import Climb
 from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 
@@ -19,6 +20,9 @@ ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
 _LEAST = np.array([-MAX_TILT, -MAX_TILT, -np.inf, MIN_THRUST])
 _MOST = np.array([MAX_TILT, MAX_TILT, np.inf, MAX_THRUST])
+
+_INTEGRATED = [PITCH, ROLL, THRUST]
+"""The controls that the integrals of x, y and z act on."""
 
 MAX_GAP = 0.5
 """Longest time between two states over which `IntegralStateFeedback` integrates, s."""
@@ -98,6 +102,15 @@ class LinearFeedback:
     def take_over(self, previous: Self) -> None:
         """Continue in flight where a controller with other parameters ends."""
 
+    def rest(self) -> None:
+        """Take note that the control is not flown: the vehicle stands on the ground, say."""
+
+    def fly(self) -> None:
+        """Take note that the control is flown from now on, if it was not already."""
+
+    def take_off(self) -> None:
+        """Take note that the control is flown from now on, from the ground or the unknown."""
+
 
 class IntegralStateFeedback(LinearFeedback):
     """Linear feedback with an integral of the position error, saturated.
@@ -107,6 +120,11 @@ class IntegralStateFeedback(LinearFeedback):
     position error in the heading frame, where a badly trimmed attitude stays
     the same when the vehicle turns. Roll and pitch are then limited to
     `MAX_TILT`, thrust to `MIN_THRUST` ... `MAX_THRUST`.
+
+    While a control is at its limit, its integral does not grow into the limit
+    (conditional integration: Astrom and Hagglund, Advanced PID Control, 2006, 3.5). Between
+    `rest` and the next flight it is zero. After `take_off`, height reference and height
+    integral are those of a `Climb` until the vehicle has arrived.
 
     Parameters
     ----------
@@ -130,10 +148,31 @@ class IntegralStateFeedback(LinearFeedback):
         super().__init__(K, u_ref, yaw_index)
         self._integrator_k = np.asarray(integrator_k, dtype=float)
         self._integrator_K = np.zeros((len(u_ref), 3))
-        self._integrator_K[[PITCH, ROLL, THRUST], [0, 1, 2]] = self._integrator_k
+        self._integrator_K[_INTEGRATED, [0, 1, 2]] = self._integrator_k
         self._integrator_limit = np.asarray(integrator_limit, dtype=float)
         self._integral = np.zeros(3)
         self._time: float | None = None
+        self._is_resting = False
+        self._climb: Climb | None = None
+        self._thrust = float(u_ref[THRUST])
+
+    @override
+    def rest(self) -> None:
+        self._is_resting = True
+        self._climb = None
+        self._integral = np.zeros(3)
+
+    @override
+    def fly(self) -> None:
+        self._is_resting = False
+
+    @override
+    def take_off(self) -> None:
+        self.rest()
+        self.fly()
+        limit = float(abs(self._integrator_k[2]) * self._integrator_limit[2])
+        self._climb = Climb(limit) if limit > 0.0 else None
+        self._thrust = float(self.u_ref[THRUST])
 
     @override
     def control(
@@ -144,10 +183,17 @@ class IntegralStateFeedback(LinearFeedback):
         A state that is not younger than the last one, or comes more than
         `MAX_GAP` after it, adds nothing to the integral.
         """
+        dt = self._time_since_last(time)
+        x_ref, climb_thrust = self._follow_climb(x, x_ref, dt)
         e = heading_error(x, x_ref, self.yaw_index)
-        self._integrate(e[:3], time)
-        u = self.u_ref + self.K @ e + self._integrator_K @ self._integral
-        return np.minimum(np.maximum(u, _LEAST), _MOST)
+        linear = self.u_ref + self.K @ e
+        if not self._is_resting:
+            self._integrate(e[:3], dt, linear)
+        u = linear + self._integrator_K @ self._integral
+        u[THRUST] += climb_thrust
+        u = np.minimum(np.maximum(u, _LEAST), _MOST)
+        self._thrust = float(u[THRUST])
+        return u
 
     @override
     def take_over(self, previous: Self) -> None:
@@ -156,13 +202,41 @@ class IntegralStateFeedback(LinearFeedback):
         np.divide(previous._integrator_k, self._integrator_k, scale, where=self._integrator_k != 0)
         self._integral = self._within_limits(previous._integral * scale)
         self._time = previous._time
+        self._is_resting = previous._is_resting
+        self._climb = previous._climb
+        self._thrust = previous._thrust
 
-    def _integrate(self, error, time):
+    def _time_since_last(self, time):
         dt = 0.0 if self._time is None else time - self._time
         self._time = time
+        return dt if 0.0 < dt <= MAX_GAP else 0.0
+
+    def _follow_climb(self, x, x_ref, dt):
+        """Return the reference, and the thrust of its acceleration, while there is a climb."""
+        climb = self._climb
+        if climb is None:
+            return x_ref, 0.0
+        climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self.u_ref[THRUST])
+        self._integral[2] = -climb.disturbance / self._integrator_k[2]
+        if climb.has_arrived:
+            self._climb = None
+            return x_ref, 0.0
+        x_ref = x_ref.copy()
+        x_ref[2], x_ref[5] = climb.z, climb.z_dot
+        return x_ref, climb.z_ddot
+
+    def _integrate(self, error, dt, linear):
         # An error that overflowed must not stay in the integral.
-        if 0.0 < dt <= MAX_GAP and np.isfinite(error).all():
-            self._integral = self._within_limits(self._integral + error * dt)
+        if dt == 0.0 or not np.isfinite(error).all():
+            return
+        integral = self._within_limits(self._integral + error * dt)
+        u = linear + self._integrator_K @ integral
+        growth = self._integrator_K @ (integral - self._integral)
+        at_limit = ((u > _MOST) & (growth > 0.0)) | ((u < _LEAST) & (growth < 0.0))
+        grows = ~at_limit[_INTEGRATED]
+        if self._climb is not None:
+            grows[2] = False
+        self._integral[grows] = integral[grows]
 
     def _within_limits(self, integral):
         limit = self._integrator_limit

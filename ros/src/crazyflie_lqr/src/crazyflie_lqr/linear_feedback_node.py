@@ -4,15 +4,21 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from std_msgs.msg import String
 from typing_extensions import override
 
+from crazyflie_lqr.flight_phase import DESCENDING, FLYING, TAKING_OFF, GroundGuess
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import LinearFeedback
 from crazyflie_lqr.reference import GuardedReference
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC, Integer
+from crazyflie_utils.last_valid import HOLD_LIMIT
+from crazyflie_utils.parameter_types import TOPIC, Integer, Number
 from crazyflie_utils.vectors import from_vector, to_vector
+
+_SAME_CLOCK = 60.0
+"""A stamp that is older than this, s, is of another clock and says nothing about an age."""
 
 
 class LinearFeedbackParameters(Parameters):
@@ -32,6 +38,36 @@ class LinearFeedbackParameters(Parameters):
     reference_topic: str = parameter(TOPIC, "where references come from", name="topics/reference")
     state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
     control_topic: str = parameter(TOPIC, "where controls go", name="topics/control")
+    own_descent_topic: str | None = parameter(
+        TOPIC,
+        "references that count before all others; by default the name of reference + `_descent`",
+        None,
+        name="topics/descent_reference",
+    )
+    flight_state_topic: str = parameter(
+        TOPIC,
+        "where the takeoff server tells the flight state",
+        "in_flight_state",
+        name="topics/flight_state",
+    )
+    max_jump: float = parameter(
+        Number("m", above=0.0),
+        "how far from the vehicle a new reference may be; a further one is moved nearer",
+        3.0,
+        name="reference/max_jump",
+        live=True,
+    )
+    max_age: float = parameter(
+        Number("s", above=0.0),
+        "older states are not answered; stamps more than a minute off are of another clock",
+        HOLD_LIMIT,
+        name="state/max_age",
+    )
+
+    @property
+    def descent_topic(self) -> str:
+        """References of a descent."""
+        return self.own_descent_topic or f"{self.reference_topic}_descent"
 
 
 class LinearFeedbackNode(Node):
@@ -56,7 +92,10 @@ class LinearFeedbackNode(Node):
     yaw_index: int
 
     def __init__(self) -> None:
-        self._reference = GuardedReference(self.yaw_index)
+        self._reference = GuardedReference(self.yaw_index, report=self._warn_of_jump)
+        self._flight_state: str | None = None
+        self._is_flown = False
+        self._ground_guess = GroundGuess()
 
     def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the reference state, shape (x_dim,), that a reference message means.
@@ -82,6 +121,7 @@ class LinearFeedbackNode(Node):
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(self.parameters_type, self._reconfigure)
         self._controller = self.make_controller(self._parameters)
+        self._reference.max_jump = self._parameters.max_jump
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -94,28 +134,87 @@ class LinearFeedbackNode(Node):
             finite="state",
             on_invalid=self._on_invalid_reference,
         )
+        handle.subscribe(
+            parameters.descent_topic, self.reference_type, self._on_descent, finite="state"
+        )
+        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
         handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
 
     def _reconfigure(self, parameters):
         controller = self.make_controller(parameters)
         controller.take_over(self._controller)
         self._controller = controller
+        self._reference.max_jump = parameters.max_jump
 
     def _on_reference(self, message):
-        self._reference.update(self.complete_reference(to_vector(message.state)))
+        x_ref = self.complete_reference(to_vector(message.state))
+        now = self._handle.stamp().to_sec()
+        if not self._reference.update(x_ref, message.header.stamp.to_sec(), now):
+            self._handle.warn(
+                f"ignoring a reference on {self._parameters.reference_topic}: it is older than "
+                "the present one; are there two publishers?",
+                throttle=1.0,
+                key="old reference",
+            )
+        elif self._flight_state == TAKING_OFF and not self._is_flown:
+            self._is_flown = True
+            self._controller.take_off()
 
     def _on_invalid_reference(self):
         self._reference.invalidate(self._handle.time())
 
+    def _on_descent(self, message):
+        x_ref = self.complete_reference(to_vector(message.state))
+        self._reference.descend(x_ref, self._handle.time())
+
+    def _on_flight_state(self, message):
+        before, self._flight_state = self._flight_state, message.data
+        if before == message.data:
+            return
+        if message.data in (FLYING, DESCENDING):
+            # Who did not see the takeoff does not know what the vehicle weighs, either.
+            if not self._is_flown:
+                self._controller.take_off()
+            self._is_flown = True
+        else:
+            self._is_flown = False
+            self._controller.rest()
+
     def _on_state(self, message):
+        if self._is_old(message.header.stamp):
+            return
         x = to_vector(message.state)
         x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None:
             return
+        if self._flight_state is None:
+            self._guess_flight(x, x_ref)
         u = self._controller.control(x, x_ref, message.header.stamp.to_sec())
         if not np.isfinite(u).all():
-            self._handle.warn(f"the control {u} is not finite and is not sent", throttle=1.0)
+            self._handle.warn(
+                f"the control {u} is not finite and is not sent", throttle=1.0, key="not finite"
+            )
             return
         control = ControlStamped(control=from_vector(Control, u))
         control.header.stamp = message.header.stamp
         self._publisher.publish(control)
+
+    def _is_old(self, stamp):
+        age = self._handle.stamp().to_sec() - stamp.to_sec()
+        if not self._parameters.max_age < age < _SAME_CLOCK:
+            return False
+        self._handle.warn(
+            f"ignoring a state that is {age:.1f} s old; do the machines' clocks agree?",
+            throttle=1.0,
+            key="old state",
+        )
+        return True
+
+    def _guess_flight(self, x, x_ref):
+        if self._ground_guess.is_flying(x[2], x_ref[2], self._handle.time()):
+            self._controller.fly()
+        else:
+            self._controller.rest()
+
+    def _warn_of_jump(self, text):
+        self._handle.warn(text, throttle=1.0, key="jump")

@@ -1,10 +1,16 @@
-"""The reference a controller follows while its source may fail."""
+"""The reference a controller follows while its sources may fail."""
+
+import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_lqr.linear_feedback import at_rest
 from crazyflie_utils.last_valid import LastValid
+
+DESCENT_LIMIT = 0.3
+"""How long the reference of a descent counts, and it alone, s."""
 
 
 class GuardedReference:
@@ -14,27 +20,74 @@ class GuardedReference:
     not dropped: `crazyflie_utils.last_valid.HOLD_LIMIT` after the first invalid
     reference it stops where it is, and stays there until a valid one comes.
 
+    A reference that is older than the present one does not count: a publisher of long ago
+    may have latched it. One that is far away is moved nearer.
+
     Parameters
     ----------
     yaw_index : int
         Where the yaw is in the state.
+    max_jump : float, optional
+        How far from the vehicle a new reference may be, m. One that is further away becomes a
+        place to rest at so far from the vehicle, in the same direction.
+    report : callable, optional
+        ``report(text)`` is told of that.
     """
 
-    def __init__(self, yaw_index: int):
+    def __init__(
+        self,
+        yaw_index: int,
+        max_jump: float = math.inf,
+        report: Callable[[str], None] = lambda text: None,
+    ):
+        self.max_jump = max_jump
         self._yaw_index = yaw_index
+        self._report = report
         self._last_valid: LastValid[NDArray[np.float64]] = LastValid()
         self._hold_point: NDArray[np.float64] | None = None
+        self._is_new = False
         self._has_arrived = False
+        self._stamp = 0.0
+        self._descent: NDArray[np.float64] | None = None
+        self._descent_time = 0.0
 
-    def update(self, x_ref: NDArray[np.float64]) -> None:
-        """Take a valid reference, shape (x_dim,)."""
+    def update(self, x_ref: NDArray[np.float64], stamp: float = 0.0, now: float = 0.0) -> bool:
+        """Take a valid reference.
+
+        Parameters
+        ----------
+        x_ref : ndarray, shape (x_dim,)
+        stamp : float
+            When it was made, s; 0 if that is not known.
+        now : float
+            By the same clock. What has a stamp ahead of it counts as made now.
+
+        Returns
+        -------
+        bool
+            False if it is older than the present one, and does not count.
+        """
+        # After a reset of the clock nothing can be told from the stamps of before.
+        if self._stamp > now:
+            self._stamp = 0.0
+        if 0.0 < stamp < self._stamp:
+            return False
+        if stamp > 0.0:
+            self._stamp = min(stamp, now)
         self._last_valid.update(x_ref)
         self._hold_point = None
         self._has_arrived = True
+        self._is_new = True
+        return True
 
     def invalidate(self, time: float) -> None:
         """Take note that an invalid reference came at ``time`` (s)."""
         self._last_valid.invalidate(time)
+
+    def descend(self, x_ref: NDArray[np.float64], time: float) -> None:
+        """Take the reference of a descent, shape (x_dim,), at ``time`` (s)."""
+        self._descent = x_ref
+        self._descent_time = time
 
     def value(self, time: float, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
         """Return what to follow.
@@ -51,9 +104,30 @@ class GuardedReference:
         ndarray, shape (x_dim,), or None
             None before the first valid reference.
         """
+        if self._descent is not None and 0.0 <= time - self._descent_time < DESCENT_LIMIT:
+            return self._descent
         x_ref = self._last_valid.value(time)
-        if x_ref is None and self._has_arrived:
-            if self._hold_point is None:
-                self._hold_point = at_rest(x, self._yaw_index)
-            x_ref = self._hold_point
+        if x_ref is None:
+            return self._hold(x) if self._has_arrived else None
+        if self._is_new:
+            self._is_new = False
+            x_ref = self._within_reach(x_ref, x)
         return x_ref
+
+    def _hold(self, x):
+        if self._hold_point is None:
+            self._hold_point = at_rest(x, self._yaw_index)
+        return self._hold_point
+
+    def _within_reach(self, x_ref, x):
+        distance = math.dist(x_ref[:3], x[:3])
+        if distance <= self.max_jump:
+            return x_ref
+        self._report(
+            f"the reference is {distance:.1f} m away; going {self.max_jump:g} m in its direction"
+        )
+        near = at_rest(x_ref, self._yaw_index)
+        # Each factor is at most 1, so that a far one does not overflow.
+        near[:3] = x[:3] + (x_ref[:3] / distance - x[:3] / distance) * self.max_jump
+        self._last_valid.update(near)
+        return near

@@ -10,6 +10,9 @@ leave the rest to the attitude loops (MAX_THRUST of crtp_commander_rpyt.c)."""
 MAX_TILT = 0.2618
 """Largest roll and pitch that controllers ask for, rad (15 degrees)."""
 
+CRASH_TILT = 1.0472
+"""A vehicle that is tilted more than this, rad (60 degrees), has crashed or is about to."""
+
 MIN_THRUST, MAX_THRUST = 4.0, 16.0
 """Range of the thrust that controllers ask for in flight, m/s^2: with less a vehicle stands on
 the ground or has its motors off, more than that it cannot do."""

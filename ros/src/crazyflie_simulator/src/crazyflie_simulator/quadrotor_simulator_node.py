@@ -3,6 +3,7 @@
 from typing_extensions import override
 
 from crazyflie_model.dynamics import Dynamics
+from crazyflie_model.limits import CRASH_TILT
 from crazyflie_model.quadrotor import CRAZYFLIE, Airframe
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
@@ -45,6 +46,7 @@ class QuadrotorSimulatorNode(SimulatorNode):
     """A full Crazyflie: a rigid body with four motors and the firmware's inner loops."""
 
     parameters_type = QuadrotorSimulatorParameters
+    max_tilt = CRASH_TILT
 
     @override
     def make_dynamics(self, parameters: QuadrotorSimulatorParameters) -> Dynamics:

@@ -1,9 +1,11 @@
 """ROS interface of a simulated vehicle, whatever its model."""
 
+import math
 import zlib
 from typing import Any
 
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
 from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
@@ -23,6 +25,10 @@ from crazyflie_utils.parameter_types import (
 )
 from crazyflie_utils.parameters import group
 from crazyflie_utils.vectors import to_vector
+
+MAX_CATCH_UP = 1.0
+"""The most that is integrated at once, s, when the clock jumps or the machine was busy; what is
+beyond it is skipped, so that the process goes on living."""
 
 
 class MotionCaptureParameters(Parameters):
@@ -87,13 +93,17 @@ class SimulatorNode(Node):
     ----------
     parameters_type : type
         A subclass of `SimulatorParameters`, where a model has parameters of its own.
+    max_tilt : float
+        See `SimulatedVehicle`; for models that can turn over.
     """
 
     parameters_type: type[SimulatorParameters] = SimulatorParameters
+    max_tilt = math.inf
 
     def __init__(self) -> None:
         self._ticks = 0
         self._measured_at: float | None = None
+        self._crash_is_known = False
 
     def make_dynamics(self, parameters: Any) -> Dynamics:
         """Return the model of the vehicle.
@@ -137,10 +147,11 @@ class SimulatorNode(Node):
         parameters = self._parameters
         position = (parameters.init_x, parameters.init_y, parameters.init_z)
         self._start = handle.time()
-        self._vehicle = SimulatedVehicle(self._dynamics, position, self._start)
+        self._vehicle = SimulatedVehicle(self._dynamics, position, self._start, self.max_tilt)
         self._broadcast = handle.broadcast_transforms()
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
+        handle.advertise_service("~reset", Empty, self._on_reset)
         handle.subscribe(
             parameters.control_topic, ControlStamped, self._on_control, finite="control"
         )
@@ -155,17 +166,38 @@ class SimulatorNode(Node):
         # Without a clock of its own, the vehicle has to catch up first, so that
         # the control takes effect now and not at the last tick.
         if not self._parameters.publishes_clock:
-            self._vehicle.advance_to(self._handle.time())
+            self._advance_to(self._handle.time())
         self._vehicle.command(to_vector(message.control))
 
+    def _on_reset(self, _):
+        self._vehicle.recover()
+        return EmptyResponse()
+
     def _on_timer(self):
-        self._vehicle.advance_to(self._handle.time())
+        self._advance_to(self._handle.time())
         self._broadcast_pose()
+
+    def _advance_to(self, now):
+        skipped = now - self._vehicle.time - max(MAX_CATCH_UP, self._parameters.time_step)
+        if skipped > 0.0:
+            self._vehicle.skip(skipped)
+            self._handle.warn(
+                f"time has moved by {skipped:.1f} s too much to simulate; the vehicle skips that",
+                throttle=1.0,
+                key="skipped time",
+            )
+        self._vehicle.advance_to(now)
+        if self._vehicle.has_crashed and not self._crash_is_known:
+            self._handle.warn(
+                f"the vehicle has tilted by more than {math.degrees(self.max_tilt):.0f} degrees: "
+                f"motors off until {self._handle.resolve('~reset')} is called"
+            )
+        self._crash_is_known = self._vehicle.has_crashed
 
     def _on_clock_timer(self):
         self._ticks += 1
         now = self._start + self._ticks * self._parameters.time_step
-        self._vehicle.advance_to(now)
+        self._advance_to(now)
         self._broadcast_pose()
         self._set_clock(now)
 

@@ -32,9 +32,20 @@ class SimulatedVehicle:
         Where it stands at the beginning, m, fixed frame.
     time : float
         Its time at the beginning, s.
+    max_tilt : float, optional
+        A vehicle that is tilted more than this, rad, has crashed: its motors stay off until
+        `recover`. By default none does.
+
+    Attributes
+    ----------
+    has_crashed : bool
     """
 
-    def __init__(self, dynamics: Dynamics, position: ArrayLike, time: float):
+    def __init__(
+        self, dynamics: Dynamics, position: ArrayLike, time: float, max_tilt: float = math.inf
+    ):
+        self.has_crashed = False
+        self._least_upright = math.cos(max_tilt) if math.isfinite(max_tilt) else -math.inf
         self._dynamics = dynamics
         self._x = dynamics.initial_state(_floats(position))
         self._u: Vector[float] = _OFF
@@ -62,6 +73,16 @@ class SimulatedVehicle:
         self._u = _floats(u)
         self._control_step = self._steps
 
+    def recover(self) -> None:
+        """Let a vehicle that has crashed obey the next control again."""
+        self.has_crashed = False
+        if self._control_step is not None:
+            self._u = _OFF
+
+    def skip(self, duration: float) -> None:
+        """Have ``duration`` (s) passed without anything having happened."""
+        self._start += duration
+
     def advance_to(self, time: float) -> None:
         """Integrate to the last whole step before ``time`` (s).
 
@@ -78,8 +99,19 @@ class SimulatedVehicle:
             for _ in range(steps):
                 self._x = self._dynamics.step(self._steps, self._x, self._effective_control())
                 self._steps += 1
+                self._notice_crash()
+
+    def _notice_crash(self):
+        if self._least_upright == -math.inf:
+            return
+        _, (x, y, _, _) = self.pose
+        # The cosine of the tilt, from the quaternion.
+        if 1.0 - 2.0 * (x * x + y * y) < self._least_upright:
+            self.has_crashed = True
 
     def _effective_control(self):
+        if self.has_crashed:
+            return _OFF
         if self._control_step is None:
             return self._u
         age = self._steps - self._control_step

@@ -1,10 +1,13 @@
 """ROS interface of the state estimators."""
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from numpy.typing import NDArray
+from std_msgs.msg import Bool, Header
 from typing_extensions import override
 
 from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_model.limits import CRASH_TILT
 from crazyflie_msgs.msg import (
     ControlStamped,
     FullStateStamped,
@@ -14,6 +17,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_state_estimator import kalman
 from crazyflie_state_estimator.control_input import ControlInput
 from crazyflie_state_estimator.motion import Motion, MotionEstimator
+from crazyflie_state_estimator.pose_gate import PoseGate, TiltMonitor, Verdict
 from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
@@ -21,6 +25,9 @@ from crazyflie_utils.parameter_types import FRAME, TIME_STEP, TOPIC, Integer, Nu
 from crazyflie_utils.vectors import from_vector, to_vector
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
+
+REPORT_PERIOD = 1.0
+"""Of the diagnostics, s; REP 107 wants one report a second."""
 
 
 class StateEstimatorParameters(Parameters):
@@ -39,6 +46,18 @@ class StateEstimatorParameters(Parameters):
         "the vehicle's control, such as /control/final; for the Kalman filter only",
         None,
         "topics/control",
+    )
+    max_speed: float = parameter(
+        Number("m/s", above=0.0),
+        "poses that a vehicle can reach only faster than this are rejected",
+        5.0,
+        "pose/max_speed",
+    )
+    max_tilt: float = parameter(
+        Number("rad", above=0.0),
+        "a vehicle that is tilted more than this has crashed",
+        CRASH_TILT,
+        "pose/max_tilt",
     )
 
 
@@ -110,6 +129,8 @@ class StateEstimatorNode(Node):
     def __init__(self) -> None:
         self._control = ControlInput()
         self._last_success = 0.0
+        self._stamp: int | None = None
+        self._is_tilted: bool | None = None
 
     def state(self, motion: Motion) -> NDArray[np.float64]:
         """Return the state vector, in the order of the message's fields."""
@@ -118,6 +139,8 @@ class StateEstimatorNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(self.parameters_type)
+        self._gate = PoseGate(self._parameters.max_speed)
+        self._tilt = TiltMonitor(self._parameters.max_tilt)
         if self._parameters.filter_type == KALMAN:
             self._estimator = self._load_kalman_filters(handle)
         else:
@@ -144,6 +167,8 @@ class StateEstimatorNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.state_topic, self.state_type)
+        self._tilted = handle.publisher(f"{parameters.state_topic}_tilted", Bool, latch=True)
+        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._lookup = handle.listen_to_transforms()
         if parameters.filter_type == KALMAN and parameters.control_topic is not None:
             handle.subscribe(
@@ -151,6 +176,7 @@ class StateEstimatorNode(Node):
             )
         self._last_success = handle.time()
         handle.timer(parameters.time_step, self._on_timer)
+        handle.timer(REPORT_PERIOD, self._report)
 
     def _on_control(self, message):
         self._control.command(to_vector(message.control), self._handle.time())
@@ -160,6 +186,7 @@ class StateEstimatorNode(Node):
         if now < self._last_success:
             # The simulation was reset, and what is known belongs to the past one.
             self._estimator.reset()
+            self._gate.reset()
             self._last_success = now
         try:
             transform = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
@@ -169,7 +196,10 @@ class StateEstimatorNode(Node):
         motion = self._update(transform, now)
         if motion is None:
             stamp = transform.header.stamp.to_sec()
-            self._report_no_state(now, f"the latest is still that of {stamp:.3f} s")
+            self._report_no_state(
+                now,
+                f"the latest is that of {stamp:.3f} s; {self._rejections()} poses were rejected",
+            )
             return
         self._last_success = now
         message = self.state_type()
@@ -179,14 +209,48 @@ class StateEstimatorNode(Node):
         self._publisher.publish(message)
 
     def _update(self, transform, now):
+        stamp = transform.header.stamp.to_nsec()
+        if stamp == self._stamp:
+            return None
+        self._stamp = stamp
         translation, rotation = transform.transform.translation, transform.transform.rotation
+        position = (translation.x, translation.y, translation.z)
+        self._tell_tilt(rotation)
+        verdict = self._gate.judge(stamp * 1e-9, position)
+        if verdict is Verdict.BAD:
+            return None
+        if verdict is Verdict.MOVED:
+            self._estimator.reset()
         attitude = rpy_from_quaternion(rotation.x, rotation.y, rotation.z, rotation.w)
         return self._estimator.update(
-            transform.header.stamp.to_nsec(),
-            (translation.x, translation.y, translation.z),
-            attitude,
-            self._control.acceleration(float(attitude[2]), now),
+            stamp, position, attitude, self._control.acceleration(float(attitude[2]), now)
         )
+
+    def _tell_tilt(self, rotation):
+        is_tilted = self._tilt.update(rotation.x, rotation.y)
+        if is_tilted == self._is_tilted:
+            return
+        self._is_tilted = is_tilted
+        self._tilted.publish(Bool(is_tilted))
+        if is_tilted:
+            self._handle.warn("the vehicle has tipped over", throttle=1.0)
+
+    def _rejections(self):
+        return self._gate.rejected + sum(self._handle.rejected_transforms().values())
+
+    def _report(self):
+        silence = self._handle.time() - self._last_success
+        is_silent = silence > HOLD_LIMIT
+        reasons = {"is too far away": self._gate.rejected, **self._handle.rejected_transforms()}
+        values = [KeyValue(f"rejected: {key}", str(count)) for key, count in reasons.items()]
+        status = DiagnosticStatus(
+            level=DiagnosticStatus.ERROR if is_silent else DiagnosticStatus.OK,
+            name=f"{self._handle.name.lstrip('/')}: poses",
+            message=f"no state for {silence:.1f} s" if is_silent else "states are published",
+            values=[KeyValue("rejected", str(self._rejections())), *values],
+        )
+        header = Header(stamp=self._handle.stamp())
+        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
     def _report_no_state(self, now, reason):
         # Shorter silences are ordinary: at the start, and when time_step is

@@ -1,6 +1,5 @@
 """The only door between a node and ROS: roscpp's NodeHandle for Python."""
 
-import math
 import time
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
@@ -17,6 +16,7 @@ from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_p
 from crazyflie_utils.runtime import flights
 from crazyflie_utils.runtime.faults import Faults
 from crazyflie_utils.runtime.services import pass_on, serve
+from crazyflie_utils.runtime.throttle import Throttle
 from crazyflie_utils.runtime.timers import Timer
 from crazyflie_utils.runtime.topics import Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite
@@ -48,7 +48,7 @@ class NodeHandle:
         self._process = process
         self._name = name
         self._faults = Faults(self)
-        self._throttled: dict[Hashable, float] = {}
+        self._throttle = Throttle()
         self._undo: list[Callable[[], None]] = []
         self._is_closed = False
 
@@ -349,6 +349,10 @@ class NodeHandle:
         self._process.transforms.listen()
         return self._process.transforms.lookup
 
+    def rejected_transforms(self) -> dict[str, int]:
+        """Return how many transforms were not taken into tf in this process, reason to number."""
+        return dict(self._process.transforms.rejected)
+
     # Log and faults.
 
     def info(self, text: str) -> None:
@@ -359,14 +363,11 @@ class NodeHandle:
         """Log a warning; the same ``key`` (the text) at most once in ``throttle`` seconds.
 
         The seconds are those of the machine's clock, so that a simulation that
-        runs fast does not flood the screen.
+        runs fast does not flood the screen. A text that varies needs a key.
         """
-        now = time.monotonic()
         key = text if key is None else key
-        if throttle > 0.0:
-            if now - self._throttled.get(key, -math.inf) < throttle:
-                return
-            self._throttled[key] = now
+        if throttle > 0.0 and not self._throttle.passes(key, throttle, time.monotonic()):
+            return
         self._process.transport.log("warn", f"{self._name}: {text}")
 
     def error(self, text: str) -> None:

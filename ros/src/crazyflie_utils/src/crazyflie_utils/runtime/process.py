@@ -11,7 +11,7 @@ from crazyflie_utils.runtime.executor import Executor
 from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.runtime.timers import SteadyTimers, Timer, TimerQueue
 from crazyflie_utils.runtime.topics import Topics
-from crazyflie_utils.runtime.transforms import Transforms
+from crazyflie_utils.runtime.transforms import AHEAD, SIMULATED_AHEAD, Transforms
 from crazyflie_utils.runtime.transport import Transport
 
 
@@ -33,7 +33,12 @@ class Process:
         self.clock: SimulatedClock | SteadyClock = (
             SimulatedClock() if use_sim_time else SteadyClock()
         )
-        self.transforms = Transforms(self.topics, self._warn_about_transform)
+        self.transforms = Transforms(
+            self.topics,
+            self._warn_about_transform,
+            lambda: self.clock.stamp().to_sec(),
+            SIMULATED_AHEAD if use_sim_time else AHEAD,
+        )
         self._log = NodeHandle(self, "/tf")
         self._steady_clock = SteadyClock()
         self._steady = SteadyTimers(TimerQueue(self.executor), self._steady_clock)
@@ -119,5 +124,5 @@ class Process:
             self._simulated.rebase(now)
         self._simulated.run_due(now)
 
-    def _warn_about_transform(self, text):
-        self._log.warn(text, throttle=1.0)
+    def _warn_about_transform(self, text, key):
+        self._log.warn(text, throttle=1.0, key=key)

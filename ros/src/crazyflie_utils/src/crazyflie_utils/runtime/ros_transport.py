@@ -31,6 +31,11 @@ _STALL_LIMIT = 5.0
 stands still."""
 
 
+_MOST_CALLS = 8
+"""Calls of one service that may be without an answer. rospy waits for one without a limit, in
+a thread that nothing can end."""
+
+
 class _RosPublisher(ExternalPublisher):
     def __init__(self, publisher: rospy.Publisher):
         self._publisher = publisher
@@ -63,6 +68,7 @@ class RosTransport(Transport):
         rospy_internals.never_connect_to_oneself()
         rospy_internals.never_fail_to_log()
         self._remappings = rospy_internals.take_over_remappings()
+        self._calls: dict[str, threading.Semaphore] = {}
 
     def remap(self, name: str) -> str:
         """Return what the command line maps the name to."""
@@ -120,8 +126,12 @@ class RosTransport(Transport):
     ) -> Future[Any]:
         """Call in a thread of its own, and give up on it after ``limit``."""
         future: Future[Any] = Future()
+        calls = self._calls.setdefault(name, threading.Semaphore(_MOST_CALLS))
+        if not calls.acquire(blocking=False):
+            _fail(future, f"{name} has not answered {_MOST_CALLS} earlier calls")
+            return future
         threading.Thread(
-            target=_call, args=(name, service_type, request, limit, future), daemon=True
+            target=_call, args=(name, service_type, request, limit, future, calls), daemon=True
         ).start()
         timer = threading.Timer(
             limit, _fail, (future, f"{name} has not answered within {limit:g} s")
@@ -174,7 +184,7 @@ def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -
     return answer.result()
 
 
-def _call(name, service_type, request, limit, future):
+def _call(name, service_type, request, limit, future, calls):
     try:
         rospy.wait_for_service(name, timeout=limit)
         response = rospy.ServiceProxy(name, service_type)(request)
@@ -184,6 +194,8 @@ def _call(name, service_type, request, limit, future):
     else:
         with contextlib.suppress(InvalidStateError):
             future.set_result(response)
+    finally:
+        calls.release()
 
 
 def _fail(future, text):

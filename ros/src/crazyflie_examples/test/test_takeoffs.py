@@ -1,0 +1,93 @@
+"""Takeoff after takeoff of the hover stack, on hand-moved time."""
+
+from pathlib import Path
+
+import pytest
+from rospkg import RosPack
+from std_srvs.srv import EmptyRequest
+
+from crazyflie_dev.flight_report import OVERSHOOT_LIMIT
+from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
+    PositionVelocityYawStateLiftLqrNode,
+)
+from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
+from crazyflie_state_estimator.estimator_node import PositionVelocityYawStateEstimatorNode
+from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
+from crazyflie_utils.testing import FakeProcess
+
+LQR = Path(RosPack().get_path("crazyflie_lqr"))
+HEIGHT = 1.0
+FRAMES = {"frames/fixed": "world", "frames/robot": "crazyflie"}
+
+# Of the launch files: gains, integrator of x, y, z and its limits, filter.
+HARDWARE = ("references/K_manual.txt", (-0.05, 0.05, -0.5), (1.0, 1.0, 6.0), "kalman")
+SOFTWARE = ("config/K_quadrotor.txt", (-0.15, 0.15, -10.0), (0.2, 0.2, 0.25), "finite_difference")
+
+
+def launch(example, mass_error, thrust_error):
+    """Return a process with vehicle, estimator, controller, server and filter."""
+    gains_file, gains, limits, rate_filter = example
+    process = FakeProcess()
+    simulator = {
+        **{"time_step": 0.01, "init/x": 0.0, "init/y": 0.0, "init/z": 0.0, **FRAMES},
+        **{"topics/control": "/control/final", "mass_error": mass_error},
+        "thrust_error": thrust_error,
+    }
+    if example is HARDWARE:
+        simulator |= {"mocap/position_noise": 0.0002, "mocap/latency": 0.02}
+    estimator = {
+        **{"x_dim": 7, "time_step": 0.01, **FRAMES, "topics/state": "/state"},
+        **{"topics/control": "/control/final", "filter/type": rate_filter},
+    }
+    controller = {
+        **{"x_dim": 7, "u_dim": 4, "K_file": str(LQR / gains_file)},
+        **{"u_ref_file": str(LQR / "config/u_ref_hover.txt"), "topics/reference": "/ref"},
+        **{"topics/state": "/state", "topics/control": "/control/lqr"},
+        **{f"integrator/k/{axis}": k for axis, k in zip("xyz", gains, strict=True)},
+        **{f"integrator/thresh/{axis}": i for axis, i in zip("xyz", limits, strict=True)},
+    }
+    server = {
+        **{"topics/reference": "/ref", "topics/control": "/control/takeoff"},
+        **{"topics/in_flight": "/in_flight", "topics/state": "/state"},
+        **{"hover/x": 0.0, "hover/y": 0.0, "hover/z": HEIGHT, "landing/descent_speed": 0.2},
+    }
+    control_filter = {
+        **{"topics/takeoff_control": "/control/takeoff", "topics/in_flight": "/in_flight"},
+        **{"topics/commanded_control": "/control/lqr", "topics/final_control": "/control/final"},
+    }
+    nodes = {
+        "/simulator": (QuadrotorSimulatorNode(), simulator),
+        "/state_estimator": (PositionVelocityYawStateEstimatorNode(), estimator),
+        "/lqr_controller": (PositionVelocityYawStateLiftLqrNode(), controller),
+        "/takeoff_server": (TakeoffServerNode(), server),
+        "/takeoff_control_filter": (TakeoffControlFilterNode(), control_filter),
+    }
+    for name, (node, parameters) in nodes.items():
+        assert process.launch(node, name, parameters)
+    process.advance(2.0)
+    return process
+
+
+def heights(process, duration):
+    """Let time pass; return the heights of the vehicle meanwhile."""
+    before = len(process.published("/tf"))
+    process.advance(duration)
+    messages = process.published("/tf")[before:]
+    return [transform.transform.translation.z for m in messages for transform in m.transforms]
+
+
+@pytest.mark.parametrize("example", [HARDWARE, SOFTWARE], ids=["hardware", "software"])
+@pytest.mark.parametrize(("mass_error", "thrust_error"), [(0.05, -0.05), (0.0, 0.0)])
+def test_no_takeoff_overshoots_also_not_after_30_s_on_the_ground(example, mass_error, thrust_error):
+    process = launch(example, mass_error, thrust_error)
+    for _ in range(2):
+        takeoff = process.call("/takeoff", EmptyRequest())
+        course = heights(process, 12.0)
+        assert takeoff.exception(timeout=0) is None
+        assert max(course) < HEIGHT + OVERSHOOT_LIMIT
+        assert course[-1] == pytest.approx(HEIGHT, abs=0.05)
+        land = process.call("/land", EmptyRequest())
+        assert heights(process, 12.0)[-1] < 0.01
+        assert land.exception(timeout=0) is None
+        process.advance(18.0)

@@ -1,0 +1,103 @@
+"""A takeoff's way up: a height reference that climbs gently, and a thrust that is learned.
+
+A step of the reference from the ground to the hover point asks more of a soft height loop
+than it can do: its integrator finds what weight and battery differ from nominal in
+seconds, during which it also collects the error of the climb, and the vehicle overshoots by
+as much. So the reference climbs as fast as a vehicle can follow, and what differs is
+found by a disturbance observer (Ohnishi et al., Motion control for advanced mechatronics,
+IEEE/ASME Trans. Mechatronics 1(1), 1996) from what the vehicle does with the thrust it gets:
+
+    z_ddot = thrust - u_ref + d,    d' = RATE (z_ddot - (thrust - u_ref) - d).
+
+On the ground z_ddot is 0, so that the thrust grows until the vehicle lifts off. When it
+has arrived, the integrator goes on from where it gives the thrust that was found.
+"""
+
+import math
+
+SPEED = 0.4
+"""Of the reference, m/s."""
+
+ACCELERATION = 0.5
+"""Of the reference, m/s^2."""
+
+LEAD = 0.15
+"""How far the reference may be above the vehicle, m: it waits for one that has not lifted off."""
+
+RATE = 3.0
+"""Bandwidth of the observer, 1/s."""
+
+LEARNING_TIME = 3.0 / RATE
+"""The shortest that a climb lasts, s, also where there is no way to go."""
+
+ARRIVAL_DISTANCE, ARRIVAL_SPEED = 0.05, 0.1
+"""So near to its goal, m, and so slow, m/s, a vehicle has arrived."""
+
+
+class Climb:
+    """The way up of one takeoff.
+
+    Attributes
+    ----------
+    disturbance : float
+        What accelerates the vehicle beside thrust and nominal weight, m/s^2, upwards.
+    z, z_dot, z_ddot : float
+        Reference, m, m/s and m/s^2.
+    has_arrived : bool
+        The vehicle is at its goal and the reference, too.
+
+    Parameters
+    ----------
+    limit : float
+        Largest disturbance that is believed in, m/s^2.
+    """
+
+    def __init__(self, limit: float):
+        self.disturbance = 0.0
+        self.z = self.z_dot = self.z_ddot = 0.0
+        self.has_arrived = False
+        self._limit = limit
+        self._last_z_dot: float | None = None
+        self._elapsed = 0.0
+
+    def advance(self, dt: float, z: float, z_dot: float, goal: float, excess: float) -> None:
+        """Go on by ``dt`` (s).
+
+        Parameters
+        ----------
+        dt : float
+            Since the last state; what the first one says is the beginning.
+        z, z_dot : float
+            Height and speed of the vehicle, m and m/s.
+        goal : float
+            Height to climb to, m.
+        excess : float
+            Thrust since the last state, less that of the reference control, m/s^2.
+        """
+        if self._last_z_dot is None:
+            self.z, self.z_dot = z, z_dot
+        else:
+            gain = RATE * (z_dot - self._last_z_dot - (excess + self.disturbance) * dt)
+            self.disturbance = _within(self.disturbance + gain, self._limit)
+            self._advance_reference(dt, z, goal)
+        self._last_z_dot = z_dot
+        self._elapsed += dt
+        is_near = abs(z - goal) < ARRIVAL_DISTANCE and abs(z_dot) < ARRIVAL_SPEED
+        has_learned = self._elapsed >= LEARNING_TIME
+        self.has_arrived = has_learned and self.z >= goal and (is_near or z > goal)
+
+    def _advance_reference(self, dt, z, goal):
+        if dt <= 0.0:
+            return
+        braking = math.sqrt(2.0 * ACCELERATION * max(goal - self.z, 0.0))
+        z_dot = min(self.z_dot + ACCELERATION * dt, SPEED, braking)
+        # More than that is a reference that jumped, not one that moves.
+        self.z_ddot = _within((z_dot - self.z_dot) / dt, 2.0 * ACCELERATION)
+        self.z_dot = z_dot
+        self.z = min(self.z + z_dot * dt, z + LEAD)
+        if goal - self.z < 1e-3:
+            self.z, self.z_dot, self.z_ddot = goal, 0.0, 0.0
+
+
+def _within(value, limit):
+    return min(max(value, -limit), limit)

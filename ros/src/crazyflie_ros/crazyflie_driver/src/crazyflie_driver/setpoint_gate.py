@@ -48,10 +48,9 @@ class SetpointGate:
         """Take note that the vehicle was given a high-level command after a stream."""
         self._high_level_since = now
 
-    @property
-    def is_waiting(self) -> bool:
-        """Whether setpoints are blocked because of a lost link."""
-        return self._is_waiting
+    def is_blocking(self, now: float) -> bool:
+        """Return whether somebody streams setpoints that are blocked because of a lost link."""
+        return self._is_waiting and self._latest is not None and now - self._latest <= PAUSE
 
     def refusal(self, now: float, is_zero: bool) -> str:
         """Return why a setpoint must not be sent; empty if it may.

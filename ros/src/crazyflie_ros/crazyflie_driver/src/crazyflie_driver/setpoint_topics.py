@@ -94,12 +94,9 @@ class SetpointTopics:
         return sum(1 for time in self._times if now - time <= _RATE_WINDOW) / _RATE_WINDOW
 
     def zeros(self) -> None:
-        """Send zero thrust a hundred times, and that setpoints end; blocks.
-
-        Without the end the vehicle would be locked 2 s later, or ignore high-level commands.
-        """
+        """Send zero thrust a hundred times, and that setpoints end; blocks."""
         self._crazyflie.setpoints.zeros()
-        self.hand_over()
+        self.is_streaming = False
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
         """Announce that setpoints end, so that the vehicle accepts high-level commands."""

@@ -296,7 +296,7 @@ class DriverVehicle:
             supervisor=self._log.supervisor,
             setpoint_rate=self.setpoints.rate(now),
             ignored=self.setpoints.ignored,
-            is_waiting=self.setpoints.gate.is_waiting,
+            is_waiting=self.setpoints.gate.is_blocking(now),
             is_high_level=not self.setpoints.is_streaming,
             restarts=self.crazyflie.restarts,
             **figures,

@@ -131,6 +131,7 @@ def test_half_of_the_packets_lost_is_a_poor_link_at_once():
     ("times", "restarted"),
     [
         ([100, 200, 300], False),
+        ([0xF00000, 0xF00010], False),
         ([100, 200, 190, 300], False),
         ([0xFFFFF0, 5, 100], False),
         ([60_000, 60_100, 900], True),

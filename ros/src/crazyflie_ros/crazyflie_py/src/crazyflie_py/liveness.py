@@ -44,12 +44,14 @@ class Uptime:
     """The vehicle's clock, in log packets, which begins anew when the firmware restarts."""
 
     def __init__(self) -> None:
-        self._latest = 0
+        self._latest: int | None = None
 
     def has_restarted(self, time_ms: int) -> bool:
         """Return whether the clock (ms, 24 bits) is behind what it was at the last call."""
-        behind = (self._latest - time_ms) % _TICKS
-        self._latest = time_ms
+        before, self._latest = self._latest, time_ms
+        if before is None:
+            return False
+        behind = (before - time_ms) % _TICKS
         return _REORDERED_MS < behind < _TICKS // 2
 
 

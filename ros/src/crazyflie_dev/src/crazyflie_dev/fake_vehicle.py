@@ -95,8 +95,12 @@ class FakeVehicle:
 
     def say(self, port: int, channel: int, data: bytes) -> None:
         """Send a packet without being asked."""
+        self.say_datagram(bytes([port << 4 | 3 << 2 | channel]) + data)
+
+    def say_datagram(self, datagram: bytes) -> None:
+        """Send any datagram."""
         if self._peer is not None and not self.is_frozen:
-            self._socket.sendto(bytes([port << 4 | 3 << 2 | channel]) + data, self._peer)
+            self._socket.sendto(datagram, self._peer)
 
     def packets(self, port: int, channel: int) -> list[bytes]:
         """Return the data of all packets received on a port and channel, oldest first."""

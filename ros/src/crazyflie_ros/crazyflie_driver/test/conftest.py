@@ -46,10 +46,10 @@ PARAMETERS = {
 class Server:
     """The driver on a fake process."""
 
-    def __init__(self):
+    def __init__(self, parameters=None):
         self.process = FakeProcess()
         self.node = CrazyflieServerNode()
-        assert self.process.launch(self.node, "/crazyflie_server")
+        assert self.process.launch(self.node, "/crazyflie_server", parameters)
         self.vehicles = []
 
     def make_vehicle(self, **options):
@@ -86,10 +86,22 @@ def result(answer):
 
 
 @pytest.fixture
-def server():
-    server = Server()
-    yield server
-    server.close()
+def make_server():
+    """Return a function that makes a server with parameters; it ends with the test."""
+    servers = []
+
+    def make(parameters=None):
+        servers.append(Server(parameters))
+        return servers[-1]
+
+    yield make
+    for server in servers:
+        server.close()
+
+
+@pytest.fixture
+def server(make_server):
+    return make_server()
 
 
 @pytest.fixture(scope="module")
@@ -98,7 +110,9 @@ def shared(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         server = Server()
-        server.add(server.make_vehicle().uri)
+        vehicle = server.make_vehicle()
+        server.add(vehicle.uri)
+        vehicle.wait_for_packets(7, 1)
         yield server
         server.close()
 
@@ -119,6 +133,8 @@ def vehicle(server):
     """Return a vehicle that has been added as cf1, without logging and parameters."""
     vehicle = server.make_vehicle()
     server.add(vehicle.uri)
+    # What ends the zeros after connecting.
+    vehicle.wait_for_packets(7, 1)
     vehicle.received.clear()
     return vehicle
 

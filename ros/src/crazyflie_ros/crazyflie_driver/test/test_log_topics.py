@@ -51,7 +51,7 @@ def test_standard_topics_need_four_log_blocks(logging):
     created = [data for data in logging.packets(5, 1) if data[0] == 6]
     started = [data[2] for data in logging.packets(5, 1) if data[0] == 3]
     assert len(created) == 4
-    assert sorted(started) == [1, 1, 10, 50]
+    assert sorted(started) == [1, 1, 10, 10]
 
 
 def test_packets_of_others(server, logging):
@@ -77,7 +77,7 @@ def test_the_frequency_of_a_custom_block_is_a_period_in_ms(server, log_block):
     blocks = [log_block("motors", 20, "motor.m1", "pm.vbat"), log_block("slow", 1000, "mag.x")]
     server.add(vehicle.uri, enable_logging=True, log_blocks=blocks)
     started = [data[2] for data in vehicle.packets(5, 1) if data[0] == 3]
-    assert sorted(started) == [2, 50, 100]
+    assert sorted(started) == [2, 10, 100]
     message = published(server, "/cf1/motors", 2)[0]
     assert message.values == [4321.0, 3.75]
     assert message.header.frame_id == "cf1/base_link"
@@ -107,6 +107,7 @@ def test_without_logging_there_are_only_status_and_packets(server, log_block):
     assert set(server.process.transport.publishers) == {
         "/diagnostics",
         "/cf1/rssi",
+        "/cf1/status",
         "/cf1/packets",
     }
 

@@ -33,6 +33,8 @@ def test_high_level_commands(flying):
     call("/cf1/set_group_mask", SetGroupMaskRequest(3))
     call("/cf1/takeoff", TAKEOFF)
     call("/cf1/go_to", GoToRequest(2, True, Point(1.0, -2.0, 0.5), 0.75, Duration(4)))
+    piece = TrajectoryPolynomialPiece(duration=Duration(1))
+    call("/cf1/upload_trajectory", UploadTrajectoryRequest(5, 0, [piece]))
     call("/cf1/start_trajectory", StartTrajectoryRequest(4, 5, 1.5, True, False))
     call("/cf1/land", LandRequest(0, 0.25, Duration(3)))
     call("/cf1/stop", StopRequest(7))
@@ -40,6 +42,7 @@ def test_high_level_commands(flying):
         b"\x00\x03",
         struct.pack("<BBff?f", 7, 1, 1.5, 0.0, True, 2.5),
         struct.pack("<4B5f", 12, 2, 1, 0, 1.0, -2.0, 0.5, 0.75, 4.0),
+        struct.pack("<4BIB", 6, 5, 1, 0, 0, 1),
         struct.pack("<6Bf", 13, 4, 0, 0, 1, 5, 1.5),
         struct.pack("<BBff?f", 8, 0, 0.25, 0.0, True, 3.0),
         b"\x03\x07",
@@ -52,12 +55,10 @@ def test_setpoints_are_handed_over_before_a_high_level_command(server, vehicle):
         vehicle.received.clear()
         return ports
 
-    # The zeros after connecting are setpoints, too.
+    # The zeros after connecting have been handed over.
     server.call("/cf1/takeoff", TAKEOFF)
-    assert vehicle.packets(7, 1) == [SETPOINTS_STOP]
-    assert sent() == [(7, 1), (8, 0)]
-    server.call("/cf1/stop", StopRequest(0))
     assert sent() == [(8, 0)]
+    server.process.advance(1.0)
     server.process.publish("/cf1/cmd_vel", Twist(Vector3(0, 0, 1.0), Vector3()))
     vehicle.wait_for_packets(3, 0)
     server.call("/cf1/land", LandRequest(0, 0.0, Duration(2)))
@@ -67,6 +68,7 @@ def test_setpoints_are_handed_over_before_a_high_level_command(server, vehicle):
 def test_setpoints_that_override_a_command_are_pointed_out(flying):
     server, vehicle = flying
     server.call("/cf1/takeoff", TAKEOFF)
+    server.process.advance(1.0)
     server.process.publish("/cf1/cmd_vel", Twist(Vector3(0, 0, 1.0), Vector3()))
     assert "cmd_vel overrides the high-level command" in server.process.logged("warn")[0]
 
@@ -149,7 +151,7 @@ def test_an_emergency_is_latched(server, vehicle):
 def test_an_emergency_without_a_link_is_sent_when_it_is_back(server, vehicle):
     vehicle.is_frozen = True
     wait_until(lambda: server.process.logged("error"), "the loss")
-    with pytest.raises(ServiceError, match="will be once the link is back"):
+    with pytest.raises(ServiceError, match="is sent when the link is back"):
         server.call("/cf1/emergency", EmptyRequest())
     vehicle.received.clear()
     vehicle.is_frozen = False

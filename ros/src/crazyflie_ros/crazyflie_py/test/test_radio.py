@@ -87,10 +87,12 @@ def test_an_error_in_flight_is_a_lost_link(mock):
     link._on_connected(URI)
     link._on_complete(URI)
     assert link.error is None
+    # With this cflib's radio driver goes on, and the vehicle may be heard again.
     mock.fail("Too many packets lost")
+    assert link.error is None
+    mock.fail("it has probably been unplugged!")
     assert isinstance(link.error, LinkLostError)
     assert "the link was lost" in str(link.error)
-    assert "radio gets no answer" in str(link.error)
     link.close()
 
 

@@ -45,16 +45,23 @@ class Board:
     faults : FaultSwitches
     settings : VehicleSettings
     storage : Storage
+    failure : str
+        See `Firmware`.
     """
 
     def __init__(
-        self, physics: Physics, faults: FaultSwitches, settings: VehicleSettings, storage: Storage
+        self,
+        physics: Physics,
+        faults: FaultSwitches,
+        settings: VehicleSettings,
+        storage: Storage,
+        failure: str = "",
     ):
-        firmware = self.firmware = Firmware(physics, faults, settings)
+        firmware = self.firmware = Firmware(physics, faults, settings, failure)
         supervisor = SupervisorPort(firmware)
         self._log = LogPort(firmware)
         ports = (
-            LinkPort(firmware.new_client),
+            LinkPort(),
             PlatformPort(settings.protocol, supervisor),
             self._log,
             ParameterPort(firmware, storage.parameters),

@@ -5,6 +5,7 @@ import math
 from crazyflie_virtual.board import Board, Storage
 from crazyflie_virtual.body.battery import LOW_CHARGE, Battery
 from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
+from crazyflie_virtual.firmware.assertion import FirmwareAssertion
 from crazyflie_virtual.link import crtp
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings
@@ -17,6 +18,9 @@ _RADIO_COMMAND = 0xFE
 _ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
 
 _BATTERY_STEPS = 10
+
+_RESTART_TIME = 1.0
+"""How long the microcontroller is not there after a failed assertion, s: assumed."""
 
 _STOPPED: MotorCommands = (0.0, 0.0, 0.0, 0.0)
 
@@ -51,6 +55,8 @@ class VirtualVehicle:
         self._storage = Storage(settings.address)
         self._steps = 0
         self._is_dead = False
+        self._failure = ""
+        self._restart_time = math.inf
         self.board: Board | None = None
         self._turn_on()
 
@@ -70,7 +76,13 @@ class VirtualVehicle:
             return [Packet(Port.LINK, _RADIO_CHANNEL, b"").encode()]
         if self.board is None:
             return []
-        return [answer.encode() for answer in self.board.receive(packet)]
+        try:
+            return [answer.encode() for answer in self.board.receive(packet)]
+        except FirmwareAssertion as assertion:
+            self.board = None
+            self._failure = str(assertion)
+            self._restart_time = self.time + _RESTART_TIME
+            return []
 
     def advance_to(self, time: float) -> list[bytes]:
         """Go on to the last whole step before ``time`` (s).
@@ -90,6 +102,8 @@ class VirtualVehicle:
     def _step(self):
         self._steps += 1
         commands = _STOPPED
+        if self.time >= self._restart_time:
+            self._start(self._failure)
         if self.board is not None:
             commands = self.board.step(self.battery.voltage)
         failed = self.faults.motor_failure
@@ -104,9 +118,6 @@ class VirtualVehicle:
         if self.faults.low_battery:
             self.battery.charge = min(self.battery.charge, LOW_CHARGE)
         self.battery.step(_BATTERY_STEPS * STEP, self.physics.load)
-        if self.board is not None and self.board.firmware.power.is_exhausted:
-            self._is_dead = True
-            self.board = None
 
     def _command_radio(self, data):
         if data[:1] != bytes([_RADIO_COMMAND]) or len(data) < 2:
@@ -116,6 +127,7 @@ class VirtualVehicle:
             self._is_dead = True
         if command in (_ALL_OFF, _OFF):
             self.board = None
+            self._restart_time = math.inf
         elif command == _ON and self.board is None:
             self._turn_on()
         elif command == _RESET:
@@ -126,4 +138,8 @@ class VirtualVehicle:
 
     def _turn_on(self):
         self.physics.put_upright()
-        self.board = Board(self.physics, self.faults, self._settings, self._storage)
+        self._start()
+
+    def _start(self, failure=""):
+        self._restart_time = math.inf
+        self.board = Board(self.physics, self.faults, self._settings, self._storage, failure)

@@ -1,5 +1,7 @@
 """Publish what a vehicle sends by itself."""
 
+from collections.abc import Callable
+
 import genpy
 from std_msgs.msg import Float32, Header
 
@@ -12,8 +14,8 @@ from crazyflie_py.log import LogBlock
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.runtime.topics import Publisher
 
-STATUS_PERIOD_MS = 500
-"""Period of the log block that the diagnostics rest on, ms."""
+STATUS_PERIOD_MS = 100
+"""Period of the log block that the diagnostics rest on, ms; its absence shows a restart."""
 
 _MOST_DATA = 30
 _LINK = 3 << 2
@@ -34,6 +36,8 @@ class LogTopics:
     crazyflie : crazyflie_py.Crazyflie
     fixed_frame : str
         Frame of the pose.
+    on_status : callable
+        ``on_status()`` is called whenever voltage and state have come.
 
     Attributes
     ----------
@@ -49,6 +53,7 @@ class LogTopics:
         parameters: VehicleParameters,
         crazyflie: Crazyflie,
         fixed_frame: str,
+        on_status: Callable[[], None],
     ):
         self.voltage: float | None = None
         self.rssi: float | None = None
@@ -57,6 +62,7 @@ class LogTopics:
         self._parameters = parameters
         self._crazyflie = crazyflie
         self._fixed_frame = fixed_frame
+        self._on_status = on_status
         self._packets: Publisher | None = None
 
     def start(self) -> None:
@@ -119,6 +125,7 @@ class LogTopics:
             self.rssi = latest.get("radio.rssi")
         if self.rssi is not None:
             rssi_publisher.publish(Float32(self.rssi))
+        self._on_status()
 
     def _start_standard(self, group):
         publishers = [self._publisher(topic.name, topic.message_type) for topic in group]

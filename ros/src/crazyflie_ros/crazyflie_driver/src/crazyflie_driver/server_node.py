@@ -4,9 +4,10 @@ from concurrent.futures import Future, wait
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from std_msgs.msg import Header
+from std_msgs.msg import Empty, Header
 from typing_extensions import override
 
+from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.srv import (
     AddCrazyflie,
     AddCrazyflieResponse,
@@ -16,23 +17,15 @@ from crazyflie_driver.srv import (
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_py.errors import CrazyflieError
-from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
-from crazyflie_utils.parameter_types import FRAME
+from crazyflie_utils import Node, NodeHandle, ServiceError
 
 ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"
 """Services of the server."""
 
 _DIAGNOSTICS_PERIOD = 1.0
-_LEAVE_LIMIT = 1.5
-"""How long, in s, the end of the server waits for its vehicles to be stopped."""
-
-
-class CrazyflieServerParameters(Parameters):
-    """Parameters of `CrazyflieServerNode`."""
-
-    fixed_frame: str = parameter(
-        FRAME, "frame of the pose that vehicles estimate", "world", "frames/fixed"
-    )
+_LEAVE_LIMIT, _LANDING_LIMIT = 1.5, 0.5
+"""How long, in s, the end of the server waits for its vehicles to be left, and each of these for
+the end of a landing, which it flies without a link, too."""
 
 
 class CrazyflieServerNode(Node):
@@ -51,11 +44,12 @@ class CrazyflieServerNode(Node):
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         handle.advertise_service(ADD, AddCrazyflie, self._on_add)
         handle.advertise_service(REMOVE, RemoveCrazyflie, self._on_remove)
+        handle.subscribe(self._parameters.emergency_topic, Empty, self._on_emergency)
         handle.timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
 
     def shutdown(self) -> None:
-        """Stop the motors of all vehicles and disconnect from them."""
-        wait([vehicle.leave() for vehicle in self._vehicles.values()], _LEAVE_LIMIT)
+        """Have vehicles in the air land, stop the motors of all others, disconnect from all."""
+        wait([vehicle.leave(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())], _LEAVE_LIMIT)
 
     def _on_add(self, request):
         wanted = VehicleParameters.from_request(request)
@@ -67,7 +61,7 @@ class CrazyflieServerNode(Node):
                     f"tf_prefix {other.tf_prefix!r} is in use by {other.uri}; choose another"
                 )
         try:
-            vehicle = DriverVehicle(self._handle, wanted, self._parameters.fixed_frame)
+            vehicle = DriverVehicle(self._handle, wanted, self._parameters)
         except CrazyflieError as error:
             self._handle.error(f"{wanted.name}: {error}")
             raise ServiceError(str(error)) from None
@@ -75,8 +69,8 @@ class CrazyflieServerNode(Node):
         self._handle.info(f"{wanted.name}: connecting to {wanted.uri}")
         return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
 
-    def _finish_adding(self, vehicle, error):
-        if error is not None:
+    def _finish_adding(self, vehicle, done):
+        if done.exception() is not None:
             self._forget(vehicle)
         return AddCrazyflieResponse()
 
@@ -87,12 +81,25 @@ class CrazyflieServerNode(Node):
             raise ServiceError(f"no vehicle {request.uri!r} has been added; known: {known}")
         if vehicle.is_leaving:
             raise ServiceError(f"{request.uri} is being removed already")
-        return self._when_done(vehicle.leave(), self._finish_removing, vehicle)
+        leaving = vehicle.leave(self._parameters.landing_limit)
+        return self._when_done(leaving, self._finish_removing, vehicle)
 
-    def _finish_removing(self, vehicle, error):
+    def _finish_removing(self, vehicle, done):
         self._forget(vehicle)
+        if problem := done.result():
+            raise ServiceError(f"{vehicle.parameters.uri} is removed, but {problem}")
         self._handle.info(f"{vehicle.parameters.name}: removed")
         return RemoveCrazyflieResponse()
+
+    def _on_emergency(self, _):
+        for vehicle in self._vehicles.values():
+            name = vehicle.parameters.name
+            try:
+                vehicle.stop_in_emergency()
+            except CrazyflieError as error:
+                self._handle.error(f"{name}: emergency stop, sent when there is a link: {error}")
+            else:
+                self._handle.error(f"{name}: emergency stop of all vehicles")
 
     def _forget(self, vehicle: DriverVehicle) -> None:
         if self._vehicles.get(vehicle.parameters.uri) is vehicle:
@@ -103,12 +110,13 @@ class CrazyflieServerNode(Node):
         answer: Future[Any] = Future()
 
         def finish_answer():
-            error = done.exception()
-            response = finish(vehicle, error)
-            if error is None:
-                answer.set_result(response)
-            else:
+            try:
+                response = finish(vehicle, done)
+                done.result()
+            except Exception as error:
                 answer.set_exception(error)
+            else:
+                answer.set_result(response)
 
         done.add_done_callback(lambda _: self._handle.submit(finish_answer))
         return answer

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 class VehicleServices:
     """Announce a vehicle's services and carry them out.
 
-    What waits for the vehicle is done by its worker; what does not, at once.
+    What waits for the vehicle is done by its worker, where landing and stopping take the place of
+    whatever was asked before; what does not, at once.
 
     Parameters
     ----------
@@ -70,14 +71,17 @@ class VehicleServices:
         try:
             self._vehicle.stop_in_emergency()
         except CrazyflieError as error:
-            text = f"emergency stop not sent, it will be once the link is back: {error}"
+            text = f"emergency stop may not have arrived, is sent when the link is back: {error}"
             self._handle.error(f"{self._vehicle.parameters.name}: {text}")
             raise ServiceError(text) from None
-        self._handle.error(f"{self._vehicle.parameters.name}: emergency stop")
+        self._handle.error(
+            f"{self._vehicle.parameters.name}: emergency stop; to fly again remove the vehicle, "
+            "restart it and add it again"
+        )
         return EmptyResponse()
 
     def _notify_setpoints_stop(self, request):
-        self._at_once(lambda: self._vehicle.hand_over(request.remainValidMillisecs))
+        self._at_once(lambda: self._vehicle.commands.notify(request.remainValidMillisecs))
         return srv.NotifySetpointsStopResponse()
 
     def _send_packet(self, request):
@@ -104,8 +108,9 @@ class VehicleServices:
     def _arm(self, request):
         vehicle = self._vehicle
 
-        def work():
+        def work(_):
             try:
+                vehicle.setpoints.gate.open()
                 if request.data:
                     vehicle.refuse_in_emergency()
                 vehicle.crazyflie.supervisor.arm(request.data)
@@ -116,21 +121,21 @@ class VehicleServices:
         return vehicle.do("arming", work)
 
     def _update_params(self, request):
-        def work():
+        def work(_):
             self._vehicle.write_parameters(request.params)
             return srv.UpdateParamsResponse()
 
         return self._vehicle.do("update_params", work)
 
     def _reboot(self, _):
-        def work():
+        def work(_):
             self._vehicle.crazyflie.reboot()
             return EmptyResponse()
 
         return self._vehicle.do("reboot", work)
 
     def _set_group_mask(self, request):
-        def work():
+        def work(_):
             self._vehicle.crazyflie.high_level.set_group_mask(request.groupMask)
             return srv.SetGroupMaskResponse()
 
@@ -144,13 +149,13 @@ class VehicleServices:
             for piece in request.pieces
         ]
 
-        def work():
+        def work(job):
             self._vehicle.crazyflie.trajectories.upload(
-                request.trajectoryId, request.pieceOffset, pieces
+                request.trajectoryId, request.pieceOffset, pieces, job.check
             )
             return srv.UploadTrajectoryResponse()
 
-        return self._vehicle.do("upload_trajectory", work)
+        return self._vehicle.do("upload_trajectory", work, is_flight=True)
 
     # High-level commands.
 
@@ -158,11 +163,11 @@ class VehicleServices:
         duration = request.duration.to_sec()
 
         def send(high_level):
-            self._vehicle.make_ready()
+            self._vehicle.commands.make_ready()
             high_level.take_off(request.height, duration, request.groupMask)
             return srv.TakeoffResponse()
 
-        return self._vehicle.command("takeoff", send, duration)
+        return self._vehicle.commands.send("takeoff", send, duration)
 
     def _land(self, request):
         duration = request.duration.to_sec()
@@ -171,14 +176,14 @@ class VehicleServices:
             high_level.land(request.height, duration, request.groupMask)
             return srv.LandResponse()
 
-        return self._vehicle.command("land", send, duration)
+        return self._vehicle.commands.send("land", send, duration, urgent=True)
 
     def _stop(self, request):
         def send(high_level):
             high_level.stop(request.groupMask)
             return srv.StopResponse()
 
-        return self._vehicle.command("stop", send)
+        return self._vehicle.commands.send("stop", send, urgent=True)
 
     def _go_to(self, request):
         duration = request.duration.to_sec()
@@ -188,7 +193,7 @@ class VehicleServices:
             high_level.go_to(goal, request.yaw, duration, request.relative, request.groupMask)
             return srv.GoToResponse()
 
-        return self._vehicle.command("go_to", send, duration)
+        return self._vehicle.commands.send("go_to", send, duration)
 
     def _start_trajectory(self, request):
         def send(high_level):
@@ -201,4 +206,4 @@ class VehicleServices:
             )
             return srv.StartTrajectoryResponse()
 
-        return self._vehicle.command("start_trajectory", send)
+        return self._vehicle.commands.send("start_trajectory", send)

@@ -1,5 +1,6 @@
 """Topics with setpoints and external poses, turned into what goes over the link."""
 
+import contextlib
 from collections import deque
 
 from geometry_msgs.msg import Point, PointStamped, PoseStamped, Twist, Vector3
@@ -7,6 +8,7 @@ from std_msgs.msg import Empty
 
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+from crazyflie_driver.setpoint_gate import SetpointGate
 from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_model.supervisor import SupervisorState
@@ -14,15 +16,21 @@ from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.errors import CrazyflieError
 from crazyflie_utils import NodeHandle
 
+CMD_VEL, CMD_STOP = "cmd_vel", "cmd_stop"
+
 _THROTTLE = 1.0
 _RATE_WINDOW = 1.0
+
+_REST, _REST_PERIOD = 0.5, 0.1
+"""After zero thrust, silence of so long is the end of a stream, s; how often that is looked at."""
 
 
 class SetpointTopics:
     """Subscribe to a vehicle's setpoints and pass them on, as long as that is allowed.
 
     Nothing is repeated or made up: when messages stop coming, the firmware's own
-    watchdogs act, after 0.5 s and 2 s.
+    watchdogs act, after 0.5 s and 2 s. But when the last one had the motors stand still, the
+    vehicle is told that setpoints end: otherwise it would be locked 2 s later.
 
     Parameters
     ----------
@@ -34,10 +42,10 @@ class SetpointTopics:
 
     Attributes
     ----------
-    is_blocked : bool
-        Whether setpoints are ignored: after an emergency stop.
+    gate : SetpointGate
+        Whether setpoints are passed on.
     is_streaming : bool
-        Whether setpoints have come since the last hand-over to high-level commands.
+        Whether setpoints were sent since the last hand-over to high-level commands.
     ignored : int
         Setpoints that were not sent.
     """
@@ -49,7 +57,7 @@ class SetpointTopics:
         crazyflie: Crazyflie,
         log: LogTopics,
     ):
-        self.is_blocked = False
+        self.gate = SetpointGate()
         self.is_streaming = False
         self.ignored = 0
         self._handle = handle
@@ -58,17 +66,20 @@ class SetpointTopics:
         self._log = log
         self._times: deque[float] = deque(maxlen=1000)
         self._high_level_end: float | None = None
+        self._is_at_rest = False
+        self._source = ""
+        self._external_time: float | None = None
 
     def subscribe(self) -> None:
         """Begin to listen."""
         setpoints = self._crazyflie.setpoints
         for name, message_type, send in (
-            ("cmd_vel", Twist, self._cmd_vel),
+            (CMD_VEL, Twist, self._cmd_vel),
             ("cmd_full_state", FullState, self._full_state),
             ("cmd_velocity_world", VelocityWorld, self._velocity_world),
             ("cmd_hover", Hover, self._hover),
             ("cmd_position", Position, self._position),
-            ("cmd_stop", Empty, lambda _: setpoints.stop()),
+            (CMD_STOP, Empty, lambda _: setpoints.stop()),
         ):
             self._subscribe(name, message_type, self._setpoint(name, send))
         for name, message_type, send in (
@@ -76,23 +87,31 @@ class SetpointTopics:
             ("external_pose", PoseStamped, self._external_pose),
         ):
             self._subscribe(name, message_type, self._guarded(name, send))
+        self._handle.timer(_REST_PERIOD, self._end_stream_at_rest)
 
     def rate(self, now: float) -> float:
         """Return how many setpoints were sent in the last second."""
         return sum(1 for time in self._times if now - time <= _RATE_WINDOW) / _RATE_WINDOW
 
     def zeros(self) -> None:
-        """Send zero thrust a hundred times; blocks.
-
-        They, too, keep the vehicle from accepting high-level commands.
-        """
-        self.is_streaming = True
+        """Send zero thrust a hundred times, and that setpoints end; blocks."""
         self._crazyflie.setpoints.zeros()
+        self.is_streaming = False
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
         """Announce that setpoints end, so that the vehicle accepts high-level commands."""
         self._crazyflie.setpoints.hand_over(remain_valid_ms)
         self.is_streaming = False
+
+    def knows_position(self, now: float) -> bool:
+        """Return whether the vehicle's planner can land it, as far as its inputs tell."""
+        fed = self._external_time is not None and now - self._external_time <= _RATE_WINDOW
+        return fed or not (self.is_streaming and self._source == CMD_VEL)
+
+    @property
+    def is_flight(self) -> bool:
+        """Whether setpoints since the last hand-over had the motors run."""
+        return self.is_streaming and not self._is_at_rest
 
     def high_level_until(self, moment: float) -> None:
         """Take note that a high-level command is carried out until a moment (s)."""
@@ -116,20 +135,29 @@ class SetpointTopics:
         send = self._guarded(name, send)
 
         def callback(message):
-            if self.is_blocked:
+            now = self._handle.time()
+            at_rest = name == CMD_STOP or (name == CMD_VEL and message.linear.z <= 0.0)
+            refusal = self.gate.refusal(now, at_rest)
+            if refusal:
                 self.ignored += 1
-                self._warn(f"ignoring {name}: emergency stop", key="emergency")
+                self._warn(f"ignoring {name}: {refusal}", key="gate")
                 return
             if not send(message):
                 self.ignored += 1
                 return
-            now = self._handle.time()
             self._times.append(now)
-            self.is_streaming = True
+            self.is_streaming, self._is_at_rest, self._source = True, at_rest, name
             if self._high_level_end is not None and now < self._high_level_end:
                 self._warn(f"{name} overrides the high-level command", key="override")
 
         return callback
+
+    def _end_stream_at_rest(self):
+        if not (self.is_streaming and self._is_at_rest):
+            return
+        if self._handle.time() - self._times[-1] > _REST:
+            with contextlib.suppress(CrazyflieError):
+                self.hand_over()
 
     def _warn(self, text, key):
         name = self._parameters.name
@@ -174,9 +202,11 @@ class SetpointTopics:
         self._crazyflie.setpoints.position(message.x, message.y, message.z, message.yaw)
 
     def _external_position(self, message):
+        self._external_time = self._handle.time()
         self._crazyflie.localization.position(*_xyz(message.point))
 
     def _external_pose(self, message):
+        self._external_time = self._handle.time()
         orientation = message.pose.orientation
         self._crazyflie.localization.pose(
             _xyz(message.pose.position),

@@ -6,17 +6,22 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TypeVar
 
+from std_msgs.msg import String
+
+from crazyflie_driver.battery import Battery
+from crazyflie_driver.farewell import take_leave
+from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
+from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_driver.status import NOT_FLYABLE, Status
-from crazyflie_driver.vehicle_parameters import VehicleParameters
-from crazyflie_driver.worker import Worker
+from crazyflie_driver.status import Status
+from crazyflie_driver.vehicle_parameters import STATUS_TOPIC, VehicleParameters
+from crazyflie_driver.worker import Job, Worker
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
 from crazyflie_py.errors import CrazyflieError, NoAnswerError
-from crazyflie_py.high_level import HighLevel
 from crazyflie_utils import NodeHandle, ServiceError
 
 Result = TypeVar("Result")
@@ -41,8 +46,8 @@ class DriverVehicle:
         Of the server.
     parameters : VehicleParameters
         How to connect it.
-    fixed_frame : str
-        Frame of the pose.
+    server : CrazyflieServerParameters
+        What all vehicles have in common.
 
     Attributes
     ----------
@@ -50,6 +55,10 @@ class DriverVehicle:
         The vehicle at the other end of the link.
     is_leaving : bool
         Whether the vehicle is being removed.
+    is_emergency : bool
+        Whether the emergency stop is latched.
+    setpoints : SetpointTopics
+    commands : FlightCommands
 
     Raises
     ------
@@ -57,12 +66,18 @@ class DriverVehicle:
         The address is malformed.
     """
 
-    def __init__(self, handle: NodeHandle, parameters: VehicleParameters, fixed_frame: str):
+    def __init__(
+        self,
+        handle: NodeHandle,
+        parameters: VehicleParameters,
+        server: CrazyflieServerParameters,
+    ):
         self.parameters = parameters
         self._handle = handle.child()
         self._server = handle
+        self._safety = server
         self._link_text = f"connecting to {parameters.uri}"
-        self._is_emergency = False
+        self.is_emergency = False
         self.is_leaving = False
         self.crazyflie = Crazyflie(
             parameters.uri,
@@ -71,12 +86,24 @@ class DriverVehicle:
             on_console=lambda line: self._handle.info(f"{parameters.name}: {line}"),
             on_packet=self._on_packet,
         )
+        self._links = 0
         self._worker = Worker(parameters.name)
         self._announcing = threading.Lock()
-        self._log = LogTopics(self._handle, parameters, self.crazyflie, fixed_frame)
-        self._setpoints = SetpointTopics(self._handle, parameters, self.crazyflie, self._log)
+        self._battery = Battery(
+            server.battery_low, server.battery_critical, server.battery_critical_time
+        )
+        self._log = LogTopics(
+            self._handle, parameters, self.crazyflie, server.fixed_frame, self._on_status
+        )
+        self.setpoints = SetpointTopics(self._handle, parameters, self.crazyflie, self._log)
+        self.commands = FlightCommands(self._handle, self, self.setpoints, self._battery, server)
         self._mirror = ParameterMirror(self._handle, parameters.prefix, self.crazyflie)
         self._services = VehicleServices(self._handle, self)
+        self._words = ""
+        self._status = self._handle.publisher(
+            f"{parameters.prefix}/{STATUS_TOPIC}", String, latch=True
+        )
+        self._publish_status()
 
     # Life.
 
@@ -86,34 +113,59 @@ class DriverVehicle:
         The future fails with `ServiceError` when that is not possible; then nothing
         remains of the vehicle.
         """
-        return self.do("connecting", self._connect)
+        return self.do("connecting", lambda _: self._connect())
 
-    def leave(self) -> Future[None]:
-        """Stop the motors, end the link, take topics and services down; the result is None.
+    def leave(self, limit: float) -> Future[str]:
+        """Land, stop the motors, end the link, take topics and services down.
 
         Also while the vehicle is being connected, or its worker waits for it.
+
+        Parameters
+        ----------
+        limit : float
+            How long a landing is waited for, s; the vehicle lands without its link, too.
+
+        Returns
+        -------
+        Future of str
+            What could not be done; empty if nothing.
         """
         self.is_leaving = True
-        self._setpoints.is_blocked = True
-        worker = Worker(f"{self.parameters.name}-leave")
-        done = worker.submit(self._leave)
-        worker.close()
+        self.setpoints.gate.leave()
+        self._worker.overtake("the removal")
+        done: Future[str] = Future()
+
+        def work():
+            try:
+                done.set_result(self._leave(limit))
+            except BaseException as error:
+                done.set_exception(error)
+
+        threading.Thread(target=work, name=f"{self.parameters.name}-leave", daemon=True).start()
         return done
 
-    def do(self, what: str, work: Callable[[], Result]) -> Future[Result]:
-        """Have ``work()`` done by the vehicle's worker; the result is its own.
+    def do(
+        self,
+        what: str,
+        work: Callable[[Job], Result],
+        is_flight: bool = False,
+        urgent: bool = False,
+    ) -> Future[Result]:
+        """Have ``work(job)`` done by the vehicle's worker; the result is its own.
 
         What goes wrong is logged, and fails the future with `ServiceError`.
         """
 
-        def job():
+        def job(job):
             try:
-                return work()
+                return work(job)
             except (CrazyflieError, ServiceError) as error:
                 self._server.error(f"{self.parameters.name}: {what} failed: {error}")
                 raise ServiceError(str(error)) from None
 
-        return self._worker.submit(job)
+        if urgent:
+            return self._worker.submit_urgent(what, job)
+        return self._worker.submit(job, is_flight)
 
     def _connect(self):
         try:
@@ -125,9 +177,14 @@ class DriverVehicle:
                 self._log.start()
                 if self.parameters.enable_parameters:
                     self._mirror.publish()
-                self._open_thrust_lock(is_new=True)
+                if self.is_emergency:
+                    self.crazyflie.supervisor.emergency_stop()
+                else:
+                    self._open_thrust_lock(is_new=True)
+                self._links = self.crazyflie.links
                 self._services.advertise()
-                self._setpoints.subscribe()
+                self.setpoints.subscribe()
+                self.commands.start()
         except BaseException:
             self.is_leaving = True
             self._end()
@@ -144,13 +201,16 @@ class DriverVehicle:
                     raise
             time.sleep(CONNECT_PAUSE)
 
-    def _leave(self):
+    def _leave(self, limit):
+        problem = ""
         try:
-            if self.crazyflie.state is LinkState.CONNECTED:
-                self._setpoints.zeros()
+            if self.crazyflie.links and not self.is_emergency:
+                take_leave(self, self._safety.landing_duration, limit)
         except CrazyflieError as error:
-            self._server.warn(f"{self.parameters.name}: cannot stop the motors: {error}")
+            problem = f"its motors could not be stopped: {error}"
+            self._server.warn(f"{self.parameters.name}: {problem}")
         self._end()
+        return problem
 
     def _end(self):
         # First the link: that ends the wait for answers in `_connect`.
@@ -170,14 +230,19 @@ class DriverVehicle:
                 "until a setpoint of zero thrust comes"
             )
         else:
-            self._setpoints.zeros()
+            self.setpoints.zeros()
 
-    # Commands.
+    # What is asked of it.
 
     @property
-    def is_emergency(self) -> bool:
-        """Whether the emergency stop is latched."""
-        return self._is_emergency
+    def is_flying(self) -> bool:
+        """Whether the vehicle says that it flies; so it does for 2 s after a landing."""
+        state = self._log.supervisor
+        return state is not None and SupervisorState.FLYING in state
+
+    def now(self) -> float:
+        """Return the time, s."""
+        return self._handle.time()
 
     def stop_in_emergency(self) -> None:
         """Stop the motors at once and for good; does not block.
@@ -185,57 +250,15 @@ class DriverVehicle:
         Raises
         ------
         LinkLostError
-            Nothing can be sent now; it will be when the link is back.
+            Nothing can be sent now, or nobody knows whether it arrives; it will be sent again
+            when the link is back.
         """
-        self._is_emergency = True
-        self._setpoints.is_blocked = True
+        self.is_emergency = True
+        self.setpoints.gate.stop_for_good()
         self.crazyflie.supervisor.emergency_stop()
-
-    def hand_over(self, remain_valid_ms: int = 0) -> None:
-        """Announce to the vehicle that setpoints end; does not block."""
-        self._setpoints.hand_over(remain_valid_ms)
-
-    def command(
-        self, what: str, send: Callable[[HighLevel], Result], duration: float = 0.0
-    ) -> Future[Result]:
-        """Have a high-level command sent, after a hand-over if setpoints were streamed.
-
-        Parameters
-        ----------
-        what : str
-        send : callable
-            ``send(high_level)`` blocks; the future's result is its own.
-        duration : float
-            How long the vehicle will be at it, s.
-        """
-
-        def work():
-            self.refuse_in_emergency()
-            if self._setpoints.is_streaming:
-                self._setpoints.hand_over()
-            response = send(self.crazyflie.high_level)
-            self._setpoints.high_level_until(self._handle.time() + duration)
-            return response
-
-        return self.do(what, work)
-
-    def make_ready(self) -> None:
-        """See to it that the vehicle can take off: arm it, if it is not armed; blocks.
-
-        Raises
-        ------
-        ServiceError
-            It cannot fly.
-        CrazyflieError
-            It refuses, or does not reply.
-        """
-        state = self.crazyflie.supervisor.read()
-        if state is None:
-            return
-        if state & NOT_FLYABLE:
-            raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
-        if SupervisorState.ARMED not in state:
-            self.crazyflie.supervisor.arm()
+        self._worker.overtake("the emergency stop")
+        self._publish_status()
+        self.crazyflie.link()
 
     def write_parameters(self, names: list[str]) -> None:
         """Write ROS parameters GROUP/NAME to the firmware; blocks."""
@@ -243,7 +266,7 @@ class DriverVehicle:
 
     def refuse_in_emergency(self) -> None:
         """Raise `ServiceError` after an emergency stop."""
-        if self._is_emergency:
+        if self.is_emergency:
             raise ServiceError(
                 f"emergency stop: remove {self.parameters.uri}, restart the vehicle and add it "
                 "again"
@@ -257,6 +280,7 @@ class DriverVehicle:
         try:
             figures = {
                 "quality": self.crazyflie.quality(),
+                "is_poor": self.crazyflie.is_poor(),
                 "latency": self.crazyflie.latency(),
                 "age": self.crazyflie.age(),
             }
@@ -266,33 +290,62 @@ class DriverVehicle:
         return Status(
             self.crazyflie.state,
             self._link_text,
-            self._is_emergency,
-            voltage=self._log.voltage,
+            self.is_emergency,
+            battery=self._battery,
             rssi=self._log.rssi,
             supervisor=self._log.supervisor,
-            setpoint_rate=self._setpoints.rate(now),
-            ignored=self._setpoints.ignored,
+            setpoint_rate=self.setpoints.rate(now),
+            ignored=self.setpoints.ignored,
+            is_waiting=self.setpoints.gate.is_blocking(now),
+            is_high_level=not self.setpoints.is_streaming,
+            restarts=self.crazyflie.restarts,
             **figures,
         )
+
+    def _on_status(self):
+        voltage = self._log.voltage
+        if voltage is not None:
+            self._battery.update(voltage, self._handle.time())
+            self.commands.check_battery()
+        if self.is_flying and self.crazyflie.state is LinkState.CONNECTED:
+            self.setpoints.gate.open()
+        self._publish_status()
+
+    def _publish_status(self):
+        words = self.status(self._handle.time()).words()
+        if words != self._words:
+            self._words = words
+            self._status.publish(String(words))
 
     def _on_link_state(self, state, text):
         # From the link's own thread. At the end nothing may wait for the callbacks'
         # turn, since the node waits for the end.
         self._link_text = text
+        if state is LinkState.LOST:
+            self.setpoints.gate.link_lost()
+            # What it was before the loss says nothing about now.
+            self._log.supervisor = None
+        elif state is LinkState.CONNECTED:
+            self.setpoints.gate.link_back()
         if not self.is_leaving:
             self._handle.submit(self._report_state, state, text)
 
     def _report_state(self, state, text):
+        self._publish_status()
         if state is LinkState.LOST:
             self._handle.error(f"{self.parameters.name}: {text}; trying to connect again")
         elif state is LinkState.CONNECTED and self._services.are_advertised:
             self._handle.warn(f"{self.parameters.name}: {text}")
-            self.do("taking up the link again", self._resume)
+            self.do("taking up the link again", lambda _: self._resume())
 
     def _resume(self):
-        if self._is_emergency:
+        if self.is_emergency:
             self.crazyflie.supervisor.emergency_stop()
             return
+        if self._links == self.crazyflie.links:
+            # It is the link of before.
+            return
+        self._links = self.crazyflie.links
         if self.parameters.enable_parameters:
             self._mirror.publish()
         self._open_thrust_lock(is_new=False)

@@ -14,6 +14,9 @@ from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
 from crazyflie_utils.parameter_types import BOOLEAN, TEXT, Integer, Number, ParameterType
 from crazyflie_utils.parameters import REQUIRED, Declaration, read_parameter
 
+STATUS_TOPIC = "status"
+"""Topic that says what state a vehicle is in."""
+
 
 @dataclass(frozen=True)
 class ListOf(ParameterType):
@@ -81,7 +84,7 @@ class LogTopic(Namespace):
         name = super().__call__(value)
         if not name:
             raise ValueError
-        if name in (*STANDARD_TOPICS, "rssi"):
+        if name in (*STANDARD_TOPICS, "rssi", STATUS_TOPIC):
             raise ValueError(f"the driver itself has a topic {name!r}")
         return name
 

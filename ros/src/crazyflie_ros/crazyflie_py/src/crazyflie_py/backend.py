@@ -14,6 +14,9 @@ import cflib.crtp
 from cflib.crazyflie import Crazyflie as CflibCrazyflie
 from cflib.crtp.crtpdriver import CRTPDriver
 from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
+from cflib.utils.callbacks import Caller
+
+from crazyflie_py import radios
 
 _init_lock = threading.Lock()
 
@@ -22,6 +25,11 @@ _UDP_RECEIVE_LIMIT = 0.1
 
 _JOIN_LIMIT = 0.3
 """How long, in s, the end of a link waits for a callback that is at work."""
+
+CLOSE_LIMIT = 1.0
+"""How long, in s, the end of a link waits for a driver."""
+
+_log = logging.getLogger(__name__)
 
 # cflib logs what it also reports, with tracebacks; we report it in other words.
 if logging.getLogger("cflib").level == logging.NOTSET:
@@ -58,6 +66,17 @@ def packet(port: int, channel: int, data: bytes) -> CRTPPacket:
     return result
 
 
+class _Guarded(Caller):
+    """cflib's list of callbacks for packets; none of them ends the thread that receives."""
+
+    def call(self, *args):
+        for callback in list(self.callbacks):
+            try:
+                callback(*args)
+            except Exception:
+                _log.warning("a packet could not be understood", exc_info=True)
+
+
 class Backend(CflibCrazyflie):
     """cflib's Crazyflie for a single connection; a new one is made for the next.
 
@@ -79,6 +98,9 @@ class Backend(CflibCrazyflie):
         self._dropping = threading.Lock()
         # Unlike cflib's own, it knows who holds it; see `send_packet`.
         self._send_lock = threading.RLock()
+        guarded = _Guarded()
+        guarded.callbacks = self.packet_received.callbacks
+        self.packet_received = guarded
         self.link_established.add_callback(self._tune_udp)
 
     def ask_for_source(self) -> None:
@@ -119,9 +141,17 @@ class Backend(CflibCrazyflie):
             if self.incoming.is_alive() and not self.is_called_by_incoming_handler_thread():
                 self.incoming.join(timeout=_JOIN_LIMIT)
             self.link = None
-            if link is not None:
-                link.close()
-            self.disconnected.call(self.link_uri)
+            # A driver joins its threads, and cflib its own, without a limit.
+            closing = threading.Thread(target=self._close, args=(link,), daemon=True)
+            closing.start()
+            closing.join(CLOSE_LIMIT)
+            radios.forget_dead_radios()
+
+    def _close(self, link):
+        if link is not None:
+            radios.release(link)
+            link.close()
+        self.disconnected.call(self.link_uri)
 
     def _link_error_cb(self, errmsg):
         # cflib's own version closes the link and joins its threads right here:

@@ -8,11 +8,12 @@ from collections.abc import Callable
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_py.address import Address
-from crazyflie_py.backend import table_cache
+from crazyflie_py.backend import CLOSE_LIMIT, table_cache
 from crazyflie_py.console import Console
 from crazyflie_py.errors import CrazyflieError, LinkLostError
 from crazyflie_py.high_level import HighLevel
-from crazyflie_py.link import Limits, Link, OnPacket
+from crazyflie_py.link import LOG_DATA, Limits, Link, OnPacket
+from crazyflie_py.liveness import Life, Uptime
 from crazyflie_py.localization import Localization
 from crazyflie_py.log import Log, LogBlock
 from crazyflie_py.parameters import FirmwareParameters
@@ -21,13 +22,20 @@ from crazyflie_py.setpoints import Setpoints
 from crazyflie_py.supervisor import Supervisor
 from crazyflie_py.trajectory import Trajectories
 
-CHECK_PERIOD = 0.1
+CHECK_PERIOD = 0.05
 """How often the link is looked at, s."""
 
 _JOIN_LIMIT = 0.3
 
-FIRST_PAUSE, LONGEST_PAUSE = 0.5, 10.0
-"""Pause before the first attempt to connect again, and the longest one, s; each is
+_STAMP_END = 4
+"""A log packet begins with the number of its block and three bytes of time."""
+
+PATIENCE = 0.4
+"""How long, in s, a link on which nothing comes any more is kept: one on which the vehicle is
+heard again needs no set-up, and a new one has to stand before 2 s, when the firmware locks."""
+
+FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
+"""Pause after the first failed attempt to connect again, and the longest one, s; each is
 twice the one before."""
 
 
@@ -44,8 +52,9 @@ class Crazyflie:
     """A vehicle: connect, use, close; or use it in a ``with`` statement.
 
     The first `connect` succeeds or raises. After that the link is watched: when
-    no sign of life has come for 0.5 s it is lost, and, with ``reconnect``, tried
-    again with growing pauses until `close`; its log blocks are started anew.
+    no sign of life has come for 0.45 s, or no log data, it is lost. If the vehicle is
+    heard again soon, the link is taken up as it was; otherwise, with ``reconnect``, a new one
+    is tried at once and then with growing pauses until `close`, and log blocks are started anew.
 
     All callbacks come from threads of this object or of cflib, and must be quick.
 
@@ -71,6 +80,10 @@ class Crazyflie:
     ----------
     setpoints, high_level, trajectories, localization, parameters, log, supervisor
         What can be done with the vehicle; see their classes.
+    links : int
+        How many times the link has been set up.
+    restarts : int
+        How many times the vehicle's clock was seen to begin anew.
 
     Raises
     ------
@@ -91,11 +104,16 @@ class Crazyflie:
         self.address = Address.parse(uri)
         self.setpoints = Setpoints(self.link)
         self.high_level = HighLevel(self.link)
-        self.trajectories = Trajectories(self.link)
+        self.trajectories = Trajectories(self.link, self.high_level)
         self.localization = Localization(self.link)
         self.parameters = FirmwareParameters(self.link)
         self.log = Log(self.link)
-        self.supervisor = Supervisor(self.link)
+        self.supervisor = Supervisor(self.link, self.any_link)
+        self.links = 0
+        self.restarts = 0
+        self._uptime = Uptime()
+        self._silent_since: float | None = None
+        self._closing: threading.Thread | None = None
         self._reconnect = reconnect
         self._on_state = on_state
         self._on_packet = on_packet
@@ -156,9 +174,19 @@ class Crazyflie:
             There is none.
         """
         link = self._link
-        if link is None:
+        if link is None or self._silent_since is not None:
             raise LinkLostError(f"no link to the vehicle: {self._reason}")
         return link
+
+    def any_link(self) -> Link:
+        """Return the link, even if nothing comes on it: for what has to be tried all the same.
+
+        Raises
+        ------
+        LinkLostError
+            There is none.
+        """
+        return self._link or self.link()
 
     def add_log_block(self, block: LogBlock) -> None:
         """Have the vehicle send a block, now and after every reconnection; blocks.
@@ -183,6 +211,10 @@ class Crazyflie:
     def quality(self) -> float:
         """Return the share of the latest pings that were answered, 0 to 1."""
         return self.link().liveness.quality()
+
+    def is_poor(self) -> bool:
+        """Return whether hardly any of the latest pings were answered."""
+        return self.link().liveness.is_poor()
 
     @property
     def rssi(self) -> float | None:
@@ -220,6 +252,8 @@ class Crazyflie:
         watcher = self._watcher
         if watcher is not None and watcher is not threading.current_thread():
             watcher.join(timeout=_JOIN_LIMIT)
+        if self._closing is not None:
+            self._closing.join(timeout=CLOSE_LIMIT)
         self._set_state(LinkState.DISCONNECTED, "the link was closed")
 
     # The link and its end.
@@ -234,6 +268,7 @@ class Crazyflie:
         finally:
             self._opening = None
         self._link = link
+        self.links += 1
         if self._closed.is_set():
             self._drop("the link was closed")
             raise LinkLostError("the link was closed while connecting")
@@ -247,23 +282,43 @@ class Crazyflie:
     def _watch(self):
         while not self._closed.wait(CHECK_PERIOD):
             link = self._link
-            error = link.error if link is not None else LinkLostError(self._reason)
-            if error is None:
-                continue
+            end = LinkLostError(self._reason) if link is None else link.error
+            why = str(end)
+            if link is not None and end is None:
+                life, why = link.life()
+                if self._is_usable(life, why):
+                    continue
             # First announce it: to close the link takes a moment.
             self._link = None
+            self._silent_since = None
             if self._closed.is_set():
                 return
-            self._set_state(LinkState.LOST, str(error))
+            self._set_state(LinkState.LOST, why)
             if link is not None:
-                link.close(str(error))
+                self._closing = threading.Thread(target=link.close, args=(why,), daemon=True)
+                self._closing.start()
             if not self._reconnect or not self._try_again():
                 return
 
+    def _is_usable(self, life, text):
+        # Whether the link may stay, for a while at least.
+        now = time.monotonic()
+        if life is Life.ALIVE:
+            since, self._silent_since = self._silent_since, None
+            if since is not None:
+                self._set_state(LinkState.CONNECTED, f"{self.address.uri} is heard again")
+            return True
+        if life is Life.RESTARTED:
+            return False
+        if self._silent_since is None:
+            self._silent_since = now
+            self._set_state(LinkState.LOST, text)
+        return now - self._silent_since < PATIENCE
+
     def _try_again(self):
-        pause = FIRST_PAUSE
+        pause = 0.0
         while not self._closed.wait(pause):
-            pause = min(2.0 * pause, LONGEST_PAUSE)
+            pause = min(max(2.0 * pause, FIRST_PAUSE), LONGEST_PAUSE)
             try:
                 self._open_link()
                 with self._blocks_lock:
@@ -290,6 +345,10 @@ class Crazyflie:
     # What arrives, in cflib's thread.
 
     def _on_received(self, port, channel, data):
+        if (port, channel) == LOG_DATA and len(data) > _STAMP_END:
+            if self._uptime.has_restarted(int.from_bytes(data[1:_STAMP_END], "little")):
+                self.restarts += 1
+                self.high_level.forget_trajectories()
         if port == CRTPPort.CONSOLE and channel == 0 and self._console is not None:
             self._console.receive(data)
         if self._on_packet is not None:

@@ -49,6 +49,9 @@ UDEV_HINT = (
     "yourself to the group plugdev, log in again and plug the dongle in again"
 )
 
+UNANSWERED = "too many packets lost"
+"""What the radio driver says, in small letters, when it goes on all the same."""
+
 _CAUSES = (
     # Text of a driver (lower case), error, what to tell the operator.
     (
@@ -71,7 +74,7 @@ _CAUSES = (
         "the USB device is in use by another program: close it (cfclient, another driver?)",
     ),
     (
-        ("too many packets lost",),
+        (UNANSWERED,),
         NoAnswerError,
         "the radio gets no answer: is the vehicle on and near, and are channel, data rate and "
         "address right? `rosrun crazyflie_tools scan` lists the vehicles in range",

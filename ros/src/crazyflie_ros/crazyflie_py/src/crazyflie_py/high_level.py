@@ -1,7 +1,7 @@
 """Commands that the vehicle's own planner carries out."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crtp.crtpstack import CRTPPort
@@ -9,6 +9,7 @@ from cflib.crtp.crtpstack import CRTPPort
 from crazyflie_py.checks import check_byte, check_finite, check_positive
 from crazyflie_py.errors import RefusedError
 from crazyflie_py.exchange import Request
+from crazyflie_py.link import Link
 from crazyflie_py.subsystem import Subsystem
 
 ALL_GROUPS = 0
@@ -25,6 +26,14 @@ class HighLevel(Subsystem):
     All raise `CrazyflieError`: `RefusedError` with the vehicle's reason,
     `NoReplyError`, `LinkLostError`, or `ValueRangeError` before anything is sent.
     """
+
+    def __init__(self, current_link: Callable[[], Link]):
+        super().__init__(current_link)
+        self._defined: set[int] = set()
+
+    def forget_trajectories(self) -> None:
+        """Take note that the vehicle has restarted: it knows no trajectory any more."""
+        self._defined = set()
 
     def set_group_mask(self, group_mask: int) -> None:
         """Set the groups (bits) that the vehicle belongs to."""
@@ -97,6 +106,9 @@ class HighLevel(Subsystem):
     ) -> None:
         """Fly a trajectory that was defined before.
 
+        The firmware answers "done" for one that was not, and does nothing: therefore it is
+        refused here.
+
         Parameters
         ----------
         trajectory_id : int
@@ -113,6 +125,12 @@ class HighLevel(Subsystem):
         check_positive("time scale", time_scale)
         check_byte("group mask", group_mask)
         is_new = self._current_link().protocol >= _START_2_PROTOCOL
+        if trajectory_id not in self._defined:
+            known = ", ".join(map(str, sorted(self._defined))) or "none"
+            raise RefusedError(
+                f"the start of the trajectory: {trajectory_id} has not been uploaded since the "
+                f"vehicle was connected or restarted; known: {known}"
+            )
         self._command(
             "the start of the trajectory",
             HighLevelCommander.COMMAND_START_TRAJECTORY_2
@@ -137,6 +155,7 @@ class HighLevel(Subsystem):
             HighLevelCommander.COMMAND_DEFINE_TRAJECTORY,
             lambda c: c.define_trajectory(trajectory_id, offset, pieces),
         )
+        self._defined.add(trajectory_id)
 
     def _command(self, what, number, send, resend=True):
         link = self._current_link()

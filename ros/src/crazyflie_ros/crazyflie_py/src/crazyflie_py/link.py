@@ -8,9 +8,11 @@ from dataclasses import dataclass
 
 from cflib.crtp.crtpstack import CRTPPort
 
+from crazyflie_py import radios
 from crazyflie_py.address import Address
 from crazyflie_py.backend import Backend, init_drivers, packet
 from crazyflie_py.errors import (
+    UNANSWERED,
     CrazyflieError,
     LinkLostError,
     NoAnswerError,
@@ -19,15 +21,18 @@ from crazyflie_py.errors import (
     explain,
 )
 from crazyflie_py.exchange import Exchange, Request
-from crazyflie_py.liveness import LOST_AFTER, Liveness
+from crazyflie_py.liveness import LOST_AFTER, Life, Liveness
 from crazyflie_py.outbox import Outbox, Send
 from crazyflie_py.setup_progress import SetupProgress
 
 OLDEST_PROTOCOL = 4
 """The first protocol version with tables of more than 255 items."""
 
-_PING_CHANNEL, _LOG_DATA_CHANNEL = 0, 2
-_SOURCE_PERIOD = 0.25
+LOG_DATA = (CRTPPort.LOGGING, 2)
+"""Port and channel of log data."""
+
+_PING_CHANNEL = 0
+_SOURCE_PERIOD = 0.1
 _MOST_DATA = 30
 
 _log = logging.getLogger(__name__)
@@ -92,6 +97,7 @@ class Link:
         self._progress = SetupProgress()
         self._progress_time = 0.0
         self._has_answered = False
+        self._radio_says = ""
         self._closing = threading.Lock()
         self._is_closed = False
         self._exchange = Exchange()
@@ -135,6 +141,7 @@ class Link:
                     self._outbox.latest("source", self.cflib.ask_for_source)
 
     def _open_cflib(self):
+        radios.forget_dead_radios()
         self.cflib.open_link(self.address.uri)
         # `open` may have given up meanwhile.
         if self._is_closed:
@@ -204,11 +211,20 @@ class Link:
     @property
     def error(self) -> CrazyflieError | None:
         """Why the link is at its end; None while it lives."""
-        if self._error is None and self._liveness and self._liveness.is_lost(time.monotonic()):
-            self._error = LinkLostError(
-                f"{self.address.uri}: the vehicle has not been heard for {self._limits.lost:g} s"
-            )
         return self._error
+
+    def life(self) -> tuple[Life, str]:
+        """Return what the vehicle's packets show, and the same in words."""
+        if self._liveness is None:
+            return Life.ALIVE, "not connected yet"
+        state = self._liveness.state(time.monotonic())
+        if state is Life.ALIVE:
+            return state, "connected"
+        if state is Life.RESTARTED:
+            text = "the log data have stopped although the vehicle answers: has it restarted?"
+        else:
+            text = f"the vehicle has not been heard for {self._limits.lost:g} s{self._radio_says}"
+        return state, f"{self.address.uri}: {text}"
 
     def stream(self, name: str, send: Send) -> None:
         """Have ``send()`` called soon, in the place of what still waits under this name."""
@@ -267,6 +283,10 @@ class Link:
         with self._changed:
             if self._error is None:
                 cause = explain(self.address.uri, text)
+                if self._is_complete and UNANSWERED in text.lower():
+                    # The driver goes on, and the vehicle may be heard again.
+                    self._radio_says = f" ({cause})"
+                    return
                 if self._is_connected:
                     cause = LinkLostError(f"the link was lost: {cause}")
                 self._error = cause
@@ -275,6 +295,7 @@ class Link:
     # An exception in here would end cflib's receiving thread.
 
     def _on_received(self, received):
+        self._radio_says = ""
         port, channel, data = received.port, received.channel, bytes(received.data)
         now = time.monotonic()
         if not self._is_complete:
@@ -283,8 +304,8 @@ class Link:
                 self._progress_time = now
             self._has_answered = True
         if self._liveness is not None:
-            if (port, channel) == (CRTPPort.LOGGING, _LOG_DATA_CHANNEL):
-                self._liveness.received(now)
+            if (port, channel) == LOG_DATA:
+                self._liveness.log_received(now)
             elif (port, channel) == (CRTPPort.LINKCTRL, _PING_CHANNEL):
                 self._liveness.ping_answered(data, now)
         self._exchange.receive(port, channel, data)

@@ -2,17 +2,57 @@
 
 cflib never notices a vehicle that is frozen: a UDP socket stays open, and a
 radio's acknowledgements come from a second processor. So a link counts as lost
-when neither a log packet nor the answer to a ping has come for a while.
+when neither a log packet nor the answer to a ping has come for a while. Firmware that
+restarts within that time answers pings as before, but knows no log blocks any more: so
+the log data, too, have to come.
 """
 
+import enum
 import threading
 
-LOST_AFTER = 0.5
-"""Age of the last sign of life, in s, at which a link is lost: the firmware, too,
-gives up on a setpoint after 500 ms."""
+LOST_AFTER = 0.45
+"""Age of the last sign of life, in s, at which a link is lost; noticed before 0.5 s, when the
+firmware gives up on a setpoint."""
+
+_PERIODS_MISSED = 4
+"""Log packets that may be missing one after the other."""
+
+_HEARD_FOR = 0.25
+"""After a silence log data may come a little later than answers to pings, s."""
 
 _WINDOW = 20
 """Pings that the link quality is computed from; cflib sends 10 a second."""
+
+_LATEST, _FEW = 5, 3
+"""A link is poor when so few of the latest pings have been answered."""
+
+_TICKS = 1 << 24
+"""The vehicle counts ms in 24 bits."""
+
+_REORDERED_MS = 100
+
+
+class Life(enum.Enum):
+    """What the packets show."""
+
+    ALIVE = "alive"
+    SILENT = "silent"
+    RESTARTED = "restarted"
+
+
+class Uptime:
+    """The vehicle's clock, in log packets, which begins anew when the firmware restarts."""
+
+    def __init__(self) -> None:
+        self._latest: int | None = None
+
+    def has_restarted(self, time_ms: int) -> bool:
+        """Return whether the clock (ms, 24 bits) is behind what it was at the last call."""
+        before, self._latest = self._latest, time_ms
+        if before is None:
+            return False
+        behind = (before - time_ms) % _TICKS
+        return _REORDERED_MS < behind < _TICKS // 2
 
 
 class Liveness:
@@ -31,13 +71,29 @@ class Liveness:
     def __init__(self, now: float, limit: float = LOST_AFTER):
         self._limit = limit
         self._received = now
+        self._heard_since = now
+        self._logged = now
+        self._log_limit: float | None = None
         self._checked = now
         self._lock = threading.Lock()
         self._pings: dict[bytes, bool] = {}
 
     def received(self, now: float) -> None:
         """Take note of a sign of life."""
+        if now - self._received > self._limit:
+            self._heard_since = now
         self._received = now
+
+    def log_received(self, now: float) -> None:
+        """Take note of a log packet."""
+        self.received(now)
+        self._logged = now
+
+    def expect_log(self, period: float, now: float) -> None:
+        """Take note that log packets are going to come with a period (s)."""
+        limit = max(self._limit, _PERIODS_MISSED * period)
+        self._log_limit = limit if self._log_limit is None else min(limit, self._log_limit)
+        self._logged = max(self._logged, now)
 
     def ping_sent(self, content: bytes) -> None:
         """Take note of a ping that was sent."""
@@ -66,8 +122,14 @@ class Liveness:
             pings = list(self._pings.values())[:-1]
         return sum(pings) / len(pings) if pings else 1.0
 
-    def is_lost(self, now: float) -> bool:
-        """Return whether the link is lost; to be called several times within the limit.
+    def is_poor(self) -> bool:
+        """Return whether hardly any of the latest pings were answered."""
+        with self._lock:
+            pings = list(self._pings.values())[-_LATEST - 1 : -1]
+        return len(pings) == _LATEST and sum(pings) <= _FEW
+
+    def state(self, now: float) -> Life:
+        """Return what the packets show; to be called several times within the limit.
 
         When this call itself comes late, the machine was busy, and packets of the
         vehicle may wait to be read: it gets a new period.
@@ -76,4 +138,10 @@ class Liveness:
         self._checked = now
         if late:
             self._received = max(self._received, now - 0.5 * self._limit)
-        return self.age(now) > self._limit
+            self._logged = max(self._logged, now - 0.5 * self._limit)
+        if self.age(now) > self._limit:
+            return Life.SILENT
+        if self._log_limit is None or now - self._logged <= self._log_limit:
+            return Life.ALIVE
+        # Until its log data come, too, nobody knows.
+        return Life.RESTARTED if now - self._heard_since > _HEARD_FOR else Life.SILENT

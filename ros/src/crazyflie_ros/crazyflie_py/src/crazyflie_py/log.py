@@ -1,6 +1,7 @@
 """Log blocks: variables that the vehicle sends by itself, every so many milliseconds."""
 
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -104,7 +105,8 @@ class Log(Subsystem):
             has not replied.
         """
         self.check(block)
-        backend = self._current_link().cflib
+        link = self._current_link()
+        backend = link.cflib
         config = LogConfig(block.name, block.period_ms)
         for variable in block.variables:
             config.add_variable(variable)
@@ -133,3 +135,4 @@ class Log(Subsystem):
             )
         if refusals:
             raise RefusedError(f"log block {block.name!r}: the vehicle says: {refusals[0]}")
+        link.liveness.expect_log(block.period_ms / 1000.0, time.monotonic())

@@ -105,7 +105,8 @@ class Setpoints(Subsystem):
     def zeros(self, count: int = ZEROS, period: float = 0.001) -> None:
         """Send zero thrust ``count`` times, every ``period`` seconds; blocks until they are sent.
 
-        It opens the firmware's thrust lock, and stops a vehicle that flies on setpoints.
+        It opens the firmware's thrust lock, and stops a vehicle that flies on setpoints. In the
+        end they are handed over (`hand_over`): otherwise the vehicle would be locked 2 s later.
         """
         link = self._current_link()
         link.forget(_STREAM)
@@ -113,6 +114,7 @@ class Setpoints(Subsystem):
         for _ in range(count):
             link.command(lambda: link.cflib.commander.send_setpoint(0, 0, 0, 0))
             time.sleep(period)
+        self.hand_over()
         link.command(sent.set)
         sent.wait(_SENT_LIMIT)
 

@@ -1,5 +1,7 @@
 """The vehicle's supervisor: arming, its state, emergency stop."""
 
+from collections.abc import Callable
+
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_model.supervisor import SupervisorState
@@ -15,10 +17,23 @@ _EMERGENCY_REPEATS = 5
 _INFO_CHANNEL, _COMMAND_CHANNEL = 0, 1
 _GET_STATE, _ARM, _RECOVER = 0x0C, 0x01, 0x02
 _ANSWER = 0x80
+_WATCHDOG = "watchdog"
 
 
 class Supervisor(Subsystem):
-    """The supervisor: the part of the firmware that arms and stops the motors."""
+    """The supervisor: the part of the firmware that arms and stops the motors.
+
+    Parameters
+    ----------
+    current_link : callable
+        Returns the living `Link`, or raises `LinkLostError`.
+    any_link : callable
+        The same, but also one on which nothing comes at the moment.
+    """
+
+    def __init__(self, current_link: Callable[[], Link], any_link: Callable[[], Link]):
+        super().__init__(current_link)
+        self._any_link = any_link
 
     def read(self) -> SupervisorState | None:
         """Ask for the state; blocks. None when the firmware is too old to report it.
@@ -70,15 +85,15 @@ class Supervisor(Subsystem):
     def emergency_stop(self) -> None:
         """Stop the motors at once, before anything else that waits to be sent; does not block.
 
-        Sent several times, since a packet may be lost. The vehicle has to be
-        restarted before it can fly again.
+        Sent several times, since a packet may be lost, and also when nothing has come from the
+        vehicle of late. The vehicle has to be restarted before it can fly again.
 
         Raises
         ------
         LinkLostError
             Nothing can be sent.
         """
-        link = self._current_link()
+        link = self._any_link()
 
         def send():
             link.cflib.supervisor.send_emergency_stop()
@@ -86,6 +101,20 @@ class Supervisor(Subsystem):
 
         for _ in range(_EMERGENCY_REPEATS):
             link.command(send, urgent=True)
+
+    def feed_watchdog(self) -> None:
+        """Feed the emergency-stop watchdog; does not block.
+
+        It begins with the first feed and cannot be ended: 1 s after the last one the vehicle
+        stops its motors and is locked until it is restarted, also on the ground.
+
+        Raises
+        ------
+        LinkLostError
+            Nothing can be sent.
+        """
+        link = self._current_link()
+        link.stream(_WATCHDOG, link.cflib.supervisor.send_emergency_stop_watchdog)
 
     def _command(self, link: Link, data: bytes, what: str) -> None:
         answer = self._ask(link, _COMMAND_CHANNEL, data, what)

@@ -1,7 +1,7 @@
 """Trajectories of polynomials, kept in the vehicle's memory and flown by its planner."""
 
 import struct
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from cflib.crazyflie.mem.memory_element import MemoryElement
 from cflib.crtp.crtpstack import CRTPPort
@@ -21,8 +21,16 @@ _CHUNK = 24
 class Trajectories(Subsystem):
     """The vehicle's memory of trajectories."""
 
+    def __init__(self, current_link: Callable[[], Link], high_level: HighLevel):
+        super().__init__(current_link)
+        self._high_level = high_level
+
     def upload(
-        self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
+        self,
+        trajectory_id: int,
+        piece_offset: int,
+        pieces: Sequence[PolynomialPiece],
+        check: Callable[[], None] = lambda: None,
     ) -> None:
         """Write pieces to the vehicle's memory and define a trajectory of them; blocks.
 
@@ -34,6 +42,8 @@ class Trajectories(Subsystem):
             Where in the memory it begins, counted in pieces.
         pieces : sequence of PolynomialPiece
             At least one.
+        check : callable
+            Called before every packet; ends the upload by raising.
 
         Raises
         ------
@@ -53,8 +63,10 @@ class Trajectories(Subsystem):
             )
         data = b"".join(map(_packed, pieces))
         for start in range(0, len(data), _CHUNK):
+            check()
             _write(link, memory.id, begin + start, data[start : start + _CHUNK])
-        HighLevel(self._current_link).define_trajectory(trajectory_id, begin, len(pieces))
+        check()
+        self._high_level.define_trajectory(trajectory_id, begin, len(pieces))
 
 
 def _packed(piece: PolynomialPiece) -> bytes:

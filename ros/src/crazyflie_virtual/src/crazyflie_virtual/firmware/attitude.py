@@ -78,8 +78,12 @@ class AttitudeController:
         tuple of float
             PWM.
         """
-        return (
-            self.roll_rate.update(rates[0], gyro[0]),
-            self.pitch_rate.update(rates[1], gyro[1]),
-            self.yaw_rate.update(rates[2], gyro[2]),
-        )
+        about_roll = self.roll_rate.update(rates[0], gyro[0])
+        about_pitch = self.pitch_rate.update(rates[1], gyro[1])
+        about_yaw = self.yaw_rate.update(rates[2], gyro[2])
+        # The firmware converts them to integers of 16 bits.
+        return (_or_zero(about_roll), _or_zero(about_pitch), _or_zero(about_yaw))
+
+
+def _or_zero(output):
+    return output if output == output else 0.0

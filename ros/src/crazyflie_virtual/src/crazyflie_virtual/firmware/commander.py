@@ -10,8 +10,9 @@ NOBODY, HIGH_LEVEL, STREAMED = 0, 1, 2
 class Commander:
     """The setpoint that holds.
 
-    A streamed setpoint keeps the high-level commander out until
-    `release`; age does not end that.
+    A streamed setpoint stops the high-level commander and keeps it out until
+    `release`. Nothing else ends that: not age, not a new client. After `release`
+    a commander that was not told to do something new holds the motors off.
 
     Parameters
     ----------
@@ -23,7 +24,7 @@ class Commander:
     priority : int
         Of the setpoint: `NOBODY`, `HIGH_LEVEL` or `STREAMED`.
     high_level_enabled : int
-        Whether the high-level commander is used.
+        Parameter that the firmware has without effect: the commander is on.
     """
 
     def __init__(self, planner: Planner):
@@ -36,23 +37,15 @@ class Commander:
         """Take a setpoint from the client."""
         self.setpoint = setpoint
         self.priority = STREAMED
-        self._planner.disable()
+        self._planner.stop()
 
     def release(self, estimate: Estimate) -> None:
         """Let the high-level commander take over, from the vehicle's state."""
         self.priority = min(self.priority, HIGH_LEVEL)
         self._planner.tell_state(estimate)
 
-    def forget(self) -> None:
-        """Begin as after a start: no setpoint, the high-level commander stopped."""
-        self.priority = NOBODY
-        self.setpoint = Setpoint()
-        self._planner.stop()
-
     def update_from_planner(self, time: float, estimate: Estimate) -> None:
         """Take the high-level commander's setpoint for ``time`` (s)."""
-        if not self.high_level_enabled:
-            return
         setpoint = self._planner.setpoint(time, estimate)
         if setpoint is not None and self.priority <= HIGH_LEVEL:
             self.setpoint = setpoint

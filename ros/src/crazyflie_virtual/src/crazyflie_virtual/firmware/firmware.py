@@ -10,10 +10,11 @@ from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.firmware.localization import DECK, Localization
 from crazyflie_virtual.firmware.planner import Phase, Planner
 from crazyflie_virtual.firmware.power import PowerMonitor
+from crazyflie_virtual.firmware.remarks import Remarks
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
-from crazyflie_virtual.firmware.stabilizer import Stabilizer
+from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, OFF, Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
-from crazyflie_virtual.firmware.supervisor import Supervisor
+from crazyflie_virtual.firmware.supervisor import State, Supervisor
 from crazyflie_virtual.link.statistics import LinkStatistics
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.memories import MemoryTester
@@ -22,6 +23,7 @@ POSITION_STEPS = 5
 """Steps between two updates of position controller and high-level commander: 100 Hz."""
 
 _SUPERVISOR_STEPS = 20
+_STARTING_UPDATES = 4
 _POWER_STEPS = 50
 _POSITION_PERIOD = POSITION_STEPS * STEP
 
@@ -36,6 +38,10 @@ class Firmware:
     faults : FaultSwitches
         Switches, which are parameters of the virtual vehicle too.
     settings : VehicleSettings
+    failure : str
+        The assertion that has led to this start. After one the firmware does
+        not pass its self test: it is there for the client and does not fly
+        (system.c of the firmware), until it is turned off and on.
 
     Attributes
     ----------
@@ -43,14 +49,26 @@ class Firmware:
         Since the start, s.
     setpoint : Setpoint
         What is flown.
+    info : SupervisorState
+        State of supervisor and high-level commander at the supervisor's last
+        update, as clients see it.
+    is_started : bool
+        Whether the self test has passed.
     """
 
-    def __init__(self, physics: Physics, faults: FaultSwitches, settings: VehicleSettings):
+    def __init__(
+        self,
+        physics: Physics,
+        faults: FaultSwitches,
+        settings: VehicleSettings,
+        failure: str = "",
+    ):
         self._physics = physics
         self.faults = faults
         self._steps = 0
         self.time = 0.0
         self.console = Console()
+        self.remark = Remarks(self.console.write_line, lambda: self.time)
         self.estimate = Estimate()
         self.sensors = Sensors(settings.sensor_noise, settings.seed)
         self.estimator = Estimator(self.estimate)
@@ -59,34 +77,31 @@ class Firmware:
         self.commander = Commander(self.planner)
         self.attitude_decoder = AttitudeDecoder()
         self.supervisor = Supervisor(self.console.write_line, settings.auto_arm)
-        self.stabilizer = Stabilizer()
+        self.stabilizer = Stabilizer(0 if settings.auto_arm else IDLE_THRUST)
         self.power = PowerMonitor()
         self.link_statistics = LinkStatistics()
         self.memory_tester = MemoryTester()
         self.setpoint = Setpoint()
         self.reset_estimation = 0
-        # The checks before the first flight take three updates; a client that
-        # connects at once is not to find them unfinished.
-        for _ in range(3):
-            self._supervise()
+        self.info = SupervisorState(0)
+        self._remarked_state: State | None = None
         self.console.write_line("SYS: ----------------------------")
         self.console.write_line("SYS: Virtual Crazyflie 2.1 is up and running!")
+        self.is_started = not failure
+        if failure:
+            self.console.write_line("SYS: The system resumed after a failed assert [WARNING]")
+            self.console.write_line(f"SYS: {failure}; no flight before power is off and on")
+            return
+        # A client that connects at once is not to find the checks before the
+        # first flight unfinished.
+        for _ in range(_STARTING_UPDATES):
+            self._supervise()
         self.console.write_line("STAB: Ready to fly.")
 
     @property
     def milliseconds(self) -> int:
         """Time since the start, ms."""
         return round(1000.0 * self.time)
-
-    @property
-    def info(self) -> SupervisorState:
-        """State of supervisor and high-level commander, as clients see it."""
-        phase = self.planner.phase
-        return self.supervisor.flags | SupervisorState.of(
-            high_level_active=phase in (Phase.FLYING, Phase.LANDING),
-            trajectory_finished=self.planner.is_finished(self.time),
-            high_level_disabled=phase is Phase.DISABLED,
-        )
 
     def step(self, voltage: float) -> MotorCommands:
         """Take `STEP` and return the motor commands, PWM.
@@ -99,6 +114,11 @@ class Firmware:
         physics, sensors, estimate = self._physics, self.sensors, self.estimate
         self._steps += 1
         self.time = self._steps * STEP
+        if self._steps % _POWER_STEPS == 0:
+            self.link_statistics.update(self.time)
+            self._watch_power(voltage)
+        if not self.is_started:
+            return OFF
         with_position = self._steps % POSITION_STEPS == 0
         sensors.sample_inertial(physics.rates, physics.specific_force)
         self.estimator.predict(sensors, STEP)
@@ -108,22 +128,21 @@ class Firmware:
         if self._steps % _SUPERVISOR_STEPS == 0:
             self._supervise()
         if self._steps % _POWER_STEPS == 0:
-            self.link_statistics.update(self.time)
-            self._watch_power(voltage)
             sensors.sample_slow(physics.position[2], physics.quaternion)
         setpoint = self.setpoint = self.supervisor.override(self.commander.setpoint)
         return self.stabilizer.update(
             setpoint, estimate, sensors, with_position, self.supervisor.can_fly
         )
 
-    def new_client(self) -> None:
-        """Take note that a client begins to talk.
-
-        On the ground it finds the commander as after a start. In flight nothing
-        changes.
-        """
-        if not self.supervisor.is_flying:
-            self.commander.forget()
+    def stream(self, setpoint: Setpoint) -> None:
+        """Take a setpoint from the client."""
+        self.commander.stream(setpoint)
+        state = self.supervisor.state
+        if not self.supervisor.can_fly and self._remarked_state is not state:
+            self._remarked_state = state
+            self.console.write_line(f"CMD: setpoints have no effect: {state.value}")
+        if not setpoint.is_finite:
+            self.remark("setpoint", "CMD: flies by a setpoint that is not a number")
 
     def _correct_estimate(self):
         if self.reset_estimation:
@@ -139,6 +158,16 @@ class Firmware:
         motors_run = max(self.stabilizer.commands) > idle
         age = self.commander.age(self.time)
         self.supervisor.update(self.time, self.sensors, age, motors_run)
+        if self.supervisor.can_fly:
+            self._remarked_state = None
+        phase = self.planner.phase
+        self.info = self.supervisor.flags | SupervisorState.of(
+            high_level_active=phase in (Phase.FLYING, Phase.LANDING),
+            trajectory_finished=self.planner.is_finished(self.time),
+            high_level_disabled=phase is Phase.DISABLED,
+        )
+        if phase is Phase.DISABLED:
+            self.remark("planner", "HLC: gives no setpoints: what was asked for is not a number")
         self.planner.block(not self.supervisor.can_fly)
 
     def _watch_power(self, voltage):

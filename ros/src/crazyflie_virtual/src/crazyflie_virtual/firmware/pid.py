@@ -1,6 +1,7 @@
 """A PID controller as the firmware uses them: with feed-forward, parameters and log variables."""
 
-from crazyflie_model.elementwise import clip
+from math import isnan
+
 from crazyflie_model.pid import Gains, terms
 
 
@@ -64,6 +65,13 @@ class FirmwarePid:
             self._dt,
         )
         self.out_ff = self.kff * desired
+        if isnan(self._integral):
+            self._integral = -self.limit
         output = self.out_p + self.out_i + self.out_d + self.out_ff
         most = self.output_limit
-        return clip(output, -most, most) if most > 0.0 else output
+        return constrain(output, -most, most) if most > 0.0 else output
+
+
+def constrain(value: float, low: float, high: float) -> float:
+    """Return ``value`` limited to [low, high]; ``low`` for what is no number, as C's fmaxf does."""
+    return high if value > high else value if value >= low else low

@@ -25,6 +25,9 @@ REFUSED = 1
 _SHORTEST = 0.01
 """Least duration of a plan, s."""
 
+_NOWHERE = PolynomialPiece(1.0, *[(math.nan,)] * 4)
+"""What the firmware's arithmetic makes of a plan with infinite numbers."""
+
 _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 
 
@@ -36,7 +39,7 @@ class Phase(Enum):
     FLYING = 1
     LANDING = 2
     DISABLED = 3
-    """It gives no setpoints: streamed ones have taken over."""
+    """It gives no setpoints, as what it was told to do is not a number."""
 
 
 class Planner:
@@ -76,7 +79,11 @@ class Planner:
         if self._trajectory is None or self.phase in (Phase.STOPPED, Phase.DISABLED):
             self.tell_state(estimate)
             return Setpoint(time=time) if self.phase is Phase.STOPPED else None
-        goal = self._last = self._trajectory.evaluate(time - self._begin)
+        goal = self._trajectory.evaluate(time - self._begin)
+        if not all(map(math.isfinite, goal.position)):
+            self.phase = Phase.DISABLED
+            return None
+        self._last = goal
         return Setpoint(
             mode=_TRACKING,
             yaw=math.degrees(goal.yaw),
@@ -98,10 +105,6 @@ class Planner:
         """Hold the motors off."""
         self.phase = Phase.STOPPED
         return 0
-
-    def disable(self) -> None:
-        """Give no more setpoints."""
-        self.phase = Phase.DISABLED
 
     def block(self, is_blocked: bool) -> None:
         """Refuse plans from now on, and stop what is flying; or allow them again."""
@@ -164,8 +167,6 @@ class Planner:
         relative_yaw: bool,
     ) -> int:
         """Fly a trajectory that was defined; ``relative`` to the present position (and yaw)."""
-        if self.blocked:
-            return REFUSED
         if trajectory_id not in self._definitions:
             return errno.ENOENT
         if not (math.isfinite(time_scale) and time_scale > 0.0):
@@ -190,11 +191,10 @@ class Planner:
         return self._fly(time, smooth_piece, start, (x, y, height), yaw, duration, phase)
 
     def _fly(self, time, plan, start, position, yaw, duration, phase):
-        if self.blocked:
-            return REFUSED
-        if not all(map(math.isfinite, (*position, yaw, duration))) or duration < 0.0:
-            return errno.EINVAL
-        piece = plan(start, position, yaw, max(duration, _SHORTEST))
+        try:
+            piece = plan(start, position, yaw, max(duration, _SHORTEST))
+        except (ArithmeticError, ValueError):
+            piece = _NOWHERE
         self._begin_at(time, Trajectory((piece,)), phase)
         return 0
 

@@ -10,7 +10,7 @@ import math
 from crazyflie_model.angles import Triple
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.pid import Gains
-from crazyflie_virtual.firmware.pid import FirmwarePid
+from crazyflie_virtual.firmware.pid import FirmwarePid, constrain
 from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Setpoint
 
 DT = 0.01
@@ -91,7 +91,7 @@ class PositionController:
         roll = -self.vy.update(vy, self.body_vy)
         thrust = self.thrust_base + _THRUST_SCALE * self.vz.update(vz, estimate.vz)
         return (
-            max(-self.roll_limit, min(self.roll_limit, roll)),
-            max(-self.pitch_limit, min(self.pitch_limit, pitch)),
-            max(self.thrust_min, min(FULL_PWM, thrust)),
+            constrain(roll, -self.roll_limit, self.roll_limit),
+            constrain(pitch, -self.pitch_limit, self.pitch_limit),
+            constrain(thrust, self.thrust_min, FULL_PWM),
         )

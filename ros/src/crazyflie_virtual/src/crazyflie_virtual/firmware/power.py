@@ -22,9 +22,8 @@ class PowerMonitor:
     state : int
         `ON_BATTERY` or `LOW`.
     low_voltage, critical_voltage : float
-        V.
-    is_exhausted : bool
-        The voltage has been critical for too long: the vehicle turns off.
+        V. Nothing follows from the second: the firmware does not turn itself
+        off, unless it was built to.
     """
 
     def __init__(self) -> None:
@@ -32,9 +31,7 @@ class PowerMonitor:
         self.level = 90
         self.state = ON_BATTERY
         self.low_voltage, self.critical_voltage = 3.2, 3.0
-        self.is_exhausted = False
         self._good_time: float | None = None
-        self._fair_time: float | None = None
 
     @property
     def millivolts(self) -> float:
@@ -44,10 +41,7 @@ class PowerMonitor:
     def update(self, time: float, voltage: float) -> None:
         """Take in the voltage (V) at a time (s)."""
         self.voltage = voltage
-        self.level = 10 * max(0, sum(voltage >= level for level in _LEVELS) - 1)
+        self.level = 10 * min(9, sum(voltage > level for level in _LEVELS))
         if voltage > self.low_voltage or self._good_time is None:
             self._good_time = time
-        if voltage > self.critical_voltage or self._fair_time is None:
-            self._fair_time = time
         self.state = LOW if time - self._good_time > _LOW_AFTER else ON_BATTERY
-        self.is_exhausted = time - self._fair_time > _LOW_AFTER

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from crazyflie_model.limits import MAX_SETPOINT_PWM
+from crazyflie_virtual.firmware.assertion import FirmwareAssertion
 from crazyflie_virtual.firmware.commander import NOBODY
 from crazyflie_virtual.firmware.compressed import decompress_quaternion
 from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Modes, Setpoint
@@ -53,10 +54,11 @@ class AttitudeDecoder:
         time : float
             s.
         """
-        values = _unpack(_ATTITUDE, data)
-        if values is None:
+        # The firmware does not look at the size, and would go on with what an
+        # earlier packet has left in the memory behind a short one.
+        if len(data) < _ATTITUDE.size:
             return None
-        roll, pitch, yaw_rate, thrust = values
+        roll, pitch, yaw_rate, thrust = _ATTITUDE.unpack_from(data)
         if priority == NOBODY:
             self.is_locked = True
         if thrust == 0:
@@ -71,7 +73,7 @@ class AttitudeDecoder:
 
 
 def decode_generic(data: bytes, time: float) -> Setpoint | None:
-    """Return a generic setpoint, port 7; None when the packet is not one.
+    """Return a generic setpoint, port 7; None for a type that there is not.
 
     Parameters
     ----------
@@ -79,21 +81,23 @@ def decode_generic(data: bytes, time: float) -> Setpoint | None:
         Type and payload.
     time : float
         s.
+
+    Raises
+    ------
+    FirmwareAssertion
+        For a payload of a wrong size.
     """
     decoder = _DECODERS.get(data[0]) if data else None
-    setpoint = decoder(data[1:]) if decoder else None
-    if setpoint is not None:
-        setpoint.time = time
-    return setpoint
-
-
-def _unpack(form, data):
-    # Like the firmware, take no notice of packets of another size; unlike it,
-    # neither of numbers that are none, which no vehicle can follow.
-    if len(data) != form.size:
+    if decoder is None:
         return None
-    values = form.unpack(data)
-    return values if all(map(math.isfinite, values)) else None
+    try:
+        setpoint = decoder(data[1:])
+    except struct.error:
+        raise FirmwareAssertion(
+            f"a setpoint of type {data[0]} with {len(data) - 1} bytes"
+        ) from None
+    setpoint.time = time
+    return setpoint
 
 
 def _with_tilt(setpoint, roll, roll_is_rate, pitch, pitch_is_rate):
@@ -123,18 +127,23 @@ class _FourFloats(NamedTuple):
     mode: Modes
     velocity_body: bool = False
 
-    def decode(self, data: bytes) -> Setpoint | None:
-        """Return the setpoint in a payload; None when it holds none."""
-        values = _unpack(_FOUR, data)
-        if values is None:
-            return None
+    def decode(self, data: bytes) -> Setpoint:
+        """Return the setpoint in a payload."""
+        values = zip(self.fields, _FOUR.unpack(data), strict=True)
         setpoint = Setpoint(mode=self.mode, velocity_body=self.velocity_body)
-        return replace(setpoint, **dict(zip(self.fields, values, strict=True)))
+        return replace(setpoint, **dict(values))
 
-    def decode_clockwise(self, data: bytes) -> Setpoint | None:
+    def decode_any_size(self, data: bytes) -> Setpoint:
+        """Return the setpoint in a payload whose size the firmware does not check.
+
+        What is missing is 0 here; there it is what an earlier packet has left.
+        """
+        return self.decode(data[: _FOUR.size].ljust(_FOUR.size, b"\0"))
+
+    def decode_clockwise(self, data: bytes) -> Setpoint:
         """Return the setpoint in a payload of an older client, whose yaw rate is clockwise."""
         setpoint = self.decode(data)
-        return setpoint and replace(setpoint, yaw_rate=-setpoint.yaw_rate)
+        return replace(setpoint, yaw_rate=-setpoint.yaw_rate)
 
 
 _VELOCITY_WORLD = _FourFloats(
@@ -163,10 +172,7 @@ def _stop(data):
 
 
 def _full_state(data):
-    values = _unpack(_FULL_STATE, data)
-    if values is None:
-        return None
-    *motion, word, p, q, r = values
+    *motion, word, p, q, r = _FULL_STATE.unpack(data)
     # mm and milliradians on the wire.
     x, y, z, vx, vy, vz, ax, ay, az = (part / 1000.0 for part in motion)
     return Setpoint(
@@ -179,22 +185,19 @@ def _full_state(data):
 
 
 def _manual(data):
-    values = _unpack(_MANUAL, data)
-    if values is None:
-        return None
-    roll, pitch, yaw_rate, thrust, is_rate = values
+    roll, pitch, yaw_rate, thrust, is_rate = _MANUAL.unpack(data)
     setpoint = Setpoint(mode=Modes(yaw=VELOCITY), yaw_rate=yaw_rate, thrust=float(thrust))
     return _with_tilt(setpoint, roll, bool(is_rate), pitch, bool(is_rate))
 
 
-_DECODERS: dict[int, Callable[[bytes], Setpoint | None]] = {
+_DECODERS: dict[int, Callable[[bytes], Setpoint]] = {
     0: _stop,
     1: _VELOCITY_WORLD.decode_clockwise,
     2: _Z_DISTANCE.decode_clockwise,
     4: _VERTICAL_SPEED.decode,
     5: _HOVER.decode_clockwise,
     6: _full_state,
-    7: _POSITION.decode,
+    7: _POSITION.decode_any_size,
     8: _VELOCITY_WORLD.decode,
     9: _Z_DISTANCE.decode,
     10: _HOVER.decode,

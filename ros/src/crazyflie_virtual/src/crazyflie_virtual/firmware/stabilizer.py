@@ -18,7 +18,10 @@ from crazyflie_virtual.firmware.states import (
     Setpoint,
 )
 
-_OFF: MotorCommands = (0.0, 0.0, 0.0, 0.0)
+OFF: MotorCommands = (0.0, 0.0, 0.0, 0.0)
+
+IDLE_THRUST = 7000
+"""Of vehicles that the client arms, with brushless motors, PWM."""
 
 
 class MotorOverride:
@@ -46,6 +49,11 @@ class MotorOverride:
 class Stabilizer:
     """The controllers of one vehicle.
 
+    Parameters
+    ----------
+    idle_thrust : int
+        To begin with.
+
     Attributes
     ----------
     attitude : AttitudeController
@@ -63,15 +71,15 @@ class Stabilizer:
         Least command of an armed motor, PWM.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, idle_thrust: int = 0) -> None:
         self.attitude = AttitudeController()
         self.position = PositionController()
         self.override = MotorOverride()
-        self.idle_thrust = 0
+        self.idle_thrust = idle_thrust
         self.roll = self.pitch = self.yaw = 0.0
         self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0
         self.thrust = self.command_roll = self.command_pitch = self.command_yaw = 0.0
-        self.requested = self.commands = _OFF
+        self.requested = self.commands = OFF
         self._automatic = (0.0, 0.0, 0.0)
         self._mode = Modes()
 
@@ -118,7 +126,7 @@ class Stabilizer:
             m1, m2, m3, m4 = limit(self.requested, float(self.idle_thrust))
             self.commands = (m1, m2, m3, m4)
         else:
-            self.commands = _OFF
+            self.commands = OFF
         return self.commands
 
     def _reset(self, estimate):
@@ -169,4 +177,4 @@ class Stabilizer:
         self._reset(estimate)
         self.yaw = estimate.yaw
         self.command_roll = self.command_pitch = self.command_yaw = 0.0
-        self.requested = _OFF
+        self.requested = OFF

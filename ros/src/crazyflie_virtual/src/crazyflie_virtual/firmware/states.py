@@ -6,7 +6,8 @@ accelerates forward (+x). Quaternions and positions are those of the rest of the
 workspace.
 """
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
 from crazyflie_model.angles import Quaternion, Triple
@@ -91,6 +92,12 @@ class Setpoint(_Motion):
         vx, vy, vz = velocity
         ax, ay, az = acceleration
         return replace(self, x=x, y=y, z=z, vx=vx, vy=vy, vz=vz, ax=ax, ay=ay, az=az)
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether no number in it is infinite or none."""
+        parts = (getattr(self, part.name) for part in fields(self))
+        return all(math.isfinite(part) for part in parts if isinstance(part, float))
 
     def leveled(self) -> "Setpoint":
         """Return the setpoint made level, with the heading kept; height stays as it is."""

@@ -1,12 +1,19 @@
 """The supervisor: may the motors run, and what overrides the setpoint. 25 Hz.
 
-States and times are those of the firmware (2025). Unlike there, a vehicle whose
-motors have been off for a while counts as landed also while its setpoint is
-old: it stands on the ground then, and need not be locked.
+It is a table of transitions, as in the firmware: docs/functional-areas/supervisor
+of crazyflie-firmware explains the scheme. States, conditions and their order are
+those of its supervisor_state_machine.c (the last version we could read is of
+2024) with what came later: that disarming in the air is no emergency (pull
+request 1426), that an armed vehicle does not wait for ever (1441), and the state
+before `State.READY` (1641). The recorded flights (release 2026.08) confirm each
+transition but these, of which there is no record: the one out of `State.READY`
+by time, those out of `State.LANDED` by disarming and of `State.LEVELLING` by
+disarming and tumbling, and those of `State.CRASHED`.
 """
 
 from collections.abc import Callable
-from enum import Enum
+from enum import Enum, Flag, auto
+from typing import NamedTuple
 
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 from crazyflie_model.supervisor import SupervisorState
@@ -31,16 +38,109 @@ class State(Enum):
 
     NOT_READY = "Pre-flight checks not passed"
     CHECKED = "Pre-flight checks passed"
+    ARMING = "Arming"
     READY = "Ready to fly"
     FLYING = "Flying"
     LANDED = "Landed"
+    RESET = "Reset"
     LEVELLING = "Warning, level out"
+    FREE_FALL = "Exception, free fall"
     CRASHED = "Crashed"
     LOCKED = "Locked"
 
 
+class Condition(Flag):
+    """What decides on transitions."""
+
+    ARMED = auto()
+    FLYING = auto()
+    """Some motor ran within the last 2 s."""
+    TUMBLED = auto()
+    SETPOINT_OLD = auto()
+    """For more than 0.5 s."""
+    SETPOINT_TOO_OLD = auto()
+    """For more than 2 s."""
+    EMERGENCY = auto()
+    CRASHED = auto()
+    """Not recovered since the crash."""
+    NOT_TAKEN_OFF = auto()
+    """Armed for `Supervisor.preflight_timeout`."""
+    NOT_FLOWN_AGAIN = auto()
+    """Landed for `Supervisor.landed_timeout`."""
+    ALWAYS = auto()
+
+
+class Transition(NamedTuple):
+    """Taken when any condition of ``when`` holds, or any of ``unless`` does not."""
+
+    to: State
+    when: Condition = Condition(0)
+    unless: Condition = Condition(0)
+
+
+_S, _C = State, Condition
+
+TRANSITIONS: dict[State, tuple[Transition, ...]] = {
+    _S.NOT_READY: (
+        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
+        Transition(_S.CHECKED, unless=_C.TUMBLED),
+    ),
+    _S.CHECKED: (
+        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
+        Transition(_S.NOT_READY, when=_C.TUMBLED),
+        Transition(_S.ARMING, when=_C.ARMED),
+    ),
+    _S.ARMING: (
+        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
+        Transition(_S.NOT_READY, when=_C.TUMBLED, unless=_C.ARMED),
+        # Brushless vehicles with telegrams from their motors wait for these here.
+        Transition(_S.READY, when=_C.ALWAYS),
+    ),
+    _S.READY: (
+        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
+        Transition(_S.NOT_READY, when=_C.TUMBLED, unless=_C.ARMED),
+        Transition(_S.FLYING, when=_C.FLYING),
+        Transition(_S.CHECKED, when=_C.NOT_TAKEN_OFF),
+    ),
+    _S.FLYING: (
+        Transition(_S.FREE_FALL, when=_C.SETPOINT_TOO_OLD | _C.EMERGENCY),
+        Transition(_S.CRASHED, when=_C.TUMBLED),
+        Transition(_S.RESET, unless=_C.ARMED),
+        Transition(_S.LEVELLING, when=_C.SETPOINT_OLD),
+        Transition(_S.LANDED, unless=_C.FLYING),
+    ),
+    _S.LANDED: (
+        Transition(_S.RESET, when=_C.NOT_FLOWN_AGAIN, unless=_C.ARMED),
+        Transition(_S.FLYING, when=_C.FLYING),
+    ),
+    _S.RESET: (Transition(_S.NOT_READY, when=_C.ALWAYS),),
+    # There is no way from here to LANDED: with its motors off, too, a vehicle
+    # that gets no setpoints is locked.
+    _S.LEVELLING: (
+        Transition(_S.FREE_FALL, when=_C.SETPOINT_TOO_OLD | _C.TUMBLED | _C.EMERGENCY),
+        Transition(_S.RESET, unless=_C.ARMED),
+        Transition(_S.FLYING, unless=_C.SETPOINT_OLD),
+    ),
+    _S.FREE_FALL: (Transition(_S.LOCKED, when=_C.ALWAYS),),
+    _S.CRASHED: (
+        Transition(_S.NOT_READY, unless=_C.CRASHED),
+        Transition(_S.LOCKED, when=_C.EMERGENCY),
+    ),
+    _S.LOCKED: (),
+}
+"""The first transition whose condition is met is taken, one in each update."""
+
 _RUNNING = (State.READY, State.FLYING, State.LANDED, State.LEVELLING)
+_KEEPS_ARMED = (*_RUNNING, State.ARMING)
 _IN_AIR = (State.FLYING, State.LEVELLING)
+
+
+def next_state(state: State, conditions: Condition) -> State:
+    """Return the state after one update."""
+    for transition in TRANSITIONS[state]:
+        if conditions & transition.when or ~conditions & transition.unless:
+            return transition.to
+    return state
 
 
 class Supervisor:
@@ -63,8 +163,9 @@ class Supervisor:
     tumble_check : int
         0 for none.
     preflight_timeout, landed_timeout : int
-        ms after which a vehicle that was armed by the client is disarmed when
-        it does not take off, and after landing.
+        ms after which a vehicle is disarmed when it does not take off, and
+        after landing. One that arms by itself cannot fly for the four updates
+        that this takes.
     """
 
     def __init__(self, write_line: Callable[[str], None], auto_arm: bool = True):
@@ -143,14 +244,14 @@ class Supervisor:
             self._thrust_time = time
         runs = self._thrust_time is not None and time - self._thrust_time < _LANDED_AFTER
         self.is_tumbled = bool(self.tumble_check) and self._has_tumbled(time, sensors)
-        state = self._next(time, setpoint_age, runs)
+        state = next_state(self.state, self._conditions(time, setpoint_age, runs))
         if state is self.state:
             return
         self.state = state
         self._state_time = time
         if state is State.CRASHED:
             self.is_crashed = True
-        if state not in _RUNNING:
+        if state not in _KEEPS_ARMED:
             self.is_armed = False
         if state is State.CHECKED and self.auto_arm:
             self.is_armed = True
@@ -164,42 +265,26 @@ class Supervisor:
             return Setpoint(time=setpoint.time)
         return setpoint.leveled() if self.state is State.LEVELLING else setpoint
 
-    def _next(self, time, setpoint_age, runs):
-        state = self.state
-        if state is State.LOCKED or self._is_emergency(time):
-            return State.LOCKED
-        if state is State.CRASHED:
-            return State.CRASHED if self.is_crashed else State.NOT_READY
-        if state is State.NOT_READY:
-            return State.NOT_READY if self.is_tumbled else State.CHECKED
-        if state is State.CHECKED:
-            if self.is_tumbled:
-                return State.NOT_READY
-            return State.READY if self.is_armed else State.CHECKED
-        if state is State.READY:
-            waited = self._waited(time, self.preflight_timeout)
-            if self.is_tumbled or not self.is_armed or waited:
-                return State.NOT_READY
-            return State.FLYING if runs else State.READY
-        if state is State.LANDED:
-            if not self.is_armed or self._waited(time, self.landed_timeout):
-                return State.NOT_READY
-            return State.FLYING if runs else State.LANDED
-        return self._next_in_air(setpoint_age, runs)
-
-    def _next_in_air(self, setpoint_age, runs):
-        if self.is_tumbled:
-            return State.CRASHED
-        if not self.is_armed:
-            return State.LOCKED
-        if not runs:
-            return State.READY if self.auto_arm else State.LANDED
-        if setpoint_age > OFF_AGE:
-            return State.LOCKED
-        return State.LEVELLING if setpoint_age > LEVEL_AGE else State.FLYING
+    def _conditions(self, time, setpoint_age, runs):
+        holding = {
+            Condition.ARMED: self.is_armed,
+            Condition.FLYING: runs,
+            Condition.TUMBLED: self.is_tumbled,
+            Condition.SETPOINT_OLD: setpoint_age > LEVEL_AGE,
+            Condition.SETPOINT_TOO_OLD: setpoint_age > OFF_AGE,
+            Condition.EMERGENCY: self._is_emergency(time),
+            Condition.CRASHED: self.is_crashed,
+            Condition.NOT_TAKEN_OFF: self._waited(time, self.preflight_timeout),
+            Condition.NOT_FLOWN_AGAIN: self._waited(time, self.landed_timeout),
+        }
+        conditions = Condition.ALWAYS
+        for condition, holds in holding.items():
+            if holds:
+                conditions |= condition
+        return conditions
 
     def _waited(self, time, timeout):
-        return not self.auto_arm and time - self._state_time > timeout / 1000.0
+        return time - self._state_time > timeout / 1000.0
 
     def _is_emergency(self, time):
         fed = self._watchdog_time

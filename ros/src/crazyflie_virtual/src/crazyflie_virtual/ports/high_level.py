@@ -4,6 +4,7 @@ import errno
 import struct
 from collections.abc import Callable
 
+from crazyflie_virtual.firmware.commander import STREAMED
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 
@@ -43,6 +44,12 @@ class HighLevelPort:
         values = struct.unpack_from("<" + form, data)
         if command in _FOR_ALL:
             return handler(self, *values)
+        f = self._firmware
+        if command in _PLANS and self._planner.blocked:
+            f.remark("planner", f"HLC: refuses command {command}: {f.supervisor.state.value}")
+            return errno.EBUSY
+        if command in _PLANS and f.commander.priority == STREAMED:
+            f.remark("planner", f"HLC: command {command} has no effect before setpoints stop")
         group, *arguments = values
         is_meant = group == _ALL_GROUPS or group & self._groups
         return handler(self, *arguments) if is_meant else 0
@@ -117,6 +124,9 @@ _COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
     13: ("B???Bf", HighLevelPort._start),
 }
 """Command -> (fields, handler). 1, 2, 4 and 5 are those of older clients."""
+
+_PLANS = tuple(command for command in _COMMANDS if command not in (0, 3, 6))
+"""Commands that are refused while the vehicle cannot fly, whomever they are for."""
 
 _FOR_ALL = (0, 6)
 """Commands that do not begin with the group of vehicles that they are for."""

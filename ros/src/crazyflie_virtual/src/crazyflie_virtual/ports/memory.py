@@ -4,6 +4,7 @@ import errno
 import struct
 from collections.abc import Iterable
 
+from crazyflie_virtual.firmware.assertion import FirmwareAssertion
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.tables.memories import Memory
 
@@ -49,6 +50,8 @@ class MemoryPort:
         if len(data) < 6:
             return None
         number, address, count = struct.unpack_from("<BIB", data)
+        if count > _MOST:
+            raise FirmwareAssertion(f"a read of {count} bytes of memory, of {_MOST} at most")
         error = self._check(number, address, count)
         if error:
             return data[:5] + bytes([error])
@@ -67,6 +70,6 @@ class MemoryPort:
     def _check(self, number, address, count):
         if number >= len(self._memories):
             return errno.ENOENT
-        if count > _MOST or address + count > self._memories[number].size:
+        if address + count > self._memories[number].size:
             return errno.EIO
         return 0

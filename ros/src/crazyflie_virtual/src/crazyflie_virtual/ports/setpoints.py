@@ -26,8 +26,12 @@ class AttitudeSetpointPort:
         f = self._firmware
         if packet.channel == _SETPOINT:
             setpoint = f.attitude_decoder.decode(packet.data, f.commander.priority, f.time)
-            if setpoint is not None:
-                f.commander.stream(setpoint)
+            if setpoint is None:
+                f.remark("setpoint", "CMD: an attitude setpoint of less than 14 bytes")
+                return []
+            f.stream(setpoint)
+            if f.attitude_decoder.is_locked:
+                f.remark("thrust", "CMD: thrust is locked until a setpoint without thrust comes")
         return []
 
 
@@ -49,8 +53,10 @@ class GenericSetpointPort:
         f = self._firmware
         if packet.channel == _SETPOINT:
             setpoint = decode_generic(packet.data, f.time)
-            if setpoint is not None:
-                f.commander.stream(setpoint)
+            if setpoint is None:
+                f.remark("setpoint", f"CMD: no setpoints of type {packet.data[:1].hex()}")
+                return []
+            f.stream(setpoint)
         elif packet.channel == _META and packet.data[:1] == bytes([_SETPOINTS_STOP]):
             f.commander.release(f.estimate)
         return []

@@ -45,8 +45,10 @@ class SupervisorPort:
         To arm and to recover are answered with: done, and armed or recovered.
         """
         supervisor = self._firmware.supervisor
-        if command == _ARM and data:
-            done = supervisor.arm(bool(data[0]))
+        if command == _ARM:
+            # Without its byte the firmware takes the one that an earlier packet
+            # has left in its place: nothing changes.
+            done = supervisor.arm(bool(data[0]) if data else supervisor.is_armed)
             return bytes([done, supervisor.is_armed])
         if command == _RECOVER:
             done = supervisor.recover()

@@ -1,0 +1,51 @@
+"""Parameters of the driver."""
+
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TOPIC, Number
+
+_VOLTS = Number("V", minimum=0.0)
+_SECONDS = Number("s", minimum=0.0)
+
+
+class SafetyParameters(Parameters):
+    """What the driver does when something goes wrong."""
+
+    emergency_watchdog: bool = parameter(
+        BOOLEAN,
+        "feed the firmware's emergency-stop watchdog from the first high-level command on: 1 s "
+        "after PC or link have died the vehicle falls, and is locked until it is restarted; so "
+        "it is after it has been removed",
+        False,
+    )
+    battery_low: float = parameter(
+        _VOLTS, "below it the diagnostics warn and takeoff is refused", 3.2, "battery/low"
+    )
+    battery_critical: float = parameter(
+        _VOLTS, "below it a high-level flight is landed", 3.0, "battery/critical"
+    )
+    battery_critical_time: float = parameter(
+        _SECONDS, "after so long, since the voltage sinks under load", 5.0, "battery/critical_time"
+    )
+    landing_duration: float = parameter(
+        Number("s", above=0.0, maximum=30.0),
+        "of landings that the driver itself begins",
+        3.0,
+        "landing/duration",
+    )
+    landing_limit: float = parameter(
+        _SECONDS, "how long the removal of a vehicle waits for one", 10.0, "landing/limit"
+    )
+
+
+class CrazyflieServerParameters(SafetyParameters):
+    """Parameters of `CrazyflieServerNode`."""
+
+    fixed_frame: str = parameter(
+        FRAME, "frame of the pose that vehicles estimate", "world", "frames/fixed"
+    )
+    emergency_topic: str = parameter(
+        TOPIC,
+        "std_msgs/Empty, stops the motors of all vehicles, for good",
+        "/all/emergency",
+        "topics/emergency",
+    )

@@ -1,0 +1,81 @@
+"""Whether setpoints may be sent: after a lost link what is streamed may be stale."""
+
+PAUSE = 1.0
+"""A stream that has been silent for so long, s, was begun anew by somebody who knows."""
+
+OVERLAP = 0.2
+"""After a high-level command, setpoints that were on their way are not sent for so long, s: a
+single one would take the vehicle from its planner, and stop it 2 s later."""
+
+
+class SetpointGate:
+    """Decide about each setpoint; times are s of one clock.
+
+    After a lost link, setpoints stay blocked: the vehicle may have been restarted, or its
+    battery been changed, and be in somebody's hand. What shows that they are meant is that the
+    vehicle still flies, a pause in the stream, zero thrust, or a call of a service.
+    """
+
+    def __init__(self) -> None:
+        self._is_emergency = False
+        self._is_leaving = False
+        self._is_down = False
+        self._is_waiting = False
+        self._latest: float | None = None
+        self._high_level_since: float | None = None
+
+    def stop_for_good(self) -> None:
+        """Take note of an emergency stop."""
+        self._is_emergency = True
+
+    def leave(self) -> None:
+        """Take note that the vehicle is being removed."""
+        self._is_leaving = True
+
+    def link_lost(self) -> None:
+        """Take note that the link was lost."""
+        self._is_down = self._is_waiting = True
+
+    def link_back(self) -> None:
+        """Take note that there is a link again."""
+        self._is_down = False
+
+    def open(self) -> None:
+        """Take note of a call, or of a flight that goes on."""
+        self._is_waiting = self._is_down
+
+    def high_level(self, now: float) -> None:
+        """Take note that the vehicle was given a high-level command after a stream."""
+        self._high_level_since = now
+
+    def is_blocking(self, now: float) -> bool:
+        """Return whether somebody streams setpoints that are blocked because of a lost link."""
+        return self._is_waiting and self._latest is not None and now - self._latest <= PAUSE
+
+    def refusal(self, now: float, is_zero: bool) -> str:
+        """Return why a setpoint must not be sent; empty if it may.
+
+        Parameters
+        ----------
+        now : float
+        is_zero : bool
+            Whether it has the motors stand still.
+        """
+        before, self._latest = self._latest, now
+        if self._is_emergency:
+            return "emergency stop"
+        if self._is_leaving:
+            return "the vehicle is being removed"
+        if self._is_down:
+            return "the link is lost"
+        is_new = before is None or now - before > PAUSE
+        if self._is_waiting and not (is_new or is_zero):
+            return (
+                "the link was lost, and the vehicle does not fly: pause the stream for "
+                f"{PAUSE:g} s, send zero thrust or call a service"
+            )
+        self._is_waiting = False
+        since = self._high_level_since
+        if since is not None and now - since < OVERLAP and not is_zero:
+            return "the vehicle was just given a high-level command"
+        return ""

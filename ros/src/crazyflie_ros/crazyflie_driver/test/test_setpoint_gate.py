@@ -1,0 +1,83 @@
+"""Which setpoints are passed on."""
+
+import pytest
+
+from crazyflie_driver.setpoint_gate import OVERLAP, PAUSE, SetpointGate
+
+
+def stream(gate, begin, end, period=0.02, is_zero=False):
+    """Stream setpoints; return how many were refused, and why the last one was."""
+    times = [begin + k * period for k in range(round((end - begin) / period))]
+    refusals = [gate.refusal(time, is_zero) for time in times]
+    return sum(map(bool, refusals)), refusals[-1]
+
+
+@pytest.fixture
+def lost():
+    """Return a gate whose link was lost and is back at 2 s, while somebody streams."""
+    gate = SetpointGate()
+    assert stream(gate, 0.0, 1.0) == (0, "")
+    gate.link_lost()
+    assert stream(gate, 1.0, 2.0) == (50, "the link is lost")
+    gate.link_back()
+    return gate
+
+
+def test_what_was_streamed_before_a_loss_stays_blocked(lost):
+    count, why = stream(lost, 2.0, 60.0)
+    assert count == 2900
+    assert why.startswith("the link was lost, and the vehicle does not fly")
+    assert lost.is_blocking(60.0)
+    assert not lost.is_blocking(62.0)
+
+
+def test_a_flight_that_goes_on_opens_it(lost):
+    lost.open()
+    assert stream(lost, 2.0, 3.0) == (0, "")
+
+
+def test_a_pause_opens_it(lost):
+    assert stream(lost, 2.0, 2.2)[0] == 10
+    assert stream(lost, 2.2 + PAUSE + 0.1, 4.0) == (0, "")
+
+
+def test_a_pause_during_the_loss_opens_it():
+    gate = SetpointGate()
+    stream(gate, 0.0, 1.0)
+    gate.link_lost()
+    gate.link_back()
+    assert stream(gate, 3.0, 4.0) == (0, "")
+
+
+def test_zero_thrust_opens_it(lost):
+    assert lost.refusal(2.0, True) == ""
+    assert stream(lost, 2.02, 3.0) == (0, "")
+
+
+def test_nothing_opens_it_without_a_link():
+    gate = SetpointGate()
+    gate.link_lost()
+    gate.open()
+    assert gate.refusal(0.0, True) == "the link is lost"
+    assert gate.refusal(5.0, False) == "the link is lost"
+    gate.link_back()
+    assert gate.refusal(5.1, False)
+
+
+def test_a_setpoint_under_way_does_not_override_a_command():
+    gate = SetpointGate()
+    stream(gate, 0.0, 1.0)
+    gate.high_level(1.0)
+    assert gate.refusal(1.0 + 0.5 * OVERLAP, False) == (
+        "the vehicle was just given a high-level command"
+    )
+    assert gate.refusal(1.0 + 0.5 * OVERLAP, True) == ""
+    assert gate.refusal(1.0 + 1.5 * OVERLAP, False) == ""
+
+
+def test_an_emergency_and_a_removal_are_for_good(lost):
+    lost.leave()
+    lost.open()
+    assert lost.refusal(9.0, True) == "the vehicle is being removed"
+    lost.stop_for_good()
+    assert lost.refusal(19.0, True) == "emergency stop"

@@ -1,0 +1,8 @@
+"""What ends in a restart of the microcontroller."""
+
+
+class FirmwareAssertion(Exception):
+    """An assertion of the firmware has failed, on a packet that it takes no care of.
+
+    The text says on what.
+    """

@@ -1,0 +1,167 @@
+"""Flights of a virtual vehicle beside those that were recorded of the firmware.
+
+What has to be equal: the supervisor's states and their order, error numbers,
+answers. What may differ, and why:
+
+* `MOMENT`: supervisor (40 ms), high-level commander (10 ms) and the log (20 ms) of
+  the recorded vehicle run at phases of their own, and a command is on its way for
+  some milliseconds. A height is compared with those of the `MOMENT` around it: it
+  is the moment that differs where a vehicle falls with several m/s.
+* `HEIGHT`: the recorded vehicle's body, of the software in the loop, has another
+  ground, motor lag and battery than `crazyflie_model`.
+* `SPEED`, `TURN`, `TILT`: so do drag and inertia.
+* `PWM`: gyroscope noise is another; and `PEAK`: the log that was recorded has missed
+  peaks that last one step.
+
+The phase of the supervisor is chosen (`Flight.begin`) where the record shows a
+state that another phase would skip. Where the steps do not say when a height was
+measured, the times are those that make sense of the record.
+"""
+
+import math
+import struct
+
+import pytest
+from virtual_bench import Bench, generic
+
+from crazyflie_model.angles import zyx_from_quaternion
+from crazyflie_virtual.body.physics import STEP
+from crazyflie_virtual.link.crtp import Port
+
+MOMENT = 0.06
+"""s."""
+
+HEIGHT = 0.05
+"""m."""
+
+SPEED = 0.04
+"""m/s."""
+
+TURN = 2.0
+"""deg and deg/s."""
+
+TILT = 0.5
+"""deg."""
+
+PWM, PEAK = 500.0, 3000.0
+"""Of motor commands."""
+
+_SAMPLE = 0.01
+_SUPERVISOR_PERIOD = 0.04
+
+
+class Track:
+    """What a vehicle did, 100 times a second from a moment on."""
+
+    def __init__(self, began):
+        self.began = began
+        self.rows = []
+
+    def add(self, flight):
+        time = flight.vehicle.time - self.began
+        self.rows.append((time, f"{flight.bits:#x}", flight.motors_run, flight.physics.position))
+
+    def height(self, time, expected):
+        """Return the height nearest to what is expected, about a time."""
+        return self.coordinate(time, expected, 2)
+
+    def coordinate(self, time, expected, axis):
+        """Return the coordinate nearest to what is expected, about a time."""
+        near = [row[3][axis] for row in self.rows if abs(row[0] - time) < MOMENT]
+        return min(near, key=lambda value: abs(value - expected))
+
+    def check_bits(self, recorded):
+        """Compare with a record of bits: [time, bits] of each change."""
+        self._check_changes(1, recorded)
+
+    def check_motors(self, recorded):
+        """Compare with a record of the motors: [time, whether any runs] of each change."""
+        self._check_changes(2, recorded)
+
+    def check_heights(self, recorded, times):
+        """Compare with heights at times."""
+        heights = [self.height(*pair) for pair in zip(times, recorded, strict=True)]
+        assert heights == pytest.approx(recorded, abs=HEIGHT)
+
+    def _check_changes(self, column, recorded):
+        begin = recorded[0][0]
+        changes = []
+        for row in self.rows:
+            if row[0] > begin - 0.5 * _SAMPLE and (not changes or row[column] != changes[-1][1]):
+                changes.append((row[0], row[column]))
+        assert [value for _, value in changes] == [value for _, value in recorded], changes
+        # The first is what was there before.
+        times = [time for time, _ in recorded]
+        assert [time for time, _ in changes] == pytest.approx(times, abs=MOMENT), changes
+
+
+class Flight(Bench):
+    """A vehicle whose track is watched."""
+
+    def __init__(self, **options):
+        super().__init__(**options)
+        self.begin()
+
+    @property
+    def bits(self):
+        return int(self.firmware.info)
+
+    @property
+    def yaw(self):
+        """deg."""
+        return math.degrees(zyx_from_quaternion(self.physics.quaternion)[2])
+
+    @property
+    def most(self):
+        """Largest motor command, PWM."""
+        return max(self.firmware.stabilizer.commands)
+
+    def begin(self, before_supervisor=None):
+        """Begin a new track; if asked for, when the supervisor's update is so far away, s."""
+        if before_supervisor is not None:
+            self.await_supervisor(before_supervisor)
+        self.track = Track(self.vehicle.time)
+        self.highest = 0.0
+        self._sample()
+        return self.track
+
+    def await_supervisor(self, before):
+        """Let time pass until the supervisor's next update is so far away, s."""
+        period = round(_SUPERVISOR_PERIOD / STEP)
+        while period - round(self.firmware.time / STEP) % period != round(before / STEP):
+            self.run(STEP)
+
+    def watch(self, duration, packet=None, period=0.02):
+        """Let time pass, while a packet is sent again and again; return the track."""
+        samples = round(duration / _SAMPLE)
+        for i in range(samples):
+            if packet is not None and i % round(period / _SAMPLE) == 0:
+                assert self.ask(*packet) == []
+            self.run(_SAMPLE)
+            self._sample()
+        return self.track
+
+    def command(self, number, form, *values):
+        """Give a command to the high-level commander; return the error number."""
+        return self.ask_one(Port.HIGH_LEVEL, 0, struct.pack("<BB" + form, number, 0, *values))[3]
+
+    def up(self, height, duration=2.0):
+        """Take off by the high-level commander; return the error number."""
+        return self.command(7, "ff?f", height, 0.0, False, duration)
+
+    def land(self, duration=2.0):
+        """Land by the high-level commander; return the error number."""
+        return self.command(8, "ff?f", 0.0, 0.0, False, duration)
+
+    def supervise(self, *data):
+        """Give a command to the supervisor; return the answers as they are recorded."""
+        return [answer.data.hex() for answer in self.ask(Port.SUPERVISOR, 1, bytes(data))]
+
+    def _sample(self):
+        self.track.add(self)
+        self.highest = max(self.highest, self.most)
+
+
+def position(x, y, z, yaw=0.0):
+    """Return a position setpoint as it is on the wire."""
+    return generic(7, "ffff", x, y, z, yaw)

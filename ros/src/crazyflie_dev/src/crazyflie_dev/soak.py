@@ -38,6 +38,12 @@ _PATIENCE = 30.0
 """How long the operator waits for a call, or for the vehicle to come to rest, s."""
 
 
+_SIMULATOR = "/simulator"
+
+_STRAY = 1.5
+"""Who comes to rest further away than this is carried back to the middle, m."""
+
+
 class Soak:
     """Flights one after the other, with a fault in each.
 
@@ -130,6 +136,15 @@ class Soak:
         self._wait(1.0, timeline)
         self.watch.may_fly = self.watch.may_fall = False
         # Nothing may begin by itself now.
+        self._wait(2.0, timeline)
+        if self.watch.distance > _STRAY:
+            self._carry_back(timeline)
+
+    def _carry_back(self, timeline):
+        # A simulator that is started anew has its vehicle where the launch file puts it.
+        self.graph.kill(_SIMULATOR)
+        self.watch.carried()
+        self._start(_SIMULATOR)
         self._wait(2.0, timeline)
 
     def _wait(self, duration, timeline):

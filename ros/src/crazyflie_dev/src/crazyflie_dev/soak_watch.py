@@ -21,8 +21,12 @@ BLIND_LIMIT = 8.0
 """How long a vehicle may be in the air without a good pose, s: 0.1 s until it is level,
 0.5 s in which the pose may come back, 5 s of descent, and what it falls then."""
 
-FLY_AWAY = 4.0
-"""How far from its start a vehicle may be, m; no reference is further than 1 m."""
+MOST_SPEED = 3.0
+"""Of a vehicle, m/s: references are 1.4 m away at most, and approached at less than half of it."""
+
+FLY_AWAY = 8.0
+"""How far from the middle a vehicle may come in a flight that begins there, m: the models of 7
+states have no drag, and glide on while they sink blindly."""
 
 HARD_LANDING = 2.0
 """Most speed at which it may meet the ground unless its motors were switched off, m/s."""
@@ -59,8 +63,8 @@ class Watch:
         Whether the vehicle may meet the ground at any speed.
     is_emergency : bool
         Whether motors have to stand still.
-    height : float
-        Of the vehicle now, m.
+    height, distance : float
+        Of the vehicle now from the ground and from the middle, m.
     state : str
         Of the flight, as the server tells it.
     """
@@ -75,10 +79,11 @@ class Watch:
     may_fall: bool = False
     is_emergency: bool = False
     height: float = 0.0
+    distance: float = 0.0
     state: str = ""
     _reference: float = 0.0
     _blind_since: float = math.inf
-    _last: tuple[float, float] | None = None
+    _last: tuple[float, tuple[float, ...]] | None = None
     _speed: float = 0.0
     _told: set[str] = field(default_factory=set)
 
@@ -106,24 +111,32 @@ class Watch:
 
     def _on_tf(self, message):
         time = self.graph.time
-        position = message.transforms[0].transform.translation
-        height = self.height = position.z
-        if self._last is not None and time > self._last[0]:
-            speed = (height - self._last[1]) / (time - self._last[0])
-            if height <= 0.001 < self._last[1]:
-                self._touch_down(-self._speed)
-            self._speed = speed
-        self._last = (time, height)
+        translation = message.transforms[0].transform.translation
+        position = (translation.x, translation.y, translation.z)
+        before, self._last = self._last, (time, position)
+        if before is None or time <= before[0]:
+            return
+        height = self.height = position[2]
+        self.distance = math.hypot(*position[:2])
+        speed = math.dist(position, before[1]) / (time - before[0])
         self.highest = max(self.highest, height - self._reference)
-        distance = math.hypot(position.x, position.y)
-        self.farthest = max(self.farthest, distance)
+        self.farthest = max(self.farthest, self.distance)
+        if height <= 0.001 < before[1][2]:
+            self._touch_down(self._speed)
+        self._speed = speed
         if height > self._reference + OVERSHOOT and self.may_fly:
             self.say(f"too high: {height:.2f} m, reference {self._reference:.2f} m")
         if height > 0.1 and not self.may_fly:
             self.say(f"in the air unasked: {height:.2f} m")
-        if distance > FLY_AWAY:
-            self.say(f"flown away: {distance:.2f} m")
+        if self.distance > FLY_AWAY:
+            self.say(f"flown away: {self.distance:.2f} m")
+        if speed > MOST_SPEED and not self.may_fall:
+            self.say(f"too fast: {speed:.2f} m/s")
         self._watch_blindness(time, height)
+
+    def carried(self) -> None:
+        """Take note that the vehicle has been put elsewhere."""
+        self._last = None
 
     def _touch_down(self, speed):
         if self.may_fall:

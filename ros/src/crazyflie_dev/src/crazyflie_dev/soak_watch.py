@@ -35,7 +35,8 @@ _AIRBORNE = 0.05
 """Height from which on a vehicle is in the air, m."""
 
 _LEGAL = {
-    "on_ground": {"taking_off"},
+    # A takeoff that is aborted at once is never told.
+    "on_ground": {"taking_off", "landing"},
     "taking_off": {"flying", "descending", "landing", "on_ground"},
     "flying": {"descending", "landing", "on_ground"},
     "descending": {"landing", "on_ground", "flying"},

@@ -171,3 +171,32 @@ def test_an_unknown_command():
     (answer,) = recorded("define_errors")["unknown_command_99"]
     assert Flight().ask_one(Port.HIGH_LEVEL, 0, b"\x63").hex() == answer
     assert bytes.fromhex(answer)[3] == errno.ENOEXEC
+
+
+def test_external_poses():
+    firmware = recorded("external_pose")
+    flight = Flight(positioning="none")
+    place = (0.5, -0.3, 0.0)
+    left = (0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5))
+
+    def send(duration, channel, data):
+        """Send a measurement at 50 Hz."""
+        for _ in range(round(duration / 0.02)):
+            flight.ask(Port.LOCALIZATION, channel, data)
+            flight.run(0.02)
+
+    send(3.0, 0, struct.pack("<3f", *place))
+    assert flight.pose() == pytest.approx(firmware["after_extpos"], abs=0.1)
+    send(3.0, 1, struct.pack("<B7f", 8, *place, *left))
+    # The attitude is pulled to the initial one.
+    assert flight.pose() == pytest.approx(firmware["after_extpose_yaw90"], abs=0.1)
+    track = []
+    for _ in range(4):
+        for duration in (0.24, 0.26):
+            send(duration, 1, struct.pack("<B7f", 8, 1.5, *place[1:], *left))
+            track.append(flight.firmware.estimate.x)
+    # To the estimate a jump is a velocity, too: it swings beyond.
+    assert track == pytest.approx(firmware["x_after_1m_jump_each_0.25s"], abs=0.03)
+    flight.run(2.0)
+    assert flight.pose()[:3] == pytest.approx(firmware["2s_without"][:3], abs=0.03)
+    assert flight.pose()[3] == pytest.approx(firmware["2s_without"][3], abs=1.0)

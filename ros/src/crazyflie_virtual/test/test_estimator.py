@@ -67,15 +67,16 @@ def test_the_first_measurements_count_in_full(estimator):
 
 
 def test_gain_converges_to_that_of_the_riccati_equation(estimator):
-    dt, deviation, noise = 0.01, 0.01, 0.5
+    dt, deviation, noise = 0.01, 0.01, 3.7e-4
     for _ in range(2000):
         estimator.grow_variances(dt)
         before = (estimator.variance_position, estimator.variance_velocity)
         estimator.correct_position(0.0, 0.0, 0.0, deviation)
     a = np.array([[1.0, dt], [0.0, 1.0]])
     c = np.array([[1.0], [0.0]])
-    g = np.array([[dt**2 / 2.0], [dt]]) * noise
-    p = solve_discrete_are(a.T, c, g @ g.T, np.array([[deviation**2]]))
+    # White noise of the acceleration, over one step.
+    q = noise * np.array([[dt**3 / 3.0, dt**2 / 2.0], [dt**2 / 2.0, dt]])
+    p = solve_discrete_are(a.T, c, q, np.array([[deviation**2]]))
     np.testing.assert_allclose(before, np.diag(p), rtol=1e-3)
 
 
@@ -95,13 +96,22 @@ def test_both_signs_of_a_quaternion_are_the_same_attitude(estimator):
         assert estimate_of(estimator).yaw == pytest.approx(math.degrees(1.0), abs=0.1)
 
 
-def test_at_rest_gravity_shows_what_is_up(estimator):
-    e = estimate_of(estimator)
-    estimator.correct_attitude(*Rotation.from_euler("ZYX", [0.5, 0.1, -0.1]).as_quat(), 1e-4)
+@pytest.mark.parametrize("initial_yaw", [0.0, 1.0])
+def test_at_rest_the_attitude_returns_to_the_initial_one(estimator, initial_yaw):
+    estimator.initial_yaw = initial_yaw
+    estimator.reset()
+    before = Rotation.from_euler("ZYX", [initial_yaw + 0.7, 0.4, -0.5])
+    estimator.correct_attitude(*before.as_quat(), 1e-6)
     for _ in range(500):
-        estimator.rest(sensors(), 0.01)
-    assert (e.roll, e.pitch) == pytest.approx((0.0, 0.0), abs=0.01)
-    assert e.yaw == pytest.approx(math.degrees(0.5), abs=1.0)
+        estimator.rest(0.01)
+    initial = Rotation.from_euler("Z", initial_yaw)
+    # Along the great circle between the two quaternions, at sin(angle / 2) / 10 s.
+    angle = (initial.inv() * before).magnitude()
+    expected = 4.0 * math.atan(math.tan(angle / 4.0) * math.exp(-0.5))
+    after = initial.inv() * Rotation.from_quat(estimate_of(estimator).quaternion)
+    assert after.magnitude() == pytest.approx(expected, rel=1e-3)
+    axes = [r.as_rotvec() / r.magnitude() for r in (initial.inv() * before, after)]
+    np.testing.assert_allclose(*axes, atol=1e-3)
 
 
 def test_reset_begins_where_it_is_told(estimator):

@@ -5,7 +5,8 @@ import math
 import struct
 
 import pytest
-from cflib.crazyflie.mem import Poly4D
+from cflib.crazyflie.high_level_commander import HighLevelCommander
+from cflib.crazyflie.mem import CompressedSegment, CompressedStart, Poly4D
 from virtual_bench import Bench, cflib_client
 
 from crazyflie_virtual.firmware.planner import REFUSED
@@ -107,19 +108,98 @@ def test_trajectory_from_memory(bench, protocol):
     assert bench.physics.position[0] == pytest.approx(0.0, abs=0.06)
 
 
-def test_trajectories_that_are_none(bench):
+@pytest.mark.parametrize(
+    ("define", "reason"),
+    [
+        (None, "it is not defined"),
+        ((1, 0, 4000, 1), "1 pieces at byte 4000 are not in the memory"),
+        ((1, 0, 0, 0), "0 pieces at byte 0 are not in the memory"),
+        ((1, 0, 0, 32), "32 pieces at byte 0 are not in the memory"),
+        ((1, 1, 4090, 1), "a compressed trajectory begins with 8 bytes"),
+        ((1, 9, 0, 1), "there are none of type 9 at location 1"),
+        ((2, 0, 0, 1), "there are none of type 0 at location 2"),
+        ((1, 0, 132, 1), "numbers that are not finite, or a negative duration"),
+    ],
+)
+def test_trajectories_that_cannot_be_flown_are_told_on_the_console(bench, define, reason):
     bench.take_off()
-    assert command(bench, "start_trajectory", 5) == errno.ENOENT
-    define = struct.pack("<4BIB", 6, 1, 1, 0, 4000, 1)
-    assert bench.ask_one(Port.HIGH_LEVEL, 0, define)[3] == errno.ENOMEM
-    # Memory that was never written has pieces without duration.
+    upload(bench, straight(1.0, 1.0), straight(1.0, -1.0))
+    if define is not None:
+        packet = struct.pack("<4BIB", 6, 5, *define)
+        assert bench.ask_one(Port.HIGH_LEVEL, 0, packet)[3] == 0
+    assert command(bench, "start_trajectory", 5) == 0
+    before = bench.firmware.setpoint
+    bench.run(1.0)
+    assert bench.firmware.setpoint.x == before.x
+    assert bench.height == pytest.approx(1.0, abs=0.1)
+    text = b"".join(p.data for p in bench.unsolicited if p.port == Port.CONSOLE).decode()
+    assert "HLC: no trajectory 5: " in text
+    assert reason in text
+
+
+def test_memory_that_was_never_written_is_at_the_origin(bench):
+    bench.take_off()
+    assert command(bench, "go_to", 1.0, 0.0, 1.0, 0.0, 2.0) == 0
+    bench.run(4.0)
     define = struct.pack("<4BIB", 6, 1, 1, 0, 0, 1)
     assert bench.ask_one(Port.HIGH_LEVEL, 0, define)[3] == 0
-    assert command(bench, "start_trajectory", 1) == errno.EINVAL
-    compressed = struct.pack("<4BIB", 6, 1, 1, 1, 0, 1)
-    assert bench.ask_one(Port.HIGH_LEVEL, 0, compressed)[3] == errno.ENOEXEC
-    bench.run(1.0)
-    assert bench.height == pytest.approx(1.0, abs=0.1)
+    assert command(bench, "start_trajectory", 1) == 0
+    bench.run(0.1)
+    setpoint = bench.firmware.setpoint
+    assert (setpoint.x, setpoint.y, setpoint.z) == (0.0, 0.0, 0.0)
+
+
+A, B, C = 0.9, 0.5, 0.5
+FIGURE_EIGHT = [
+    CompressedStart(0.0, 0.0, 0.0, 0.0),
+    CompressedSegment(2.0, [0.0, 1.0, 1.0], [0.0, A, 0.0], [], []),
+    CompressedSegment(2.0, [1.0, B, 0.0], [-A, -C, 0.0], [], []),
+    CompressedSegment(2.0, [-B, -1.0, -1.0], [C, A, 0.0], [], []),
+    CompressedSegment(2.0, [-1.0, 0.0, 0.0], [-A, 0.0, 0.0], [], []),
+]
+"""The trajectory of cflib's example autonomous_sequence_high_level_compressed."""
+
+
+def define_compressed(bench, trajectory):
+    """Upload and define a trajectory, as cflib's example does."""
+    upload(bench, *trajectory)
+    kind = HighLevelCommander.TRAJECTORY_TYPE_POLY4D_COMPRESSED
+    assert command(bench, "define_trajectory", 1, 0, len(trajectory), type=kind) == 0
+
+
+def test_the_compressed_trajectory_of_cflibs_example(bench):
+    bench.take_off()
+    define_compressed(bench, FIGURE_EIGHT)
+    begin = bench.firmware.setpoint
+    assert command(bench, "start_trajectory", 1, 1.0, relative_position=True) == 0
+    for x in (1.0, 0.0, -1.0, 0.0, 0.0):
+        bench.run(2.0)
+        setpoint = bench.firmware.setpoint
+        assert (setpoint.x, setpoint.y) == pytest.approx((begin.x + x, begin.y), abs=0.02)
+        assert setpoint.z == begin.z
+        assert math.dist(bench.physics.position[:2], (setpoint.x, setpoint.y)) < 0.6
+    bench.run(2.0)
+    assert bench.physics.position == pytest.approx((0.0, 0.0, 1.0), abs=0.06)
+
+
+@pytest.mark.parametrize("keywords", [{"reversed": True}, {"time_scale": 2.0}])
+def test_compressed_trajectories_are_neither_flown_backwards_nor_scaled(bench, keywords):
+    bench.take_off()
+    define_compressed(bench, FIGURE_EIGHT)
+    assert command(bench, "start_trajectory", 1, **keywords) == errno.ENOEXEC
+    bench.run(2.0)
+    assert bench.physics.position == pytest.approx((0.0, 0.0, 1.0), abs=0.06)
+
+
+def test_a_spiral_ends_where_it_has_to(bench):
+    bench.take_off()
+    begin = bench.firmware.setpoint
+    assert command(bench, "spiral", -math.pi / 2, 0.4, 0.6, -0.3, 3.0, clockwise=True) == 0
+    bench.run(7.0)
+    # Backwards about an axis 0.4 m to the right.
+    expected = (begin.x - 0.6, begin.y - 0.4, begin.z - 0.3)
+    assert bench.physics.position == pytest.approx(expected, abs=0.06)
+    assert bench.firmware.estimate.yaw == pytest.approx(90.0, abs=4.0)
 
 
 def test_stop_drops_the_vehicle(bench):
@@ -135,6 +215,18 @@ def test_groups(bench):
     bench.run(1.0)
     assert bench.height == 0.0
     assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b11) == 0
+    bench.run(1.0)
+    assert bench.height > 0.3
+
+
+def test_the_groups_are_a_parameter(bench):
+    name = b"hlCommander\0groupmask\0"
+    assert bench.ask_one(Port.PARAMETERS, 3, b"\0" + name + b"\x08\x02")[-1] == 0
+    assert bench.firmware.planner.groups == 0b10
+    assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b01) == 0
+    bench.run(1.0)
+    assert bench.height == 0.0
+    assert command(bench, "takeoff", 1.0, 1.0, group_mask=0b10) == 0
     bench.run(1.0)
     assert bench.height > 0.3
 

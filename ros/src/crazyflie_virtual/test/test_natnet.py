@@ -58,8 +58,9 @@ def test_model(version):
 def test_frame(version):
     message = Encoder(version).frame(77, BODIES, Stamps(1.5, 1.6, 1.7))
     frame, rest = read(DataFrame, message, natnet.FRAME, version)
-    # The end mark, which the library leaves.
-    assert rest == 4
+    # The end mark, which the library leaves; of version 4.1 it does not know the precision
+    # time stamp, 8 bytes before the flags.
+    assert rest == (12 if version == "4.1" else 4)
     assert frame.prefix.frame_number == 77
     first, second = frame.rigid_bodies
     assert (first.id_num, first.pos, first.tracking_valid) == (1, (1.0, 2.0, 3.0), True)
@@ -69,6 +70,24 @@ def test_frame(version):
     if version != "2.9":
         assert frame.suffix.stamp_camera_mid_exposure == 1_500_000_000
         assert frame.suffix.stamp_transmit == 1_700_000_000
+
+
+@pytest.mark.parametrize(
+    ("version", "form", "stamps"),
+    [
+        ("2.9", "<IIdhI", ()),
+        ("3.1", "<IId3QhI", (1_500_000_000, 1_600_000_000, 1_700_000_000)),
+        # With the precision time stamp: seconds, and their fraction.
+        ("4.1", "<IId3QIIhI", (1_500_000_000, 1_600_000_000, 1_700_000_000, 0, 0)),
+    ],
+)
+def test_the_end_of_a_frame(version, form, stamps):
+    message = Encoder(version).frame(77, [], Stamps(1.5, 1.6, 1.7))
+    end = struct.unpack(form, message[-struct.calcsize(form) :])
+    assert end == (0, 0, 1.5, *stamps, 0, 0)
+    # Before it are the number, and counts, from 4.1 on with sizes; all are zero.
+    counts = {"2.9": 6, "3.1": 7, "4.1": 16}[version]
+    assert len(message) == 4 + 4 + 4 * counts + struct.calcsize(form)
 
 
 def test_echo():

@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
 from crazyflie_model.polynomials import Goal
-from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece, straight_piece
+from crazyflie_virtual.firmware.trajectory import (
+    Trajectory,
+    smooth_piece,
+    spiral_piece,
+    straight_piece,
+)
 
 ZERO = (0.0, 0.0, 0.0)
 NUMBER = st.floats(-3.0, 3.0)
@@ -50,6 +55,56 @@ def test_straight_piece_has_constant_speed(p, end, duration, s):
 def test_the_turn_is_the_shorter_one():
     start = Goal(ZERO, ZERO, ZERO, 3.0, 0.0)
     assert smooth_piece(start, ZERO, -3.0, 1.0).evaluate(1.0).yaw == pytest.approx(2 * math.pi - 3)
+
+
+RADIUS = st.floats(0.0, 2.0)
+
+
+def on_spiral(start, angle, radii, ascent, sideways, clockwise, s):
+    """Return where a spiral is at a part of its way, as a complex number, height and yaw."""
+    heading = np.exp(1j * start.yaw)
+    sense = -1 if clockwise else 1
+    # From where it begins the axis is to the left, to the right, or ahead.
+    to_axis = heading * (1 if sideways else 1j * sense)
+    axis = complex(*start.position[:2]) + radii[0] * to_axis
+    radius = (1 - s) * radii[0] + s * radii[1]
+    place = axis - radius * to_axis * np.exp(1j * sense * angle * s)
+    return place, start.position[2] + s * ascent, start.yaw + sense * angle * s
+
+
+@given(
+    VECTOR,
+    NUMBER,
+    st.floats(-2.0 * math.pi, 2.0 * math.pi),
+    st.tuples(RADIUS, RADIUS),
+    NUMBER,
+    DURATION,
+    st.booleans(),
+    st.booleans(),
+)
+def test_spiral_piece(p, yaw, angle, radii, ascent, duration, sideways, clockwise):
+    start = Goal(p, ZERO, ZERO, yaw, 0.0)
+    piece = spiral_piece(start, angle, radii, ascent, duration, sideways, clockwise)
+    # On a quarter of a turn it is a spiral; on more it still ends as one.
+    parts = (0.0, 0.25, 0.5, 0.75, 1.0) if abs(angle) <= math.pi / 2 else (0.0, 1.0)
+    for s in parts:
+        goal = piece.evaluate(s * duration)
+        place, height, heading = on_spiral(start, angle, radii, ascent, sideways, clockwise, s)
+        assert abs(complex(*goal.position[:2]) - place) < 0.01 * max(radii) + 1e-6
+        assert goal.position[2] == pytest.approx(height, abs=1e-6)
+        assert goal.yaw == pytest.approx(heading, abs=1e-6)
+        assert goal.yaw_rate == pytest.approx((-angle if clockwise else angle) / duration, abs=1e-6)
+    h = 1e-5
+    for s in (0.0, 1.0):
+        goal = piece.evaluate(s * duration)
+        near = [
+            on_spiral(start, angle, radii, ascent, sideways, clockwise, s + d)[0]
+            for d in (-h, 0.0, h)
+        ]
+        velocity = (near[2] - near[0]) / (2 * h * duration)
+        assert abs(complex(*goal.velocity[:2]) - velocity) < 1e-3
+        acceleration = (near[2] - 2 * near[1] + near[0]) / (h * duration) ** 2
+        assert abs(complex(*goal.acceleration[:2]) - acceleration) < 1e-2 * (1 + abs(acceleration))
 
 
 def line(start, end, duration):

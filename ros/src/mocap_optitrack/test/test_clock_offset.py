@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mocap_optitrack.clock_offset import ClockOffset
+from mocap_optitrack.clock_offset import ClockOffset, Verdict
 
 PERIOD = 0.01
 
@@ -107,11 +107,63 @@ def test_begins_anew_when_the_servers_clock_is_set(step):
     network.run(clock, 3.0)
     network.server += step
     network.offset -= step
-    assert not clock.update(*network.message())
+    verdicts = [clock.update(*network.message()) for _ in range(10)]
+    assert verdicts[-1] is Verdict.RESTART
+    assert set(verdicts[:-1]) <= {Verdict.OLD, Verdict.FOREIGN}
     assert not clock.is_settled
     errors = network.run(clock, 3.0)
     assert errors
     assert all(0.0 < error < 0.0015 for error in errors)
+
+
+def settled():
+    """Return a clock that is settled, and its network."""
+    clock, network = ClockOffset(), Network(50.0)
+    network.run(clock, 3.0)
+    return clock, network
+
+
+def test_a_message_that_comes_again_costs_nothing():
+    clock, network = settled()
+    first, second = network.message(), network.message()
+    assert clock.update(*first) is Verdict.NEW
+    for _ in range(50):
+        assert clock.update(first[0], first[1] + 0.001) is Verdict.OLD
+    assert clock.update(*second) is Verdict.NEW
+    assert clock.update(first[0], second[1] + 0.001) is Verdict.OLD
+    assert clock.is_settled
+    assert clock.update(*network.message()) is Verdict.NEW
+
+
+def test_messages_that_were_overtaken_are_old():
+    clock, network = settled()
+    messages = [network.message() for _ in range(30)]
+    verdicts = []
+    # Each third message comes first, and those before it follow.
+    for k in range(0, 30, 3):
+        for sent, _ in (messages[k + 2], messages[k], messages[k + 1]):
+            verdicts.append(clock.update(sent, messages[k + 2][1]))
+    assert verdicts == [Verdict.NEW, Verdict.OLD, Verdict.OLD] * 10
+    assert clock.is_settled
+
+
+@pytest.mark.parametrize("sent", [0.0, -1e300, 1e300, 1e9])
+def test_one_message_of_another_clock_changes_nothing(sent):
+    clock, network = settled()
+    before = clock.to_local(0.0)
+    arrival = network.message()[1]
+    assert clock.update(sent, arrival) is Verdict.FOREIGN
+    assert clock.update(*network.message()) is Verdict.NEW
+    assert clock.to_local(0.0) == pytest.approx(before, abs=1e-3)
+
+
+def test_two_servers_are_told_apart():
+    clock, network = settled()
+    other = Network(-700.0)
+    for _ in range(200):
+        sent, arrival = network.message()
+        assert clock.update(sent, arrival) is Verdict.NEW
+        assert clock.update(other.message()[0], arrival) is Verdict.FOREIGN
 
 
 def test_begins_anew_when_the_servers_clock_has_stood_still():
@@ -129,6 +181,6 @@ def test_a_pause_changes_nothing():
     network = Network(50.0)
     network.run(clock, 3.0)
     network.server += 60.0
-    assert clock.update(*network.message())
+    assert clock.update(*network.message()) is Verdict.NEW
     assert clock.is_settled
     assert clock.to_local(network.server) == pytest.approx(network.local(network.server), abs=2e-3)

@@ -48,6 +48,8 @@ def test_a_good_stream(health):
         "rate (Hz)": "100.5",
         "longest gap (ms)": "10.0",
         "stale frames": "0",
+        "repeated frames": "0",
+        "frames of another clock": "0",
         "latency, mean (ms)": "5.1",
         "latency, maximum (ms)": "25.0",
     }
@@ -81,6 +83,18 @@ def test_a_connection_that_ended(health):
     assert one[1:3] == (ERROR, "no frames")
 
 
+def test_a_connection_that_is_silent(health):
+    stream(health, 0.0, 1.0, ONE)
+    health.report(1.0)
+    health.silent("no frames for 1 s; is it live?")
+    assert health.report(2.0)[0][1:3] == (ERROR, "no frames for 1 s; is it live?")
+    stream(health, 2.5, 3.0, ONE)
+    assert health.report(3.0)[0].message == "gaps of up to 1510.0 ms"
+    stream(health, 3.0, 4.0, ONE)
+    assert health.report(4.0)[0].level == OK
+    assert health.report(5.0)[0].message == "no frames"
+
+
 def test_while_the_clock_is_learned(health):
     health.learning()
     assert health.report(1.0)[0][1:3] == (WARN, "learning the server's clock")
@@ -104,6 +118,14 @@ def test_a_clock_that_jumps_once_is_no_fault_but_again_and_again_is(health):
     level, message = health.report(2.0)[0][1:3]
     assert level == ERROR
     assert "two servers" in message
+
+
+@pytest.mark.parametrize(("foreign", "level"), [(1, OK), (2, WARN), (101, ERROR)])
+def test_frames_of_two_servers(health, foreign, level):
+    stream(health, 0.0, 1.0, ONE)
+    for _ in range(foreign):
+        health.foreign()
+    assert health.report(1.0)[0].level == level
 
 
 def test_gaps(health):

@@ -3,6 +3,7 @@
 import math
 from pathlib import Path
 
+import genpy
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -191,6 +192,47 @@ def test_trouble_is_warned_of_and_reported():
     assert message.status[0].message == "no server answers"
     node.on_connected("a server")
     assert "/mocap_node: connected to a server" in process.logged("info")
+
+
+def timed(process, exposure):
+    """Return a frame of a server whose clock is 100 s behind, just sent."""
+    return Frame(exposure, exposure + 0.005, process.clock.time(), (body(1),))
+
+
+def test_a_silence_of_the_stream_costs_nothing_but_itself():
+    process, node = launch()
+    topic = "/mocap_node/Robot_1/pose"
+    node.on_connected("a server")
+    for _ in range(100):
+        process.advance(0.01)
+        node.on_frame(timed(process, process.clock.time() - 100.005))
+    before = len(process.published(topic))
+    process.advance(1.2)
+    node.on_silence("no frames for 1 s; is it live?")
+    node.on_frame(timed(process, process.clock.time() - 100.005))
+    assert len(process.published(topic)) == before + 1
+    # Nor does a new connection to the same server; one to another does.
+    node.on_trouble("no frames for 10 s")
+    node.on_connected("a server")
+    process.advance(0.01)
+    node.on_frame(timed(process, process.clock.time() - 100.005))
+    assert len(process.published(topic)) == before + 2
+    node.on_connected("another server")
+    process.advance(0.01)
+    node.on_frame(timed(process, process.clock.time() - 100.005))
+    assert len(process.published(topic)) == before + 2
+    assert "/mocap_node: no frames for 1 s; is it live?" in process.logged("warn")
+
+
+def test_a_machine_whose_clock_is_set_back_is_warned_of():
+    process, node = launch()
+    show(process, node, body(1))
+    before = process.clock.stamp
+    process.clock.stamp = lambda moment=None: before(moment) - genpy.Duration(3.0)
+    show(process, node, body(1))
+    (text,) = process.logged("warn")
+    assert text == "/mocap_node: this machine's clock was set back by 2.990 s: stamps step back too"
+    assert len(process.published("/mocap_node/Robot_1/pose")) == 2
 
 
 def test_natnet_is_the_default():

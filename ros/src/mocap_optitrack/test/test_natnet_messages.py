@@ -1,6 +1,10 @@
 """NatNet messages: those of the virtual server, and one that is built here by hand."""
 
+import contextlib
+import math
 import struct
+import time
+import tracemalloc
 
 import pytest
 from hypothesis import given
@@ -59,6 +63,14 @@ def test_frames(version):
     assert frame.exposure == pytest.approx(100.0, abs=1e-9)
     # Before version 3.0 there is but one time.
     assert frame.sent == pytest.approx(100.005 if version >= "3.0" else 100.0, abs=1e-9)
+
+
+def test_a_server_with_ptp_is_read_like_one_without():
+    message = payload(Encoder("4.1").frame(5, POSES, Stamps(100.0, 100.002, 100.005)), natnet.FRAME)
+    # The precision time stamp is before flags and end mark.
+    precise = message[:-14] + struct.pack("<II", 1_700_000_000, 0x80000000) + message[-6:]
+    read = [natnet.read_frame(each, "4.1", FREQUENCY, NAMES, 7.5) for each in (message, precise)]
+    assert read[0] == read[1]
 
 
 @pytest.mark.parametrize(
@@ -165,13 +177,91 @@ def test_a_force_plate_with_too_many_channels_is_refused_at_once():
         natnet.read_frame(content, "3.1", FREQUENCY, {}, 0.0)
 
 
-@given(st.binary(max_size=300))
-def test_infos_and_models_of_noise_are_refused_or_read(content):
-    for read in (natnet.read_server_info, lambda noise: natnet.read_names(noise, "3.1")):
-        try:
-            read(content)
-        except natnet.DecodeError as error:
-            assert "cannot decode" in str(error)
+def read(datagram, version):
+    """Read a datagram, whatever it is, as the client does."""
+    number, content = natnet.split(datagram)
+    if number == natnet.SERVER_INFO:
+        natnet.read_server_info(content)
+    elif number == natnet.MODEL:
+        natnet.read_names(content, version)
+    elif number == natnet.FRAME:
+        frame = natnet.read_frame(content, version, FREQUENCY, {}, 0.0)
+        assert all(map(math.isfinite, (frame.exposure, frame.sent)))
+
+
+def refused_or_read(datagram, version):
+    """Read a datagram; the one exception that is allowed is the documented one."""
+    with contextlib.suppress(natnet.DecodeError):
+        read(datagram, version)
+
+
+def datagram(number, content):
+    """Return a message with a header that fits."""
+    return struct.pack("<HH", number, len(content)) + content
+
+
+def valid(number, version):
+    """Return a message of the virtual server, or, of version 3.0, one with all there is."""
+    if number == natnet.SERVER_INFO:
+        return Encoder("4.1").server_info("virtual", 1511, "239.255.42.99")
+    if number == natnet.FRAME and version == "3.0":
+        return datagram(number, full_frame_3_0(5_000_000, 5_020_000, 5_050_000))
+    encoder = Encoder("3.1" if version == "3.0" else version)
+    if number == natnet.MODEL:
+        return encoder.model(POSES)
+    return encoder.frame(5, POSES, Stamps(100.0, 100.002, 100.005))
+
+
+NUMBERS = st.sampled_from([natnet.SERVER_INFO, natnet.MODEL, natnet.FRAME])
+READABLE = st.sampled_from(["2.5", "2.9", "3.0", "3.1", "4.1"])
+
+
+@given(st.binary(max_size=400), READABLE)
+def test_noise(content, version):
+    refused_or_read(content, version)
+
+
+@given(NUMBERS, st.binary(max_size=400), READABLE)
+def test_noise_with_a_header_that_fits(number, content, version):
+    refused_or_read(datagram(number, content), version)
+
+
+@given(NUMBERS, st.sampled_from(["2.9", "3.0", "3.1", "4.1"]), st.data())
+def test_valid_messages_with_bytes_changed_cut_out_or_added(number, version, data):
+    content = valid(number, version)[4:]
+    for _ in range(data.draw(st.integers(1, 4))):
+        begin = data.draw(st.integers(0, len(content)))
+        end = data.draw(st.integers(begin, min(begin + 8, len(content))))
+        content = content[:begin] + data.draw(st.binary(max_size=8)) + content[end:]
+    refused_or_read(datagram(number, content), version)
+    # And in a stream of another version.
+    refused_or_read(datagram(number, content), data.draw(READABLE))
+
+
+@pytest.mark.parametrize("version", ["2.9", "4.1"])
+@pytest.mark.parametrize("number", [natnet.MODEL, natnet.FRAME])
+@pytest.mark.parametrize("filling", [b"\0", b"\1\0\0\0", b"a\0\0\0\0"])
+@pytest.mark.parametrize("first", [(1, 0), (0x7FFFFFFF, 0)])
+def test_the_largest_datagrams_take_little_time_and_memory(number, version, filling, first):
+    # As many names, bodies or channels as fit, and numbers that say there are more.
+    room = 65507 - 12
+    content = struct.pack("<ii", *first) + (filling * room)[:room]
+    tracemalloc.start()
+    begin = time.process_time()
+    try:
+        refused_or_read(datagram(number, content), version)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert time.process_time() - begin < 5.0
+    assert peak < 50e6
+
+
+@pytest.mark.parametrize("stamp", [math.nan, math.inf])
+def test_a_frame_without_a_time_is_refused(stamp):
+    message = Encoder("2.9").frame(5, POSES, Stamps(stamp, 0.0, 0.0))
+    with pytest.raises(natnet.DecodeError, match="has no time"):
+        natnet.read_frame(payload(message, natnet.FRAME), "2.9", FREQUENCY, {}, 0.0)
 
 
 def test_requests():

@@ -166,6 +166,44 @@ def test_a_unicast_server_is_sent_keep_alives(monkeypatch):
         source.close()
 
 
+def test_a_server_that_was_started_anew_is_found_over_the_same_sockets():
+    port = free_port()
+    with contextlib.ExitStack() as stack:
+        with server(port):
+            source, _ = stack.enter_context(connection(port))
+            wait_for_frame(source)
+            sockets = list(source._sockets)
+        while source.read(0.0) is not None:
+            pass
+        assert source.read(0.05) is None
+        with server(port):
+            wait_for_frame(source)
+        assert source._sockets == sockets
+
+
+def test_a_server_that_became_another_is_connected_to_anew(monkeypatch):
+    monkeypatch.setattr(module, "_SILENCE", 0.05)
+    port = free_port()
+    with contextlib.ExitStack() as stack:
+        with server(port, version="3.1"):
+            source, _ = stack.enter_context(connection(port))
+            wait_for_frame(source)
+        with (
+            server(port, version="4.1", silent=True),
+            pytest.raises(SourceError, match=r"is not what it was: virtual_mocap 4\.1"),
+        ):
+            wait_for_frame(source, lambda frame: False)
+
+
+def test_a_network_that_is_gone_for_a_moment_is_only_quiet(monkeypatch):
+    with server() as running, connection(running.address[1]) as (source, _):
+        wait_for_frame(source)
+        # Nothing can be sent there.
+        monkeypatch.setattr(source, "_server", ("255.255.255.255", 0))
+        monkeypatch.setattr(module, "_KEEP_ALIVE", 0.0)
+        wait_for_frame(source)
+
+
 def test_bodies_that_appear_later_get_their_names(monkeypatch):
     monkeypatch.setattr(module, "_NAMES_AGAIN", 0.05)
     settings = MocapSettings(command_port=0, observer_port=0, rate=200.0)

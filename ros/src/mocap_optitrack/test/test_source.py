@@ -14,7 +14,7 @@ LIMIT = 10.0
 
 
 class ScriptedSource(Source):
-    """A system that does what a list says: raise, return, or go on with the next."""
+    """A system that does what a list says: raise, return, or be silent for some seconds."""
 
     silence_hint = "is it plugged in?"
 
@@ -38,6 +38,9 @@ class ScriptedSource(Source):
         value = self._script.pop(0) if self._script else default
         if isinstance(value, Exception):
             raise value
+        if isinstance(value, float):
+            time.sleep(value)
+            return None
         return value
 
 
@@ -52,6 +55,7 @@ class Run:
             self._make,
             lambda text: self.said.put(("connected", text)),
             lambda frame: self.said.put(("frame", frame)),
+            lambda text: self.said.put(("silence", text)),
             lambda text: self.said.put(("trouble", text)),
         )
 
@@ -75,6 +79,7 @@ def _short_waits(monkeypatch):
     monkeypatch.setattr(module, "_RETRY", 0.001)
     monkeypatch.setattr(module, "_POLL", 0.001)
     monkeypatch.setattr(module, "_SILENCE", 0.05)
+    monkeypatch.setattr(module, "_GIVE_UP", 0.5)
 
 
 def frame(number):
@@ -102,11 +107,21 @@ def test_a_connection_that_ends_is_made_anew():
     assert said[2:] == [("trouble", "gone"), ("connected", "a server"), ("frame", frame(2))]
 
 
+def test_a_connection_that_is_silent_for_a_while_is_kept():
+    silence = [0.02] * 5
+    with Run(["a server", frame(1), *silence, frame(2), *silence, frame(3)]) as run:
+        said = [run.next() for _ in range(6)]
+        assert not run.sources[0].is_closed
+    text = "no frames for 0.05 s; is it plugged in?"
+    assert said[2:5] == [("silence", text), ("frame", frame(2)), ("silence", text)]
+
+
 def test_a_connection_without_frames_is_given_up():
     with Run(["a server", frame(1)], ["a server", frame(2)]) as run:
-        said = [run.next() for _ in range(5)]
-    assert said[2] == ("trouble", "no frames for 0.05 s; is it plugged in?")
-    assert said[4] == ("frame", frame(2))
+        said = [run.next() for _ in range(6)]
+    assert said[2] == ("silence", "no frames for 0.05 s; is it plugged in?")
+    assert said[3] == ("trouble", "no frames for 0.5 s; is it plugged in?")
+    assert said[5] == ("frame", frame(2))
 
 
 def test_the_thread_outlives_errors_nobody_thought_of():

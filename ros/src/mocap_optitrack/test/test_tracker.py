@@ -1,6 +1,8 @@
 """Which bodies of which frames are published, and with what time."""
 
 import math
+import random
+from itertools import pairwise
 
 import pytest
 
@@ -15,9 +17,9 @@ BODIES = RigidBodyDictionary()(
 ).bodies
 
 
-def tracker(up_axis="z", stale_after=0.2):
+def tracker(up_axis="z", stale_after=0.2, health=None):
     """Return a tracker of one body by its number and two by their names."""
-    return Tracker(BODIES, up_axis, stale_after, Health(BODIES, stale_after, 0.0))
+    return Tracker(BODIES, up_axis, stale_after, health or Health(BODIES, stale_after, 0.0))
 
 
 def body(number=1, name=None, position=(1.0, 2.0, 3.0), quaternion=UPRIGHT, is_tracked=True):
@@ -76,12 +78,19 @@ def test_frames_without_a_time_have_that_of_their_arrival():
     assert seen.time == 12.5
 
 
-@pytest.mark.parametrize("time", [10.0, 9.9])
-def test_a_frame_that_is_not_new_is_dropped(time):
+def test_a_frame_that_is_not_new_is_dropped():
     one = tracker()
     assert one.take(frame(body()))
-    assert not one.take(frame(body(), time=time))
+    assert not one.take(frame(body()))
     assert one.take(frame(body(), time=10.1))
+
+
+def test_simulated_time_that_begins_again():
+    one = tracker()
+    time = settled(one)
+    assert one.take(timed(time))
+    assert one.take(frame(body(), time=3.0))
+    assert not one.take(frame(body(), time=3.0))
 
 
 def timed(server_time, latency=0.03, network=0.001):
@@ -122,7 +131,81 @@ def test_a_frame_that_is_too_old_is_dropped():
     assert not one.take(timed(time + 0.02, latency=0.25))
 
 
-def test_a_new_connection_is_learned_anew():
+def counts(health):
+    """Return how many frames were repeated, and how many of another clock."""
+    values = health.report(10.0)[0].values
+    return values["repeated frames"], values["frames of another clock"]
+
+
+def test_after_a_silence_the_first_frame_is_published():
+    one = tracker()
+    time = settled(one)
+    for silence in (1.2, 5.0, 600.0):
+        time += silence
+        (seen,) = one.take(timed(time))
+        assert seen.time == pytest.approx(500.0 + time, abs=0.0011)
+
+
+def test_frames_that_come_again_or_too_late_are_dropped_and_counted():
+    health = Health(BODIES, 0.2, 0.0)
+    one = tracker(health=health)
+    time = settled(one)
+    published = 0
+    for k in range(100):
+        published += len(one.take(timed(time + 0.01 * k)))
+        assert not one.take(timed(time + 0.01 * k, network=0.002))
+        assert not one.take(timed(time + 0.01 * (k - 3), network=0.032))
+    assert published == 100
+    assert counts(health) == ("200", "0")
+
+
+@pytest.mark.parametrize("shift", [-400.0, 8.0])
+def test_one_frame_with_a_wild_time_is_dropped_and_counted(shift):
+    health = Health(BODIES, 0.2, 0.0)
+    one = tracker(health=health)
+    time = settled(one)
+    wild = timed(time)
+    assert not one.take(wild._replace(exposure=wild.exposure + shift, sent=wild.sent + shift))
+    assert one.take(timed(time + 0.01))
+    assert counts(health) == ("0", "1")
+
+
+def test_an_exposure_in_the_future_is_dropped_and_counted():
+    health = Health(BODIES, 0.2, 0.0)
+    one = tracker(health=health)
+    time = settled(one)
+    assert not one.take(timed(time)._replace(exposure=time + 8.0))
+    assert one.take(timed(time + 0.01))
+    assert counts(health) == ("0", "1")
+
+
+def test_no_stamp_is_ever_in_the_future_or_steps_back():
+    one = tracker(stale_after=10.0)
+    generator = random.Random(4)
+    stamps = []
+    for k in range(5000):
+        taken = timed(0.01 * k + generator.choice([0.0] * 9 + [-0.5, -0.01, 0.02, 8.0]))
+        arrival = 500.0 + 0.01 * k + 0.031 + generator.expovariate(500.0)
+        for seen in one.take(taken._replace(arrival=arrival)):
+            stamps.append(seen.time)
+            assert seen.time < arrival + 0.005
+    assert all(a < b for a, b in pairwise(stamps))
+    # Four in thirteen are wrong.
+    assert len(stamps) > 3300
+
+
+def test_a_server_whose_clock_is_set_back_is_followed():
+    one = tracker()
+    time = settled(one)
+    published = 0
+    for k in range(100):
+        late = timed(time + 0.01 * k - 300.0)
+        published += len(one.take(late._replace(arrival=late.arrival + 300.0)))
+    # Half a second, and ten frames.
+    assert published == pytest.approx(40, abs=3)
+
+
+def test_another_server_is_learned_anew():
     one = tracker()
     time = settled(one)
     one.restart()

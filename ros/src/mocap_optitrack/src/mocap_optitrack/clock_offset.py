@@ -1,6 +1,7 @@
 """The server's clock by the local one."""
 
 from collections import deque
+from enum import Enum
 
 _BUCKET = 0.25
 """s of local time whose shortest delay is kept as one figure."""
@@ -18,7 +19,27 @@ _SLEW = 1e-3
 most, and stamps never run backwards; no quartz drifts as fast."""
 
 _JUMP = 0.1
-"""A difference that no drift explains, s: one of the clocks was set."""
+"""A difference that no drift explains, s."""
+
+_RESTART = 1.0
+"""A message that was sent this long before the newest one, s, has not been overtaken:
+networks do not hold messages back for so long."""
+
+_PATIENCE = 10
+"""Messages in a row that contradict what is known, until the clock is taken to be set."""
+
+
+class Verdict(Enum):
+    """What a message is, by its times."""
+
+    NEW = "new"
+    """Sent after all others."""
+    OLD = "old"
+    """Sent with or before one that has come already: doubled, or overtaken on its way."""
+    FOREIGN = "foreign"
+    """By another clock: too far back, or not even sent when it arrived."""
+    RESTART = "restart"
+    """One of the clocks was set; everything is learned anew, beginning with this message."""
 
 
 class ClockOffset:
@@ -29,12 +50,16 @@ class ClockOffset:
     smallest difference of the last five seconds is the offset but for the
     shortest delay, which on a wired network is a fraction of a millisecond. (A
     mean would follow every busy moment.) What has been learned is applied
-    smoothly. When a clock is set or the server starts again, learning begins anew.
+    smoothly. Silence changes nothing.
+
+    A message that contradicts the others is dropped. Only when they keep coming has a
+    clock been set, or the server been started again, and learning begins anew.
     """
 
     _offset: float | None
-    _sent: float | None
+    _newest: float | None
     _updated: float
+    _contradictions: int
 
     def __init__(self) -> None:
         self._forget()
@@ -44,8 +69,8 @@ class ClockOffset:
         """Whether enough messages have come to rely on `to_local`."""
         return self._offset is not None
 
-    def update(self, sent: float, arrival: float) -> bool:
-        """Take note of a message; return False if a clock was set since the last one.
+    def update(self, sent: float, arrival: float) -> Verdict:
+        """Take note of a message and return what it is.
 
         Parameters
         ----------
@@ -55,19 +80,28 @@ class ClockOffset:
             s of the local clock; never before that of the last message.
         """
         difference = arrival - sent
-        is_consistent = not self._is_contradiction(sent, difference)
-        if not is_consistent:
+        verdict = self._judge(sent, difference)
+        if verdict is not Verdict.NEW:
+            # The newest message again, however often, is no sign of another clock.
+            self._contradictions += sent != self._newest
+            if self._contradictions < _PATIENCE:
+                return verdict
+            verdict = Verdict.RESTART
+        elif self._has_lagged():
+            verdict = Verdict.RESTART
+        if verdict is Verdict.RESTART:
             self._forget()
-        self._sent = sent
+        self._contradictions = 0
+        self._newest = sent
         self._collect(arrival, difference)
-        shortest = min(smallest for _, smallest in self._window)
+        shortest = self._shortest()
         if self._offset is not None:
             step = _SLEW * (arrival - self._updated)
             self._offset += min(max(shortest - self._offset, -step), step)
         elif self._is_plausible():
             self._offset = shortest
         self._updated = arrival
-        return is_consistent
+        return verdict
 
     def to_local(self, moment: float) -> float:
         """Return a moment of the server's clock (s) by the local clock (s).
@@ -86,15 +120,22 @@ class ClockOffset:
         self._window: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)
         self._offset = None
         self._updated = 0.0
-        self._sent = None
+        self._newest = None
+        self._contradictions = 0
 
-    def _is_contradiction(self, sent, difference):
-        if self._sent is not None and sent < self._sent:
-            return True
-        if self._offset is None:
-            return False
-        shortest = min(smallest for _, smallest in self._window)
-        return difference < shortest - _JUMP or shortest > self._offset + _JUMP
+    def _shortest(self):
+        return min(smallest for _, smallest in self._window)
+
+    def _judge(self, sent, difference):
+        if self._newest is None:
+            return Verdict.NEW
+        if sent < self._newest - _RESTART or difference < self._shortest() - _JUMP:
+            return Verdict.FOREIGN
+        return Verdict.OLD if sent <= self._newest else Verdict.NEW
+
+    def _has_lagged(self):
+        # The server's clock was set back by a little, or has stood still.
+        return self._offset is not None and self._shortest() > self._offset + _JUMP
 
     def _is_plausible(self):
         # The last bucket is still open: it is not yet what it will be.

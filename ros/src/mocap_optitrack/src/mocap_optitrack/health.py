@@ -17,6 +17,8 @@ first moments of a stream, s."""
 _MOST_OTHERS = 10
 """Bodies that are not configured and are remembered, so that a message can name them."""
 
+_TWO_SERVERS = "the server's clock keeps jumping: do two servers send to the same address?"
+
 
 class Status(NamedTuple):
     """The state of the stream or of a body.
@@ -64,6 +66,7 @@ class Health:
         self.stale_after = stale_after
         self._server: str | None = None
         self._trouble = "not connected so far"
+        self._silence = "no frames"
         self._last_frame: float | None = None
         self._stream_begin: float | None = None
         self._others: dict[tuple[int | None, str | None], Body] = {}
@@ -78,8 +81,16 @@ class Health:
         self._jumps += 1
 
     def stale(self) -> None:
-        """Take note of a frame that was too old, or not new."""
+        """Take note of a frame that was too old."""
         self._stale += 1
+
+    def repeated(self) -> None:
+        """Take note of a frame that had come already, or was overtaken on its way."""
+        self._repeated += 1
+
+    def foreign(self) -> None:
+        """Take note of a frame whose time does not fit the server's clock."""
+        self._foreign += 1
 
     def frame(self, now: float, latency: float) -> None:
         """Take note of a good frame and its latency from exposure to arrival (s)."""
@@ -88,6 +99,7 @@ class Health:
         if self._stream_begin is None:
             self._stream_begin = now
         self._last_frame = now
+        self._silence = "no frames"
         self._latencies.append(latency)
 
     def body(self, body: RigidBody, now: float, is_tracked: bool) -> None:
@@ -106,6 +118,10 @@ class Health:
     def connected(self, server: str) -> None:
         """Take note of a new connection."""
         self._server = server
+
+    def silent(self, text: str) -> None:
+        """Take note that a connection has no frames; the next one ends that."""
+        self._silence = text
 
     def disconnected(self, trouble: str) -> None:
         """Take note that there is no connection: what was seen before does not count."""
@@ -142,6 +158,8 @@ class Health:
         self._learning = 0
         self._jumps = 0
         self._stale = 0
+        self._repeated = 0
+        self._foreign = 0
         for count in self._bodies.values():
             count.begin_period()
 
@@ -157,6 +175,8 @@ class Health:
             "rate (Hz)": f"{rate:.1f}",
             "longest gap (ms)": _milliseconds(gap),
             "stale frames": str(self._stale),
+            "repeated frames": str(self._repeated),
+            "frames of another clock": str(self._foreign),
         }
         if frames:
             mean = math.fsum(self._latencies) / frames
@@ -168,16 +188,16 @@ class Health:
     def _stream_assessment(self, values, gap):
         if self._server is None:
             return ERROR, self._trouble
-        if self._jumps > 1:
-            return ERROR, (
-                "the server's clock keeps jumping: do two servers send to the same address?"
-            )
+        if self._jumps > 1 or self._foreign > len(self._latencies):
+            return ERROR, _TWO_SERVERS
         if not self._latencies:
             if self._learning:
                 return WARN, "learning the server's clock"
             if self._stale:
                 return ERROR, "all frames are stale: is the server paused or playing a recording?"
-            return ERROR, "no frames"
+            return ERROR, self._silence
+        if self._foreign > 1:
+            return WARN, _TWO_SERVERS
         if gap > self.stale_after:
             return WARN, f"gaps of up to {values['longest gap (ms)']} ms"
         return OK, (

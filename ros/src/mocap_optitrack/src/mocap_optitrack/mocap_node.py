@@ -1,5 +1,6 @@
 """ROS interface of a motion capture system."""
 
+import genpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import (
     Point,
@@ -43,6 +44,8 @@ class MocapNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         bodies, stale_after = parameters.rigid_bodies.bodies, parameters.stale_after
+        self._server = ""
+        self._stamp = genpy.Time()
         self._health = Health(bodies, stale_after, handle.time())
         self._tracker = Tracker(bodies, parameters.up_axis, stale_after, self._health)
         self._poses = {
@@ -75,6 +78,7 @@ class MocapNode(Node):
             lambda: self._make_source(handle),
             on_connected=lambda text: handle.submit(self.on_connected, text),
             on_frame=lambda frame: handle.submit(self.on_frame, frame),
+            on_silence=lambda text: handle.submit(self.on_silence, text),
             on_trouble=lambda text: handle.submit(self.on_trouble, text),
         )
 
@@ -86,7 +90,14 @@ class MocapNode(Node):
         """Take note of a new connection."""
         self._handle.info(f"connected to {server}")
         self._health.connected(server)
-        self._tracker.restart()
+        if server != self._server:
+            self._server = server
+            self._tracker.restart()
+
+    def on_silence(self, text: str) -> None:
+        """Warn that nothing comes over a connection."""
+        self._handle.warn(text, throttle=_REPEAT, key="silence")
+        self._health.silent(text)
 
     def on_trouble(self, text: str) -> None:
         """Warn that there is no connection."""
@@ -99,6 +110,11 @@ class MocapNode(Node):
         if not sightings:
             return
         stamp = self._handle.stamp(sightings[0].time)
+        if stamp < self._stamp:
+            step = (self._stamp - stamp).to_sec()
+            text = f"this machine's clock was set back by {step:.3f} s: stamps step back too"
+            self._handle.warn(text, throttle=_REPEAT, key="clock")
+        self._stamp = stamp
         transforms = []
         for sighting in sightings:
             body = sighting.body

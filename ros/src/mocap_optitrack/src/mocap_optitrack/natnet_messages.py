@@ -6,6 +6,7 @@ time stamps are worth nothing, and it needs the server's address, which multicas
 does not.
 """
 
+import math
 import struct
 from typing import NamedTuple
 
@@ -140,6 +141,8 @@ def read_frame(
         # Without hardware synchronisation the time of exposure is missing.
         first = stamps.stamp_camera_mid_exposure or stamps.stamp_data_received
         exposure = (first or stamps.stamp_transmit) / clock_frequency
+    if not math.isfinite(sent):
+        raise DecodeError(f"a frame of {sent:g} s has no time")
     bodies = tuple(
         Body(body.id_num, names.get(body.id_num), body.pos, body.rot, _is_tracked(body))
         for body in frame.rigid_bodies

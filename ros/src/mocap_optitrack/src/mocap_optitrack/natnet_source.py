@@ -1,6 +1,7 @@
 """OptiTrack's Motive, and whatever else speaks NatNet."""
 
 import contextlib
+import math
 import select
 import socket
 import time
@@ -21,6 +22,10 @@ _ASK_AGAIN = 0.5
 
 _NAMES_AGAIN = 2.0
 """From one request for the names of bodies to the next, s."""
+
+_SILENCE = 0.5
+"""Without a frame for this long the server is asked again, s: one that was started anew
+knows its clients no more."""
 
 _KEEP_ALIVE = 1.0
 """From one sign of life to the next, without which a server stops sending, s."""
@@ -54,6 +59,7 @@ class NatNetSource(Source):
         self._wants_names = True
         self._asked_names_at: float | None = None
         self._kept_alive_at: float | None = None
+        self._heard_at = -math.inf
 
     @override
     def open(self) -> str:
@@ -65,6 +71,7 @@ class NatNetSource(Source):
             self._group = self._find_group()
             if self._group is not None:
                 self._join(*self._group)
+            self._heard_at = time.monotonic()
         except OSError as error:
             raise SourceError(f"cannot open a NatNet connection: {error}") from None
         return self._description()
@@ -200,16 +207,28 @@ class NatNetSource(Source):
         if self._wants_names and _is_due(self._asked_names_at, _NAMES_AGAIN, now):
             self._asked_names_at = now
             self._send(natnet.REQUEST_MODEL)
+        if _is_due(self._heard_at, _SILENCE, now):
+            self._heard_at = now
+            self._send(natnet.CONNECT, "Ping")
 
-    def _send(self, number):
-        self._commands.sendto(natnet.request(number), self._server)
+    def _send(self, number, text=""):
+        # A network that is gone for a moment is no reason to give up: it is quiet then.
+        with contextlib.suppress(OSError):
+            self._commands.sendto(natnet.request(number, text), self._server)
 
     def _take(self, datagram, sender, arrival):
         try:
-            return self._decode(*natnet.split(datagram), arrival)
+            number, payload = natnet.split(datagram)
+            if number == natnet.SERVER_INFO and sender == self._server:
+                self._check(natnet.read_server_info(payload))
+            return self._decode(number, payload, arrival)
         except natnet.DecodeError as error:
             self._warn(f"ignoring a datagram from {sender[0]}: {error}")
             return None
+
+    def _check(self, info):
+        if info != self._info:
+            raise SourceError(f"{self._where()} is not what it was: {info.name} {info.version}")
 
     def _decode(self, number, payload, arrival):
         version = self._info.version
@@ -218,6 +237,7 @@ class NatNetSource(Source):
             self._wants_names = False
         if number != natnet.FRAME:
             return None
+        self._heard_at = time.monotonic()
         frequency = self._info.clock_frequency
         frame = natnet.read_frame(payload, version, frequency, self._names, arrival)
         if any(body.name is None for body in frame.bodies):

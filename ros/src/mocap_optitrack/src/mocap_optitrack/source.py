@@ -9,7 +9,11 @@ from collections.abc import Callable
 from mocap_optitrack.frames import Frame
 
 _SILENCE = 1.0
-"""A connection without a frame for this long is given up and made anew, s."""
+"""A connection without a frame for this long is told of, s."""
+
+_GIVE_UP = 10.0
+"""A connection without a frame for this long is made anew, s: the server may have moved,
+or a network interface may have forgotten its multicast groups."""
 
 _RETRY = 1.0
 """From a failure to the next attempt, s."""
@@ -68,6 +72,8 @@ class Receiver:
         Called with what `Source.open` returned.
     on_frame : callable
         Called with every `Frame`.
+    on_silence : callable
+        Called with a text when an open connection has had no frame for a while.
     on_trouble : callable
         Called with a text whenever a connection fails or ends; there will be
         another attempt.
@@ -78,11 +84,13 @@ class Receiver:
         make_source: Callable[[], Source],
         on_connected: Callable[[str], None],
         on_frame: Callable[[Frame], None],
+        on_silence: Callable[[str], None],
         on_trouble: Callable[[str], None],
     ):
         self._make_source = make_source
         self._on_connected = on_connected
         self._on_frame = on_frame
+        self._on_silence = on_silence
         self._on_trouble = on_trouble
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="motion capture", daemon=True)
@@ -115,10 +123,16 @@ class Receiver:
 
     def _receive(self, source):
         last = time.monotonic()
+        is_told = False
         while not self._stopping.is_set():
             frame = source.read(_POLL)
+            silence = time.monotonic() - last
             if frame is not None:
                 last = time.monotonic()
+                is_told = False
                 self._on_frame(frame)
-            elif time.monotonic() - last > _SILENCE:
-                raise SourceError(f"no frames for {_SILENCE:g} s; {source.silence_hint}")
+            elif silence > _GIVE_UP:
+                raise SourceError(f"no frames for {_GIVE_UP:g} s; {source.silence_hint}")
+            elif silence > _SILENCE and not is_told:
+                is_told = True
+                self._on_silence(f"no frames for {_SILENCE:g} s; {source.silence_hint}")

@@ -5,10 +5,17 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from mocap_optitrack.axes import normalized, to_z_up
-from mocap_optitrack.clock_offset import ClockOffset
+from mocap_optitrack.clock_offset import ClockOffset, Verdict
 from mocap_optitrack.frames import Frame, Quaternion, Vector3
 from mocap_optitrack.health import Health
 from mocap_optitrack.parameters import RigidBody
+
+_LEAD = 0.005
+"""By how much a stamp may be ahead of its arrival, s: the offset of the server's clock is
+known to a millisecond or two."""
+
+_RESET = 1.0
+"""By how much local time steps back when a simulation is reset, at least, s."""
 
 
 class Sighting(NamedTuple):
@@ -34,9 +41,10 @@ class Sighting(NamedTuple):
 class Tracker:
     """Finds the wanted bodies in frames and drops what is invalid or stale.
 
-    A frame counts once: one that is not newer than the last one is dropped, and
-    so is one that is older than ``stale_after`` on arrival. Of a frame, bodies are
-    dropped that were not tracked or whose pose is none.
+    A frame counts once: one that is not newer than the last one is dropped. So is one
+    that is older than ``stale_after`` on arrival, or from the future, or from another
+    server's clock. Of a frame, bodies are dropped that were not tracked or whose pose
+    is none.
 
     Parameters
     ----------
@@ -62,11 +70,11 @@ class Tracker:
         self._up_axis = up_axis
         self.stale_after = stale_after
         self._health = health
-        self._newest = -math.inf
+        self._newest = self._arrival = -math.inf
         self._clock = ClockOffset()
 
     def restart(self) -> None:
-        """Take note that a new connection begins: the server's clock may be another one."""
+        """Take note that the server is another one, and so is its clock."""
         self._clock = ClockOffset()
 
     def take(self, frame: Frame) -> list[Sighting]:
@@ -76,15 +84,24 @@ class Tracker:
         -------
         list of Sighting
             All of the same time, which is later than that of the frame before. Empty
-            during the first half second of a stream, in which the server's clock is
-            learned.
+            during the first half second of a server, in which its clock is learned.
         """
+        if frame.arrival < self._arrival - _RESET:
+            # Simulated time begins again.
+            self._newest = -math.inf
+            self._clock = ClockOffset()
+        self._arrival = frame.arrival
         time = self._time_of(frame)
         if time is None:
-            self._health.learning()
             return []
         age = frame.arrival - time
-        if time <= self._newest or age > self.stale_after:
+        if time <= self._newest:
+            self._health.repeated()
+            return []
+        if age < -_LEAD:
+            self._health.foreign()
+            return []
+        if age > self.stale_after:
             self._health.stale()
             return []
         self._newest = time
@@ -104,9 +121,19 @@ class Tracker:
     def _time_of(self, frame):
         if frame.exposure is None:
             return frame.arrival
-        if not self._clock.update(frame.sent, frame.arrival):
+        verdict = self._clock.update(frame.sent, frame.arrival)
+        if verdict is Verdict.OLD:
+            self._health.repeated()
+            return None
+        if verdict is Verdict.FOREIGN:
+            self._health.foreign()
+            return None
+        if verdict is Verdict.RESTART:
             self._health.clock_set()
-        return self._clock.to_local(frame.exposure) if self._clock.is_settled else None
+        if not self._clock.is_settled:
+            self._health.learning()
+            return None
+        return self._clock.to_local(frame.exposure)
 
     def _wanted(self, body):
         # Systems without numbers may well call a body "1".

@@ -3,22 +3,22 @@
 Position and velocity: a Kalman filter per axis, predicted with the
 accelerometer and corrected with measured positions; the axes have one
 covariance. Attitude: the gyroscope's integral, corrected with measured
-attitudes in proportion to its variance, and, while the motors are off, with the
-direction of gravity.
+attitudes in proportion to its variance, and, while the vehicle stands, pulled
+towards the initial attitude.
 """
 
 import math
 
-from crazyflie_model.angles import quaternion_from_zyx, rotate, zyx_from_quaternion
+from crazyflie_model.angles import rotate, zyx_from_quaternion
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.states import Estimate
 
-_ACCELERATION_NOISE = 0.5
-"""Process noise, m/s^2, held for one step of the position's filter."""
+_ACCELERATION_NOISE = 3.7e-4
+"""Process noise, m^2/s^3: 0.6 m/s^2, held for 1 ms each."""
 
-_RATE_NOISE = 0.1
-"""Process noise, rad/s, held for one step of the attitude's filter."""
+_RATE_NOISE = 1e-5
+"""Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each."""
 
 _FIRST_VARIANCES = (100.0, 0.0, 1.0)
 """Of the position, with the velocity, of the velocity; m^2, m^2/s, m^2/s^2."""
@@ -26,8 +26,8 @@ _FIRST_VARIANCES = (100.0, 0.0, 1.0)
 _FIRST_ATTITUDE_VARIANCE = 10.0
 """rad^2: the first measurement counts in full."""
 
-_LEVELLING_TIME = 0.5
-"""Time constant with which gravity corrects the attitude at rest, s."""
+_REVERSION_TIME = 10.0
+"""Time constant with which the attitude returns to the initial one at rest, s."""
 
 
 class Estimator:
@@ -102,15 +102,15 @@ class Estimator:
     def grow_variances(self, dt: float) -> None:
         """Let the variances grow by what ``dt`` (s) adds to them."""
         p, m, v = self._covariance
-        q = _ACCELERATION_NOISE**2
-        p += 2.0 * dt * m + dt * dt * v + 0.25 * q * dt**4
-        m += dt * v + 0.5 * q * dt**3
-        v += q * dt * dt
+        q = _ACCELERATION_NOISE
+        p += 2.0 * dt * m + dt * dt * v + q * dt**3 / 3.0
+        m += dt * v + q * dt * dt / 2.0
+        v += q * dt
         if p > _FIRST_VARIANCES[0]:
             p, m, v = _FIRST_VARIANCES
         self._covariance = (p, m, v)
         self.variance_attitude = min(
-            self.variance_attitude + _RATE_NOISE**2 * dt * dt, _FIRST_ATTITUDE_VARIANCE
+            self.variance_attitude + _RATE_NOISE * dt, _FIRST_ATTITUDE_VARIANCE
         )
 
     def correct_position(self, x: float, y: float, z: float, deviation: float) -> None:
@@ -137,20 +137,13 @@ class Estimator:
         self._blend(x, y, z, w, gain)
         self.variance_attitude *= 1.0 - gain
 
-    def rest(self, sensors: Sensors, dt: float) -> None:
-        """Take it that the vehicle stands still: no velocity, and gravity shows what is up."""
+    def rest(self, dt: float) -> None:
+        """Take it that the vehicle stands: its attitude cannot be far from the initial one."""
         e = self._estimate
-        e.vx = e.vy = e.vz = 0.0
-        norm = math.sqrt(sensors.acc_x**2 + sensors.acc_y**2 + sensors.acc_z**2)
-        if not 0.9 < norm < 1.1:
-            return
-        roll = math.atan2(sensors.acc_y, sensors.acc_z)
-        pitch = math.asin(max(-1.0, min(1.0, -sensors.acc_x / norm)))
-        level = quaternion_from_zyx(roll, pitch, math.radians(e.yaw))
-        if sum(a * b for a, b in zip(level, (e.qx, e.qy, e.qz, e.qw), strict=True)) < 0.0:
-            x, y, z, w = level
-            level = (-x, -y, -z, -w)
-        self._blend(*level, dt / _LEVELLING_TIME)
+        z, w = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
+        if e.qz * z + e.qw * w < 0.0:
+            z, w = -z, -w
+        self._blend(0.0, 0.0, z, w, dt / _REVERSION_TIME)
 
     def _blend(self, x, y, z, w, gain):
         # Towards another quaternion of the same sign; for small angles the

@@ -151,7 +151,7 @@ class Firmware:
         self.estimator.grow_variances(_POSITION_PERIOD)
         self.localization.update(self.time)
         if not any(self.stabilizer.commands) and not self.supervisor.is_flying:
-            self.estimator.rest(self.sensors, _POSITION_PERIOD)
+            self.estimator.rest(_POSITION_PERIOD)
 
     def _supervise(self):
         idle = self.stabilizer.idle_thrust

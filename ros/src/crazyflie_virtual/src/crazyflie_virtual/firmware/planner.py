@@ -2,22 +2,31 @@
 
 import errno
 import math
+import struct
 from enum import Enum
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece
+from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, Goal, PolynomialPiece
+from crazyflie_virtual.firmware.compressed_trajectory import read_compressed
 from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Modes, Setpoint
 from crazyflie_virtual.firmware.trajectory import (
     Trajectory,
     smooth_piece,
+    spiral_piece,
     straight_piece,
 )
 
 MEMORY_SIZE = 4096
 """Bytes of the trajectory memory."""
 
-DEFINITIONS = 10
+DEFINITIONS = 31
 """Trajectories that can be defined at one time."""
+
+IN_MEMORY = 1
+"""Where a trajectory can be."""
+
+POLYNOMIALS, COMPRESSED = 0, 1
+"""What it can be."""
 
 REFUSED = 1
 """What a command returns that does not fit what the planner is doing."""
@@ -27,6 +36,8 @@ _SHORTEST = 0.01
 
 _NOWHERE = PolynomialPiece(1.0, *[(math.nan,)] * 4)
 """What the firmware's arithmetic makes of a plan with infinite numbers."""
+
+_PIECE = struct.Struct("<33f")
 
 _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 
@@ -56,6 +67,8 @@ class Planner:
         Set while the vehicle cannot fly: plans are refused.
     takeoff_speed, landing_speed : float
         Where a command gives none, m/s.
+    groups : int
+        Groups of vehicles that this one belongs to, a bit each.
     """
 
     def __init__(self) -> None:
@@ -63,7 +76,8 @@ class Planner:
         self.phase = Phase.STOPPED
         self.blocked = False
         self.takeoff_speed = self.landing_speed = 0.5
-        self._definitions: dict[int, tuple[int, int]] = {}
+        self.groups = 0
+        self._definitions: dict[int, tuple[int, int, int, int]] = {}
         self._trajectory: Trajectory | None = None
         self._begin = 0.0
         self._last = Goal((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
@@ -149,13 +163,58 @@ class Planner:
         plan = straight_piece if linear else smooth_piece
         return self._fly(time, plan, start, position, yaw, duration, Phase.FLYING)
 
-    def define(self, trajectory_id: int, offset: int, pieces: int) -> int:
-        """Define where in the memory a trajectory is: offset in bytes, number of pieces."""
-        fits = pieces > 0 and offset + pieces * PIECE_SIZE <= len(self.memory)
-        if trajectory_id >= DEFINITIONS or not fits:
-            return errno.ENOMEM
-        self._definitions[trajectory_id] = (offset, pieces)
+    def spiral(
+        self,
+        time: float,
+        angle: float,
+        radii: tuple[float, float],
+        ascent: float,
+        duration: float,
+        sideways: bool,
+        clockwise: bool,
+    ) -> int:
+        """Fly along a spiral; see `spiral_piece`. Radii are 0 at least, angles a turn at most."""
+        if self.blocked:
+            return REFUSED
+        if not all(map(math.isfinite, (angle, *radii, ascent, duration))) or duration < 0.0:
+            return errno.EINVAL
+        piece = spiral_piece(
+            self._last,
+            max(-2.0 * math.pi, min(2.0 * math.pi, angle)),
+            (max(0.0, radii[0]), max(0.0, radii[1])),
+            ascent,
+            max(duration, _SHORTEST),
+            sideways,
+            clockwise,
+        )
+        self._begin_at(time, Trajectory((piece,)), Phase.FLYING)
         return 0
+
+    def define(self, trajectory_id: int, location: int, kind: int, offset: int, pieces: int) -> int:
+        """Define where a trajectory is; whether there is one shows at its start.
+
+        Parameters
+        ----------
+        trajectory_id : int
+        location, kind : int
+            Only `IN_MEMORY`, and `POLYNOMIALS` or `COMPRESSED`, can be flown.
+        offset : int
+            In the memory, bytes.
+        pieces : int
+            Without meaning for one that is compressed.
+        """
+        if trajectory_id >= DEFINITIONS:
+            return errno.ENOEXEC
+        self._definitions[trajectory_id] = (location, kind, offset, pieces)
+        return 0
+
+    def unflyable(self, trajectory_id: int) -> str:
+        """Return why a trajectory cannot be flown; an empty text when it can."""
+        try:
+            self._pieces(trajectory_id)
+        except ValueError as error:
+            return str(error)
+        return ""
 
     def start(
         self,
@@ -166,23 +225,40 @@ class Planner:
         relative: bool,
         relative_yaw: bool,
     ) -> int:
-        """Fly a trajectory that was defined; ``relative`` to the present position (and yaw)."""
-        if trajectory_id not in self._definitions:
-            return errno.ENOENT
-        if not (math.isfinite(time_scale) and time_scale > 0.0):
-            return errno.EINVAL
-        offset, count = self._definitions[trajectory_id]
-        chunks = (self.memory[offset + i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
+        """Fly a trajectory that was defined; ``relative`` to the present position (and yaw).
+
+        One that cannot be flown is no error: nothing happens.
+        """
         try:
-            pieces = tuple(PolynomialPiece.unpack(bytes(chunk)) for chunk in chunks)
+            pieces, is_compressed = self._pieces(trajectory_id)
         except ValueError:
+            return 0
+        if self.blocked:
+            return REFUSED
+        if is_compressed and (time_scale != 1.0 or backwards):
+            return errno.ENOEXEC
+        if not (math.isfinite(time_scale) and time_scale > 0.0):
             return errno.EINVAL
         trajectory = Trajectory(pieces, time_scale, backwards)
         if relative:
-            yaw = self._last.yaw if relative_yaw else None
+            yaw = self._last.yaw if relative_yaw and not is_compressed else None
             trajectory = trajectory.moved_to(self._last.position, yaw)
         self._begin_at(time, trajectory, Phase.FLYING)
         return 0
+
+    def _pieces(self, trajectory_id):
+        if trajectory_id not in self._definitions:
+            raise ValueError("it is not defined")
+        location, kind, offset, count = self._definitions[trajectory_id]
+        if location != IN_MEMORY or kind not in (POLYNOMIALS, COMPRESSED):
+            raise ValueError(f"there are none of type {kind} at location {location}")
+        data = bytes(self.memory[offset:])
+        if kind == COMPRESSED:
+            return read_compressed(data), True
+        if not 0 < count * PIECE_SIZE <= len(data):
+            raise ValueError(f"{count} pieces at byte {offset} are not in the memory")
+        chunks = (data[i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
+        return tuple(map(_read_piece, chunks)), False
 
     def _move_vertically(self, time, height, yaw, duration, phase):
         x, y, z = self._last.position
@@ -202,3 +278,11 @@ class Planner:
         self._trajectory = trajectory
         self._begin = time
         self.phase = phase
+
+
+def _read_piece(data):
+    # Memory that was never written is a piece too: no time at all, at the origin.
+    *coefficients, duration = _PIECE.unpack(data)
+    if not all(map(math.isfinite, coefficients)) or not 0.0 <= duration < math.inf:
+        raise ValueError("it holds numbers that are not finite, or a negative duration")
+    return PolynomialPiece(duration, *(coefficients[i : i + COEFFICIENTS] for i in (0, 8, 16, 24)))

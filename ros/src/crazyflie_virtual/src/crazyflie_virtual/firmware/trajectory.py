@@ -51,6 +51,72 @@ def straight_piece(
     return PolynomialPiece(duration, *axes)
 
 
+def spiral_piece(
+    start: Goal[float],
+    angle: float,
+    radii: tuple[float, float],
+    ascent: float,
+    duration: float,
+    sideways: bool,
+    clockwise: bool,
+) -> PolynomialPiece:
+    """Return the piece that approximates a spiral about a vertical axis.
+
+    On the spiral, angle, radius, height and heading change evenly. Each axis is the
+    polynomial of the 7th degree that meets its position, velocity and acceleration
+    at both ends, without jerk: close up to a quarter of a turn, and not far beyond.
+
+    Parameters
+    ----------
+    start : Goal
+        Its position and heading tell where the axis is.
+    angle : float
+        rad; negative to fly backwards.
+    radii : tuple, 2 components
+        Distance from the axis at the beginning and at the end, m.
+    ascent : float
+        m.
+    duration : float
+        s, > 0.
+    sideways : bool
+        With the axis ahead and not to the side.
+    clockwise : bool
+        Seen from above; then the axis is to the right, otherwise to the left.
+    """
+    sense = -1.0 if clockwise else 1.0
+    rate = sense * angle / duration
+    # From the axis to the vehicle.
+    direction = start.yaw + (math.pi if sideways else -sense * math.pi / 2.0)
+    growth = (radii[1] - radii[0]) / duration
+    x, y, z = start.position
+    center = (x - radii[0] * math.cos(direction), y - radii[0] * math.sin(direction))
+
+    def end(time):
+        # Value, velocity, acceleration and jerk of each axis.
+        radius, around = radii[0] + growth * time, direction + rate * time
+        c, s = math.cos(around), math.sin(around)
+        tangential, normal = 2.0 * growth * rate, radius * rate**2
+        return (
+            (
+                center[0] + radius * c,
+                growth * c - radius * rate * s,
+                -tangential * s - normal * c,
+                0.0,
+            ),
+            (
+                center[1] + radius * s,
+                growth * s + radius * rate * c,
+                tangential * c - normal * s,
+                0.0,
+            ),
+            (z + ascent * time / duration, ascent / duration, 0.0, 0.0),
+            (start.yaw + rate * time, rate, 0.0, 0.0),
+        )
+
+    axes = (hermite(a, b, duration) for a, b in zip(end(0.0), end(duration), strict=True))
+    return PolynomialPiece(duration, *axes)
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """Pieces flown one after the other, then the last position.

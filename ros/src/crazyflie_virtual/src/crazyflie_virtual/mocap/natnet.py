@@ -142,6 +142,9 @@ class Encoder:
         payload += struct.pack("<IId", 0, 0, stamps.exposure)
         if self._parts >= (3, 0):
             payload += struct.pack("<3Q", *(round(s * CLOCK_FREQUENCY) for s in stamps))
+        if self._parts >= (4, 1):
+            # Precision time stamp, in seconds and their fraction: zeros without PTP.
+            payload += struct.pack("<II", 0, 0)
         return _message(FRAME, payload + struct.pack("<hI", 0, 0))
 
     def _rigid_body(self, body):

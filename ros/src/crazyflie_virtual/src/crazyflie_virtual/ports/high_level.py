@@ -9,7 +9,6 @@ from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 
 _ALL_GROUPS = 0
-_LOCATION_MEMORY, _TYPE_POLYNOMIALS = 1, 0
 
 
 class HighLevelPort:
@@ -25,7 +24,6 @@ class HighLevelPort:
     def __init__(self, firmware: Firmware):
         self._firmware = firmware
         self._planner = firmware.planner
-        self._groups = 0
 
     def handle(self, packet: Packet) -> list[Packet]:
         """Return the answer to a command: four bytes, the last an error number."""
@@ -51,7 +49,7 @@ class HighLevelPort:
         if command in _PLANS and f.commander.priority == STREAMED:
             f.remark("planner", f"HLC: command {command} has no effect before setpoints stop")
         group, *arguments = values
-        is_meant = group == _ALL_GROUPS or group & self._groups
+        is_meant = group == _ALL_GROUPS or group & self._planner.groups
         return handler(self, *arguments) if is_meant else 0
 
     @property
@@ -59,7 +57,7 @@ class HighLevelPort:
         return self._firmware.time
 
     def _set_groups(self, groups):
-        self._groups = groups
+        self._planner.groups = groups
         return 0
 
     def _stop(self):
@@ -94,7 +92,15 @@ class HighLevelPort:
     def _go_to_1(self, relative, x, y, z, yaw, duration):
         return self._go_to(relative, False, x, y, z, yaw, duration)
 
+    def _spiral(self, sideways, clockwise, angle, first, last, ascent, duration):
+        return self._planner.spiral(
+            self._time, angle, (first, last), ascent, duration, sideways, clockwise
+        )
+
     def _start(self, relative, relative_yaw, backwards, trajectory_id, time_scale):
+        reason = self._planner.unflyable(trajectory_id)
+        if reason:
+            self._firmware.console.write_line(f"HLC: no trajectory {trajectory_id}: {reason}")
         return self._planner.start(
             self._time, trajectory_id, time_scale, backwards, relative, relative_yaw
         )
@@ -102,10 +108,8 @@ class HighLevelPort:
     def _start_1(self, relative, backwards, trajectory_id, time_scale):
         return self._start(relative, False, backwards, trajectory_id, time_scale)
 
-    def _define(self, trajectory_id, location, trajectory_type, offset, pieces):
-        if (location, trajectory_type) != (_LOCATION_MEMORY, _TYPE_POLYNOMIALS):
-            return errno.ENOEXEC
-        return self._planner.define(trajectory_id, offset, pieces)
+    def _define(self, trajectory_id, location, kind, offset, pieces):
+        return self._planner.define(trajectory_id, location, kind, offset, pieces)
 
 
 _COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
@@ -120,6 +124,7 @@ _COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
     8: ("Bff?f", HighLevelPort._land),
     9: ("Bf?f?f", HighLevelPort._take_off_at_speed),
     10: ("Bf?f?f", HighLevelPort._land_at_speed),
+    11: ("B??5f", HighLevelPort._spiral),
     12: ("B??5f", HighLevelPort._go_to),
     13: ("B???Bf", HighLevelPort._start),
 }

@@ -77,9 +77,10 @@ _GROUPS = {
         ("stop", U8, "supervisor.emergency_stop"),
     ],
     "commander": [("enHighLevel", U8, "commander.high_level_enabled")],
-    "hlCommander": _rows(
-        FLOAT, _PERSISTENT, vtoff="planner.takeoff_speed", vland="planner.landing_speed"
-    ),
+    "hlCommander": [
+        *_rows(FLOAT, _PERSISTENT, vtoff="planner.takeoff_speed", vland="planner.landing_speed"),
+        ("groupmask", U8, "planner.groups"),
+    ],
     "supervisor": [
         ("infdmp", U8, 0),
         ("prefltTimeout", U16, "supervisor.preflight_timeout", _PERSISTENT),

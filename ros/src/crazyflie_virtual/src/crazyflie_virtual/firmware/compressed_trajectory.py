@@ -1,0 +1,76 @@
+"""Trajectories in the compact form in which a client can upload them.
+
+Each axis of a segment is a Bezier curve of degree 0, 1, 3 or 7. The format is
+described in the firmware's documentation, "Trajectory formats".
+"""
+
+import struct
+
+import numpy as np
+from scipy.interpolate import BPoly, PPoly
+
+from crazyflie_model.polynomials import PolynomialPiece
+
+_START = struct.Struct("<4h")
+_HEADER = struct.Struct("<BH")
+
+_POINTS = (0, 1, 3, 7)
+"""Control points that are stored for each type of curve: all but the first."""
+
+_MILLI = 1e-3
+_TENTH_DEGREE = np.pi / 1800.0
+_UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)
+"""Of x, y, z and yaw: m and rad."""
+
+
+def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:
+    """Return the pieces of a compressed trajectory.
+
+    It goes on until a segment of no duration, or until the end of the memory:
+    nothing else tells where it ends.
+
+    Parameters
+    ----------
+    memory : bytes
+        Beginning with the start point, 4 numbers of 16 bits: x, y, z in mm and yaw in
+        tenths of a degree. Then segments: a byte with two bits for each axis' type of
+        curve, x lowest; the duration in ms, 16 bits; the control points of x, of y, of z
+        and of yaw. The first control point is the last one before and is left out.
+
+    Returns
+    -------
+    tuple of PolynomialPiece
+        At least one: without any segment one of no duration, at the start point.
+
+    Raises
+    ------
+    ValueError
+        There is not even a start point.
+    """
+    if len(memory) < _START.size:
+        raise ValueError("a compressed trajectory begins with 8 bytes")
+    ends = [unit * n for unit, n in zip(_UNITS, _START.unpack_from(memory), strict=True)]
+    pieces = []
+    at = _START.size
+    while at + _HEADER.size <= len(memory):
+        types, milliseconds = _HEADER.unpack_from(memory, at)
+        at += _HEADER.size
+        counts = [_POINTS[types >> 2 * axis & 3] for axis in range(4)]
+        if milliseconds == 0 or at + 2 * sum(counts) > len(memory):
+            break
+        duration = _MILLI * milliseconds
+        axes = []
+        for axis, count in enumerate(counts):
+            numbers = struct.unpack_from(f"<{count}h", memory, at)
+            at += 2 * count
+            points = [ends[axis], *(_UNITS[axis] * n for n in numbers)]
+            axes.append(_bezier(points, duration))
+            ends[axis] = points[-1]
+        pieces.append(PolynomialPiece(duration, *axes))
+    return tuple(pieces) or (PolynomialPiece(0.0, *((end,) for end in ends)),)
+
+
+def _bezier(points, duration):
+    # Coefficients, the constant first, of the curve over 0 to duration.
+    bernstein = BPoly(np.reshape(points, (-1, 1)), [0.0, duration])
+    return tuple(PPoly.from_bernstein_basis(bernstein).c[::-1, 0].tolist())

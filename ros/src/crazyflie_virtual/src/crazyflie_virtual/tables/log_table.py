@@ -109,7 +109,9 @@ _GROUPS: dict[str, Rows] = {
     "stateEstimate": _attributes(FLOAT, (*_MOTION, *_ANGLES, *_QUATERNION), _estimate),
     "stateEstimateZ": [
         *_attributes(I16, _MOTION[:6], _estimate, 1000.0),
-        *_attributes(I16, _MOTION[6:], _estimate, 9810.0),
+        *_attributes(I16, _MOTION[6:8], _estimate, 9810.0),
+        # With gravity, unlike stateEstimate.az.
+        ("az", I16, lambda f: 9810.0 * (f.estimate.az + 1.0)),
         ("quat", U32, lambda f: f.estimate.compressed_quaternion),
         ("rateRoll", I16, lambda f: _MILLIRADIAN * f.sensors.gyro_x),
         ("ratePitch", I16, lambda f: -_MILLIRADIAN * f.sensors.gyro_y),

@@ -1,5 +1,6 @@
 """A whole virtual Crazyflie, without sockets and with the time given to it."""
 
+import logging
 import math
 
 from crazyflie_virtual.board import Board, Storage
@@ -19,6 +20,11 @@ _ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
 _BATTERY_STEPS = 10
 
 _STOPPED: MotorCommands = (0.0, 0.0, 0.0, 0.0)
+
+_RESTART_INTERVAL = 1.0
+"""Least time between two restarts after errors, s."""
+
+_LOGGER = logging.getLogger(__name__)
 
 
 class VirtualVehicle:
@@ -48,8 +54,9 @@ class VirtualVehicle:
             settings.thrust_error,
         )
         self.battery = Battery(settings.battery)
-        self._storage = Storage(settings.address)
+        self._storage = Storage(settings)
         self._steps = 0
+        self._restarted = -math.inf
         self._is_dead = False
         self.board: Board | None = None
         self._turn_on()
@@ -70,7 +77,11 @@ class VirtualVehicle:
             return [Packet(Port.LINK, _RADIO_CHANNEL, b"").encode()]
         if self.board is None:
             return []
-        return [answer.encode() for answer in self.board.receive(packet)]
+        try:
+            return [answer.encode() for answer in self.board.receive(packet)]
+        except Exception as error:
+            self._report(self.board, f"packet {datagram.hex()}", error)
+            return []
 
     def advance_to(self, time: float) -> list[bytes]:
         """Go on to the last whole step before ``time`` (s).
@@ -82,16 +93,21 @@ class VirtualVehicle:
         """
         datagrams = []
         for _ in range(math.floor(time / STEP + 1e-6) - self._steps):
-            self._step()
-            if self.board is not None:
-                datagrams += [packet.encode() for packet in self.board.unsolicited()]
+            datagrams += self._step()
         return datagrams
 
     def _step(self):
         self._steps += 1
-        commands = _STOPPED
+        commands, datagrams = _STOPPED, []
         if self.board is not None:
-            commands = self.board.step(self.battery.voltage)
+            try:
+                commands = self.board.step(self.battery.voltage)
+                datagrams = [packet.encode() for packet in self.board.unsolicited()]
+            except Exception as error:
+                self._restart(error)
+        if math.isnan(sum(commands)):
+            # As the processor converts what is no number to a whole one.
+            commands = _STOPPED
         failed = self.faults.motor_failure
         if failed:
             m1, m2, m3, m4 = (0.0 if i + 1 == failed else c for i, c in enumerate(commands))
@@ -99,6 +115,20 @@ class VirtualVehicle:
         self.physics.step(commands, self.battery.voltage)
         if self._steps % _BATTERY_STEPS == 0:
             self._drain()
+        return datagrams
+
+    def _restart(self, error):
+        # What has failed once fails in the next step, too: the firmware, after an
+        # assertion, starts anew. What fails again at once may be what is stored.
+        if self.time - self._restarted < _RESTART_INTERVAL:
+            return
+        self._restarted = self.time
+        self.board = Board(self.physics, self.faults, self._settings, self._storage)
+        self._report(self.board, "a step, and so it has restarted", error)
+
+    def _report(self, board, text, error):
+        if board.firmware.remark("error", f"SYS: {type(error).__name__} in {text}: {error}"):
+            _LOGGER.error("virtual vehicle: an error in %s", text, exc_info=error)
 
     def _drain(self):
         if self.faults.low_battery:

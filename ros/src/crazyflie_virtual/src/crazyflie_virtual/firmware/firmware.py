@@ -2,6 +2,7 @@
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
+from crazyflie_virtual.body.ranging import RangingSensors
 from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.commander import Commander
@@ -10,6 +11,7 @@ from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.firmware.localization import DECK, Localization
 from crazyflie_virtual.firmware.planner import Phase, Planner
 from crazyflie_virtual.firmware.power import PowerMonitor
+from crazyflie_virtual.firmware.remarks import Remarks
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
 from crazyflie_virtual.firmware.stabilizer import Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
@@ -51,10 +53,13 @@ class Firmware:
         self._steps = 0
         self.time = 0.0
         self.console = Console()
+        self.remark = Remarks(self.console.write_line, lambda: self.time)
         self.estimate = Estimate()
         self.sensors = Sensors(settings.sensor_noise, settings.seed)
+        has_deck = settings.positioning == DECK
+        self.ranging = RangingSensors(physics, settings.multiranger, has_deck)
         self.estimator = Estimator(self.estimate)
-        self.localization = Localization(self.estimator, physics, settings.positioning == DECK)
+        self.localization = Localization(self.estimator, physics, has_deck)
         self.planner = Planner()
         self.commander = Commander(self.planner)
         self.attitude_decoder = AttitudeDecoder()
@@ -126,6 +131,9 @@ class Firmware:
             self.commander.forget()
 
     def _correct_estimate(self):
+        if not self.estimate.is_finite:
+            self.remark("estimate", "ESTKALMAN: the state is no number, resetting")
+            self.reset_estimation = 1
         if self.reset_estimation:
             self.reset_estimation = 0
             self.estimator.reset()

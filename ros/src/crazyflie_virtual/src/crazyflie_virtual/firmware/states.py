@@ -6,6 +6,7 @@ accelerates forward (+x). Quaternions and positions are those of the rest of the
 workspace.
 """
 
+import math
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -114,6 +115,11 @@ class Estimate(_Motion):
     qy: float = 0.0
     qz: float = 0.0
     qw: float = 1.0
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether all of it is numbers: what is not spreads to the attitude or the position."""
+        return math.isfinite(self.x + self.y + self.z + self.vx + self.vy + self.vz + self.qw)
 
     @property
     def quaternion(self) -> Quaternion:

@@ -119,7 +119,8 @@ def run_example(name: str, place: pathlib.Path) -> Run:
     place.mkdir(parents=True)
     with contextlib.ExitStack() as stack:
         pairs = [
-            stack.enter_context(virtual_vehicle()) for _ in range(SWARM_SIZE if name == SWARM else 1)
+            stack.enter_context(virtual_vehicle())
+            for _ in range(SWARM_SIZE if name == SWARM else 1)
         ]
         servers, uris = [server for server, _ in pairs], [uri for _, uri in pairs]
         geometry = place / "geometry.yaml"

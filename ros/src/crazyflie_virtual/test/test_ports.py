@@ -89,9 +89,7 @@ def test_decks_have_parameters_and_one_wire_memories(options, names):
     bench = Bench(**options)
     decks = [(i, s) for i, s in enumerate(parameter_specs()) if s.group == "deck"]
     attached = {
-        spec.name
-        for i, spec in decks
-        if bench.ask_one(Port.PARAMETERS, 1, struct.pack("<H", i))[3]
+        spec.name for i, spec in decks if bench.ask_one(Port.PARAMETERS, 1, struct.pack("<H", i))[3]
     }
     assert attached == names
     one_wire = [m for m in memories(bench) if m[0] == 0x01]

@@ -21,8 +21,8 @@ _BATTERY_STEPS = 10
 
 _STOPPED: MotorCommands = (0.0, 0.0, 0.0, 0.0)
 
-_RESTART_INTERVAL = 1.0
-"""Least time between two restarts after errors, s."""
+_RESTART_TIME = 1.0
+"""How long the microcontroller is not there after an error in a step, s."""
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -56,7 +56,8 @@ class VirtualVehicle:
         self.battery = Battery(settings.battery)
         self._storage = Storage(settings)
         self._steps = 0
-        self._restarted = -math.inf
+        self._failure = ""
+        self._restart_time = math.inf
         self._is_dead = False
         self.board: Board | None = None
         self._turn_on()
@@ -80,7 +81,9 @@ class VirtualVehicle:
         try:
             return [answer.encode() for answer in self.board.receive(packet)]
         except Exception as error:
-            self._report(self.board, f"packet {datagram.hex()}", error)
+            text = f"{type(error).__name__} in packet {datagram.hex()}: {error}"
+            if self.board.firmware.remark("error", f"SYS: {text}"):
+                _LOGGER.exception("virtual vehicle: %s", text)
             return []
 
     def advance_to(self, time: float) -> list[bytes]:
@@ -99,12 +102,14 @@ class VirtualVehicle:
     def _step(self):
         self._steps += 1
         commands, datagrams = _STOPPED, []
+        if self.time >= self._restart_time:
+            self._start()
         if self.board is not None:
             try:
                 commands = self.board.step(self.battery.voltage)
                 datagrams = [packet.encode() for packet in self.board.unsolicited()]
             except Exception as error:
-                self._restart(error)
+                self._fail(f"{type(error).__name__} in a step: {error}")
         if math.isnan(sum(commands)):
             # As the processor converts what is no number to a whole one.
             commands = _STOPPED
@@ -117,18 +122,13 @@ class VirtualVehicle:
             self._drain()
         return datagrams
 
-    def _restart(self, error):
-        # What has failed once fails in the next step, too: the firmware, after an
-        # assertion, starts anew. What fails again at once may be what is stored.
-        if self.time - self._restarted < _RESTART_INTERVAL:
-            return
-        self._restarted = self.time
-        self.board = Board(self.physics, self.faults, self._settings, self._storage)
-        self._report(self.board, "a step, and so it has restarted", error)
-
-    def _report(self, board, text, error):
-        if board.firmware.remark("error", f"SYS: {type(error).__name__} in {text}: {error}"):
-            _LOGGER.error("virtual vehicle: an error in %s", text, exc_info=error)
+    def _fail(self, failure):
+        # What has failed once fails in the next step, too: as the firmware after an
+        # assertion, the vehicle starts anew.
+        _LOGGER.exception("virtual vehicle: %s; it restarts", failure)
+        self.board = None
+        self._failure = failure
+        self._restart_time = self.time + _RESTART_TIME
 
     def _drain(self):
         if self.faults.low_battery:
@@ -146,6 +146,7 @@ class VirtualVehicle:
             self._is_dead = True
         if command in (_ALL_OFF, _OFF):
             self.board = None
+            self._restart_time = math.inf
         elif command == _ON and self.board is None:
             self._turn_on()
         elif command == _RESET:
@@ -156,4 +157,11 @@ class VirtualVehicle:
 
     def _turn_on(self):
         self.physics.put_upright()
+        self._failure = ""
+        self._start()
+
+    def _start(self):
+        self._restart_time = math.inf
         self.board = Board(self.physics, self.faults, self._settings, self._storage)
+        if self._failure:
+            self.board.firmware.console.write_line(f"SYS: restarted after {self._failure}")

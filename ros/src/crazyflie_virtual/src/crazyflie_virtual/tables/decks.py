@@ -46,9 +46,7 @@ class Deck(NamedTuple):
         texts = ((_NAME, self.name), (_REVISION, self.revision))
         elements = b"".join(bytes([n, len(text)]) + text.encode() for n, text in texts)
         elements = bytes([0, len(elements)]) + elements
-        content = b"".join(
-            part + bytes([zlib.crc32(part) & 0xFF]) for part in (header, elements)
-        )
+        content = b"".join(part + bytes([zlib.crc32(part) & 0xFF]) for part in (header, elements))
         return bytearray(content.ljust(_SIZE, b"\xff"))
 
 

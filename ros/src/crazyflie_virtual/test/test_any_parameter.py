@@ -1,4 +1,4 @@
-"""Whatever a client writes and sends, the vehicle goes on: it answers, and its body stays finite."""
+"""Whatever a client writes and sends, the vehicle goes on: it answers, its body stays finite."""
 
 import logging
 import math

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from crazyflie_virtual.tables.number_types import FLOAT, I8, U8, U16, U32, NumberType
 
-
 NO_LIMITS = (-math.inf, math.inf)
 """Those of the firmware's parameters, which stores also what is no number."""
 

@@ -68,7 +68,8 @@ def test_tables_values_and_memories_arrive(connected):
     assert elements(cf.param.toc) == {f"{p.group}.{p.name}" for p in parameter_specs()}
     assert float(cf.param.get_value("posCtlPid.thrustBase")) == 36000
     assert cf.param.toc.get_element("pm", "lowVoltage").is_persistent()
-    assert [(m.type, m.size) for m in cf.mem.mems] == [(0, 112), (0x12, 4096), (0x15, 4096)]
+    sizes = {m.type: m.size for m in cf.mem.mems}
+    assert (sizes[0x00], sizes[0x12], sizes[0x15]) == (8191, 4096, 4096)
     wait_until(lambda: "up and running" in client.text)
 
 

@@ -94,9 +94,15 @@ def test_what_is_written_holds(bench):
     assert read(bench, "ring.effect") == 7
 
 
-def test_read_only_and_numbers_that_are_none_are_refused(bench):
-    assert write(bench, "deck.bcFlow2", 0) == 1
-    assert write(bench, "pid_rate.roll_kp", math.nan) == 250.0
+def test_a_write_to_a_read_only_parameter_is_not_answered(bench):
+    data = number("deck.bcFlow2") + b"\0"
+    assert bench.ask(Port.PARAMETERS, WRITE, data) == []
+    assert read(bench, "deck.bcFlow2") == 1
+
+
+def test_what_is_no_number_is_stored(bench):
+    assert math.isnan(write(bench, "pid_rate.roll_kp", math.nan))
+    assert math.isnan(bench.firmware.stabilizer.attitude.roll_rate.kp)
 
 
 def test_errors(bench):
@@ -124,7 +130,7 @@ def test_set_by_name(bench):
 
 def test_extended_types(bench):
     assert misc(bench, 7, "posCtlPid.xKp") == b"\0\1"
-    assert misc(bench, 7, "stabilizer.stop") == b"\0\0"
+    assert misc(bench, 7, "stabilizer.stop") == bytes([errno.ENOENT])
     assert misc(bench, 2, "posCtlPid.xKp") == b"\1"
 
 
@@ -153,5 +159,7 @@ def test_stored_parameters_outlive_a_restart(bench):
 def test_fault_switches_are_parameters(bench):
     write(bench, "virtual.motorFailure", 3)
     write(bench, "virtual.loss", 0.25)
+    assert write(bench, "virtual.loss", 1.5) == 0.25
+    assert write(bench, "virtual.delay", math.nan) == 0.0
     assert bench.vehicle.faults.motor_failure == 3
     assert bench.vehicle.faults.loss == 0.25

@@ -9,6 +9,7 @@ from virtual_bench import Bench
 
 from crazyflie_virtual.link.crtp import Port
 from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_virtual.tables.parameter_table import parameter_specs
 from crazyflie_virtual.vehicle import VirtualVehicle
 
 
@@ -36,7 +37,7 @@ def test_rubbish_is_not_answered(bench):
 def test_versions(bench):
     assert bench.ask_one(Port.PLATFORM, 1, b"\0") == b"\0" + struct.pack("<i", 12)
     assert Bench(protocol=8).ask_one(Port.PLATFORM, 1, b"\0") == b"\0" + struct.pack("<i", 8)
-    assert bench.ask_one(Port.PLATFORM, 1, b"\2") == b"\2CF21\0"
+    assert bench.ask_one(Port.PLATFORM, 1, b"\2") == b"\2Crazyflie 2.1"
     assert bench.ask(Port.PLATFORM, 1, b"\x63") == []
 
 
@@ -53,15 +54,68 @@ def test_console_waits_for_a_client(bench):
 # Memories.
 
 
+def memories(bench):
+    """Return type, size and serial number of all memories."""
+    count = bench.ask_one(Port.MEMORY, 0, b"\1")[1]
+    details = [bench.ask_one(Port.MEMORY, 0, bytes([2, i])) for i in range(count)]
+    assert [d[:2] for d in details] == [bytes([2, i]) for i in range(count)]
+    assert bench.ask_one(Port.MEMORY, 0, bytes([2, count])) == bytes([2, count])
+    return [struct.unpack("<BI8s", d[2:]) for d in details]
+
+
 def test_list_of_memories(bench):
-    assert bench.ask_one(Port.MEMORY, 0, b"\1") == b"\1\3"
-    details = [bench.ask_one(Port.MEMORY, 0, bytes([2, i])) for i in range(3)]
-    assert [struct.unpack("<BBBI8s", d) for d in details] == [
-        (2, 0, 0x00, 112, bytes(8)),
-        (2, 1, 0x12, 4096, bytes(8)),
-        (2, 2, 0x15, 4096, bytes(8)),
+    no_serial = bytes(8)
+    assert memories(bench) == [
+        (0x00, 8191, bytes(7) + b"\x50"),
+        (0x12, 4096, no_serial),
+        (0x15, 4096, no_serial),
+        (0x10, 24, no_serial),
+        (0x17, 40, no_serial),
+        (0x14, 0x1000 + 4 * 61, no_serial),
+        (0x19, 0x50000000, no_serial),
+        *((0x01, 112, bytes([0x0D, product]) + bytes(6)) for product in (0x01, 0x0F, 0x10)),
     ]
-    assert bench.ask_one(Port.MEMORY, 0, b"\2\3") == b"\2\3"
+
+
+@pytest.mark.parametrize(
+    ("options", "names"),
+    [
+        ({"positioning": "none"}, {"bcLedRing"}),
+        ({}, {"bcLedRing", "bcFlow2", "bcLighthouse4", "bcZRanger2"}),
+        ({"positioning": "none", "multiranger": True}, {"bcLedRing", "bcMultiranger"}),
+    ],
+)
+def test_decks_have_parameters_and_one_wire_memories(options, names):
+    bench = Bench(**options)
+    decks = [(i, s) for i, s in enumerate(parameter_specs()) if s.group == "deck"]
+    attached = {
+        spec.name for i, spec in decks if bench.ask_one(Port.PARAMETERS, 1, struct.pack("<H", i))[3]
+    }
+    assert attached == names
+    one_wire = [m for m in memories(bench) if m[0] == 0x01]
+    # The ranging sensor down is on the flow deck.
+    assert len(one_wire) == len(names - {"bcZRanger2"})
+
+
+def test_lighthouse_data_outlive_a_restart_when_stored(bench):
+    data = struct.pack("<BI", 5, 0x1100) + bytes(range(24))
+    read = struct.pack("<BIB", 5, 0x1100, 24)
+
+    def restart():
+        for command in (2, 3):
+            bench.ask(Port.LINK, 3, bytes([0xFE, command]))
+
+    assert bench.ask_one(Port.MEMORY, 2, data)[-1] == 0
+    restart()
+    assert bench.ask_one(Port.MEMORY, 1, read)[6:] == bytes(24)
+    bench.ask_one(Port.MEMORY, 2, data)
+    store = struct.pack("<BHH", 11, 0, 0b10)
+    assert bench.ask_one(Port.LOCALIZATION, 1, store) == b"\x0b\1"
+    restart()
+    assert bench.ask_one(Port.MEMORY, 1, read)[6:] == bytes(range(24))
+    # There are four base stations.
+    assert bench.ask_one(Port.LOCALIZATION, 1, struct.pack("<BHH", 11, 0x10, 0)) == b"\x0b\0"
+    assert bench.ask_one(Port.MEMORY, 1, struct.pack("<BIB", 5, 0x400, 1))[-1] == errno.EIO
 
 
 def test_memory_keeps_what_is_written(bench):
@@ -74,7 +128,7 @@ def test_memory_keeps_what_is_written(bench):
 
 @pytest.mark.parametrize(
     ("number", "address", "count", "error"),
-    [(1, 4073, 24, errno.EIO), (9, 0, 1, errno.ENOENT)],
+    [(1, 4073, 24, errno.EIO), (99, 0, 1, errno.EIO)],
 )
 def test_memory_errors(bench, number, address, count, error):
     answer = bench.ask_one(Port.MEMORY, 1, struct.pack("<BIB", number, address, count))

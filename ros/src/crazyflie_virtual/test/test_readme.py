@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from test_cflib_examples import OTHERS, RUNNING
+
 from crazyflie_virtual.tables.log_table import log_variables
 from crazyflie_virtual.tables.parameter_table import parameter_specs
 
@@ -21,3 +23,8 @@ def test_figures():
 def test_switches_are_parameters_too():
     names = [f"`virtual.{spec.name}`" for spec in parameter_specs() if spec.group == "virtual"]
     assert [name for name in names if name not in README] == []
+
+
+def test_examples():
+    names = (*RUNNING, *OTHERS)
+    assert [name for name in names if f"`{name}`" not in README] == []

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from crazyflie_virtual.body.physics import MotorCommands, Physics
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.firmware.localization import DECK
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.ports.high_level import HighLevelPort
 from crazyflie_virtual.ports.link import LinkPort
@@ -16,23 +17,27 @@ from crazyflie_virtual.ports.platform import PlatformPort
 from crazyflie_virtual.ports.setpoints import AttitudeSetpointPort, GenericSetpointPort
 from crazyflie_virtual.ports.supervisor import SupervisorPort
 from crazyflie_virtual.settings import VehicleSettings
-from crazyflie_virtual.tables import memories
-from crazyflie_virtual.tables.memories import Memory
+from crazyflie_virtual.tables.decks import decks
+from crazyflie_virtual.tables.memories import LighthouseMemory, eeprom, memories
 
 _ADDRESS_PREFIX = 0xE7E7E7E700
 
 
 class Storage:
-    """What outlives a restart: configuration memory and stored parameters.
+    """What outlives a restart: memories and stored parameters.
 
     Parameters
     ----------
-    address : int
-        Last byte of the radio's.
+    settings : VehicleSettings
     """
 
-    def __init__(self, address: int):
-        self.eeprom = memories.eeprom(_ADDRESS_PREFIX | address)
+    def __init__(self, settings: VehicleSettings):
+        self.eeprom = eeprom(_ADDRESS_PREFIX | settings.address)
+        self.one_wire = [
+            (deck.serial, deck.one_wire())
+            for deck in decks(settings.positioning == DECK, settings.multiranger)
+        ]
+        self.lighthouse: dict[int, bytes] = {}
         self.parameters: dict[str, float] = {}
 
 
@@ -60,22 +65,26 @@ class Board:
         firmware = self.firmware = Firmware(physics, faults, settings, failure)
         supervisor = SupervisorPort(firmware)
         self._log = LogPort(firmware)
+        lighthouse = LighthouseMemory(storage.lighthouse)
         ports = (
-            LinkPort(),
-            PlatformPort(settings.protocol, supervisor),
+            LinkPort(firmware.remark),
+            PlatformPort(settings.protocol, supervisor, firmware.remark),
             self._log,
             ParameterPort(firmware, storage.parameters),
             MemoryPort(
-                (
-                    Memory.over(memories.EEPROM, storage.eeprom),
-                    Memory.over(memories.TRAJECTORY, firmware.planner.memory),
-                    firmware.memory_tester.memory(),
-                )
+                memories(
+                    storage.eeprom,
+                    firmware.planner.memory,
+                    firmware.memory_tester,
+                    lighthouse,
+                    storage.one_wire,
+                ),
+                firmware.remark,
             ),
             AttitudeSetpointPort(firmware),
             GenericSetpointPort(firmware),
             HighLevelPort(firmware),
-            LocalizationPort(firmware, settings.address),
+            LocalizationPort(firmware, settings.address, lighthouse),
             supervisor,
         )
         self._handlers: dict[int, Callable[[Packet], list[Packet]]] = {
@@ -86,13 +95,17 @@ class Board:
         """Return the answers to a packet."""
         self.firmware.link_statistics.count_received(self.firmware.time)
         handle = self._handlers.get(packet.port)
-        answers = handle(packet) if handle else []
+        answers = handle(packet) if handle else self._no_port(packet)
         self.firmware.link_statistics.count_sent(len(answers))
         return answers
 
     def step(self, voltage: float) -> MotorCommands:
         """Take a step and return the motor commands; see `Firmware.step`."""
         return self.firmware.step(voltage)
+
+    def _no_port(self, packet):
+        self.firmware.remark("port", f"CRTP: nothing listens on port {packet.port}")
+        return []
 
     def unsolicited(self) -> list[Packet]:
         """Return the packets that are sent without being asked for: log and console."""

@@ -35,6 +35,9 @@ class VehicleSettings(Parameters):
         "positioning deck, or nothing but the inertial sensors",
         DECK,
     )
+    multiranger: bool = parameter(
+        BOOLEAN, "carry a Multi-ranger deck, which sees the ground and nothing else", False
+    )
     auto_arm: bool = parameter(
         BOOLEAN,
         "arm by itself, as a Crazyflie 2.1; else the client arms, as with brushless motors",

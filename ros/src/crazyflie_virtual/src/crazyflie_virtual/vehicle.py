@@ -1,5 +1,6 @@
 """A whole virtual Crazyflie, without sockets and with the time given to it."""
 
+import logging
 import math
 
 from crazyflie_virtual.board import Board, Storage
@@ -23,6 +24,8 @@ _RESTART_TIME = 1.0
 """How long the microcontroller is not there after a failed assertion, s: assumed."""
 
 _STOPPED: MotorCommands = (0.0, 0.0, 0.0, 0.0)
+
+_LOGGER = logging.getLogger(__name__)
 
 
 class VirtualVehicle:
@@ -52,7 +55,7 @@ class VirtualVehicle:
             settings.thrust_error,
         )
         self.battery = Battery(settings.battery)
-        self._storage = Storage(settings.address)
+        self._storage = Storage(settings)
         self._steps = 0
         self._is_dead = False
         self._failure = ""
@@ -79,9 +82,12 @@ class VirtualVehicle:
         try:
             return [answer.encode() for answer in self.board.receive(packet)]
         except FirmwareAssertion as assertion:
-            self.board = None
-            self._failure = str(assertion)
-            self._restart_time = self.time + _RESTART_TIME
+            self._restart(str(assertion))
+            return []
+        except Exception as error:
+            text = f"{type(error).__name__} in packet {datagram.hex()}: {error}"
+            if self.board.firmware.remark("error", f"SYS: {text}"):
+                _LOGGER.exception("virtual vehicle: %s", text)
             return []
 
     def advance_to(self, time: float) -> list[bytes]:
@@ -94,18 +100,26 @@ class VirtualVehicle:
         """
         datagrams = []
         for _ in range(math.floor(time / STEP + 1e-6) - self._steps):
-            self._step()
-            if self.board is not None:
-                datagrams += [packet.encode() for packet in self.board.unsolicited()]
+            datagrams += self._step()
         return datagrams
 
     def _step(self):
         self._steps += 1
-        commands = _STOPPED
+        commands, datagrams = _STOPPED, []
         if self.time >= self._restart_time:
             self._start(self._failure)
         if self.board is not None:
-            commands = self.board.step(self.battery.voltage)
+            try:
+                commands = self.board.step(self.battery.voltage)
+                datagrams = [packet.encode() for packet in self.board.unsolicited()]
+            except Exception as error:
+                failure = f"{type(error).__name__} in a step: {error}"
+                _LOGGER.exception("virtual vehicle: %s; it restarts", failure)
+                # What has failed once would fail in the next step, too.
+                self._restart(failure)
+        if math.isnan(sum(commands)):
+            # As the processor converts what is no number to a whole one.
+            commands = _STOPPED
         failed = self.faults.motor_failure
         if failed:
             m1, m2, m3, m4 = (0.0 if i + 1 == failed else c for i, c in enumerate(commands))
@@ -113,6 +127,12 @@ class VirtualVehicle:
         self.physics.step(commands, self.battery.voltage)
         if self._steps % _BATTERY_STEPS == 0:
             self._drain()
+        return datagrams
+
+    def _restart(self, failure):
+        self.board = None
+        self._failure = failure
+        self._restart_time = self.time + _RESTART_TIME
 
     def _drain(self):
         if self.faults.low_battery:

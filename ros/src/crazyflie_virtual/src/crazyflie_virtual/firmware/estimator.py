@@ -26,6 +26,9 @@ _FIRST_VARIANCES = (100.0, 0.0, 1.0)
 _FIRST_ATTITUDE_VARIANCE = 10.0
 """rad^2: the first measurement counts in full."""
 
+_LEAST_VARIANCE = 1e-12
+"""Of a measurement, m^2 and rad^2: clients may set its deviation to 0."""
+
 _REVERSION_TIME = 10.0
 """Time constant with which the attitude returns to the initial one at rest, s."""
 
@@ -117,7 +120,7 @@ class Estimator:
         """Take in a measured position (m) with its standard deviation (m)."""
         e = self._estimate
         p, m, v = self._covariance
-        total = p + deviation * deviation
+        total = p + max(deviation * deviation, _LEAST_VARIANCE)
         gain_p, gain_v = p / total, m / total
         dx, dy, dz = x - e.x, y - e.y, z - e.z
         e.x += gain_p * dx
@@ -131,7 +134,8 @@ class Estimator:
     def correct_attitude(self, x: float, y: float, z: float, w: float, deviation: float) -> None:
         """Take in a measured attitude, a unit quaternion, with its deviation (rad)."""
         e = self._estimate
-        gain = self.variance_attitude / (self.variance_attitude + deviation * deviation)
+        variance = max(deviation * deviation, _LEAST_VARIANCE)
+        gain = self.variance_attitude / (self.variance_attitude + variance)
         if e.qx * x + e.qy * y + e.qz * z + e.qw * w < 0.0:
             x, y, z, w = -x, -y, -z, -w
         self._blend(x, y, z, w, gain)

@@ -2,6 +2,7 @@
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
+from crazyflie_virtual.body.ranging import RangingSensors
 from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.commander import Commander
@@ -71,8 +72,10 @@ class Firmware:
         self.remark = Remarks(self.console.write_line, lambda: self.time)
         self.estimate = Estimate()
         self.sensors = Sensors(settings.sensor_noise, settings.seed)
+        has_deck = settings.positioning == DECK
+        self.ranging = RangingSensors(physics, settings.multiranger, has_deck)
         self.estimator = Estimator(self.estimate)
-        self.localization = Localization(self.estimator, physics, settings.positioning == DECK)
+        self.localization = Localization(self.estimator, physics, has_deck)
         self.planner = Planner()
         self.commander = Commander(self.planner)
         self.attitude_decoder = AttitudeDecoder()
@@ -145,6 +148,9 @@ class Firmware:
             self.remark("setpoint", "CMD: flies by a setpoint that is not a number")
 
     def _correct_estimate(self):
+        if not self.estimate.is_finite:
+            self.remark("estimate", "ESTKALMAN: the state is no number, resetting")
+            self.reset_estimation = 1
         if self.reset_estimation:
             self.reset_estimation = 0
             self.estimator.reset()

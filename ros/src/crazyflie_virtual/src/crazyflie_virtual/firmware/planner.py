@@ -39,6 +39,9 @@ _NOWHERE = PolynomialPiece(1.0, *[(math.nan,)] * 4)
 
 _PIECE = struct.Struct("<33f")
 
+_LEAST_SPEED = 0.001
+"""Of a climb, m/s: clients may set the speed to 0."""
+
 _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 
 
@@ -142,6 +145,8 @@ class Planner:
         """Return height (m) and duration (s) of a climb at a mean speed (m/s)."""
         now = self._last.position[2]
         height = now + height if is_relative else height
+        if abs(speed) < _LEAST_SPEED:
+            speed = _LEAST_SPEED
         return height, abs(height - now) / speed
 
     def go_to(

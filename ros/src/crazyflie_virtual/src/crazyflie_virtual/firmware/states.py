@@ -123,6 +123,11 @@ class Estimate(_Motion):
     qw: float = 1.0
 
     @property
+    def is_finite(self) -> bool:
+        """Whether all of it is numbers: what is not spreads to the attitude or the position."""
+        return math.isfinite(self.x + self.y + self.z + self.vx + self.vy + self.vz + self.qw)
+
+    @property
     def quaternion(self) -> Quaternion:
         """(qx, qy, qz, qw)."""
         return (self.qx, self.qy, self.qz, self.qw)

@@ -1,5 +1,6 @@
 """Port 15: the link itself."""
 
+from crazyflie_virtual.firmware.remarks import Remarks
 from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
 
 _ECHO, _SOURCE, _SINK = 0, 1, 2
@@ -8,9 +9,17 @@ _IDENTITY = b"Bitcraze Crazyflie"
 
 
 class LinkPort:
-    """Echo, and who is there."""
+    """Echo, and who is there.
+
+    Parameters
+    ----------
+    remark : Remarks
+    """
 
     port = Port.LINK
+
+    def __init__(self, remark: Remarks):
+        self._remark = remark
 
     def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
@@ -18,4 +27,6 @@ class LinkPort:
             return [packet]
         if packet.channel == _SOURCE:
             return [Packet(Port.LINK, _SOURCE, _IDENTITY.ljust(MAX_DATA, b"\0"))]
+        if packet.channel != _SINK:
+            self._remark("link", f"LINK: unknown channel {packet.channel}")
         return []

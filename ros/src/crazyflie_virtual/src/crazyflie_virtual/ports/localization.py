@@ -6,9 +6,11 @@ import struct
 from crazyflie_virtual.firmware.compressed import decompress_quaternion
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.tables.memories import LighthouseMemory
 
 _POSITION, _GENERIC, _PACKED_POSITIONS = 0, 1, 2
 _EMERGENCY_STOP, _EMERGENCY_WATCHDOG, _POSE, _PACKED_POSES = 3, 4, 8, 9
+_STORE_LIGHTHOUSE = 11
 
 _PACKED_POSITION = struct.Struct("<B3h")
 _PACKED_POSE = struct.Struct("<B3hI")
@@ -23,16 +25,18 @@ class LocalizationPort:
     address : int
         Last byte of the radio's address: packed positions and poses of several
         vehicles are marked with it.
+    lighthouse : LighthouseMemory
     """
 
     port = Port.LOCALIZATION
 
-    def __init__(self, firmware: Firmware, address: int):
+    def __init__(self, firmware: Firmware, address: int, lighthouse: LighthouseMemory):
         self._firmware = firmware
         self._address = address
+        self._lighthouse = lighthouse
 
     def handle(self, packet: Packet) -> list[Packet]:
-        """Take a measurement; there is no answer."""
+        """Take a measurement; only to storing lighthouse data there is an answer."""
         data = packet.data
         if packet.channel == _POSITION:
             self._position(data)
@@ -40,8 +44,13 @@ class LocalizationPort:
             for values in _each(_PACKED_POSITION, data):
                 if values[0] == self._address:
                     self._take_position([part / 1000.0 for part in values[1:]])
+        elif packet.channel == _GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
+            done = self._lighthouse.store(*struct.unpack_from("<HH", data, 1))
+            return [Packet(self.port, _GENERIC, bytes([_STORE_LIGHTHOUSE, done]))]
         elif packet.channel == _GENERIC and data:
             self._generic(data[0], data[1:])
+        else:
+            self._firmware.remark("location", f"LOC: unknown channel {packet.channel}")
         return []
 
     def _generic(self, command, data):
@@ -58,6 +67,8 @@ class LocalizationPort:
             supervisor.stop()
         elif command == _EMERGENCY_WATCHDOG:
             supervisor.feed_watchdog(self._firmware.time)
+        else:
+            self._firmware.remark("location", f"LOC: nothing done with a message {command}")
 
     def _position(self, data):
         if len(data) == 12:

@@ -14,7 +14,7 @@ MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
 """Blocks at one time, variables in all of them, bytes of values in one."""
 
 _TABLE, _CONTROL, _DATA = 0, 1, 2
-_DELETE, _START, _STOP, _RESET, _CREATE, _APPEND = 2, 3, 4, 5, 6, 7
+_DELETE, _START, _STOP, _RESET, _CREATE, _APPEND, _START_2 = 2, 3, 4, 5, 6, 7, 8
 
 _PERIOD_UNIT = 10
 """Of the period on the wire, ms."""
@@ -22,14 +22,14 @@ _PERIOD_UNIT = 10
 
 class _Block:
     def __init__(self) -> None:
-        self.variables: list[tuple[Callable[[Firmware], float], NumberType]] = []
+        self.variables: list[tuple[Callable[[Firmware], float], NumberType | None]] = []
         self.size = 0
         self.period = 0
         self.due: int | None = None
 
     def add(self, variable, number_type):
         self.variables.append((variable.read, number_type))
-        self.size += number_type.size
+        self.size += number_type.size if number_type else 0
 
 
 class LogPort:
@@ -50,6 +50,7 @@ class LogPort:
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
         self._blocks: dict[int, _Block] = {}
         self._due: int | None = None
+        self._once: list[_Block] = []
 
     def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
@@ -66,9 +67,10 @@ class LogPort:
     def collect(self) -> list[Packet]:
         """Return the packets with values that are due."""
         now = self._firmware.milliseconds
+        once, self._once = self._once, []
+        packets = [self._data_packet(i, b, now) for i, b in self._blocks.items() if b in once]
         if self._due is None or now < self._due:
-            return []
-        packets = []
+            return packets
         for block_id, block in self._blocks.items():
             if block.due is not None and now >= block.due:
                 # The phase is kept; what was missed is skipped.
@@ -87,12 +89,11 @@ class LogPort:
                 return errno.EEXIST
             if len(self._blocks) >= MAX_BLOCKS:
                 return errno.ENOMEM
+            # It stays, with the variables that have found a place, also after an error.
             self._blocks[block_id] = _Block()
-            error = self._append(self._blocks[block_id], data)
-            if error:
-                del self._blocks[block_id]
-            return error
-        if command not in (_APPEND, _DELETE, _START, _STOP):
+            return self._append(self._blocks[block_id], data)
+        if command not in (_APPEND, _DELETE, _START, _STOP, _START_2):
+            self._firmware.remark("log", f"LOG: unknown command {command}")
             return errno.ENOEXEC
         block = self._blocks.get(block_id)
         if block is None:
@@ -102,28 +103,30 @@ class LogPort:
         if command == _DELETE:
             del self._blocks[block_id]
         elif command == _START:
-            period = _PERIOD_UNIT * (data[0] if data else 0)
-            if period == 0:
-                return errno.EINVAL
-            block.period = period
-            block.due = self._firmware.milliseconds + period
+            self._start(block, _PERIOD_UNIT * (data[0] if data else 0))
+        elif command == _START_2:
+            self._start(block, int.from_bytes(data[:2], "little"))
         else:
             block.due = None
         self._schedule()
         return 0
+
+    def _start(self, block, period):
+        if period == 0:
+            self._once.append(block)
+        else:
+            block.period = period
+            block.due = self._firmware.milliseconds + period
 
     def _append(self, block, data):
         for code, index in struct.iter_unpack("<BH", data[: len(data) // 3 * 3]):
             if index >= len(self._variables):
                 return errno.ENOENT
             variable = self._variables[index]
-            # The low half of the code is the type to send; 0 is the variable's own.
-            number_type = LOG_TYPES.get(
-                code & 0xF, variable.number_type if code & 0xF == 0 else None
-            )
-            if number_type is None:
-                return errno.ENOENT
-            if block.size + number_type.size > MAX_BYTES:
+            # The low half of the code is the type to send; of one that there is not,
+            # nothing is sent.
+            number_type = LOG_TYPES.get(code & 0xF)
+            if number_type and block.size + number_type.size > MAX_BYTES:
                 return errno.E2BIG
             if sum(len(b.variables) for b in self._blocks.values()) >= MAX_VARIABLES:
                 return errno.ENOMEM
@@ -136,6 +139,8 @@ class LogPort:
 
     def _data_packet(self, block_id, block, now):
         firmware = self._firmware
-        values = b"".join(number_type.pack(read(firmware)) for read, number_type in block.variables)
+        values = b"".join(
+            number_type.pack(read(firmware)) for read, number_type in block.variables if number_type
+        )
         stamp = (now & 0xFFFFFF).to_bytes(3, "little")
         return Packet(Port.LOG, _DATA, bytes([block_id]) + stamp + values)

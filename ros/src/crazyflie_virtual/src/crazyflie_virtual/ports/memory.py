@@ -5,6 +5,7 @@ import struct
 from collections.abc import Iterable
 
 from crazyflie_virtual.firmware.assertion import FirmwareAssertion
+from crazyflie_virtual.firmware.remarks import Remarks
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.tables.memories import Memory
 
@@ -12,7 +13,7 @@ _INFO, _READ, _WRITE = 0, 1, 2
 _COUNT, _DETAILS = 1, 2
 
 _MOST = 24
-"""Bytes read or written at once."""
+"""Bytes read at once."""
 
 
 class MemoryPort:
@@ -22,18 +23,20 @@ class MemoryPort:
     ----------
     memories : iterable of Memory
         In the order of their numbers.
+    remark : Remarks
     """
 
     port = Port.MEMORY
 
-    def __init__(self, memories: Iterable[Memory]):
+    def __init__(self, memories: Iterable[Memory], remark: Remarks):
         self._memories = tuple(memories)
+        self._remark = remark
 
     def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
         handlers = {_INFO: self._info, _READ: self._read, _WRITE: self._write}
-        handler = handlers.get(packet.channel)
-        answer = handler(packet.data) if handler else None
+        handler = handlers.get(packet.channel, self._unknown)
+        answer = handler(packet.data)
         return [] if answer is None else [Packet(Port.MEMORY, packet.channel, answer)]
 
     def _info(self, data):
@@ -43,7 +46,11 @@ class MemoryPort:
             if data[1] >= len(self._memories):
                 return data[:2]
             memory = self._memories[data[1]]
-            return data[:2] + struct.pack("<BI8x", memory.type, memory.size)
+            return data[:2] + struct.pack("<BI8s", memory.type, memory.size, memory.serial)
+        return self._unknown(data)
+
+    def _unknown(self, data):
+        self._remark("memory", f"MEM: unknown request {data[:1].hex()}")
         return None
 
     def _read(self, data):
@@ -52,24 +59,22 @@ class MemoryPort:
         number, address, count = struct.unpack_from("<BIB", data)
         if count > _MOST:
             raise FirmwareAssertion(f"a read of {count} bytes of memory, of {_MOST} at most")
-        error = self._check(number, address, count)
-        if error:
-            return data[:5] + bytes([error])
-        return data[:5] + b"\0" + self._memories[number].read(address, count)
+        content = None
+        if number < len(self._memories):
+            content = self._memories[number].read(address, count)
+        if content is None:
+            self._remark("memory", f"MEM: {number} has no {count} bytes at {address:#x} to read")
+            return data[:5] + bytes([errno.EIO])
+        return data[:5] + b"\0" + content
 
     def _write(self, data):
         if len(data) < 5:
             return None
         number, address = struct.unpack_from("<BI", data)
         content = data[5:]
-        error = self._check(number, address, len(content))
-        if not error:
-            self._memories[number].write(address, content)
-        return data[:5] + bytes([error])
-
-    def _check(self, number, address, count):
-        if number >= len(self._memories):
-            return errno.ENOENT
-        if address + count > self._memories[number].size:
-            return errno.EIO
-        return 0
+        done = number < len(self._memories) and self._memories[number].write(address, content)
+        if not done:
+            self._remark(
+                "memory", f"MEM: {number} has no {len(content)} bytes at {address:#x} to write"
+            )
+        return data[:5] + bytes([0 if done else errno.EIO])

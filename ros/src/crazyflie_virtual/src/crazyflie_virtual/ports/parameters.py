@@ -1,20 +1,25 @@
 """Port 2: parameters."""
 
 import errno
-import math
 import struct
 from operator import attrgetter
 
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
 from crazyflie_virtual.tables.number_types import PARAMETER_CODES, PARAMETER_TYPES
-from crazyflie_virtual.tables.parameter_table import ParameterSpec, parameter_specs
+from crazyflie_virtual.tables.parameter_table import NO_LIMITS, ParameterSpec, parameter_specs
 from crazyflie_virtual.tables.toc import Entry, Table
 
 _TABLE, _READ, _WRITE, _MISC = 0, 1, 2, 3
 
 _SET_BY_NAME, _EXTENDED_TYPE, _STORE, _STATE, _CLEAR = 0, 2, 3, 4, 5
 _DEFAULT, _EXTENDED_TYPE_2, _DEFAULT_2 = 6, 7, 8
+
+_WORD = 4
+"""Bytes of a request in which the answer to a write has the value as it is."""
+
+_PERSISTENT = 1
+"""The only extended type."""
 
 _EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40
 """Flags beside the type's code."""
@@ -45,10 +50,22 @@ class Parameter:
         """The present value."""
         return self._value if self._owner is None else getattr(self._owner, self._attribute)
 
+    @property
+    def has_effect(self) -> bool:
+        """Whether the vehicle does anything with it."""
+        return self._owner is not None
+
     def set(self, value: float) -> None:
-        """Change the value, unless it is read-only or the new one is no number."""
-        if self.spec.read_only or not math.isfinite(value):
-            return
+        """Change the value.
+
+        Raises
+        ------
+        ValueError
+            It is out of its limits; the text says so.
+        """
+        low, high = self.spec.limits
+        if not low <= value <= high and self.spec.limits != NO_LIMITS:
+            raise ValueError(f"is {low:g} to {high:g}, not {value:g}")
         if self._owner is None:
             self._value = value
         else:
@@ -78,6 +95,7 @@ class ParameterPort:
     def __init__(self, firmware: Firmware, stored: dict[str, float]):
         self._parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
         self._stored = stored
+        self._remark = firmware.remark
         for parameter in self._parameters:
             if parameter.full_name in stored:
                 parameter.set(stored[parameter.full_name])
@@ -111,11 +129,26 @@ class ParameterPort:
     def _write(self, data):
         parameter = self._find(data)
         if parameter is None:
+            self._remark("parameter", f"PARAM: there is none with the number {data[:2].hex()}")
             return data[:2] + bytes([errno.ENOENT])
+        if parameter.spec.read_only:
+            self._remark(parameter.full_name, f"PARAM: {parameter.full_name} is read-only")
+            return None
+        self._set(parameter, data[2:])
+        # As long as the request, whatever the value's size is.
+        value = parameter.spec.number_type.pack(parameter.value).ljust(_WORD, b"\0")
+        return data[:2] + (value[: len(data) - 2] + data[2 + len(value) :])
+
+    def _set(self, parameter, data):
         number_type = parameter.spec.number_type
-        if len(data) >= 2 + number_type.size:
-            parameter.set(number_type.unpack(data[2 : 2 + number_type.size]))
-        return data[:2] + number_type.pack(parameter.value)
+        value = number_type.unpack(data[: number_type.size].ljust(number_type.size, b"\0"))
+        name = parameter.full_name
+        if not parameter.has_effect and value != parameter.value:
+            self._remark(name, f"PARAM: {name} is kept, but a virtual vehicle does nothing with it")
+        try:
+            parameter.set(value)
+        except ValueError as error:
+            self._remark(name, f"PARAM: {name} {error}")
 
     def _misc(self, data):
         if not data:
@@ -124,6 +157,7 @@ class ParameterPort:
             return self._set_by_name(data)
         handler = _MISC_HANDLERS.get(data[0])
         if handler is None or len(data) < 3:
+            self._remark("parameter command", f"PARAM: unknown command {data.hex()}")
             return None
         parameter = self._find(data, 1)
         return data[:3] + handler(self, parameter)
@@ -134,29 +168,26 @@ class ParameterPort:
             return None
         group, name = parts[0].decode("latin1"), parts[1].decode("latin1")
         index = self.table.index(group, name)
-        number_type, value = PARAMETER_TYPES.get(parts[2][0]), parts[2][1:]
+        number_type = PARAMETER_TYPES.get(parts[2][0])
         error = 0
         if index is None:
             error = errno.ENOENT
-        elif (
-            number_type is not self._parameters[index].spec.number_type
-            or len(value) != number_type.size
-        ):
+        elif number_type is not self._parameters[index].spec.number_type:
             error = errno.EINVAL
         elif self._parameters[index].spec.read_only:
             error = errno.EACCES
         else:
-            self._parameters[index].set(number_type.unpack(value))
+            self._set(self._parameters[index], parts[2][1:])
         names = data[: 1 + len(parts[0]) + 1 + len(parts[1]) + 1]
         return (names + bytes([error]))[:MAX_DATA]
 
     def _extended_type(self, parameter):
-        return bytes([1 if parameter is not None and parameter.spec.persistent else 0])
+        is_extended = parameter is not None and parameter.spec.persistent
+        return bytes([_PERSISTENT if is_extended else errno.ENOENT])
 
     def _extended_type_2(self, parameter):
-        if parameter is None:
-            return bytes([errno.ENOENT])
-        return b"\0" + self._extended_type(parameter)
+        known = parameter is not None and parameter.spec.persistent
+        return (b"\0" if known else b"") + self._extended_type(parameter)
 
     def _default(self, parameter):
         if parameter is None or parameter.spec.read_only:
@@ -177,11 +208,12 @@ class ParameterPort:
     def _clear(self, parameter):
         if parameter is None or not parameter.spec.persistent:
             return bytes([errno.ENOENT])
-        self._stored.pop(parameter.full_name, None)
+        if self._stored.pop(parameter.full_name, None) is None:
+            return bytes([errno.ENOENT])
         return b"\0"
 
     def _state(self, parameter):
-        if parameter is None or not parameter.spec.persistent:
+        if parameter is None:
             return bytes([errno.ENOENT])
         number_type = parameter.spec.number_type
         default = number_type.pack(parameter.default)

@@ -2,15 +2,17 @@
 
 import struct
 
-from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.firmware.remarks import Remarks
+from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
 from crazyflie_virtual.ports.supervisor import SupervisorPort
 
 _COMMAND, _VERSION = 0, 1
 _CONTINUOUS_WAVE, _ARM, _RECOVER, _NOTIFY = 0, 1, 2, 3
 _PROTOCOL, _FIRMWARE, _DEVICE = 0, 1, 2
 
-DEVICE = "CF21"
-FIRMWARE = "virtual"
+DEVICE = "Crazyflie 2.1"
+FIRMWARE = "2026.08 virtual"
+"""Names; the firmware is the release whose behaviour is imitated."""
 
 
 class PlatformPort:
@@ -22,13 +24,15 @@ class PlatformPort:
         Version of the protocol to report.
     supervisor : SupervisorPort
         Which arms and recovers.
+    remark : Remarks
     """
 
     port = Port.PLATFORM
 
-    def __init__(self, protocol: int, supervisor: SupervisorPort):
+    def __init__(self, protocol: int, supervisor: SupervisorPort, remark: Remarks):
         self._protocol = protocol
         self._supervisor = supervisor
+        self._remark = remark
 
     def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
@@ -42,6 +46,8 @@ class PlatformPort:
             answer = self._supervisor.command(command, data)
         elif packet.channel == _COMMAND and command in (_CONTINUOUS_WAVE, _NOTIFY):
             answer = data
+        else:
+            self._remark("platform", f"PLATFORM: unknown command {packet.channel}/{command}")
         if answer is None:
             return []
         return [Packet(Port.PLATFORM, packet.channel, bytes([command]) + answer)]
@@ -50,4 +56,7 @@ class PlatformPort:
         if command == _PROTOCOL:
             return struct.pack("<i", self._protocol)
         texts = {_FIRMWARE: FIRMWARE, _DEVICE: DEVICE}
-        return texts[command].encode() + b"\0" if command in texts else None
+        if command in texts:
+            return texts[command].encode()[: MAX_DATA - 1]
+        self._remark("platform", f"PLATFORM: unknown version {command}")
+        return None

@@ -131,6 +131,9 @@ _GROUPS: dict[str, Rows] = {
     "acc": _attributes(FLOAT, {"x": "acc_x", "y": "acc_y", "z": "acc_z"}, _sensors),
     "gyro": _attributes(FLOAT, {"x": "gyro_x", "y": "gyro_y", "z": "gyro_z"}, _sensors),
     "mag": _attributes(FLOAT, {"x": "mag_x", "y": "mag_y", "z": "mag_z"}, _sensors),
+    "range": _attributes(
+        U16, ("front", "back", "up", "left", "right", "zrange"), lambda f: f.ranging
+    ),
     "baro": [
         ("asl", FLOAT, lambda f: f.sensors.asl),
         ("temp", FLOAT, lambda f: f.sensors.temperature),
@@ -234,6 +237,10 @@ _GROUPS: dict[str, Rows] = {
             VY=lambda f: f.stabilizer.position.vy,
             VZ=lambda f: f.stabilizer.position.vz,
         ),
+    ],
+    "lighthouse": [
+        (name, U16, _constant(0))
+        for name in ("bsReceive", "bsActive", "bsAvailable", "bsGeoVal", "bsCalVal")
     ],
     "memTst": [("errCntW", U32, lambda f: f.memory_tester.errors)],
     "crtp": [

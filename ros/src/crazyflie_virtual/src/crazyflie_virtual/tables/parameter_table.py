@@ -5,9 +5,13 @@ it is a variable in the firmware; or a number, which is kept and given back but
 has no effect on the virtual vehicle.
 """
 
+import math
 from typing import NamedTuple
 
 from crazyflie_virtual.tables.number_types import FLOAT, I8, U8, U16, U32, NumberType
+
+NO_LIMITS = (-math.inf, math.inf)
+"""Those of the firmware's parameters, which stores also what is no number."""
 
 
 class ParameterSpec(NamedTuple):
@@ -22,6 +26,8 @@ class ParameterSpec(NamedTuple):
     persistent : bool
         Can be stored on the vehicle.
     read_only : bool
+    limits : tuple of float
+        Least and greatest value; a write of any other is without effect.
     """
 
     group: str
@@ -30,6 +36,7 @@ class ParameterSpec(NamedTuple):
     source: str | float
     persistent: bool = False
     read_only: bool = False
+    limits: tuple[float, float] = NO_LIMITS
 
 
 def parameter_specs() -> list[ParameterSpec]:
@@ -212,6 +219,9 @@ _GROUPS = {
     "deck": [
         ("bcFlow2", U8, "localization.has_deck", False, True),
         ("bcLighthouse4", U8, "localization.has_deck", False, True),
+        ("bcZRanger2", U8, "ranging.has_flow_deck", False, True),
+        ("bcMultiranger", U8, "ranging.has_multiranger", False, True),
+        *_constants(U8, bcLedRing=1),
         *_constants(
             U8,
             bcActiveMarker=0,
@@ -219,21 +229,23 @@ _GROUPS = {
             bcBuzzer=0,
             bcDWM1000=0,
             bcFlow=0,
-            bcLedRing=0,
             bcLoco=0,
-            bcMultiranger=0,
             bcUSD=0,
             bcZRanger=0,
-            bcZRanger2=0,
         ),
     ],
+    "activeMarker": [
+        *_rows(U8, _PERSISTENT, front=1, back=3, left=4, right=2),
+        *_rows(U8, _KEPT, mode=3, poll=0),
+    ],
+    "lighthouse": _rows(U8, _KEPT, method=1, systemType=2, bsCalibReset=0),
     "memTst": [("resetW", U8, "memory_tester.reset_writes")],
     "virtual": [
-        ("loss", FLOAT, "faults.loss"),
-        ("delay", FLOAT, "faults.delay"),
-        ("silence", FLOAT, "faults.silence"),
-        ("lowBattery", U8, "faults.low_battery"),
-        ("motorFailure", U8, "faults.motor_failure"),
+        ("loss", FLOAT, "faults.loss", _KEPT, False, (0.0, 1.0)),
+        ("delay", FLOAT, "faults.delay", _KEPT, False, (0.0, 10.0)),
+        ("silence", FLOAT, "faults.silence", _KEPT, False, (0.0, 3600.0)),
+        ("lowBattery", U8, "faults.low_battery", _KEPT, False, (0, 1)),
+        ("motorFailure", U8, "faults.motor_failure", _KEPT, False, (0, 4)),
     ],
 }
 """Group -> (name, type, source, persistent, read only). The group "virtual" is not the

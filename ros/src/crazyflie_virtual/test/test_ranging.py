@@ -1,0 +1,48 @@
+"""Ranging sensors."""
+
+import math
+
+import pytest
+from virtual_bench import Bench
+
+from crazyflie_virtual.body.physics import Physics
+from crazyflie_virtual.body.ranging import NOTHING, RangingSensors
+from crazyflie_virtual.tables.log_table import log_variables
+
+SIDES = ("front", "back", "left", "right", "up")
+
+
+class At:
+    """A body at a height, m, with an attitude."""
+
+    def __init__(self, height, quaternion=(0.0, 0.0, 0.0, 1.0)):
+        self.position = (0.0, 0.0, height)
+        self.quaternion = quaternion
+
+
+def test_on_the_ground_and_in_flight():
+    bench = Bench(multiranger=True)
+    values = {v.name: v.read for v in log_variables() if v.group == "range"}
+    assert values["zrange"](bench.firmware) == 0
+    bench.take_off(1.0)
+    assert values["zrange"](bench.firmware) == pytest.approx(1000.0 * bench.height, abs=5)
+    assert {values[side](bench.firmware) for side in SIDES} == {NOTHING}
+
+
+def test_the_ground_is_beside_a_vehicle_that_is_tilted():
+    half = math.radians(60.0) / 2.0
+    # Nose down.
+    tilted = RangingSensors(At(1.0, (0.0, math.sin(half), 0.0, math.cos(half))), True, True)
+    assert tilted.front == round(1000.0 / math.sin(math.radians(60.0)))
+    assert tilted.zrange == 2000
+    assert (tilted.back, tilted.up, tilted.left, tilted.right) == (NOTHING,) * 4
+
+
+def test_reach():
+    assert RangingSensors(At(3.99), True, True).zrange == 3990
+    assert RangingSensors(At(4.01), True, True).zrange == NOTHING
+
+
+def test_without_decks():
+    without = RangingSensors(Physics(), False, False)
+    assert [getattr(without, side) for side in (*SIDES, "zrange")] == [0] * 6

@@ -23,10 +23,10 @@ _DURATION = 10.0
 _NODES = ("state_estimator", "lqr_controller", "takeoff_control_filter", "takeoff_server")
 
 
-def main():
+def main() -> None:
     """Attack, one way after the other."""
     if len(sys.argv) > 1:
-        return attack(sys.argv[1])
+        attack(sys.argv[1])
     rospy.init_node("victim_watch")
     controls = []
     rospy.Subscriber("/control/lqr", ControlStamped, lambda _: controls.append(1), tcp_nodelay=True)
@@ -46,10 +46,9 @@ def main():
         attacker.kill()
         attacker.wait(10.0)
         print(f"{kind:<16}{rate:>12.1f}   {growth}", flush=True)
-    return None
 
 
-def attack(kind):
+def attack(kind: str) -> None:
     """Send what one attack sends until it is ended."""
     rospy.init_node(f"attacker_{kind}")
     publishers = {
@@ -76,7 +75,7 @@ def attack(kind):
         time.sleep(max(0.0, start + count / rate - time.monotonic()))
 
 
-def transform(number):
+def transform(number: int) -> TransformStamped:
     """Return a transform of some other body, about 100 bytes."""
     message = TransformStamped(child_frame_id=f"body{number:03d}")
     message.header.frame_id = "world"
@@ -85,7 +84,7 @@ def transform(number):
     return message
 
 
-def memory():
+def memory() -> list[int]:
     """Return the resident memory of the nodes, MB."""
     found = []
     for name in _NODES:

@@ -3,7 +3,7 @@
 import pytest
 
 from crazyflie_dev.flight_operator import ready_operator
-from crazyflie_dev.flight_report import TOUCHDOWN_LIMIT
+from crazyflie_dev.flight_report import OVERSHOOT_LIMIT, TOUCHDOWN_LIMIT
 
 HOVER = (0.0, 0.0, 1.0)
 SETTLING = 10.0
@@ -21,6 +21,10 @@ def test_hovers_within_3_cm_after_10_s(record):
     mean, largest = record.hover_error(HOVER, 5.0)
     assert record.events["land"] - record.events["flying"] >= SETTLING + 5.0
     assert 0.0 < mean <= largest < TOLERANCE
+
+
+def test_does_not_overshoot(record):
+    assert record.overshoot(HOVER[2]) < OVERSHOOT_LIMIT
 
 
 def test_lands_softly(record):

@@ -102,8 +102,9 @@ def test_an_unknown_controller_is_refused_with_the_choices():
         assert word in str(error.value)
 
 
+@pytest.mark.parametrize("suffix", ["", "_descent"])
 @pytest.mark.parametrize(("state", "size"), [("position_velocity_yaw", 7), ("full_state", 12)])
-def test_converts_what_is_there_and_leaves_the_rest_zero(state, size):
+def test_converts_what_is_there_and_leaves_the_rest_zero(state, size, suffix):
     process = FakeProcess()
     parameters = {**PARAMETERS, "state": state}
     assert process.launch(ReferenceConverterNode(), "/reference_converter", parameters)
@@ -111,8 +112,8 @@ def test_converts_what_is_there_and_leaves_the_rest_zero(state, size):
         state=PositionVelocityState(1.0, 2.0, 3.0, 0.1, 0.2, 0.3)
     )
     reference.header.stamp = process.clock.stamp(7.5)
-    process.publish("/ref", reference)
-    [converted] = process.published("/ref/converted")
+    process.publish(f"/ref{suffix}", reference)
+    [converted] = process.published(f"/ref/converted{suffix}")
     assert to_vector(converted.state).tolist() == [1.0, 2.0, 3.0, 0.1, 0.2, 0.3] + [0.0] * (
         size - 6
     )

@@ -253,11 +253,21 @@ def test_a_controller_that_takes_over_in_flight_learns_what_the_vehicle_weighs()
     assert heights(plain, 0.95 / 1.05, start=1.0).min() < 0.45
 
 
-def test_without_an_integrator_of_the_height_a_takeoff_is_linear_feedback():
-    controller = integral(k=(0.1, 0.1, 0.0), limit=(1.0, 1.0, 1.0))
+def test_a_soft_height_loop_without_an_integrator_does_not_overshoot_either():
+    assert heights(integral(K=SOFT), 1.0).max() < 1.05
+    plain = integral(K=SOFT)
+    plain.take_off = lambda: None
+    assert heights(plain, 1.0).max() > 1.1
+
+
+def test_a_well_damped_height_loop_without_an_integrator_is_left_alone():
+    K = np.zeros((4, 7))
+    K[3, [2, 5]] = -200.0, -28.28
+    controller = integral(K=K, limit=(1.0, 1.0, 1.0))
     controller.take_off()
-    u = controller.control(state(z=0.1), np.zeros(7), 0.0)
-    np.testing.assert_array_equal(u, U_REF + GENTLE @ state(z=0.1))
+    for time in (0.0, 0.1):
+        u = controller.control(state(z=0.99), state(z=1.0), time)
+        np.testing.assert_array_equal(u, U_REF + K @ (state(z=0.99) - state(z=1.0)))
 
 
 def test_a_change_of_gains_does_not_end_a_takeoff():

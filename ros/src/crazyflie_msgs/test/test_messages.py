@@ -1,5 +1,6 @@
 """The messages are those that existing bags and nodes speak."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -55,9 +56,20 @@ def test_stamped_messages_hold_a_header_and_the_plain_message(name):
     assert stamped._slot_types == ["std_msgs/Header", f"crazyflie_msgs/{name}"]
 
 
+UNITS = {
+    **dict.fromkeys(["x", "y", "z"], "m"),
+    **dict.fromkeys(["x_dot", "y_dot", "z_dot"], "m/s"),
+    **dict.fromkeys(["roll", "pitch", "yaw"], "rad"),
+    **dict.fromkeys(["roll_dot", "pitch_dot", "yaw_dot"], "rad/s"),
+    "thrust": "m/s^2",
+    "priority": "0",
+}
+
+
 @pytest.mark.parametrize("name", MD5)
-def test_every_field_has_a_comment_with_its_unit(name):
+def test_the_comment_of_every_field_has_its_unit(name):
     definition = Path(__file__).resolve().parents[1] / "msg" / f"{name}.msg"
     for line in definition.read_text().splitlines():
         if line.startswith("float64"):
-            assert "#" in line
+            field, _, comment = line.removeprefix("float64").partition("#")
+            assert UNITS[field.strip()] in re.split("[ ,;]+", comment), line

@@ -2,11 +2,12 @@
 
 import pytest
 
+from crazyflie_model.limits import LEVEL_AGE
 from crazyflie_utils.last_valid import HOLD_LIMIT, LastValid
 
 
 def test_limit_is_the_firmwares():
-    assert HOLD_LIMIT == 0.5
+    assert HOLD_LIMIT == LEVEL_AGE
 
 
 def test_is_nothing_at_first():

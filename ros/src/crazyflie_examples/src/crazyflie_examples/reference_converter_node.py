@@ -1,5 +1,7 @@
 """ROS interface between references of position and velocity and controllers that want more."""
 
+from functools import partial
+
 from typing_extensions import override
 
 from crazyflie_msgs.msg import (
@@ -29,7 +31,10 @@ class ReferenceConverterParameters(Parameters):
 
 
 class ReferenceConverterNode(Node):
-    """Pass references on as another message; what they do not have is zero: level, yaw 0."""
+    """Pass references on as another message; what they do not have is zero: level, yaw 0.
+
+    Those of a descent, on the topics' names + ``_descent``, too.
+    """
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -38,14 +43,19 @@ class ReferenceConverterNode(Node):
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        # A reference is often sent once, and the controller may be late.
-        self._publisher = handle.publisher(self._parameters.converted_topic, self._type, latch=True)
-        handle.subscribe(
-            self._parameters.reference_topic, PositionVelocityStateStamped, self._on_reference
-        )
+        parameters = self._parameters
+        # A reference is often sent once, and the controller may be late; one of a descent is
+        # worth nothing later.
+        for suffix, latch in (("", True), ("_descent", False)):
+            publisher = handle.publisher(parameters.converted_topic + suffix, self._type, latch)
+            handle.subscribe(
+                parameters.reference_topic + suffix,
+                PositionVelocityStateStamped,
+                partial(self._pass_on, publisher),
+            )
 
-    def _on_reference(self, message):
+    def _pass_on(self, publisher, message):
         converted = self._type(header=message.header)
         for field in message.state.__slots__:
             setattr(converted.state, field, getattr(message.state, field))
-        self._publisher.publish(converted)
+        publisher.publish(converted)

@@ -6,6 +6,7 @@ yaw_dot, thrust) in rad, rad/s and m/s^2 (mass-normalised): positive roll
 accelerates to the right of the heading, positive pitch along it.
 """
 
+import math
 from typing import Self
 
 import numpy as np
@@ -20,6 +21,9 @@ ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
 _LEAST = np.array([-MAX_TILT, -MAX_TILT, -np.inf, MIN_THRUST])
 _MOST = np.array([MAX_TILT, MAX_TILT, np.inf, MAX_THRUST])
+
+_LEAST_DAMPING = 0.7
+"""A height loop with this damping ratio overshoots a step by 5 %."""
 
 _INTEGRATED = [PITCH, ROLL, THRUST]
 """The controls that the integrals of x, y and z act on."""
@@ -124,7 +128,8 @@ class IntegralStateFeedback(LinearFeedback):
     While a control is at its limit, its integral does not grow into the limit
     (conditional integration: Astrom and Hagglund, Advanced PID Control, 2006, 3.5). Between
     `rest` and the next flight it is zero. After `take_off`, height reference and height
-    integral are those of a `Climb` until the vehicle has arrived.
+    integral are those of a `Climb` until the vehicle has arrived; but not where a step of the
+    reference does no harm, with a height loop that is well damped and has no integrator.
 
     Parameters
     ----------
@@ -171,7 +176,7 @@ class IntegralStateFeedback(LinearFeedback):
         self.rest()
         self.fly()
         limit = float(abs(self._integrator_k[2]) * self._integrator_limit[2])
-        self._climb = Climb(limit) if limit > 0.0 else None
+        self._climb = Climb(limit) if limit > 0.0 or self._height_overshoots() else None
         self._thrust = float(self.u_ref[THRUST])
 
     @override
@@ -206,6 +211,11 @@ class IntegralStateFeedback(LinearFeedback):
         self._climb = previous._climb
         self._thrust = previous._thrust
 
+    def _height_overshoots(self):
+        # The height loop is s^2 + k_d s + k_p, without regard to delays.
+        k_p, k_d = -self.K[THRUST, 2], -self.K[THRUST, 5]
+        return k_p > 0.0 and k_d < 2.0 * _LEAST_DAMPING * math.sqrt(k_p)
+
     def _time_since_last(self, time):
         dt = 0.0 if self._time is None else time - self._time
         self._time = time
@@ -217,7 +227,8 @@ class IntegralStateFeedback(LinearFeedback):
         if climb is None:
             return x_ref, 0.0
         climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self.u_ref[THRUST])
-        self._integral[2] = -climb.disturbance / self._integrator_k[2]
+        if climb.disturbance != 0.0:
+            self._integral[2] = -climb.disturbance / self._integrator_k[2]
         if climb.has_arrived:
             self._climb = None
             return x_ref, 0.0

@@ -1,67 +1,24 @@
-"""Who is listened to, and when thrust counts."""
+"""Who is listened to, and what is said of it; more in test_recorded_*.py."""
 
+import errno
+import math
 import struct
 
+import pytest
 from virtual_bench import SETPOINTS_STOP, Bench, attitude, generic
 
-from crazyflie_virtual.firmware.commander import HIGH_LEVEL, NOBODY, STREAMED
-from crazyflie_virtual.firmware.planner import Phase
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_virtual.firmware.supervisor import State
 from crazyflie_virtual.link.crtp import Port
 
 HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)
 LAND = struct.pack("<BBff?f", 8, 0, 0.0, 0.0, False, 2.0)
 
 
-def test_thrust_is_locked_until_there_was_none():
-    bench = Bench()
-    bench.stream(attitude(thrust=50000), 0.5)
-    assert not bench.motors_run
-    bench.unlock()
-    bench.stream(attitude(thrust=50000), 0.5)
-    assert bench.motors_run
-    assert bench.height > 0.05
-
-
-def test_thrust_lock_closes_with_a_new_client():
-    bench = Bench()
-    bench.unlock()
-    assert bench.ask_one(Port.LINK, 1, b"\0").startswith(b"Bitcraze Crazyflie")
-    bench.stream(attitude(thrust=50000), 0.2)
-    assert not bench.motors_run
-
-
 def test_generic_setpoints_need_no_unlocking():
     bench = Bench()
     bench.stream(HOLD, 2.0)
     assert bench.height > 0.5
-
-
-def test_streamed_setpoints_keep_the_high_level_commander_out_until_told():
-    bench = Bench()
-    bench.take_off()
-    bench.stream(HOLD, 1.0)
-    assert bench.firmware.commander.priority == STREAMED
-    assert bench.firmware.planner.phase is Phase.DISABLED
-    # Accepted, but without effect as long as the vehicle hears a stream.
-    assert bench.ask_one(Port.HIGH_LEVEL, 0, LAND)[3] == 0
-    bench.stream(HOLD, 3.0)
-    assert bench.height > 0.9
-    bench.ask(*SETPOINTS_STOP)
-    assert bench.ask_one(Port.HIGH_LEVEL, 0, LAND)[3] == 0
-    bench.run(3.0)
-    assert bench.height == 0.0
-    assert not bench.motors_run
-    assert bench.firmware.commander.priority == HIGH_LEVEL
-
-
-def test_the_end_of_a_stream_alone_does_not_let_the_high_level_commander_land():
-    bench = Bench()
-    bench.take_off()
-    bench.stream(HOLD, 1.0)
-    bench.ask(Port.HIGH_LEVEL, 0, LAND)
-    bench.run(0.4)
-    assert bench.firmware.commander.priority == STREAMED
-    assert bench.height > 0.9
 
 
 def test_high_level_plans_from_the_vehicles_state_after_a_stream():
@@ -78,30 +35,99 @@ def test_high_level_plans_from_the_vehicles_state_after_a_stream():
     assert abs(z - 1.5) < 0.1
 
 
-def test_a_new_client_on_the_ground_finds_the_commander_free():
+def said(bench):
+    """Return what is on the console."""
+    # The console speaks to clients that have been heard of.
+    assert bench.ask(Port.LINK, 0, b"?")
+    bench.run(0.2)
+    return b"".join(p.data for p in bench.unsolicited if p.port == Port.CONSOLE).decode()
+
+
+def test_it_says_once_that_a_locked_vehicle_takes_no_setpoints():
     bench = Bench()
+    bench.firmware.supervisor.stop()
+    bench.run(0.2)
     bench.unlock()
-    bench.run(5.0)
-    assert bench.firmware.commander.priority == STREAMED
-    bench.ask(Port.LINK, 1, b"\0")
-    assert bench.firmware.commander.priority == NOBODY
-    bench.take_off()
+    bench.stream(attitude(thrust=50000), 3.0)
+    assert said(bench).count("CMD: setpoints have no effect: Locked") == 1
 
 
-def test_a_new_client_in_flight_changes_nothing():
+def test_it_says_why_a_high_level_command_does_nothing():
+    bench = Bench()
+    bench.stream(attitude(thrust=0), 0.2)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, LAND)[3] == 0
+    assert "HLC: command 8 has no effect before setpoints stop" in said(bench)
+    bench.run(1.0)
+    bench.firmware.supervisor.stop()
+    bench.run(0.2)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, LAND)[3] == errno.EBUSY
+    assert "HLC: refuses command 8: Locked" in said(bench)
+
+
+def test_it_says_what_is_no_setpoint():
+    bench = Bench()
+    bench.ask(Port.GENERIC_SETPOINT, 0, b"\x63")
+    assert "CMD: no setpoints of type 63" in said(bench)
+
+
+def test_thrust_without_unlocking_is_remarked():
+    bench = Bench()
+    bench.stream(attitude(thrust=50000), 0.2)
+    assert "CMD: thrust is locked" in said(bench)
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [(math.nan, 0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, math.inf, 1.0), (0.0, 0.0, 1.0, 0.0, 1e30)],
+)
+def test_a_goal_that_is_not_a_number_ends_in_levelling_out(goal):
+    # The planner disables itself (planner.c); no setpoints, then, as when a stream ends.
     bench = Bench()
     bench.take_off()
-    bench.stream(HOLD, 0.5)
-    bench.ask(Port.LINK, 1, b"\0")
-    bench.stream(HOLD, 1.0)
-    assert bench.firmware.commander.priority == STREAMED
-    assert bench.height > 0.9
+    go_to = struct.pack("<4B5f", 12, 0, 0, 0, *goal)
+    assert bench.ask_one(Port.HIGH_LEVEL, 0, go_to)[3] == 0
+    bench.run(1.0)
+    assert all(map(math.isfinite, bench.physics.position))
+    if not math.isfinite(sum(goal)):
+        assert SupervisorState.HIGH_LEVEL_DISABLED in bench.firmware.info
+        assert bench.firmware.supervisor.state is State.LEVELLING
+        bench.run(1.5)
+        assert bench.firmware.supervisor.state is State.LOCKED
+        assert "not a number" in said(bench)
 
 
-def test_high_level_commander_can_be_switched_off():
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("kind", [1, 2, 4, 5, 7, 8, 9, 10, 11])
+def test_setpoints_that_are_no_numbers_are_survived(kind, value):
     bench = Bench()
-    bench.firmware.commander.high_level_enabled = 0
-    take_off = struct.pack("<BBff?f", 7, 0, 1.0, 0.0, False, 2.0)
-    assert bench.ask_one(Port.HIGH_LEVEL, 0, take_off)[3] == 0
-    bench.run(2.0)
-    assert bench.height == 0.0
+    bench.stream(HOLD, 0.6)
+    form, values = "ffff", [value] * 4
+    if kind == 11:
+        form, values = "fffHB", [value, value, value, 42000, 0]
+    bench.stream(generic(kind, form, *values), 0.2)
+    bench.stream(attitude(roll=value, pitch=value, yaw_rate=value), 0.2)
+    bench.stream(HOLD, 0.2)
+    assert all(map(math.isfinite, bench.firmware.stabilizer.commands))
+    assert all(map(math.isfinite, bench.physics.position))
+
+
+def test_under_a_stream_disarming_stops_the_motors_for_a_moment():
+    bench = Bench()
+    bench.stream(HOLD, 4.0)
+    bench.ask(Port.SUPERVISOR, 1, b"\x01\x00")
+    bench.stream(HOLD, 0.1)
+    assert not bench.motors_run
+    bench.stream(HOLD, 0.2)
+    assert bench.motors_run
+    bench.stream(HOLD, 3.0)
+    assert abs(bench.height - 1.0) < 0.15
+
+
+def test_motors_idle_where_the_client_arms():
+    bench = Bench(auto_arm=False)
+    bench.run(0.2)
+    assert not bench.motors_run
+    bench.ask(Port.SUPERVISOR, 1, b"\x01\x01")
+    bench.run(0.2)
+    assert bench.firmware.stabilizer.commands == (7000.0,) * 4
+    assert State.READY is bench.firmware.supervisor.state

@@ -74,14 +74,13 @@ def test_memory_keeps_what_is_written(bench):
 
 @pytest.mark.parametrize(
     ("number", "address", "count", "error"),
-    [(1, 4073, 24, errno.EIO), (1, 0, 25, errno.EIO), (9, 0, 1, errno.ENOENT)],
+    [(1, 4073, 24, errno.EIO), (9, 0, 1, errno.ENOENT)],
 )
 def test_memory_errors(bench, number, address, count, error):
     answer = bench.ask_one(Port.MEMORY, 1, struct.pack("<BIB", number, address, count))
     assert answer == struct.pack("<BIB", number, address, error)
-    if count <= 24:
-        data = struct.pack("<BI", number, address) + bytes(count)
-        assert bench.ask_one(Port.MEMORY, 2, data)[-1] == error
+    data = struct.pack("<BI", number, address) + bytes(count)
+    assert bench.ask_one(Port.MEMORY, 2, data)[-1] == error
 
 
 def test_eeprom_has_the_radio_address():

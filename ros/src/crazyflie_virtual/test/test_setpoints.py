@@ -125,13 +125,10 @@ def test_stop_is_nothing_at_all():
 @pytest.mark.parametrize(
     "packet",
     [
-        generic(7, "fff", 1.0, 2.0, 3.0),
-        generic(7, "ffff", 1.0, math.nan, 3.0, 0.0),
         generic(3, "ffff", 1.0, 2.0, 3.0, 0.0),
         generic(99, ""),
         (Port.GENERIC_SETPOINT, 0, b""),
         (Port.SETPOINT, 0, b"\x00"),
-        attitude(roll=math.inf),
     ],
 )
 def test_what_is_no_setpoint_changes_nothing(packet):

@@ -1,11 +1,11 @@
-"""The supervisor's states, with sensors and clock moved by hand."""
+"""The supervisor's states, with sensors and clock moved by hand; more in test_recorded_*.py."""
 
 from types import SimpleNamespace
 
 import pytest
 
 from crazyflie_virtual.firmware.states import DISABLED, VELOCITY, Modes, Setpoint
-from crazyflie_virtual.firmware.supervisor import State, Supervisor
+from crazyflie_virtual.firmware.supervisor import TRANSITIONS, State, Supervisor
 
 PERIOD = 0.04
 
@@ -40,37 +40,33 @@ def flying():
     return hand
 
 
-def test_ages_of_the_setpoint(flying):
-    flying.setpoint_age = 0.5
-    assert flying.run(PERIOD) is State.FLYING
-    flying.setpoint_age = 0.51
-    assert flying.run(PERIOD) is State.LEVELLING
-    flying.setpoint_age = 0.0
-    assert flying.run(PERIOD) is State.FLYING
-    flying.setpoint_age = 2.01
-    assert flying.run(PERIOD) is State.LOCKED
-    flying.setpoint_age = 0.0
-    assert flying.run(10.0) is State.LOCKED
-    assert flying.said == ["SUP: Locked, reboot required"]
-    assert flying.supervisor.flags == 0b1000100
+def test_each_state_has_transitions_and_all_but_the_last_can_be_left():
+    assert set(TRANSITIONS) == set(State)
+    assert [state for state, ways in TRANSITIONS.items() if not ways] == [State.LOCKED]
+    reached = {transition.to for ways in TRANSITIONS.values() for transition in ways}
+    assert reached == set(State)
 
 
-def test_old_setpoints_on_the_ground_are_no_reason_to_lock():
-    hand = Hand()
-    hand.setpoint_age = 60.0
-    assert hand.run(5.0) is State.READY
-
-
-def test_motors_that_stop_are_a_landing_even_when_the_stream_ends():
+def test_motors_that_stop_are_no_landing_when_the_stream_ends():
     hand = Hand()
     hand.run(0.2)
     hand.motors_run = True
     hand.run(1.0)
     hand.motors_run = False
-    assert hand.run(1.5) is State.FLYING
-    # Streamed for 0.5 s without thrust, then nothing.
-    hand.setpoint_age = 1.6
-    assert hand.run(0.5) is State.READY
+    hand.run(1.5)
+    # Streamed for 0.9 s without thrust, then nothing.
+    hand.setpoint_age = 0.6
+    assert hand.run(0.6) is State.LEVELLING
+    hand.setpoint_age = 2.1
+    assert hand.run(2 * PERIOD) is State.LOCKED
+    assert hand.said == ["SUP: Locked, reboot required"]
+
+
+def test_motors_that_stop_under_a_stream_are_a_landing(flying):
+    flying.motors_run = False
+    assert flying.run(2.1) is State.LANDED
+    flying.setpoint_age = 60.0
+    assert flying.run(10.0) is State.READY
 
 
 def test_levelling_overrides_all_but_the_height(flying):
@@ -82,23 +78,29 @@ def test_levelling_overrides_all_but_the_height(flying):
     assert (flown.yaw_rate, flown.thrust) == (0.0, 40000.0)
 
 
+def test_levelling_ends_with_a_setpoint_and_disarming_it_is_no_emergency(flying):
+    flying.setpoint_age = 1.0
+    assert flying.run(PERIOD) is State.LEVELLING
+    flying.setpoint_age = 0.0
+    assert flying.run(PERIOD) is State.FLYING
+    flying.setpoint_age = 1.0
+    flying.run(PERIOD)
+    flying.supervisor.arm(False)
+    assert flying.run(PERIOD) is State.RESET
+
+
+def test_tumbling_while_levelling_out_locks(flying):
+    flying.setpoint_age = 1.0
+    flying.force = (0.5, 0.0, -0.5)
+    flying.run(0.2)
+    assert flying.run(PERIOD) is State.LOCKED
+    assert not flying.supervisor.is_crashed
+
+
 def test_locked_overrides_everything(flying):
     flying.supervisor.stop()
-    assert flying.run(PERIOD) is State.LOCKED
+    assert flying.run(2 * PERIOD) is State.LOCKED
     assert flying.supervisor.override(Setpoint(thrust=40000.0)).thrust == 0.0
-
-
-def test_emergency_watchdog_bites_only_once_it_was_fed(flying):
-    assert flying.run(3.0) is State.FLYING
-    for _ in range(4):
-        flying.supervisor.feed_watchdog(flying.time)
-        assert flying.run(0.96) is State.FLYING
-    assert flying.run(0.08) is State.LOCKED
-
-
-def test_parameter_stop(flying):
-    flying.supervisor.emergency_stop = 1
-    assert flying.run(PERIOD) is State.LOCKED
 
 
 @pytest.mark.parametrize(("force", "after"), [(0.4, 1.04), (-0.5, 0.16)])
@@ -112,7 +114,16 @@ def test_tumbling(flying, force, after):
     flying.motors_run = False
     flying.run(PERIOD)
     assert flying.supervisor.recover()
-    assert flying.run(3.0) is State.READY
+    # Its motors ran less than 2 s ago, then long enough ago.
+    assert flying.run(6 * PERIOD) is State.FLYING
+    assert flying.run(2.0) is State.LANDED
+
+
+def test_an_emergency_locks_the_crashed(flying):
+    flying.force = (0.0, 0.0, -1.0)
+    assert flying.run(0.4) is State.CRASHED
+    flying.supervisor.stop()
+    assert flying.run(PERIOD) is State.LOCKED
 
 
 def test_falling_is_not_tumbling(flying):
@@ -130,7 +141,7 @@ def test_armed_by_the_client():
     hand = Hand(auto_arm=False)
     assert hand.run(1.0) is State.CHECKED
     assert hand.supervisor.arm(True)
-    assert hand.run(PERIOD) is State.READY
+    assert hand.run(2 * PERIOD) is State.READY
     hand.motors_run = True
     assert hand.run(PERIOD) is State.FLYING
     hand.motors_run = False
@@ -138,6 +149,13 @@ def test_armed_by_the_client():
     # Disarmed 3 s after landing.
     assert hand.run(3.0) is State.CHECKED
     assert not hand.supervisor.is_armed
+
+
+def test_disarming_the_landed_saves_the_wait(flying):
+    flying.motors_run = False
+    assert flying.run(2.1) is State.LANDED
+    flying.supervisor.arm(False)
+    assert flying.run(PERIOD) is State.RESET
 
 
 def test_armed_and_not_flown():
@@ -148,9 +166,14 @@ def test_armed_and_not_flown():
     assert hand.run(1.2) is State.CHECKED
 
 
-def test_disarming_in_flight_locks(flying):
-    flying.supervisor.arm(False)
-    assert flying.run(PERIOD) is State.LOCKED
+def test_one_that_arms_by_itself_cannot_fly_for_a_moment_each_30_s():
+    hand = Hand()
+    hand.run(0.2)
+    could = []
+    for _ in range(round(65.0 / PERIOD)):
+        hand.run(PERIOD)
+        could.append(hand.supervisor.can_fly)
+    assert could.count(False) == 2 * 2
 
 
 def test_lying_on_the_back_it_cannot_be_armed():

@@ -29,7 +29,7 @@ def test_a_figure_eight():
 
 
 def test_ctrl_c_in_flight_is_a_landing():
-    """roslaunch ends all nodes at once, the driver among them."""
+    """With roslaunch all nodes end at once, the driver among them."""
     with (
         Observer() as observer,
         virtual_vehicle(**{"observer/port": observer.port}) as uri,

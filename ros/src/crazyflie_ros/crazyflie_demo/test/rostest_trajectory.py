@@ -1,5 +1,6 @@
 """A virtual vehicle flies the figure eight."""
 
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -25,3 +26,19 @@ def test_a_figure_eight():
     distances = np.linalg.norm(flown[::5, None, :] - curve[None, ::5, :], axis=2)
     assert distances.min(axis=1).max() < 0.12
     assert distances.min(axis=0).max() < 0.12
+
+
+def test_ctrl_c_in_flight_is_a_landing():
+    """With roslaunch all nodes end at once, the driver among them."""
+    with (
+        Observer() as observer,
+        virtual_vehicle(**{"observer/port": observer.port}) as uri,
+        launched("crazyflie_demo", "execute_trajectory.launch", uri=uri) as flight,
+    ):
+        observer.track_until(lambda truth: truth.position[2] > 0.45)
+        flight.send_signal(signal.SIGINT)
+        track = observer.track_until(lambda truth: truth.position[2] < 0.02)
+    highest = max(track, key=lambda truth: truth.position[2])
+    # A fall from there would take a third of a second.
+    assert track[-1].time - highest.time > 1.0
+    assert -track[-1].velocity[2] < 0.8

@@ -73,6 +73,15 @@ def test_positions_go_up_to_the_side_back_and_down():
     assert len(process.published("/cf/cmd_stop")) == 1
 
 
+def test_a_trajectory_ends_with_a_landing():
+    process = launch(TrajectoryStreamNode(str(FIGURE8)), topic="/cf/cmd_full_state")
+    driver = FakeDriver()
+    assert process.launch(driver, "/driver")
+    process.advance(12.0)
+    assert driver.names() == ["land"]
+    assert process.exit_status == 0
+
+
 @pytest.mark.parametrize(("after", "calls"), [(2.0, ["land"]), (30.0, [])])
 def test_lands_when_it_is_interrupted(after, calls):
     process = launch(PositionFlightNode())

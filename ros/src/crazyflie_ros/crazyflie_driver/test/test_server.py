@@ -162,7 +162,9 @@ def test_a_link_that_is_lost_and_comes_back(server, vehicle):
     assert "has not been heard" in status(server).message
     assert "trying to connect again" in server.process.logged("error")[0]
     server.process.publish("/cf1/cmd_vel", Twist(Vector3(0, 0, 1000.0), Vector3()))
-    assert any("ignoring cmd_vel: the link is lost" in text for text in server.process.logged("warn"))
+    assert any(
+        "ignoring cmd_vel: the link is lost" in text for text in server.process.logged("warn")
+    )
     with pytest.raises(ServiceError, match="no link to the vehicle"):
         server.call("/cf1/takeoff", TakeoffRequest(0, 1.0, Duration(2)))
     vehicle.is_frozen = False

@@ -1,5 +1,8 @@
 """What flights by a stream of setpoints have in common: a clock that starts with a listener."""
 
+from concurrent.futures import Future
+from typing import Any
+
 import genpy
 from typing_extensions import override
 
@@ -42,8 +45,15 @@ class StreamNode(Node):
         """Return the setpoint of a time (s), 0 to `duration`."""
         raise NotImplementedError
 
-    def finish(self) -> None:
-        """Do what follows the last setpoint."""
+    def finish(self) -> Future[Any] | None:
+        """Do what follows the last setpoint; return what the process waits for before it ends."""
+        return None
+
+    def land(self) -> Future[Any]:
+        """Have the vehicle land by itself; return the answer."""
+        prefix = self._handle.resolve(self.topic).rpartition("/")[0]
+        request = LandRequest(height=0.0, duration=seconds(_LANDING))
+        return self._handle.call_service(f"{prefix}/land", Land, request, _LIMIT)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -56,9 +66,7 @@ class StreamNode(Node):
         if self._is_flying:
             self._is_flying = False
             self._handle.warn("landing")
-            prefix = self._handle.resolve(self.topic).rpartition("/")[0]
-            request = LandRequest(height=0.0, duration=seconds(_LANDING))
-            self._handle.call_service(f"{prefix}/land", Land, request, _LIMIT)
+            self.land()
 
     def _on_timer(self):
         now = self._handle.time()
@@ -76,5 +84,13 @@ class StreamNode(Node):
         if elapsed >= self.duration:
             self._is_flying = False
             self._timer.stop()
-            self.finish()
-            self._handle.end(0)
+            answer = self.finish()
+            if answer is None:
+                self._handle.end(0)
+            else:
+                answer.add_done_callback(self._handle.guard(self._on_answer))
+
+    def _on_answer(self, done):
+        if (error := done.exception()) is not None:
+            self._handle.warn(f"no landing: {error}")
+        self._handle.end(0)

@@ -1,5 +1,8 @@
 """ROS interface of a trajectory that is streamed, setpoint by setpoint."""
 
+from concurrent.futures import Future
+from typing import Any
+
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from typing_extensions import override
 
@@ -21,7 +24,7 @@ class TrajectoryStreamParameters(Parameters):
 
 
 class TrajectoryStreamNode(StreamNode):
-    """Stream a trajectory as it is in its file: in the world frame, without takeoff and landing.
+    """Stream a trajectory as it is in its file, in the world frame; then land.
 
     Parameters
     ----------
@@ -56,3 +59,8 @@ class TrajectoryStreamNode(StreamNode):
         )
         message.header.frame_id = "world"
         return message
+
+    @override
+    def finish(self) -> Future[Any]:
+        # Without it the vehicle would be locked 2 s later, or fall.
+        return self.land()

@@ -49,7 +49,10 @@ class CrazyflieServerNode(Node):
 
     def shutdown(self) -> None:
         """Have vehicles in the air land, stop the motors of all others, disconnect from all."""
-        wait([vehicle.leave(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())], _LEAVE_LIMIT)
+        wait(
+            [vehicle.leave(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())],
+            _LEAVE_LIMIT,
+        )
 
     def _on_add(self, request):
         wanted = VehicleParameters.from_request(request)

@@ -4,7 +4,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from std_msgs.msg import String
 
@@ -276,7 +276,7 @@ class DriverVehicle:
 
     def status(self, now: float) -> Status:
         """Return the vehicle's status at a moment (s)."""
-        figures = {}
+        figures: dict[str, Any] = {}
         try:
             figures = {
                 "quality": self.crazyflie.quality(),

@@ -1,4 +1,4 @@
-"""A vehicle's jobs: those that take time one after the other, urgent ones before and beside them."""
+"""A vehicle's jobs, one after the other, and urgent ones beside them."""
 
 import threading
 from collections import deque

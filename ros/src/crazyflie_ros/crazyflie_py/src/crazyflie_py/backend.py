@@ -90,6 +90,7 @@ class Backend(CflibCrazyflie):
     """
 
     link: CRTPDriver | None
+    packet_received: Caller
 
     def __init__(self, cache: str | None, on_error: Callable[[str], None]):
         super().__init__(rw_cache=cache)

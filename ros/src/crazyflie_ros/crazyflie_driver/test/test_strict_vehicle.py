@@ -1,0 +1,120 @@
+"""The driver on the virtual vehicle, which locks itself as the firmware does; in real time."""
+
+import threading
+import time
+
+import pytest
+from genpy import Duration
+
+from crazyflie_driver.msg import Position
+from crazyflie_driver.srv import LandRequest, NotifySetpointsStopRequest, TakeoffRequest
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.crazyflie import Crazyflie
+from crazyflie_py.log import LogBlock
+from crazyflie_virtual.testing import virtual_vehicle
+
+LIMIT = 20.0
+PERIOD = 0.02
+HEIGHT = 0.5
+LOCK_TIME = 2.5
+"""Silence after which the firmware has locked itself, s."""
+
+
+class Flight:
+    """A vehicle that is added to a server, with time as it goes by, and a stream of positions."""
+
+    def __init__(self, server, virtual, uri):
+        self.server, self.uri, self.virtual = server, uri, virtual
+        self.heights = []
+        self.state = SupervisorState(0)
+        server.add(uri)
+        self.crazyflie = server.node._vehicles[uri].crazyflie
+        self._log(self.crazyflie)
+
+    def _log(self, crazyflie):
+        variables = ("stateEstimate.z", "supervisor.info")
+        crazyflie.add_log_block(LogBlock("test", 20, variables, self._note))
+
+    def _note(self, _, values):
+        self.heights.append(values[0])
+        self.state = SupervisorState(values[1])
+
+    def run(self, duration, height=None, until=lambda: False):
+        """Let time go by, streaming positions if a height is given."""
+        end = time.monotonic() + duration
+        while time.monotonic() < end and not until():
+            self.server.process.advance(PERIOD)
+            if height is not None:
+                self.server.process.publish("/cf1/cmd_position", Position(z=height))
+            time.sleep(PERIOD)
+
+    def climb(self):
+        self.run(LIMIT, HEIGHT, lambda: self.heights and self.heights[-1] > 0.9 * HEIGHT)
+        assert self.heights[-1] > 0.9 * HEIGHT
+        self.run(0.5, HEIGHT)
+
+    def seen_by_another(self):
+        """Return the state that a new client is told."""
+        with Crazyflie(self.uri) as other:
+            return other.supervisor.read()
+
+
+@pytest.fixture
+def flight(server):
+    with virtual_vehicle() as (virtual, uri):
+        yield Flight(server, virtual, uri)
+
+
+def remove(flight):
+    """Remove the vehicle; return how long it took to sink."""
+    removing = threading.Thread(target=flight.server.remove, args=(flight.uri,))
+    begin, count = time.monotonic(), len(flight.heights)
+    removing.start()
+    sunk = None
+    while removing.is_alive():
+        flight.run(PERIOD)
+        if sunk is None and flight.heights[count:] and flight.heights[-1] < 0.05:
+            sunk = time.monotonic() - begin
+    return sunk
+
+
+def test_a_vehicle_that_was_added_and_removed_can_fly(flight):
+    flight.run(LOCK_TIME)
+    assert SupervisorState.LOCKED not in flight.state
+    remove(flight)
+    time.sleep(LOCK_TIME)
+    assert SupervisorState.LOCKED not in flight.seen_by_another()
+
+
+def test_a_removal_in_flight_is_a_landing_and_locks_nothing(flight):
+    flight.climb()
+    # A fall would take a third of a second, the landing takes three.
+    assert remove(flight) > 1.5
+    time.sleep(LOCK_TIME)
+    assert SupervisorState.LOCKED not in flight.seen_by_another()
+
+
+def test_a_streamed_flight_survives_0_8_s_of_silence(flight):
+    flight.climb()
+    flight.virtual.switches.silence = 0.8
+    count = len(flight.heights)
+    flight.run(4.0, HEIGHT)
+    assert SupervisorState.FLYING in flight.state
+    assert SupervisorState.LOCKED not in flight.state
+    assert min(flight.heights[count:]) > 0.5 * HEIGHT
+    assert flight.crazyflie.links == 1
+
+
+def test_users_may_announce_the_landing_first(flight):
+    flight.climb()
+    flight.server.call("/cf1/notify_setpoints_stop", NotifySetpointsStopRequest(0, 0))
+    flight.run(0.3)
+    assert flight.heights[-1] > 0.8 * HEIGHT
+    flight.server.call("/cf1/land", LandRequest(0, 0.0, Duration(2)))
+    flight.run(1.0)
+    assert flight.heights[-1] > 0.1 * HEIGHT
+    flight.run(LIMIT, until=lambda: SupervisorState.FLYING not in flight.state)
+    flight.run(0.5)
+    flight.server.call("/cf1/takeoff", TakeoffRequest(0, HEIGHT, Duration(1)))
+    flight.run(LIMIT, until=lambda: flight.heights[-1] > 0.8 * HEIGHT)
+    assert flight.heights[-1] > 0.8 * HEIGHT

@@ -3,9 +3,10 @@
 import pytest
 import rospy
 from std_msgs.msg import Empty, String
+from std_srvs.srv import Empty as EmptyService
 
 from crazyflie_msgs.msg import Control, ControlStamped
-from crazyflie_utils.testing.peer import listening, wait_until
+from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
 
 @pytest.fixture(scope="module")
@@ -58,13 +59,26 @@ def test_passes_the_right_control(say, final):
     # The takeoff control gets old.
     say_until_heard(say, "/control/lqr", 3.0, final)
 
+    # In flight the controller must not be silent.
+    stream = rospy.Timer(rospy.Duration(0.02), lambda _: say("/control/lqr", control(3.0)))
     with listening("/in_flight_filter", String) as memory:
-        assert memory.next().data == "commanded"
+        assert memory.next().data .startswith(("unknown", "commanded"))
         say("/in_flight", Empty())
-        assert memory.next().data == "flying"
+        memory.next(lambda message: message.data == "flying")
     # In flight every control is passed on, whatever the age of the other kind.
     for value in range(10, 20):
         say("/control/takeoff", control(value))
         final.next(has_thrust(value))
         say("/control/lqr", control(value + 0.5))
         final.next(has_thrust(value + 0.5))
+    stream.shutdown()
+    with listening("/in_flight_filter", String) as memory:
+        memory.next(lambda message: message.data.startswith("sinking from flying: no control"))
+        memory.next(lambda message: message.data.startswith("down: "))
+    final.next(has_thrust(0.0))
+    rospy.wait_for_service("/emergency_reset", LIMIT)
+    with pytest.raises(rospy.ServiceException, match="there is no emergency"):
+        rospy.ServiceProxy("/emergency_reset", EmptyService)()
+    rospy.ServiceProxy("/emergency", EmptyService)()
+    with listening("/in_flight_filter", String) as memory:
+        memory.next(lambda message: message.data.endswith("/emergency was called"))

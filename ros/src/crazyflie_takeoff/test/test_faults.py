@@ -97,6 +97,19 @@ def test_a_frozen_controller_keeps_takeoff_refused_until_it_speaks(network):
     assert not network.call("/takeoff").done()
 
 
+def test_a_filter_that_is_still_down_does_not_end_the_next_takeoff():
+    process = FakeProcess()
+    assert process.launch(TakeoffServerNode(), "/takeoff_server", SERVER)
+    process.publish("/state", state(0.0))
+    process.publish("/in_flight_filter", String("down from on_ground: brought down"))
+    process.advance(0.1)
+    takeoff = process.call("/takeoff", EmptyRequest())
+    process.publish("/in_flight_filter", String("down from taking_off: brought down"))
+    process.advance(0.1)
+    assert word(process) == "taking_off"
+    assert not takeoff.done()
+
+
 @pytest.mark.parametrize("pose", [True, False])
 def test_the_filter_alone_brings_the_vehicle_down(network, pose):
     network.kill("server")

@@ -199,7 +199,9 @@ class TakeoffServerNode(Node):
         if report.takeover is None:
             flight.regain()
             return
-        if flight.state is FlightState.ON_GROUND:
+        # A filter that hears of the takeoff before it is sent its first control is still down.
+        is_old = flight.state is FlightState.TAKING_OFF and report.takeover is Takeover.DOWN
+        if flight.state is FlightState.ON_GROUND or is_old:
             return
         self._cause = report.reason
         why = ServiceError(f"the flight was ended by the filter: {report.reason}")

@@ -108,7 +108,7 @@ class Flight(Bench):
 
     @property
     def yaw(self):
-        """deg."""
+        """Of the body, deg."""
         return math.degrees(zyx_from_quaternion(self.physics.quaternion)[2])
 
     @property

@@ -59,7 +59,6 @@ def test_monitor_says_low_after_five_seconds():
     assert monitor.state == ON_BATTERY
 
 
-
 @pytest.mark.parametrize(
     ("voltage", "level"), [(2.9, 0), (3.5, 10), (3.8, 20), (3.93, 60), (4.2, 90)]
 )

@@ -51,9 +51,7 @@ def test_thrust_lock():
     assert flight.firmware.stabilizer.thrust == firmware["thrust_log_at_65535"]
 
 
-@pytest.mark.parametrize(
-    "name", ["stream_silence_0.3", "stream_silence_0.7", "stream_silence_2.5"]
-)
+@pytest.mark.parametrize("name", ["stream_silence_0.3", "stream_silence_0.7", "stream_silence_2.5"])
 def test_stream_silence(name):
     firmware = recorded(name)
     flight = streamed(3.5)

@@ -6,7 +6,7 @@ import math
 from crazyflie_virtual.board import Board, Storage
 from crazyflie_virtual.body.battery import LOW_CHARGE, Battery
 from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
-from crazyflie_virtual.firmware.assertion import FirmwareAssertion
+from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
 from crazyflie_virtual.link import crtp
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings
@@ -81,7 +81,7 @@ class VirtualVehicle:
             return []
         try:
             return [answer.encode() for answer in self.board.receive(packet)]
-        except FirmwareAssertion as assertion:
+        except FirmwareAssertionError as assertion:
             self._restart(str(assertion))
             return []
         except Exception as error:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from crazyflie_model.limits import MAX_SETPOINT_PWM
-from crazyflie_virtual.firmware.assertion import FirmwareAssertion
+from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
 from crazyflie_virtual.firmware.commander import NOBODY
 from crazyflie_virtual.firmware.compressed import decompress_quaternion
 from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Modes, Setpoint
@@ -84,7 +84,7 @@ def decode_generic(data: bytes, time: float) -> Setpoint | None:
 
     Raises
     ------
-    FirmwareAssertion
+    FirmwareAssertionError
         For a payload of a wrong size.
     """
     decoder = _DECODERS.get(data[0]) if data else None
@@ -93,7 +93,7 @@ def decode_generic(data: bytes, time: float) -> Setpoint | None:
     try:
         setpoint = decoder(data[1:])
     except struct.error:
-        raise FirmwareAssertion(
+        raise FirmwareAssertionError(
             f"a setpoint of type {data[0]} with {len(data) - 1} bytes"
         ) from None
     setpoint.time = time

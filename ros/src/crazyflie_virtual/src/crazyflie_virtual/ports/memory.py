@@ -4,7 +4,7 @@ import errno
 import struct
 from collections.abc import Iterable
 
-from crazyflie_virtual.firmware.assertion import FirmwareAssertion
+from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
 from crazyflie_virtual.firmware.remarks import Remarks
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.tables.memories import Memory
@@ -58,7 +58,7 @@ class MemoryPort:
             return None
         number, address, count = struct.unpack_from("<BIB", data)
         if count > _MOST:
-            raise FirmwareAssertion(f"a read of {count} bytes of memory, of {_MOST} at most")
+            raise FirmwareAssertionError(f"a read of {count} bytes of memory, of {_MOST} at most")
         content = None
         if number < len(self._memories):
             content = self._memories[number].read(address, count)

@@ -1,6 +1,7 @@
 """The commands of the manual do what the manual says, typed as they stand into terminals."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor, wait
 
 import pytest
 from pages import PAGES, Page
@@ -14,6 +15,45 @@ PAGES_WITH_COMMANDS = [
 ]
 
 
+def calls_run(page):
+    """Tell whether a page calls the script ``run``, which builds the workspace where it must."""
+    typed = [part for part in page.parts if isinstance(part, str)]
+    typed += [block.text for block in page.blocks if block.comment.startswith("run")]
+    return any("./run " in text for text in typed)
+
+
+def in_turns():
+    """Return lists of pages: two programs must not build one workspace at a time."""
+    pages = {path: Page(path) for path in PAGES_WITH_COMMANDS}
+    changing = [p for p in pages if any(b.comment == "apply" for b in pages[p].blocks)]
+    calling = [p for p in pages if p not in changing and calls_run(pages[p])]
+    others = [p for p in pages if p not in changing and p not in calling]
+    return [calling, *([path] for path in changing[:-1]), [*changing[-1:], *others]]
+
+
+AT_A_TIME = 2
+"""So many pages are followed at a time: flights and calls mostly wait."""
+
+
+@pytest.fixture(scope="module")
+def followed(workspace, tmp_path_factory):
+    """Return the pages, each with a future that is done when it has been followed."""
+
+    def follow(path):
+        reader = Reader(workspace, tmp_path_factory.mktemp("home"))
+        try:
+            reader.follow(Page(path))
+        finally:
+            reader.close()
+
+    with ThreadPoolExecutor(AT_A_TIME) as executor:
+        futures = {}
+        for pages in in_turns():
+            wait(futures.values())
+            futures |= {path: executor.submit(follow, path) for path in pages}
+        yield futures
+
+
 def test_commands_of_the_installation(workspace):
     # They are what has made the workspace.
     for space in ("devel", "install"):
@@ -21,14 +61,11 @@ def test_commands_of_the_installation(workspace):
 
 
 @pytest.mark.parametrize("path", PAGES_WITH_COMMANDS, ids=lambda path: path.name)
-def test_commands_of_a_page(path, workspace, tmp_path):
-    reader = Reader(workspace, tmp_path / "home")
-    try:
-        reader.follow(Page(path))
-    finally:
-        reader.close()
+def test_commands_of_a_page(path, followed):
+    followed[path].result()
 
 
+@pytest.mark.usefixtures("followed")
 def test_the_picture_of_the_graph_shows_the_graph_that_runs(workspace):
     # Whatever graphviz has drawn anew when the page of the graph was tested.
     drawn = workspace / "docs" / "images" / "sw_hover_graph.svg"

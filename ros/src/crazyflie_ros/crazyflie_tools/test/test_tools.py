@@ -134,7 +134,7 @@ def test_the_console_is_printed_line_by_line_until_the_link_is_lost(answer, vehi
     speaker.join()
     assert (status, lines) == (1, ["SYS: up and running", "ESTIMATOR: Kalman"])
     assert error.startswith("console: ")
-    assert "has not been heard for 0.5 s" in error
+    assert "has not been heard for 0.45 s" in error
 
 
 def test_the_console_ends_after_its_duration(answer):

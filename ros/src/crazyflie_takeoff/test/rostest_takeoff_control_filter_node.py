@@ -62,7 +62,7 @@ def test_passes_the_right_control(say, final):
     # In flight the controller must not be silent.
     stream = rospy.Timer(rospy.Duration(0.02), lambda _: say("/control/lqr", control(3.0)))
     with listening("/in_flight_filter", String) as memory:
-        assert memory.next().data .startswith(("unknown", "commanded"))
+        assert memory.next().data.startswith(("unknown", "commanded"))
         say("/in_flight", Empty())
         memory.next(lambda message: message.data == "flying")
     # In flight every control is passed on, whatever the age of the other kind.

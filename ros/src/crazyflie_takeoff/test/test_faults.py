@@ -148,6 +148,20 @@ def test_a_filter_that_dies_in_its_descent_leaves_a_landing(network):
     assert thrusts(network)[-1] == 0.0
 
 
+def test_a_filter_that_was_gone_for_long_does_not_lift_the_vehicle_off_the_floor(network):
+    """The vehicle has stopped its motors and fallen meanwhile."""
+    network.kill("filter")
+    network.advance(3.0)
+    assert network.vehicle.z == 0.0
+    begun = network.time
+    network.start_filter()
+    network.advance(5.0)
+    assert network.vehicle.z == 0.0
+    assert set(thrusts(network, begun)) == {0.0}
+    assert network.last("/in_flight_state") == "on_ground"
+    network.take_off()
+
+
 def test_the_pose_is_lost_in_a_landing(network):
     """The ramp would let it fall."""
     network.call("/land")

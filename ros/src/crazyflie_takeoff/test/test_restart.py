@@ -289,6 +289,7 @@ def test_filter_with_a_foreign_server():
 def test_server_takes_the_place_of_a_foreign_one_in_flight():
     """The filter knows from the toggle that the vehicle flies."""
     network = HoverNetwork(BARE)
+    network.vehicle_node.offset = 1.0
     network.kill("server")
     network.kill("filter")
     network.start_filter()

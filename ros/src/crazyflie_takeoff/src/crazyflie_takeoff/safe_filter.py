@@ -27,6 +27,9 @@ was stopped for a while, nobody has been silent for as long as it seems."""
 STANDING_SPEED = 0.1
 """A vehicle near the ground that sinks slower than this has met it, m/s."""
 
+LYING_HEIGHT = 0.1
+"""A vehicle below this when the filter starts has come down without it, m."""
+
 RESET_DELAY = 2.0
 """How long after the motors were stopped they cannot be released, s: the vehicle may still fall."""
 
@@ -81,11 +84,14 @@ class SafeFilter(Generic[Control]):
     ----------
     patience : Patience
     limits : Limits
+    sees : bool
+        Whether states can be expected.
     """
 
-    def __init__(self, patience: Patience, limits: Limits):
+    def __init__(self, patience: Patience, limits: Limits, sees: bool = False):
         self.mode = Mode.PASSING
         self.takeovers = 0
+        self._has_to_look = sees
         self._patience = patience
         self._limits = limits
         self._choice: ControlFilter[Control] = ControlFilter()
@@ -188,6 +194,7 @@ class SafeFilter(Generic[Control]):
                 return None
             self._choice.end_flight()
         self._enter(Mode.PASSING, "")
+        self._has_to_look = False
         self._return_age = math.inf
         return self._choice.takeoff(time, control, thrust)
 
@@ -207,7 +214,9 @@ class SafeFilter(Generic[Control]):
         self._silence = 0.0
         self._lacks_control = False
         chosen = self._choice.commanded(time, control)
-        if self.mode.is_final:
+        if self._has_to_look and self._choice.in_flight:
+            self._look()
+        if self.mode.is_final or (self._has_to_look and self._choice.in_flight):
             return None
         if chosen is not control:
             return chosen
@@ -224,6 +233,7 @@ class SafeFilter(Generic[Control]):
 
     def stop_listening(self, time: float) -> Control | None:
         """Return what to pass on; see `ControlFilter.stop_listening`."""
+        self._has_to_look = False
         waiting = self._choice.stop_listening(time)
         return None if self.mode.is_final else waiting
 
@@ -253,6 +263,13 @@ class SafeFilter(Generic[Control]):
             self._own = self._safe.advance(step, self._fresh_speed(), sinks)
             return self._own
         return MOTORS_OFF if self.mode in (Mode.DOWN, Mode.EMERGENCY) else None
+
+    def _look(self):
+        # The filter before this one was gone for too long, if the vehicle lies on the ground.
+        if self._state_age < FRESHNESS:
+            self._has_to_look = False
+            if self._height < LYING_HEIGHT:
+                self._stop_motors(Mode.DOWN, "the vehicle was on the ground when the filter began")
 
     # The end.
 

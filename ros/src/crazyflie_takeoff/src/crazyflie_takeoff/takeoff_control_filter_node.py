@@ -107,7 +107,9 @@ class TakeoffControlFilterNode(Node):
         parameters = handle.load(TakeoffControlFilterParameters)
         self._parameters = parameters
         patience = Patience(parameters.hold, parameters.recovery, parameters.descent)
-        self._filter: SafeFilter[ControlStamped] = SafeFilter(patience, parameters.limits())
+        self._filter: SafeFilter[ControlStamped] = SafeFilter(
+            patience, parameters.limits(), parameters.state_topic is not None
+        )
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:

@@ -64,7 +64,9 @@ class Soak:
     """
 
     def __init__(self, seed: int, **arguments: object):
-        launch_file = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/sw_hover.launch"
+        launch_file = (
+            Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/sw_hover.launch"
+        )
         given = {"composed": True, "rviz": False, "simulator_dt": 0.005, **arguments}
         _, parameters = expand(launch_file, **given)
         self._classes = {
@@ -116,7 +118,9 @@ class Soak:
         outcome: Future[Any] = self.graph.call(service, EmptyRequest())
         end = self.graph.time + _PATIENCE
         # A server that is killed never answers.
-        while not outcome.done() and self.graph.time < end and self.graph.is_alive("/takeoff_server"):
+        while (
+            not outcome.done() and self.graph.time < end and self.graph.is_alive("/takeoff_server")
+        ):
             self._wait(_STEP, timeline)
         if allow is not None and outcome.done():
             if outcome.exception() is None:
@@ -198,13 +202,13 @@ def soak(duration: float, seed: int, progress: bool = False, **arguments: object
     began = time.monotonic()
     run = Soak(seed, **arguments)
     start = run.graph.time
-    names = []
+    faults: list[Fault] = []
     with tqdm(total=round(duration), unit="s", disable=not progress) as bar:
         while run.graph.time - start < duration:
             before = len(run.watch.violations)
             # Each fault once, in a new order, before any comes again.
-            names = names or run.random.sample(FAULTS, len(FAULTS))
-            fault = names.pop()
+            faults = faults or run.random.sample(FAULTS, len(FAULTS))
+            fault = faults.pop()
             run.fly(fault)
             new = run.watch.violations[before:]
             run.watch.violations[before:] = [f"{fault.name}: {each}" for each in new]

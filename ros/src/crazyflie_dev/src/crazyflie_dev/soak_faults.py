@@ -159,7 +159,11 @@ def _call_everything(flight: Flight) -> None:
 
 def _stop_motors(flight: Flight) -> Undo:
     flight.graph.call("/emergency", EmptyRequest())
-    return lambda: flight.graph.call("/emergency_reset", EmptyRequest())
+
+    def reset():
+        flight.graph.call("/emergency_reset", EmptyRequest())
+
+    return reset
 
 
 FAULTS = [
@@ -172,10 +176,7 @@ FAULTS = [
     Fault("stamps are 3 s old", _with_each(_shift(-3.0)), 0.3, 4.0, blinds=True),
     Fault("stamps are 8 s ahead", _with_each(_shift(8.0)), 0.3, 4.0, blinds=True),
     *(Fault(f"{name} is killed", _kill(name), _RESPAWN, _RESPAWN) for name in _NODES),
-    *(
-        Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER)
-        for name in _NODES
-    ),
+    *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER) for name in _NODES),
     Fault("references are not finite", _nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
     Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 20.0)),
     Fault("references are old", _nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),

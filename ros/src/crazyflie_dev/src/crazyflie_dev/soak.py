@@ -22,7 +22,7 @@ from std_srvs.srv import EmptyRequest
 from tqdm import tqdm
 
 from crazyflie_dev.launch_files import composed_nodes, expand
-from crazyflie_dev.soak_faults import EMERGENCY, FAULTS, Fault, Flight
+from crazyflie_dev.soak_faults import EMERGENCY, FAULTS, Fault, Flight, Undo
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.runtime.runner import NodeClasses
@@ -161,13 +161,15 @@ class Soak:
 class _Fault:
     """One fault on its way: not yet, now, over."""
 
-    def __init__(self, fault, begin, random, flight, watch):
+    def __init__(
+        self, fault: Fault, begin: float, random: Random, flight: Flight, watch: Watch
+    ) -> None:
         self._fault = fault
         self._begin = begin
         self._end = begin + random.uniform(fault.shortest, fault.longest)
         self._flight = flight
         self._watch = watch
-        self._undo = None
+        self._undo: Undo | None = None
         self.is_over = False
 
     def update(self):

@@ -112,3 +112,18 @@ def test_one_that_was_near_when_it_came_is_not_moved_when_the_vehicle_drifts():
     reference.update(np.ones(7))
     assert followed(reference, 0.0, np.zeros(7)) == [1.0] * 7
     assert followed(reference, 1.0, np.full(7, -9.0)) == [1.0] * 7
+
+
+def test_who_repeats_one_that_is_far_away_does_not_lead_the_vehicle_there():
+    reference = GuardedReference(6, max_jump=3.0)
+    far = np.array([50.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    vehicle = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    for _ in range(20):
+        reference.update(far)
+        goal = reference.value(0.0, vehicle)
+        np.testing.assert_allclose(goal, [3.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+        vehicle = goal
+    reference.update(np.zeros(7))
+    reference.value(0.0, vehicle)
+    reference.update(far)
+    np.testing.assert_allclose(reference.value(0.0, np.zeros(7))[:3], [3.0, 0.0, 0.06], atol=0.01)

@@ -178,7 +178,7 @@ FAULTS = [
     *(Fault(f"{name} is killed", _kill(name), _RESPAWN, _RESPAWN) for name in _NODES),
     *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER) for name in _NODES),
     Fault("references are not finite", _nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
-    Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 20.0)),
+    Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),
     Fault("references are old", _nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),
     Fault("somebody streams references", _nothing, 3.0, 9.0, again=_refer_to(0.3, 0.2, 1.0)),
     Fault("services are hammered", _nothing, 0.1, 3.0, again=_call_everything),

@@ -29,7 +29,8 @@ class GuardedReference:
         Where the yaw is in the state.
     max_jump : float, optional
         How far from the vehicle a new reference may be, m. One that is further away becomes a
-        place to rest at so far from the vehicle, in the same direction.
+        place to rest at so far from the vehicle, in the same direction, and is this as long as
+        references are so far away.
     report : callable, optional
         ``report(text)`` is told of that.
     """
@@ -45,6 +46,7 @@ class GuardedReference:
         self._report = report
         self._last_valid: LastValid[NDArray[np.float64]] = LastValid()
         self._hold_point: NDArray[np.float64] | None = None
+        self._near: NDArray[np.float64] | None = None
         self._is_new = False
         self._has_arrived = False
         self._stamp = 0.0
@@ -122,12 +124,16 @@ class GuardedReference:
     def _within_reach(self, x_ref, x):
         distance = math.dist(x_ref[:3], x[:3])
         if distance <= self.max_jump:
+            self._near = None
             return x_ref
         self._report(
             f"the reference is {distance:.1f} m away; going {self.max_jump:g} m in its direction"
         )
-        near = at_rest(x_ref, self._yaw_index)
-        # Each factor is at most 1, so that a far one does not overflow.
-        near[:3] = x[:3] + (x_ref[:3] / distance - x[:3] / distance) * self.max_jump
-        self._last_valid.update(near)
-        return near
+        # Who repeats one that is far away must not lead the vehicle there step by step.
+        if self._near is None:
+            self._near = at_rest(x_ref, self._yaw_index)
+            # Each factor is at most 1, so that a far one does not overflow.
+            direction = x_ref[:3] / distance - x[:3] / distance
+            self._near[:3] = x[:3] + direction * self.max_jump
+        self._last_valid.update(self._near)
+        return self._near

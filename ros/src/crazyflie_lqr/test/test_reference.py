@@ -124,6 +124,6 @@ def test_who_repeats_one_that_is_far_away_does_not_lead_the_vehicle_there():
         np.testing.assert_allclose(goal, [3.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
         vehicle = goal
     reference.update(np.zeros(7))
-    reference.value(0.0, vehicle)
+    assert followed(reference, 0.0, np.zeros(7)) == [0.0] * 7
     reference.update(far)
     np.testing.assert_allclose(reference.value(0.0, np.zeros(7))[:3], [3.0, 0.0, 0.06], atol=0.01)

@@ -137,6 +137,8 @@ class Soak:
             if self.graph.time > end:
                 self.watch.say(f"not at rest: {self.watch.state}, {self.watch.height:.2f} m")
                 break
+        # Refused where there was no emergency, or it has been reset.
+        self.graph.call("/emergency_reset", EmptyRequest())
         self._wait(1.0, timeline)
         self.watch.may_fly = self.watch.may_fall = False
         # Nothing may begin by itself now.

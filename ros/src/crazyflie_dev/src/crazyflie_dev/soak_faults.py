@@ -175,7 +175,10 @@ FAULTS = [
     Fault("poses jump", _with_each(_jump), 0.3, 4.0, blinds=True),
     Fault("stamps are 3 s old", _with_each(_shift(-3.0)), 0.3, 4.0, blinds=True),
     Fault("stamps are 8 s ahead", _with_each(_shift(8.0)), 0.3, 4.0, blinds=True),
-    *(Fault(f"{name} is killed", _kill(name), _RESPAWN, _RESPAWN) for name in _NODES),
+    *(
+        Fault(f"{name} is killed", _kill(name), _RESPAWN, _RESPAWN, drops=name == FILTER)
+        for name in _NODES
+    ),
     *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER) for name in _NODES),
     Fault("references are not finite", _nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
     Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),

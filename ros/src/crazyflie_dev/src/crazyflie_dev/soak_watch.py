@@ -17,6 +17,10 @@ MOST_TILT = math.radians(15.1)
 OVERSHOOT = 0.2
 """How far above its highest reference a vehicle may be, m."""
 
+DEAF_OVERSHOOT = 0.5
+"""The same while nothing passes the last node before the vehicle, which then keeps for 0.5 s
+what it was told last, m."""
+
 BLIND_LIMIT = 8.0
 """How long a vehicle may be in the air without a good pose, s: 0.1 s until it is level,
 0.5 s in which the pose may come back, 5 s of descent, and what it falls then."""
@@ -125,7 +129,8 @@ class Watch:
         if height <= 0.001 < before[1][2]:
             self._touch_down(self._speed)
         self._speed = speed
-        if height > self._reference + OVERSHOOT and self.may_fly:
+        most = self._reference + (DEAF_OVERSHOOT if self.may_fall else OVERSHOOT)
+        if height > most and self.may_fly:
             self.say(f"too high: {height:.2f} m, reference {self._reference:.2f} m")
         if height > 0.1 and not self.may_fly:
             self.say(f"in the air unasked: {height:.2f} m")

@@ -11,8 +11,19 @@ somebody has carried it while nobody looked."""
 LONGEST_WAY = 0.5
 """For how much time a vehicle that was not seen is believed to have flown on, s."""
 
+CONFIRMATION = 3
+"""So many poses in a row, without a jump between them, are believed after wild ones: a few of
+many always come to lie where the vehicle might be."""
+
+MOMENT = 0.03
+"""So long after a good pose one alone is believed, s: the vehicle cannot have gone far."""
+
 SLACK = 0.02
 """What noise may move a pose by, m."""
+
+
+Pose = tuple[float, tuple[float, ...]]
+"""Time, s, and position, m."""
 
 
 class Verdict(Enum):
@@ -42,14 +53,17 @@ class PoseGate:
     def __init__(self, max_speed: float):
         self.rejected = 0
         self.max_speed = max_speed
-        self._last: tuple[float, tuple[float, ...]] | None = None
-        self._elsewhere: tuple[float, tuple[float, ...]] | None = None
-        self._elsewhere_since = 0.0
+        self.reset()
 
     def reset(self) -> None:
         """Believe the next pose."""
-        self._last = None
-        self._elsewhere = None
+        # The last pose that was believed, the last one that came, and how long the latter
+        # has gone on without a jump: since when, and for how many poses.
+        self._last: Pose | None = None
+        self._previous: Pose | None = None
+        self._since = 0.0
+        self._count = 0
+        self._is_doubtful = False
 
     def judge(self, time: float, position: Sequence[float]) -> Verdict:
         """Return what to do with a pose.
@@ -64,21 +78,28 @@ class PoseGate:
         pose = (time, tuple(position))
         if self._last is None or time < self._last[0]:
             self.reset()
-            self._last = pose
+            self._last = self._previous = pose
             return Verdict.GOOD
-        if self._is_reachable(self._last, pose):
-            self._last = pose
-            self._elsewhere = None
+        if self._previous is None or not self._is_reachable(self._previous, pose):
+            self._since = time
+            self._count = 0
+        self._previous = pose
+        self._count += 1
+        is_recent = not self._is_doubtful or time - self._last[0] < MOMENT
+        is_steady = is_recent or self._count >= CONFIRMATION
+        if is_steady and self._is_reachable(self._last, pose):
+            self._believe(pose)
             return Verdict.GOOD
-        if self._elsewhere is None or not self._is_reachable(self._elsewhere, pose):
-            self._elsewhere_since = time
-        self._elsewhere = pose
-        if time - self._elsewhere_since >= PERSISTENCE - 1e-6:
-            self._last = pose
-            self._elsewhere = None
+        if time - self._since >= PERSISTENCE - 1e-6:
+            self._believe(pose)
             return Verdict.MOVED
+        self._is_doubtful = True
         self.rejected += 1
         return Verdict.BAD
+
+    def _believe(self, pose):
+        self._last = pose
+        self._is_doubtful = False
 
     def _is_reachable(self, start, end):
         way = self.max_speed * min(end[0] - start[0], LONGEST_WAY) + SLACK

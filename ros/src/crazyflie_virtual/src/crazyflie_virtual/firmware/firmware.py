@@ -124,8 +124,9 @@ class Firmware:
             return OFF
         with_position = self._steps % POSITION_STEPS == 0
         sensors.sample_inertial(physics.rates, physics.specific_force)
-        self.estimator.predict(sensors, STEP)
+        self.estimator.sample(sensors)
         if with_position:
+            self.estimator.predict(_POSITION_PERIOD)
             self._correct_estimate()
             self.commander.update_from_planner(self.time, estimate)
         if self._steps % _SUPERVISOR_STEPS == 0:
@@ -134,7 +135,7 @@ class Firmware:
             sensors.sample_slow(physics.position[2], physics.quaternion)
         setpoint = self.setpoint = self.supervisor.override(self.commander.setpoint)
         return self.stabilizer.update(
-            setpoint, estimate, sensors, with_position, self.supervisor.can_fly
+            setpoint, estimate, sensors, with_position, self.supervisor.motors_may_run
         )
 
     def stream(self, setpoint: Setpoint) -> None:

@@ -131,7 +131,7 @@ TRANSITIONS: dict[State, tuple[Transition, ...]] = {
 """The first transition whose condition is met is taken, one in each update."""
 
 _RUNNING = (State.READY, State.FLYING, State.LANDED, State.LEVELLING)
-_KEEPS_ARMED = (*_RUNNING, State.ARMING)
+_ARMED = (*_RUNNING, State.ARMING)
 _IN_AIR = (State.FLYING, State.LEVELLING)
 
 
@@ -184,8 +184,13 @@ class Supervisor:
 
     @property
     def can_fly(self) -> bool:
-        """Whether the motors may run."""
+        """Whether setpoints are flown."""
         return self.state in _RUNNING
+
+    @property
+    def motors_may_run(self) -> bool:
+        """Whether the motors idle at least."""
+        return self.state in _ARMED
 
     @property
     def is_flying(self) -> bool:
@@ -251,7 +256,7 @@ class Supervisor:
         self._state_time = time
         if state is State.CRASHED:
             self.is_crashed = True
-        if state not in _KEEPS_ARMED:
+        if state not in _ARMED:
             self.is_armed = False
         if state is State.CHECKED and self.auto_arm:
             self.is_armed = True

@@ -9,7 +9,7 @@ from virtual_bench import SETPOINTS_STOP, Bench, attitude, generic
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body.physics import STEP
-from crazyflie_virtual.firmware.supervisor import State
+from crazyflie_virtual.firmware.supervisor_states import State
 from crazyflie_virtual.link.crtp import Port
 
 HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)

@@ -58,6 +58,8 @@ class Estimator:
     def __init__(self, estimate: Estimate):
         self._estimate = estimate
         self.initial_x = self.initial_y = self.initial_z = self.initial_yaw = 0.0
+        self._sums = [0.0] * 6
+        self._samples = 0
         self.reset()
 
     def reset(self) -> None:

@@ -15,7 +15,8 @@ from crazyflie_virtual.firmware.remarks import Remarks
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
 from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, OFF, Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
-from crazyflie_virtual.firmware.supervisor import State, Supervisor
+from crazyflie_virtual.firmware.supervisor import Supervisor
+from crazyflie_virtual.firmware.supervisor_states import State
 from crazyflie_virtual.link.statistics import LinkStatistics
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.memories import MemoryTester

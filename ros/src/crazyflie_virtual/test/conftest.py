@@ -1,11 +1,21 @@
 """Fixtures of the tests with sockets."""
 
 import contextlib
+import logging
 
 import pytest
 
 from crazyflie_dev.fixtures import time_limit  # noqa: F401
 from crazyflie_virtual.testing import virtual_vehicle
+
+
+@pytest.fixture(autouse=True)
+def no_errors(caplog):
+    """Fail a test in which a vehicle meets an error; one that expects some ends with a clear()."""
+    yield
+    for phase in ("setup", "call"):
+        records = caplog.get_records(phase)
+        assert [r.getMessage() for r in records if r.levelno >= logging.ERROR] == []
 
 
 @pytest.fixture

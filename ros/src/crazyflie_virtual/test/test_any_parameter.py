@@ -198,6 +198,7 @@ def test_an_error_in_a_packet_is_told_and_the_vehicle_goes_on(bench, monkeypatch
     assert console(bench).count("SYS: RuntimeError in packet fc42: a fault of ours") == 1
     assert [record.levelno for record in caplog.records] == [logging.ERROR]
     assert caplog.records[0].exc_info
+    caplog.clear()
 
 
 def test_after_an_error_in_a_step_the_vehicle_restarts(bench, monkeypatch, caplog):
@@ -214,3 +215,4 @@ def test_after_an_error_in_a_step_the_vehicle_restarts(bench, monkeypatch, caplo
     bench.run(0.02)
     assert "SYS: RuntimeError in a step: a fault of ours" in console(bench)
     assert len(caplog.records) == 1
+    caplog.clear()

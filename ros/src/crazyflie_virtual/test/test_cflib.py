@@ -8,7 +8,7 @@ from cflib.crtp.udpdriver import UdpDriver
 from cflib.utils.power_switch import PowerSwitch
 from virtual_client import LIMIT, Client, wait_until
 
-from crazyflie_virtual.firmware.supervisor import State
+from crazyflie_virtual.firmware.supervisor_states import State
 from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
 from crazyflie_virtual.tables.log_table import log_variables

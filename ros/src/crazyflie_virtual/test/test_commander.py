@@ -8,7 +8,8 @@ import pytest
 from virtual_bench import SETPOINTS_STOP, Bench, attitude, generic
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_virtual.firmware.supervisor import State
+from crazyflie_virtual.body.physics import STEP
+from crazyflie_virtual.firmware.supervisor_states import State
 from crazyflie_virtual.link.crtp import Port
 
 HOLD = generic(7, "ffff", 0.0, 0.0, 1.0, 0.0)
@@ -131,3 +132,19 @@ def test_motors_idle_where_the_client_arms():
     bench.run(0.2)
     assert bench.firmware.stabilizer.commands == (7000.0,) * 4
     assert State.READY is bench.firmware.supervisor.state
+
+
+def test_motors_idle_in_the_moment_of_arming_already():
+    bench = Bench(auto_arm=False)
+    bench.ask(Port.SUPERVISOR, 1, b"\x01\x01")
+    # Setpoints are not flown yet.
+    bench.unlock()
+    bench.ask(*attitude(thrust=30000))
+    while bench.firmware.supervisor.state is State.CHECKED:
+        assert not bench.motors_run
+        bench.run(STEP)
+    assert bench.firmware.supervisor.state is State.ARMING
+    assert not bench.firmware.supervisor.can_fly
+    assert bench.firmware.stabilizer.commands == (7000.0,) * 4
+    bench.run(0.1)
+    assert max(bench.firmware.stabilizer.commands) > 29000.0

@@ -31,13 +31,18 @@ def sensors(gyro=(0.0, 0.0, 0.0), force=(0.0, 0.0, 1.0)):
     )
 
 
+def move(estimator, measured):
+    estimator.sample(measured)
+    estimator.predict(DT)
+
+
 def estimate_of(estimator):
     return estimator._estimate
 
 
 def test_dead_reckoning_of_a_constant_acceleration(estimator):
     for _ in range(500):
-        estimator.predict(sensors(force=(0.1, -0.2, 1.3)), DT)
+        move(estimator, sensors(force=(0.1, -0.2, 1.3)))
     e = estimate_of(estimator)
     expected = np.array([0.1, -0.2, 0.3]) * GRAVITY
     np.testing.assert_allclose((e.vx, e.vy, e.vz), expected, rtol=1e-9)
@@ -48,7 +53,7 @@ def test_dead_reckoning_of_a_constant_acceleration(estimator):
 @pytest.mark.parametrize("rates", [(40.0, 0.0, 0.0), (0.0, 30.0, 0.0), (10.0, -20.0, 50.0)])
 def test_attitude_is_the_integral_of_the_rates(estimator, rates):
     for _ in range(500):
-        estimator.predict(sensors(gyro=rates), DT)
+        move(estimator, sensors(gyro=rates))
     expected = Rotation.from_rotvec(np.radians(rates))
     error = expected.inv() * Rotation.from_quat(estimate_of(estimator).quaternion)
     assert error.magnitude() < 1e-4
@@ -56,6 +61,16 @@ def test_attitude_is_the_integral_of_the_rates(estimator, rates):
     yaw, pitch, roll = expected.as_euler("ZYX", degrees=True)
     e = estimate_of(estimator)
     assert (e.roll, e.pitch, e.yaw) == pytest.approx((roll, -pitch, yaw), abs=0.01)
+
+
+def test_a_prediction_is_by_the_mean_of_the_samples_since_the_last(estimator):
+    for rate in (100.0, 0.0, 20.0):
+        estimator.sample(sensors(gyro=(0.0, 0.0, rate)))
+        assert estimate_of(estimator).yaw == 0.0
+    for _ in range(2):
+        estimator.predict(0.01)
+        assert estimate_of(estimator).yaw == pytest.approx(0.4, abs=1e-4)
+        estimator.sample(sensors())
 
 
 def test_the_first_measurements_count_in_full(estimator):
@@ -83,7 +98,7 @@ def test_gain_converges_to_that_of_the_riccati_equation(estimator):
 def test_velocity_follows_from_positions(estimator):
     for k in range(300):
         for _ in range(5):
-            estimator.predict(sensors(), DT)
+            move(estimator, sensors())
         estimator.grow_variances(0.01)
         estimator.correct_position(0.01 * 0.5 * (k + 1), 0.0, 1.0, 0.01)
     e = estimate_of(estimator)
@@ -115,7 +130,7 @@ def test_at_rest_the_attitude_returns_to_the_initial_one(estimator, initial_yaw)
 
 
 def test_reset_begins_where_it_is_told(estimator):
-    estimator.predict(sensors(force=(1.0, 0.0, 1.0)), DT)
+    move(estimator, sensors(force=(1.0, 0.0, 1.0)))
     estimator.initial_x, estimator.initial_yaw = 2.0, 1.0
     estimator.reset()
     e = estimate_of(estimator)

@@ -11,7 +11,7 @@ import pytest
 from virtual_client import LIMIT, Client, wait_until
 
 from crazyflie_dev.programs import free_port
-from crazyflie_virtual.firmware.supervisor import State
+from crazyflie_virtual.firmware.supervisor_states import State
 
 
 @pytest.fixture

@@ -9,6 +9,7 @@ from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crazyflie.mem import CompressedSegment, CompressedStart, Poly4D
 from virtual_bench import Bench, cflib_client
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.firmware.planner import REFUSED
 from crazyflie_virtual.link.crtp import Port
 
@@ -137,6 +138,23 @@ def test_trajectories_that_cannot_be_flown_are_told_on_the_console(bench, define
     assert reason in text
 
 
+@pytest.mark.parametrize("scale", [0.0, -1.0, math.nan])
+def test_with_no_positive_time_scale_a_trajectory_is_at_its_end_at_once(bench, scale):
+    bench.take_off()
+    upload(bench, straight(0.2, 1.0))
+    assert command(bench, "define_trajectory", 1, 0, 1) == 0
+    assert command(bench, "start_trajectory", 1, scale) == 0
+    bench.run(0.02)
+    setpoint = bench.firmware.setpoint
+    assert (setpoint.x, setpoint.y, setpoint.z) == pytest.approx((0.2, 0.0, 1.0))
+    assert setpoint.vx == 0.0
+    assert command(bench, "start_trajectory", 1, scale, relative_position=True) == 0
+    bench.run(0.02)
+    assert bench.firmware.setpoint.x == pytest.approx(0.2)
+    text = b"".join(p.data for p in bench.unsolicited if p.port == Port.CONSOLE).decode()
+    assert "HLC: at its end at once" in text
+
+
 def test_memory_that_was_never_written_is_at_the_origin(bench):
     bench.take_off()
     assert command(bench, "go_to", 1.0, 0.0, 1.0, 0.0, 2.0) == 0
@@ -200,6 +218,16 @@ def test_a_spiral_ends_where_it_has_to(bench):
     expected = (begin.x - 0.6, begin.y - 0.4, begin.z - 0.3)
     assert bench.physics.position == pytest.approx(expected, abs=0.06)
     assert bench.firmware.estimate.yaw == pytest.approx(90.0, abs=4.0)
+
+
+@pytest.mark.parametrize("angle", [math.nan, math.inf])
+def test_a_spiral_that_is_not_a_number_levels_out(bench, angle):
+    bench.take_off()
+    error = command(bench, "spiral", angle, 0.4, math.nan, 0.0, 2.0)
+    assert error == 0
+    bench.run(0.1)
+    assert SupervisorState.HIGH_LEVEL_DISABLED in bench.firmware.info
+    assert command(bench, "takeoff", 1.0, 2.0) == REFUSED
 
 
 def test_stop_drops_the_vehicle(bench):

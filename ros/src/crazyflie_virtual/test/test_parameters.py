@@ -78,6 +78,12 @@ def test_table(bench):
     assert item[3] == 0x8 | READ_ONLY
 
 
+def test_the_default_speeds_of_the_high_level_commander_cannot_be_stored(bench):
+    for name in ("hlCommander.vtoff", "hlCommander.vland"):
+        item = bench.ask_one(Port.PARAMETERS, TABLE, b"\x02" + number(name))
+        assert not item[3] & EXTENDED
+
+
 def test_every_parameter_can_be_read_and_fits_into_a_packet(bench):
     assert len(set(NAMES)) == len(NAMES)
     for spec, name in zip(parameter_specs(), NAMES, strict=True):

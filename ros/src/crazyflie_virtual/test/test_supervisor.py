@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import pytest
 
 from crazyflie_virtual.firmware.states import DISABLED, VELOCITY, Modes, Setpoint
-from crazyflie_virtual.firmware.supervisor import TRANSITIONS, State, Supervisor
+from crazyflie_virtual.firmware.supervisor import Supervisor
+from crazyflie_virtual.firmware.supervisor_states import TRANSITIONS, State
 
 PERIOD = 0.04
 

@@ -5,6 +5,12 @@ accelerometer and corrected with measured positions; the axes have one
 covariance. Attitude: the gyroscope's integral, corrected with measured
 attitudes in proportion to its variance, and, while the vehicle stands, pulled
 towards the initial attitude.
+
+Between two predictions, 100 times a second, the estimate stands still, as the
+firmware's does (estimator_kalman.c, PREDICT_RATE). To the attitude controller,
+500 times a second, its rate of change is a pulse in one step of five, and in fast
+turns the limit of the outputs cuts off these pulses: the damping of a large
+step of the yaw is lost, and it overshoots.
 """
 
 import math
@@ -52,6 +58,8 @@ class Estimator:
     def __init__(self, estimate: Estimate):
         self._estimate = estimate
         self.initial_x = self.initial_y = self.initial_z = self.initial_yaw = 0.0
+        self._sums = [0.0] * 6
+        self._samples = 0
         self.reset()
 
     def reset(self) -> None:
@@ -63,6 +71,7 @@ class Estimator:
         e.qz, e.qw = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
         self._covariance = _FIRST_VARIANCES
         self.variance_attitude = _FIRST_ATTITUDE_VARIANCE
+        self._forget_samples()
         self._update_angles()
 
     @property
@@ -75,12 +84,21 @@ class Estimator:
         """Variance of the velocity along each axis, m^2/s^2."""
         return self._covariance[2]
 
-    def predict(self, sensors: Sensors, dt: float) -> None:
-        """Move on by ``dt`` (s) with what the inertial sensors measure."""
+    def sample(self, sensors: Sensors) -> None:
+        """Take in what the inertial sensors measure, for the next `predict`."""
+        s = sensors
+        sample = (s.gyro_x, s.gyro_y, s.gyro_z, s.acc_x, s.acc_y, s.acc_z)
+        self._sums = [a + b for a, b in zip(self._sums, sample, strict=True)]
+        self._samples += 1
+
+    def predict(self, dt: float) -> None:
+        """Move on by ``dt`` (s) with the mean of what was sampled in it."""
+        mean = [total / self._samples for total in self._sums]
+        self._forget_samples()
         e = self._estimate
         x, y, z, w = e.qx, e.qy, e.qz, e.qw
         half = 0.5 * dt * math.pi / 180.0
-        a, b, c = half * sensors.gyro_x, half * sensors.gyro_y, half * sensors.gyro_z
+        a, b, c = (half * rate for rate in mean[:3])
         x, y, z, w = (
             x + w * a + y * c - z * b,
             y + w * b + z * a - x * c,
@@ -90,8 +108,8 @@ class Estimator:
         scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
         e.qx, e.qy, e.qz, e.qw = x, y, z, w = x * scale, y * scale, z * scale, w * scale
 
-        force = (sensors.acc_x, sensors.acc_y, sensors.acc_z)
-        e.ax, e.ay, up = rotate((x, y, z, w), force)
+        force_x, force_y, force_z = mean[3:]
+        e.ax, e.ay, up = rotate((x, y, z, w), (force_x, force_y, force_z))
         e.az = up - 1.0
         dvx, dvy, dvz = GRAVITY * dt * e.ax, GRAVITY * dt * e.ay, GRAVITY * dt * e.az
         e.x += dt * (e.vx + 0.5 * dvx)
@@ -101,6 +119,10 @@ class Estimator:
         e.vy += dvy
         e.vz += dvz
         self._update_angles()
+
+    def _forget_samples(self) -> None:
+        self._sums = [0.0] * 6
+        self._samples = 0
 
     def grow_variances(self, dt: float) -> None:
         """Let the variances grow by what ``dt`` (s) adds to them."""

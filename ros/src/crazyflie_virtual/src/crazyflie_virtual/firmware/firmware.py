@@ -15,7 +15,8 @@ from crazyflie_virtual.firmware.remarks import Remarks
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
 from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, OFF, Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
-from crazyflie_virtual.firmware.supervisor import State, Supervisor
+from crazyflie_virtual.firmware.supervisor import Supervisor
+from crazyflie_virtual.firmware.supervisor_states import State
 from crazyflie_virtual.link.statistics import LinkStatistics
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.memories import MemoryTester
@@ -124,8 +125,9 @@ class Firmware:
             return OFF
         with_position = self._steps % POSITION_STEPS == 0
         sensors.sample_inertial(physics.rates, physics.specific_force)
-        self.estimator.predict(sensors, STEP)
+        self.estimator.sample(sensors)
         if with_position:
+            self.estimator.predict(_POSITION_PERIOD)
             self._correct_estimate()
             self.commander.update_from_planner(self.time, estimate)
         if self._steps % _SUPERVISOR_STEPS == 0:
@@ -134,7 +136,7 @@ class Firmware:
             sensors.sample_slow(physics.position[2], physics.quaternion)
         setpoint = self.setpoint = self.supervisor.override(self.commander.setpoint)
         return self.stabilizer.update(
-            setpoint, estimate, sensors, with_position, self.supervisor.can_fly
+            setpoint, estimate, sensors, with_position, self.supervisor.motors_may_run
         )
 
     def stream(self, setpoint: Setpoint) -> None:

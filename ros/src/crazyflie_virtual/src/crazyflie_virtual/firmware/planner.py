@@ -67,7 +67,7 @@ class Planner:
         Pieces of trajectories, uploaded by the client.
     phase : Phase
     blocked : bool
-        Set while the vehicle cannot fly: plans are refused.
+        Whether the vehicle cannot fly: then nothing may be planned.
     takeoff_speed, landing_speed : float
         Where a command gives none, m/s.
     groups : int
@@ -124,14 +124,14 @@ class Planner:
         return 0
 
     def block(self, is_blocked: bool) -> None:
-        """Refuse plans from now on, and stop what is flying; or allow them again."""
+        """Stop what is flying, and plan nothing from now on; or allow it again."""
         if is_blocked and self.phase in (Phase.FLYING, Phase.LANDING):
             self.phase = Phase.STOPPED
         self.blocked = is_blocked
 
     def take_off(self, time: float, height: float, yaw: float | None, duration: float) -> int:
         """Climb to ``height`` (m) in ``duration`` (s), turning to ``yaw`` (rad) unless None."""
-        if self.phase in (Phase.FLYING, Phase.LANDING):
+        if self.phase is not Phase.STOPPED:
             return REFUSED
         return self._move_vertically(time, height, yaw, duration, Phase.FLYING)
 
@@ -166,7 +166,8 @@ class Planner:
             position = (dx + x, dy + y, dz + z)
             yaw += start.yaw
         plan = straight_piece if linear else smooth_piece
-        return self._fly(time, plan, start, position, yaw, duration, Phase.FLYING)
+        way = (start, position, yaw, max(duration, _SHORTEST))
+        return self._fly(time, Phase.FLYING, plan, *way)
 
     def spiral(
         self,
@@ -179,21 +180,11 @@ class Planner:
         clockwise: bool,
     ) -> int:
         """Fly along a spiral; see `spiral_piece`. Radii are 0 at least, angles a turn at most."""
-        if self.blocked:
-            return REFUSED
-        if not all(map(math.isfinite, (angle, *radii, ascent, duration))) or duration < 0.0:
-            return errno.EINVAL
-        piece = spiral_piece(
-            self._last,
-            max(-2.0 * math.pi, min(2.0 * math.pi, angle)),
-            (max(0.0, radii[0]), max(0.0, radii[1])),
-            ascent,
-            max(duration, _SHORTEST),
-            sideways,
-            clockwise,
-        )
-        self._begin_at(time, Trajectory((piece,)), Phase.FLYING)
-        return 0
+        # In this order, what is no number stays none.
+        angle = min(max(angle, -2.0 * math.pi), 2.0 * math.pi)
+        radii = (max(radii[0], 0.0), max(radii[1], 0.0))
+        form = (angle, radii, ascent, max(duration, _SHORTEST), sideways, clockwise)
+        return self._fly(time, Phase.FLYING, spiral_piece, self._last, *form)
 
     def define(self, trajectory_id: int, location: int, kind: int, offset: int, pieces: int) -> int:
         """Define where a trajectory is; whether there is one shows at its start.
@@ -232,19 +223,21 @@ class Planner:
     ) -> int:
         """Fly a trajectory that was defined; ``relative`` to the present position (and yaw).
 
-        One that cannot be flown is no error: nothing happens.
+        One that cannot be flown is no error: nothing happens. Nor is a time scale
+        that is not positive, with which the trajectory is at its end at once.
         """
         try:
             pieces, is_compressed = self._pieces(trajectory_id)
         except ValueError:
             return 0
-        if self.blocked:
-            return REFUSED
         if is_compressed and (time_scale != 1.0 or backwards):
             return errno.ENOEXEC
-        if not (math.isfinite(time_scale) and time_scale > 0.0):
-            return errno.EINVAL
-        trajectory = Trajectory(pieces, time_scale, backwards)
+        if time_scale > 0.0:
+            trajectory = Trajectory(pieces, time_scale, backwards)
+        else:
+            end = Trajectory(pieces, 1.0, backwards).evaluate(math.inf)
+            still = PolynomialPiece(0.0, *((part,) for part in (*end.position, end.yaw)))
+            trajectory = Trajectory((still,))
         if relative:
             yaw = self._last.yaw if relative_yaw and not is_compressed else None
             trajectory = trajectory.moved_to(self._last.position, yaw)
@@ -269,11 +262,12 @@ class Planner:
         x, y, z = self._last.position
         start = Goal((x, y, z), (0.0,) * 3, (0.0,) * 3, self._last.yaw, 0.0)
         yaw = start.yaw if yaw is None else yaw
-        return self._fly(time, smooth_piece, start, (x, y, height), yaw, duration, phase)
+        way = (start, (x, y, height), yaw, max(duration, _SHORTEST))
+        return self._fly(time, phase, smooth_piece, *way)
 
-    def _fly(self, time, plan, start, position, yaw, duration, phase):
+    def _fly(self, time, phase, plan, *way):
         try:
-            piece = plan(start, position, yaw, max(duration, _SHORTEST))
+            piece = plan(*way)
         except (ArithmeticError, ValueError):
             piece = _NOWHERE
         self._begin_at(time, Trajectory((piece,)), phase)

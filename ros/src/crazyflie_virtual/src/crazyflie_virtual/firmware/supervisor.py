@@ -1,24 +1,12 @@
-"""The supervisor: may the motors run, and what overrides the setpoint. 25 Hz.
-
-It is a table of transitions, as in the firmware: docs/functional-areas/supervisor
-of crazyflie-firmware explains the scheme. States, conditions and their order are
-those of its supervisor_state_machine.c (the last version we could read is of
-2024) with what came later: that disarming in the air is no emergency (pull
-request 1426), that an armed vehicle does not wait for ever (1441), and the state
-before `State.READY` (1641). The recorded flights (release 2026.08) confirm each
-transition but these, of which there is no record: the one out of `State.READY`
-by time, those out of `State.LANDED` by disarming and of `State.LEVELLING` by
-disarming and tumbling, and those of `State.CRASHED`.
-"""
+"""The supervisor: may the motors run, and what overrides the setpoint. 25 Hz."""
 
 from collections.abc import Callable
-from enum import Enum, Flag, auto
-from typing import NamedTuple
 
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.states import Setpoint
+from crazyflie_virtual.firmware.supervisor_states import Condition, State, next_state
 
 EMERGENCY_WATCHDOG = 1.0
 """How long one message holds off the emergency stop, s, once there has been one."""
@@ -32,115 +20,9 @@ _TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
 _FREE_FALL = 0.1
 """Accelerometer, g, below which in all axes the vehicle is falling: not tumbled."""
 
-
-class State(Enum):
-    """Where the supervisor is."""
-
-    NOT_READY = "Pre-flight checks not passed"
-    CHECKED = "Pre-flight checks passed"
-    ARMING = "Arming"
-    READY = "Ready to fly"
-    FLYING = "Flying"
-    LANDED = "Landed"
-    RESET = "Reset"
-    LEVELLING = "Warning, level out"
-    FREE_FALL = "Exception, free fall"
-    CRASHED = "Crashed"
-    LOCKED = "Locked"
-
-
-class Condition(Flag):
-    """What decides on transitions."""
-
-    ARMED = auto()
-    FLYING = auto()
-    """Some motor ran within the last 2 s."""
-    TUMBLED = auto()
-    SETPOINT_OLD = auto()
-    """For more than 0.5 s."""
-    SETPOINT_TOO_OLD = auto()
-    """For more than 2 s."""
-    EMERGENCY = auto()
-    CRASHED = auto()
-    """Not recovered since the crash."""
-    NOT_TAKEN_OFF = auto()
-    """Armed for `Supervisor.preflight_timeout`."""
-    NOT_FLOWN_AGAIN = auto()
-    """Landed for `Supervisor.landed_timeout`."""
-    ALWAYS = auto()
-
-
-class Transition(NamedTuple):
-    """Taken when any condition of ``when`` holds, or any of ``unless`` does not."""
-
-    to: State
-    when: Condition = Condition(0)
-    unless: Condition = Condition(0)
-
-
-_S, _C = State, Condition
-
-TRANSITIONS: dict[State, tuple[Transition, ...]] = {
-    _S.NOT_READY: (
-        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
-        Transition(_S.CHECKED, unless=_C.TUMBLED),
-    ),
-    _S.CHECKED: (
-        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
-        Transition(_S.NOT_READY, when=_C.TUMBLED),
-        Transition(_S.ARMING, when=_C.ARMED),
-    ),
-    _S.ARMING: (
-        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
-        Transition(_S.NOT_READY, when=_C.TUMBLED, unless=_C.ARMED),
-        # Brushless vehicles with telegrams from their motors wait for these here.
-        Transition(_S.READY, when=_C.ALWAYS),
-    ),
-    _S.READY: (
-        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
-        Transition(_S.NOT_READY, when=_C.TUMBLED, unless=_C.ARMED),
-        Transition(_S.FLYING, when=_C.FLYING),
-        Transition(_S.CHECKED, when=_C.NOT_TAKEN_OFF),
-    ),
-    _S.FLYING: (
-        Transition(_S.FREE_FALL, when=_C.SETPOINT_TOO_OLD | _C.EMERGENCY),
-        Transition(_S.CRASHED, when=_C.TUMBLED),
-        Transition(_S.RESET, unless=_C.ARMED),
-        Transition(_S.LEVELLING, when=_C.SETPOINT_OLD),
-        Transition(_S.LANDED, unless=_C.FLYING),
-    ),
-    _S.LANDED: (
-        Transition(_S.RESET, when=_C.NOT_FLOWN_AGAIN, unless=_C.ARMED),
-        Transition(_S.FLYING, when=_C.FLYING),
-    ),
-    _S.RESET: (Transition(_S.NOT_READY, when=_C.ALWAYS),),
-    # There is no way from here to LANDED: with its motors off, too, a vehicle
-    # that gets no setpoints is locked.
-    _S.LEVELLING: (
-        Transition(_S.FREE_FALL, when=_C.SETPOINT_TOO_OLD | _C.TUMBLED | _C.EMERGENCY),
-        Transition(_S.RESET, unless=_C.ARMED),
-        Transition(_S.FLYING, unless=_C.SETPOINT_OLD),
-    ),
-    _S.FREE_FALL: (Transition(_S.LOCKED, when=_C.ALWAYS),),
-    _S.CRASHED: (
-        Transition(_S.NOT_READY, unless=_C.CRASHED),
-        Transition(_S.LOCKED, when=_C.EMERGENCY),
-    ),
-    _S.LOCKED: (),
-}
-"""The first transition whose condition is met is taken, one in each update."""
-
 _RUNNING = (State.READY, State.FLYING, State.LANDED, State.LEVELLING)
-_KEEPS_ARMED = (*_RUNNING, State.ARMING)
+_ARMED = (*_RUNNING, State.ARMING)
 _IN_AIR = (State.FLYING, State.LEVELLING)
-
-
-def next_state(state: State, conditions: Condition) -> State:
-    """Return the state after one update."""
-    for transition in TRANSITIONS[state]:
-        if conditions & transition.when or ~conditions & transition.unless:
-            return transition.to
-    return state
 
 
 class Supervisor:
@@ -184,8 +66,13 @@ class Supervisor:
 
     @property
     def can_fly(self) -> bool:
-        """Whether the motors may run."""
+        """Whether setpoints are flown."""
         return self.state in _RUNNING
+
+    @property
+    def motors_may_run(self) -> bool:
+        """Whether the motors idle at least."""
+        return self.state in _ARMED
 
     @property
     def is_flying(self) -> bool:
@@ -251,7 +138,7 @@ class Supervisor:
         self._state_time = time
         if state is State.CRASHED:
             self.is_crashed = True
-        if state not in _KEEPS_ARMED:
+        if state not in _ARMED:
             self.is_armed = False
         if state is State.CHECKED and self.auto_arm:
             self.is_armed = True

@@ -34,15 +34,17 @@ class HighLevelPort:
         return [Packet(Port.HIGH_LEVEL, packet.channel, answer)]
 
     def _command(self, command, data):
+        f = self._firmware
         if command not in _COMMANDS:
+            f.remark("command", f"HLC: unknown command {command}")
             return errno.ENOEXEC
         form, handler = _COMMANDS[command]
         if len(data) < struct.calcsize("<" + form):
+            f.remark("command", f"HLC: command {command} is too short")
             return errno.EINVAL
         values = struct.unpack_from("<" + form, data)
         if command in _FOR_ALL:
             return handler(self, *values)
-        f = self._firmware
         if command in _PLANS and self._planner.blocked:
             f.remark("planner", f"HLC: refuses command {command}: {f.supervisor.state.value}")
             return errno.EBUSY
@@ -101,6 +103,8 @@ class HighLevelPort:
         reason = self._planner.unflyable(trajectory_id)
         if reason:
             self._firmware.console.write_line(f"HLC: no trajectory {trajectory_id}: {reason}")
+        elif not time_scale > 0.0:
+            self._firmware.console.write_line(f"HLC: at its end at once: time scale {time_scale:g}")
         return self._planner.start(
             self._time, trajectory_id, time_scale, backwards, relative, relative_yaw
         )

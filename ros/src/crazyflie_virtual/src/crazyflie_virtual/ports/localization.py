@@ -38,8 +38,8 @@ class LocalizationPort:
     def handle(self, packet: Packet) -> list[Packet]:
         """Take a measurement; only to storing lighthouse data there is an answer."""
         data = packet.data
-        if packet.channel == _POSITION:
-            self._position(data)
+        if packet.channel == _POSITION and len(data) == 12:
+            self._take_position(struct.unpack("<fff", data))
         elif packet.channel == _PACKED_POSITIONS:
             for values in _each(_PACKED_POSITION, data):
                 if values[0] == self._address:
@@ -50,7 +50,8 @@ class LocalizationPort:
         elif packet.channel == _GENERIC and data:
             self._generic(data[0], data[1:])
         else:
-            self._firmware.remark("location", f"LOC: unknown channel {packet.channel}")
+            text = f"LOC: nothing done with {len(data)} bytes on channel {packet.channel}"
+            self._firmware.remark("location", text)
         return []
 
     def _generic(self, command, data):
@@ -70,21 +71,23 @@ class LocalizationPort:
         else:
             self._firmware.remark("location", f"LOC: nothing done with a message {command}")
 
-    def _position(self, data):
-        if len(data) == 12:
-            self._take_position(struct.unpack("<fff", data))
-
     def _take_position(self, position):
         if all(map(math.isfinite, position)):
             self._firmware.localization.take_position(self._firmware.time, position)
+        else:
+            self._refuse()
 
     def _take_pose(self, position, quaternion):
         norm = math.hypot(*quaternion)
         # No rotation, or not a number.
         if not (all(map(math.isfinite, position)) and 0.5 < norm < 2.0):
+            self._refuse()
             return
         unit = tuple(part / norm for part in quaternion)
         self._firmware.localization.take_pose(self._firmware.time, position, unit)
+
+    def _refuse(self):
+        self._firmware.remark("location", "LOC: a measurement that is not a number, or no rotation")
 
 
 def _each(form, data):

@@ -32,6 +32,8 @@ class AttitudeSetpointPort:
             f.stream(setpoint)
             if f.attitude_decoder.is_locked:
                 f.remark("thrust", "CMD: thrust is locked until a setpoint without thrust comes")
+        else:
+            f.remark("setpoint", f"CMD: unknown channel {packet.channel}")
         return []
 
 
@@ -59,4 +61,7 @@ class GenericSetpointPort:
             f.stream(setpoint)
         elif packet.channel == _META and packet.data[:1] == bytes([_SETPOINTS_STOP]):
             f.commander.release(f.estimate)
+        else:
+            head = packet.data[:1].hex()
+            f.remark("setpoint", f"CMD: unknown command {packet.channel}/{head}")
         return []

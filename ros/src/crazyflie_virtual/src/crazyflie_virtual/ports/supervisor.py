@@ -6,7 +6,7 @@ from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 
 _INFO, _COMMAND = 0, 1
-_FIRST_BIT, _LAST_BIT, _ALL_BITS = 0x01, 0x0B, 0x0C
+_FIRST_BIT, _ALL_BITS = 0x01, 0x0C
 _ARM, _RECOVER, _EMERGENCY_STOP, _EMERGENCY_WATCHDOG = 1, 2, 3, 4
 _RESPONSE = 0x80
 
@@ -29,12 +29,14 @@ class SupervisorPort:
         if not packet.data:
             return []
         command = packet.data[0]
-        if packet.channel == _INFO:
+        answer = None
+        if packet.channel == _INFO and _FIRST_BIT <= command <= _ALL_BITS:
             answer = self._info(command)
-        elif packet.channel == _COMMAND:
+        elif packet.channel == _COMMAND and _ARM <= command <= _EMERGENCY_WATCHDOG:
             answer = self.command(command, packet.data[1:])
         else:
-            answer = None
+            text = f"SUP: unknown command {packet.channel}/{command}"
+            self._firmware.remark("supervisor", text)
         if answer is None:
             return []
         return [Packet(Port.SUPERVISOR, packet.channel, bytes([_RESPONSE | command]) + answer)]
@@ -63,6 +65,4 @@ class SupervisorPort:
         bits = self._firmware.info
         if command == _ALL_BITS:
             return struct.pack("<H", bits)
-        if _FIRST_BIT <= command <= _LAST_BIT:
-            return bytes([bits >> (command - _FIRST_BIT) & 1])
-        return None
+        return bytes([bits >> (command - _FIRST_BIT) & 1])

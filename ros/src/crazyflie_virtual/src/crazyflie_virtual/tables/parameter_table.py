@@ -85,7 +85,7 @@ _GROUPS = {
     ],
     "commander": [("enHighLevel", U8, "commander.high_level_enabled")],
     "hlCommander": [
-        *_rows(FLOAT, _PERSISTENT, vtoff="planner.takeoff_speed", vland="planner.landing_speed"),
+        *_rows(FLOAT, _KEPT, vtoff="planner.takeoff_speed", vland="planner.landing_speed"),
         ("groupmask", U8, "planner.groups"),
     ],
     "supervisor": [

@@ -30,7 +30,7 @@ _ATTACKS = {
     "none": None,
     "junk, 10 kHz": (*_FLOOD, "/in_flight_state", "std_msgs/String", "10000"),
     "/ref, 10 kHz": (*_FLOOD, "/ref", "crazyflie_msgs/PositionVelocityStateStamped", "10000"),
-    "no frames, 10 kHz": (*_FLOOD, "/tf", "tf2_msgs/TFMessage", "10000"),
+    "no frames, 10 kHz": (*_FLOOD, "/tf", "tf2_msgs/TFMessage", "10000", "transforms: [{}]"),
     "/tf, 20 MB/s": (*_FLOOD, "/tf", "tf2_msgs/TFMessage", "2500", "80"),
     "frozen listener": (sys.executable, __file__, "freeze"),
 }

@@ -1,9 +1,12 @@
 """A publisher that behaves as none should, written on the bare protocol (TCPROS).
 
 It sends prepared bytes in one piece per millisecond, so that it is not what limits a flood.
-As a program it floods a topic until its standard input ends, and prints how much it has sent:
+As a program it floods a topic until there is something on its standard input, and prints to
+how many subscribers it has sent how many messages a second:
 
-    python3 -m crazyflie_utils.testing.hostile_publisher TOPIC TYPE RATE [TRANSFORMS]
+    python3 -m crazyflie_utils.testing.hostile_publisher TOPIC TYPE RATE [CONTENT]
+
+CONTENT is the message in YAML, or how many transforms it has.
 """
 
 import contextlib
@@ -21,6 +24,7 @@ from xmlrpc.server import SimpleXMLRPCServer
 import genpy
 import rosgraph
 import roslib.message
+import yaml
 from geometry_msgs.msg import TransformStamped
 from rosgraph.network import read_ros_handshake_header, write_ros_handshake_header
 from tf2_msgs.msg import TFMessage
@@ -135,13 +139,15 @@ def crowd(count: int) -> TFMessage:
     return TFMessage(transforms)
 
 
-def _flood(topic, type_name, rate, transforms=0):
+def _flood(topic, type_name, rate, content="{}"):
     message_type = roslib.message.get_message_class(type_name)
 
     def prepare():
-        if transforms:
-            return frame(crowd(transforms))
-        return frame(message_type(*([[TransformStamped()]] if message_type is TFMessage else [])))
+        if content.isdigit():
+            return frame(crowd(int(content)))
+        message = message_type()
+        genpy.message.fill_message_args(message, [yaml.safe_load(content)])
+        return frame(message)
 
     sent, data = 0, prepare()
     with HostilePublisher(topic, message_type) as publisher:
@@ -157,4 +163,4 @@ def _flood(topic, type_name, rate, transforms=0):
 
 
 if __name__ == "__main__":
-    _flood(sys.argv[1], sys.argv[2], float(sys.argv[3]), int((sys.argv[4:] or ["0"])[0]))
+    _flood(sys.argv[1], sys.argv[2], float(sys.argv[3]), *sys.argv[4:])

@@ -72,7 +72,7 @@ def end(attacker: subprocess.Popen[bytes]) -> str:
     """End an attacker, and return to how many subscribers it sent how many messages a second."""
     attacker.send_signal(signal.SIGCONT)
     sent, _ = attacker.communicate(b"end\n", timeout=10.0)
-    return " x ".join(sent.decode().split())
+    return " x ".join(sent.decode().split()[1:])
 
 
 def freeze() -> None:
@@ -85,6 +85,7 @@ def freeze() -> None:
     ):
         rospy.Subscriber(topic, kind, lambda _: None)
     time.sleep(1.0)
+    print("frozen", flush=True)
     os.kill(os.getpid(), signal.SIGSTOP)
     os._exit(0)
 

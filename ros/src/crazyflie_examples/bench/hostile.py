@@ -1,32 +1,45 @@
 #!/usr/bin/env python
-"""How the hover stack bears hostile messages: rates of the control, and memory of the nodes.
+"""How the hover stack bears hostile peers: rate of the control, and memory of the nodes.
 
 Start `roslaunch crazyflie_examples sw_hover.launch rviz:=false` in one shell and this in
-another; it prints a line for each attack. Nothing is asserted: the figures depend on the
-machine, of which the attacker takes a core.
+another; it prints a line for each attack, with the undisturbed rate just before it. Nothing
+is asserted: the figures depend on the machine, and on what else it does.
 """
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
 
 import rospy
-from geometry_msgs.msg import TransformStamped
-from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_msgs.msg import ControlStamped, PositionVelocityStateStamped
+from crazyflie_msgs.msg import (
+    ControlStamped,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
 
 _DURATION = 10.0
 _NODES = ("state_estimator", "lqr_controller", "takeoff_control_filter", "takeoff_server")
 
+_FLOOD = (sys.executable, "-m", "crazyflie_utils.testing.hostile_publisher")
+_ATTACKS = {
+    "none": None,
+    "junk, 10 kHz": (*_FLOOD, "/in_flight_state", "std_msgs/String", "10000"),
+    "/ref, 10 kHz": (*_FLOOD, "/ref", "crazyflie_msgs/PositionVelocityStateStamped", "10000"),
+    "no frames, 10 kHz": (*_FLOOD, "/tf", "tf2_msgs/TFMessage", "10000", "transforms: [{}]"),
+    "/tf, 20 MB/s": (*_FLOOD, "/tf", "tf2_msgs/TFMessage", "2500", "80"),
+    "frozen listener": (sys.executable, __file__, "freeze"),
+}
+
 
 def main() -> None:
     """Attack, one way after the other."""
-    if len(sys.argv) > 1:
-        attack(sys.argv[1])
+    if sys.argv[1:] == ["freeze"]:
+        freeze()
     rospy.init_node("victim_watch")
     controls = []
     rospy.Subscriber("/control/lqr", ControlStamped, lambda _: controls.append(1), tcp_nodelay=True)
@@ -34,57 +47,50 @@ def main() -> None:
     reference = rospy.Publisher("/ref", PositionVelocityStateStamped, latch=True, queue_size=1)
     reference.publish(PositionVelocityStateStamped())
     time.sleep(3.0)
-    print(f"{'attack':<16}{'control, Hz':>12}{'   memory of ' + ', '.join(_NODES) + ', MB'}")
-    for kind in ("none", "junk", "reference", "empty_frames", "tf"):
-        attacker = subprocess.Popen([sys.executable, __file__, kind])
-        time.sleep(3.0)
+
+    def rate():
         del controls[:]
-        before = memory()
+        start = time.monotonic()
         time.sleep(_DURATION)
-        rate = len(controls) / _DURATION
-        growth = ", ".join(f"{b} -> {a}" for b, a in zip(before, memory(), strict=True))
-        attacker.kill()
-        attacker.wait(10.0)
-        print(f"{kind:<16}{rate:>12.1f}   {growth}", flush=True)
+        return len(controls) / (time.monotonic() - start)
+
+    print(f"{'attack':<18}{'before':>8}{'control, Hz':>13}{'sent, Hz':>14}   memory, MB, of", *_NODES)
+    for kind, command in _ATTACKS.items():
+        before = rate()
+        attacker = None
+        if command:
+            attacker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        time.sleep(3.0)
+        memory_before = memory()
+        under_attack = rate()
+        growth = ", ".join(f"{b:.1f} -> {a:.1f}" for b, a in zip(memory_before, memory()))
+        sent = end(attacker) if attacker else ""
+        print(f"{kind:<18}{before:>8.1f}{under_attack:>13.1f}{sent:>14}   {growth}", flush=True)
 
 
-def attack(kind: str) -> None:
-    """Send what one attack sends until it is ended."""
-    rospy.init_node(f"attacker_{kind}")
-    publishers = {
-        "junk": ("/in_flight_state", String, 10_000.0),
-        "reference": ("/ref", PositionVelocityStateStamped, 10_000.0),
-        "empty_frames": ("/tf", TFMessage, 1000.0),
-        "tf": ("/tf", TFMessage, 20e6 / 8000.0),
-    }
-    if kind not in publishers:
-        time.sleep(3600.0)
-    topic, message_type, rate = publishers[kind]
-    publisher = rospy.Publisher(topic, message_type, queue_size=10)
-    message = message_type()
-    if kind == "junk":
-        message.data = "junk"
-    if kind == "empty_frames":
-        message.transforms = [TransformStamped()]
-    count, start = 0, time.monotonic()
-    while not rospy.is_shutdown():
-        if kind == "tf":
-            message.transforms = [transform(k) for k in range(80)]
-        publisher.publish(message)
-        count += 1
-        time.sleep(max(0.0, start + count / rate - time.monotonic()))
+def end(attacker: subprocess.Popen[bytes]) -> str:
+    """End an attacker, and return to how many subscribers it sent how many messages a second."""
+    attacker.send_signal(signal.SIGCONT)
+    sent, _ = attacker.communicate(b"end\n", timeout=10.0)
+    return " x ".join(sent.decode().split()[1:])
 
 
-def transform(number: int) -> TransformStamped:
-    """Return a transform of some other body, about 100 bytes."""
-    message = TransformStamped(child_frame_id=f"body{number:03d}")
-    message.header.frame_id = "world"
-    message.header.stamp = rospy.Time.now()
-    message.transform.rotation.w = 1.0
-    return message
+def freeze() -> None:
+    """Subscribe to what matters, and stop without hanging up."""
+    rospy.init_node("frozen_listener")
+    for topic, kind in (
+        ("/tf", TFMessage),
+        ("/state", PositionVelocityYawStateStamped),
+        ("/control/final", ControlStamped),
+    ):
+        rospy.Subscriber(topic, kind, lambda _: None)
+    time.sleep(1.0)
+    print("frozen", flush=True)
+    os.kill(os.getpid(), signal.SIGSTOP)
+    os._exit(0)
 
 
-def memory() -> list[int]:
+def memory() -> list[float]:
     """Return the resident memory of the nodes, MB."""
     found = []
     for name in _NODES:
@@ -95,7 +101,7 @@ def memory() -> list[int]:
                 if f"__name:={name}" in command and "python" in command:
                     with open(f"/proc/{process}/status", encoding="utf-8") as file:
                         size = re.search(r"VmRSS:\s+(\d+)", file.read())
-                    found.append(int(size[1]) // 1024)
+                    found.append(int(size[1]) / 1024.0)
                     break
             except OSError:
                 continue

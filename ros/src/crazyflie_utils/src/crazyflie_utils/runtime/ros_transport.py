@@ -1,8 +1,10 @@
 """The world outside a process, as rospy shows it."""
 
 import contextlib
+import math
 import threading
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Hashable
 from concurrent.futures import Future, InvalidStateError, wait
 from functools import partial
 from time import monotonic
@@ -13,6 +15,7 @@ import rosgraph
 import rospy
 
 from crazyflie_utils.runtime import rospy_internals
+from crazyflie_utils.runtime.throttle import Throttle
 from crazyflie_utils.runtime.transport import (
     ExternalPublisher,
     ExternalSubscriber,
@@ -62,13 +65,34 @@ class _RosSubscriber(ExternalSubscriber):
 
 
 class RosTransport(Transport):
-    """rospy, for a process that has called ``rospy.init_node``."""
+    """rospy, for a process that has called ``rospy.init_node``.
+
+    Attributes
+    ----------
+    refused : collections.Counter
+        How often peers did something wrong, by kind.
+    """
 
     def __init__(self) -> None:
+        self.refused: Counter[Hashable] = Counter()
+        self._complaints = Throttle()
+        rospy_internals.bear_hostile_newcomers(self._refuse)
         rospy_internals.never_connect_to_oneself()
         rospy_internals.never_fail_to_log()
         self._remappings = rospy_internals.take_over_remappings()
         self._calls: dict[str, threading.Semaphore] = {}
+
+    def receive(self, limits_rate: bool) -> None:
+        """Get ready for what publishers may send; see `rospy_internals`."""
+        rospy_internals.bear_hostile_publishers(self._refuse, limits_rate)
+
+    def _refuse(self, text, key):
+        # Once, since a peer that is wrong stays so; and of the first 64 only.
+        if self._complaints.passes(key, math.inf, 0.0):
+            self.log("warn", text)
+        elif key not in self.refused:
+            key = "others"
+        self.refused[key] += 1
 
     def remap(self, name: str) -> str:
         """Return what the command line maps the name to."""

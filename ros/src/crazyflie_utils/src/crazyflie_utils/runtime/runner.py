@@ -134,6 +134,8 @@ def ros_process() -> Process:
     except ValueError:
         transport.log("error", f"parameter /use_sim_time: expected {BOOLEAN}")
         _fail()
+    # In simulated time there is no such thing as too many messages a second.
+    transport.receive(limits_rate=not use_sim_time)
     return Process(transport, use_sim_time)
 
 

@@ -129,9 +129,15 @@ class Topics:
         return Publisher(topic, self._transport.advertise(name, message_type, latch), latch)
 
     def subscribe(
-        self, name: str, message_type: type[genpy.Message], receiver: Receiver
+        self,
+        name: str,
+        message_type: type[genpy.Message],
+        receiver: Receiver,
+        outside_type: type[genpy.Message] | None = None,
     ) -> Subscriber:
         """Have ``receiver(message)`` called for every message on a topic.
+
+        Messages from outside come as ``outside_type``, a subclass of ``message_type``, if given.
 
         Raises
         ------
@@ -145,7 +151,7 @@ class Topics:
                 receiver(publisher.latched)
         # Each receiver for itself, so that one that comes late is sent what an
         # outside publisher has latched; the connection is shared all the same.
-        external = self._transport.subscribe(name, message_type, receiver)
+        external = self._transport.subscribe(name, outside_type or message_type, receiver)
         return Subscriber(topic, receiver, external)
 
     def _topic(self, name, message_type):

@@ -108,7 +108,7 @@ def test_a_node_that_dies_ends_the_launch_or_is_started_again(file):
     nodes, _ = launch_files.expand(LAUNCH / f"{file}.launch", rviz="true")
     required = {name for name, node in nodes.items() if node.required}
     respawning = {name for name, node in nodes.items() if node.respawn}
-    assert required == {"/simulator", "/lqr_controller"}
+    assert required == {"/simulator"}
     assert respawning == set(nodes) - required - {"/rviz", "/visualizer"}
 
 

@@ -256,7 +256,7 @@ class HoverNetwork(Network):
 
     def start_server(self):
         """Start a server."""
-        self.start("server", TakeoffServerNode(), self.server_parameters)
+        self.server = self.start("server", TakeoffServerNode(), self.server_parameters)
 
     def take_off(self):
         """Take off and wait until the vehicle is flying."""

@@ -435,3 +435,39 @@ def test_a_hover_point_outside_the_geofence_is_refused():
     fence = {"box/max/z": 0.9, "box/min/x": -1.0}
     assert not process.launch(TakeoffServerNode(), "/takeoff_server", {**SERVER, **fence})
     assert "0.10 m outside the geofence" in process.logged("error")[0]
+
+
+# The end of the launch.
+
+
+def flights(network):
+    return [message.data for _, message in network.on("/flights")]
+
+
+def test_a_server_that_is_to_leave_lands_first(network):
+    assert flights(network)[-1].endswith(" in flight")
+    network.server.leave()
+    until_on_ground(network)
+    assert network.vehicle.touchdown_speed < 0.6
+    assert flights(network)[-1].endswith(" on ground")
+    assert network.last("/in_flight_status") == "on ground: the launch is to end"
+
+
+def test_a_server_that_is_to_leave_aborts_a_takeoff():
+    network = HoverNetwork(SERVER)
+    network.advance(1.0)
+    takeoff = network.call("/takeoff")
+    network.advance(3.0)
+    network.server.leave()
+    with pytest.raises(ServiceError, match="takeoff aborted: .* is to end"):
+        takeoff.result(timeout=0)
+    until_on_ground(network)
+    assert network.vehicle.z == 0.0
+
+
+def test_on_the_ground_there_is_nothing_to_land():
+    network = HoverNetwork(SERVER)
+    network.advance(1.0)
+    network.server.leave()
+    network.advance(1.0)
+    assert states(network) == ["on_ground"]

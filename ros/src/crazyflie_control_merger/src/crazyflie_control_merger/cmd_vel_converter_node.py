@@ -22,6 +22,8 @@ class CmdVelConverterParameters(Parameters):
 class CmdVelConverterNode(Node):
     """Publish each control in the form that the radio driver expects."""
 
+    needed_in_flight = True
+
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(CmdVelConverterParameters)

@@ -37,6 +37,8 @@ class MergerNode(Node):
         Entries of the control that it decides on.
     """
 
+    needed_in_flight = True
+
     prioritized_type: type[genpy.Message]
     entries: tuple[int, ...] = ALL_ENTRIES
 

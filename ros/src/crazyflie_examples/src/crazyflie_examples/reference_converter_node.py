@@ -36,6 +36,8 @@ class ReferenceConverterNode(Node):
     Those of a descent, on the topics' names + ``_descent``, too.
     """
 
+    needed_in_flight = True
+
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(ReferenceConverterParameters)

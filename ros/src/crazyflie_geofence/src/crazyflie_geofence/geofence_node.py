@@ -113,6 +113,8 @@ class GeofenceNode(Node):
     Silent until there is a regular control: without one, the merger is silent too.
     """
 
+    needed_in_flight = True
+
     def __init__(self) -> None:
         self._regular: NDArray[np.float64] | None = None
 

@@ -86,6 +86,8 @@ class LinearFeedbackNode(Node):
         Where the yaw is in the state, which begins with position and velocity.
     """
 
+    needed_in_flight = True
+
     state_type: type
     reference_type: type
     parameters_type: type[LinearFeedbackParameters] = LinearFeedbackParameters

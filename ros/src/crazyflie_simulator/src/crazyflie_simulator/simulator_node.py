@@ -97,6 +97,8 @@ class SimulatorNode(Node):
         See `SimulatedVehicle`; for models that can turn over.
     """
 
+    needed_in_flight = True
+
     parameters_type: type[SimulatorParameters] = SimulatorParameters
     max_tilt = math.inf
 

@@ -123,6 +123,8 @@ class StateEstimatorNode(Node):
         `StateEstimatorParameters` or a subclass.
     """
 
+    needed_in_flight = True
+
     state_type: type
     parameters_type: type[StateEstimatorParameters] = StateEstimatorParameters
 

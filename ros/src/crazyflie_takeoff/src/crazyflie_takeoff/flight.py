@@ -160,6 +160,11 @@ class FlightStateMachine:
         self.check_takeoff()
         self._enter(FlightState.TAKING_OFF)
 
+    @property
+    def may_land(self) -> bool:
+        """Whether `land` makes sense."""
+        return self._state in (FlightState.FLYING, FlightState.TAKING_OFF)
+
     def land(self) -> None:
         """Begin to land.
 
@@ -168,7 +173,7 @@ class FlightStateMachine:
         RefusalError
             The vehicle is on the ground, or landing already.
         """
-        if self._state not in (FlightState.FLYING, FlightState.TAKING_OFF):
+        if not self.may_land:
             raise RefusalError(_REFUSALS[self._state])
         self._enter(self._way_down())
 

@@ -1,4 +1,4 @@
-"""Where a vehicle must not be, and how it must not lie: there its motors are stopped."""
+"""Where a vehicle must not be: there its motors are stopped."""
 
 import math
 from dataclasses import dataclass
@@ -40,14 +40,11 @@ class Limits:
         How far outside the box is too far, m.
     floor : float
         Lowest z, m, fixed frame.
-    tilt : float
-        Largest angle between the vehicle's vertical axis and the fixed one, rad.
     """
 
     box: Box
     outside: float
     floor: float
-    tilt: float
 
     def of_position(self, position: tuple[float, ...]) -> str:
         """Return in words what is wrong with a position (m); nothing if nothing is."""
@@ -55,25 +52,6 @@ class Limits:
             return f"{-position[2]:.2f} m below the ground"
         excess = self.box.excess(position)
         return f"{excess:.2f} m outside the geofence" if excess > self.outside else ""
-
-    def of_attitude(self, tilt: float) -> str:
-        """Return in words what is wrong with a tilt (rad); nothing if nothing is."""
-        return f"tilted by {math.degrees(tilt):.0f} degrees" if tilt > self.tilt else ""
-
-
-def tilt_of(quaternion: tuple[float, float, float, float]) -> float:
-    """Return the angle between the body's z axis and the fixed one, rad.
-
-    Parameters
-    ----------
-    quaternion : tuple
-        x, y, z, w, of any length but zero; of zero length it says nothing, and the tilt is 0.
-    """
-    x, y, z, w = quaternion
-    square = x * x + y * y + z * z + w * w
-    if square == 0.0:
-        return 0.0
-    return math.acos(max(-1.0, 1.0 - 2.0 * (x * x + y * y) / square))
 
 
 class Persistence:

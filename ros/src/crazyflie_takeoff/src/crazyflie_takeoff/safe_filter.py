@@ -102,7 +102,7 @@ class SafeFilter(Generic[Control]):
         self._silence = 0.0
         self._lacks_control = False
         self._position_limit = Persistence()
-        self._attitude_limit = Persistence()
+        self._is_tilted = False
         self._height = self._speed = 0.0
         self._state_age = math.inf
         self._ground = 0.0
@@ -174,9 +174,9 @@ class SafeFilter(Generic[Control]):
         if self._choice.stands:
             self._ground = position[2]
 
-    def set_tilt(self, tilt: float) -> None:
-        """Take a measured tilt, rad."""
-        self._attitude_limit.measure(self._limits.of_attitude(tilt))
+    def set_tilted(self, is_tilted: bool) -> None:
+        """Take note of whether the vehicle is tilted as only one that crashes is."""
+        self._is_tilted = is_tilted
 
     def controller_left(self) -> None:
         """Take note that nobody publishes commanded controls: whoever comes next is new."""
@@ -309,9 +309,11 @@ class SafeFilter(Generic[Control]):
         return self._speed if self._state_age < self._patience.hold else None
 
     def _watch_limits(self, step):
-        complaints = [limit.advance(step) for limit in (self._position_limit, self._attitude_limit)]
-        if any(complaints) and not self._is_on_ground:
-            self.stop(", ".join(filter(None, complaints)))
+        complaint = self._position_limit.advance(step)
+        if self._is_tilted:
+            complaint = "the vehicle has tilted over"
+        if complaint and not self._is_on_ground:
+            self.stop(complaint)
 
     def _begin_descent(self):
         self._lacks_control = True

@@ -3,7 +3,6 @@
 import math
 
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
@@ -13,7 +12,7 @@ from crazyflie_msgs.msg import Control, ControlStamped, PositionVelocityYawState
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.flight_state import COMMANDED, ORIGIN, UNKNOWN, FlightState
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
-from crazyflie_takeoff.limits import Box, Limits, tilt_of
+from crazyflie_takeoff.limits import Box, Limits
 from crazyflie_takeoff.safe_control import Setpoint
 from crazyflie_takeoff.safe_filter import Mode, Patience, SafeFilter
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
@@ -53,11 +52,8 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
     state_topic: str | None = parameter(
         TOPIC, "where the vehicle is; without it the limits are not watched", None, "topics/state"
     )
-    pose_topic: str | None = parameter(
-        TOPIC,
-        "how the vehicle lies, such as motion capture's pose; without it tilt is not watched",
-        None,
-        "topics/pose",
+    own_tilted_topic: str | None = parameter(
+        TOPIC, "by default the name of state + `_tilted`", None, "topics/tilted"
     )
     all_emergency_topic: str = parameter(
         TOPIC, "stops the motors of all vehicles", "/all/emergency", "topics/all_emergency"
@@ -80,22 +76,27 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         "loss/descent_limit",
     )
     floor: float = parameter(METRES, "lower is below the ground", -0.5, "limits/floor")
-    tilt: float = parameter(
-        Number("deg", above=0.0, maximum=180.0), "more is a crash", 60.0, "limits/tilt"
-    )
     outside: float = parameter(
         Number("m", minimum=0.0), "further outside the geofence is too far", 0.5, "limits/outside"
     )
+
+    @property
+    def tilted_topic(self) -> str | None:
+        """Where the estimator tells that the vehicle is tilted as only one that crashes is."""
+        of_state = None if self.state_topic is None else f"{self.state_topic}_tilted"
+        return self.own_tilted_topic or of_state
 
     def limits(self) -> Limits:
         """Return where the motors are stopped."""
         # A takeoff begins below many a fence; the floor is a limit of its own.
         lower = (*self.box.lower[:2], -math.inf)
-        return Limits(Box(lower, self.box.upper), self.outside, self.floor, math.radians(self.tilt))
+        return Limits(Box(lower, self.box.upper), self.outside, self.floor)
 
 
 class TakeoffControlFilterNode(Node):
     """Pass on takeoff control always, and commanded control in flight; see `SafeFilter`."""
+
+    needed_in_flight = True
 
     def __init__(self) -> None:
         self._published_state: str | None = None
@@ -164,8 +165,8 @@ class TakeoffControlFilterNode(Node):
                 self._on_measured_state,
                 finite="state",
             )
-        if parameters.pose_topic is not None:
-            handle.subscribe(parameters.pose_topic, PoseStamped, self._on_pose, finite="pose")
+        if parameters.tilted_topic is not None:
+            handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
 
     def _register_timers(self, handle):
         handle.timer(TIME_STEP, self._on_timer)
@@ -198,9 +199,8 @@ class TakeoffControlFilterNode(Node):
         state = message.state
         self._filter.set_height((state.x, state.y, state.z), state.z_dot)
 
-    def _on_pose(self, message):
-        q = message.pose.orientation
-        self._filter.set_tilt(tilt_of((q.x, q.y, q.z, q.w)))
+    def _on_tilted(self, message):
+        self._filter.set_tilted(message.data)
 
     def _on_takeoff_control(self, message):
         now = self._handle.time()

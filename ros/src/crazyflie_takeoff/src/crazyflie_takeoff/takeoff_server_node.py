@@ -47,6 +47,8 @@ controller, s: nodes that are launched together need a while to find each other.
 class TakeoffServerNode(Node):
     """Let the vehicle take off and land when a service asks for it."""
 
+    needed_in_flight = True
+
     def __init__(self) -> None:
         # None until it is known where the flight stands.
         self._flight: FlightStateMachine | None = None
@@ -84,6 +86,7 @@ class TakeoffServerNode(Node):
         self._flight_state = handle.publisher(parameters.flight_state_topic, String, latch=True)
         self._status = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
+        self._announce_flight = handle.announce_flights()
         handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
         handle.subscribe(parameters.filter_state_topic, String, self._on_filter_state)
@@ -103,6 +106,16 @@ class TakeoffServerNode(Node):
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
         handle.timer(STATUS_PERIOD, self._publish_status, steady=True)
         handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True)
+
+    @override
+    def leave(self) -> None:
+        """Land: the process is to end."""
+        flight = self._flight
+        if flight is None or not flight.may_land:
+            return
+        self._calls.fail(ServiceError(f"takeoff aborted: {self._handle.name} is to end"))
+        flight.land()
+        self._cause = "the launch is to end"
 
     @override
     def make_safe(self) -> None:
@@ -266,8 +279,7 @@ class TakeoffServerNode(Node):
         text = f"the battery is low, {self._battery.voltage:.2f} V"
         if charge in (Charge.LOW, Charge.CRITICAL):
             self._handle.warn(text, throttle=30.0, key="battery")
-        is_up = flight.state in (FlightState.FLYING, FlightState.TAKING_OFF)
-        if charge is Charge.CRITICAL and is_up:
+        if charge is Charge.CRITICAL and flight.may_land:
             self._calls.fail(ServiceError(f"takeoff aborted: {text}"))
             flight.land()
             self._cause = text
@@ -287,6 +299,7 @@ class TakeoffServerNode(Node):
         if output.state is not self._published_state:
             self._published_state = output.state
             self._flight_state.publish(String(output.state.value))
+            self._announce_flight(output.state is not FlightState.ON_GROUND)
             self._publish_status()
         if output.toggle:
             self._in_flight.publish(Empty())

@@ -44,6 +44,8 @@ class ServerNode(Node):
         ``server_type(settings, warn)`` listens, or raises `OSError`; ``warn(text)`` logs.
     """
 
+    needed_in_flight = True
+
     settings_type: ClassVar[type[Parameters]]
     server_type: ClassVar[type]
 

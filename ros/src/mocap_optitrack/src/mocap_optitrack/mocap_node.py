@@ -34,6 +34,8 @@ _REPEAT = 5.0
 class MocapNode(Node):
     """Publish where the rigid bodies of a motion capture system are, as topics and on tf."""
 
+    needed_in_flight = True
+
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(MocapParameters, self._reconfigure)

@@ -8,25 +8,26 @@ import json
 import os
 import signal
 import socket
+import subprocess
 import sys
 import tempfile
-import threading
 import time
 from pathlib import Path
 
 import rosgraph
 import rospy
 from dynamic_reconfigure.client import Client
-from faulty_flight import LIMIT, Observer, master_knows, node_process
-from std_msgs.msg import Empty
+from faulty_flight import LIMIT, Observer, node_process
+from std_msgs.msg import Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
 
 from crazyflie_dev.flight_operator import FlightError
 from crazyflie_dev.flight_record import Series
 from crazyflie_dev.programs import free_port, running
 from crazyflie_driver.msg import GenericLogData
-from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest, RemoveCrazyflie
+from crazyflie_driver.srv import RemoveCrazyflie
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_utils.testing.peer import wait_until
 
 _VARIABLES = ("stateEstimate.z", "stateEstimate.vz", "motor.m1", "motor.m2", "motor.m3", "motor.m4")
@@ -37,7 +38,7 @@ _RESTART = bytes((0xFF, 0xFE, 0xF0, 0x01))
 # A battery that is nearly empty is so, and has been for long enough, within a second; what the
 # takeoff server waits for after a takeoff is short.
 _PARAMETERS = {
-    "/takeoff_server/duration/hover": 3.0,
+    "/takeoff_server/duration/hover": 0.5,
     "/takeoff_server/battery/low": 3.45,
     "/takeoff_server/battery/critical": 3.2,
     "/takeoff_server/battery/duration": 1.0,
@@ -51,10 +52,12 @@ class Vehicle:
         self.uri = f"udp://127.0.0.1:{port}"
         self._address = ("127.0.0.1", port)
         self._log = Series((*_VARIABLES, "supervisor.info"))
+        self.words = []
+        rospy.Subscriber("/crazyflie/status", String, lambda status: self.words.append(status.data))
         rospy.Subscriber("/crazyflie/truth", GenericLogData, self._note)
 
     def _note(self, message):
-        self._log.append(rospy.get_time(), message.values)
+        self._log.append(message.header.stamp.to_sec(), message.values)
 
     def speaks(self):
         """Return whether there are log data of the last 0.3 s."""
@@ -78,6 +81,15 @@ class Vehicle:
         """Return the greatest of all motors since a moment (s)."""
         return float(self._log.between(begin, float("inf"))[:, 2:6].max())
 
+    def motors_stop_after(self, begin):
+        """Return how long after a moment (s) all motors stand still for good, s."""
+        runs = self._log.values[:, 2:6].any(axis=1)
+        return max(0.0, float(self._log.times[runs][-1]) - begin)
+
+    def rests(self):
+        """Return whether all motors stand still."""
+        return not self._log.last[2:6].any()
+
     def restart(self):
         """Restart the firmware, at once and without a word to its client."""
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
@@ -96,10 +108,16 @@ class Flight:
         wait_until(self.vehicle.speaks, "the vehicle's log data", LIMIT)
         wait_until(lambda: rospy.get_time() - self.observer.now < 0.2, "the state", LIMIT)
 
+    def lift_off(self):
+        """Take off."""
+        self.observer.takeoff()
+        wait_until(lambda: self.vehicle.height > 0.5, "the vehicle to lift off", LIMIT)
+
     def take_off(self):
-        """Take off; return the greatest height, m."""
+        """Take off and hover; return the greatest height, m."""
         begin = self.observer.now
         self.observer.takeoff()
+        self.observer.hover(4.0)
         return self.observer.range_since(begin)[1]
 
     def is_back_at(self, height):
@@ -121,6 +139,11 @@ class Flight:
         return ""
 
 
+def next_message(topic, message_type):
+    """Return what the next message on a topic, or a latched one, says."""
+    return rospy.wait_for_message(topic, message_type, LIMIT).data
+
+
 def call(service):
     """Call a service of type Empty."""
     rospy.wait_for_service(service, LIMIT)
@@ -130,6 +153,7 @@ def call(service):
 def lose_the_link(flight, duration):
     """Let the link be silent."""
     begin = flight.observer.now
+    flight.vehicle.words.clear()
     Client("/virtual_crazyflie", LIMIT).update_configuration({"fault/silence": duration})
     flight.observer.hover(duration + 1.0)
     wait_until(flight.vehicle.speaks, "the link", LIMIT)
@@ -138,6 +162,7 @@ def lose_the_link(flight, duration):
         "heights": flight.observer.range_since(begin),
         "height afterwards": end,
         "locked": flight.vehicle.is_locked,
+        "words": flight.vehicle.words[:],
     }
 
 
@@ -156,35 +181,33 @@ def lose_motion_capture_for_a_moment(flight):
 
 
 def lose_motion_capture(flight):
-    """Let motion capture be silent until the vehicle is down, and for 3 s at least."""
+    """Let motion capture be silent until the vehicle is down."""
     begin = rospy.get_time()
     motion_capture = Client("/virtual_mocap", LIMIT)
     motion_capture.update_configuration({"fault/silent": True})
-    time.sleep(3.0)
     flight.wait_for_the_ground()
-    seen = {"fastest descent": flight.vehicle.fastest_descent_since(begin)}
     refusal = flight.refusal()
     motion_capture.update_configuration({"fault/silent": False})
+    seen = {
+        "seconds to the ground": rospy.get_time() - begin,
+        "fastest descent": flight.vehicle.fastest_descent_since(begin),
+        "refusal": refusal,
+    }
+    wait_until(flight.vehicle.rests, "the motors to stop", LIMIT)
     down = rospy.get_time()
     time.sleep(1.5)
-    return {
-        **seen,
-        "refusal": refusal,
-        "highest PWM afterwards": flight.vehicle.highest_pwm_since(down),
-    }
+    return {**seen, "highest PWM afterwards": flight.vehicle.highest_pwm_since(down)}
 
 
 def stop_in_emergency(flight):
     """Call /emergency in flight, and end it again."""
-    call("/emergency")
     called = rospy.get_time()
+    call("/emergency")
     flight.wait_for_the_ground()
     refusal = flight.refusal()
     time.sleep(max(0.0, called + 2.1 - rospy.get_time()))
-    # The log shows the motors 20 ms late, and they were told within 50 ms.
-    seen = {"refusal": refusal, "highest PWM": flight.vehicle.highest_pwm_since(called + 0.2)}
     call("/emergency_reset")
-    return seen
+    return {"refusal": refusal, "seconds": flight.vehicle.motors_stop_after(called)}
 
 
 def restart_the_firmware(flight):
@@ -217,19 +240,41 @@ def empty_the_battery(flight):
     return {"fastest descent": descent, "refusal": refusal}
 
 
+@contextlib.contextmanager
+def another_battery(flight):
+    """Switch the vehicle off, and on again with another battery for the time of a with block."""
+    os.kill(node_process("/virtual_crazyflie"), signal.SIGTERM)
+    rospy.set_param("/virtual_crazyflie/fault/low_battery", False)
+    wait_until(lambda: not flight.vehicle.speaks(), "the vehicle to be off", LIMIT)
+    vehicle = ["rosrun", "crazyflie_virtual", "virtual_crazyflie", "__name:=virtual_crazyflie"]
+    with running(*vehicle, stdout=subprocess.DEVNULL):
+        wait_until(lambda: next_message("/crazyflie/battery", Float32) > 4.0, "4 V", LIMIT)
+        yield
+
+
 def stop_all_in_emergency(flight):
-    """Stop all vehicles in flight; then do what the driver wants done."""
+    """Stop all vehicles in flight."""
     publisher = rospy.Publisher("/all/emergency", Empty, queue_size=1)
     wait_until(lambda: publisher.get_num_connections() >= 2, "driver and filter", LIMIT)
-    publisher.publish()
     begin = rospy.get_time()
+    publisher.publish()
     flight.wait_for_the_ground()
-    refusal = flight.refusal()
     time.sleep(max(0.0, begin + 2.1 - rospy.get_time()))
+    # The filter's stop can be reset, the driver's not.
     call("/emergency_reset")
-    seen = {"refusal": refusal, "highest PWM": flight.vehicle.highest_pwm_since(begin + 0.2)}
-    seen["refusal without emergency"] = flight.refusal()
-    return seen
+    status = next_message("/crazyflie/status", String)
+    return {"status": status, "seconds": flight.vehicle.motors_stop_after(begin)}
+
+
+def add_the_vehicle_again(flight):
+    """Do what the driver wants done after an emergency stop."""
+    rospy.ServiceProxy("/remove_crazyflie", RemoveCrazyflie)(flight.vehicle.uri)
+    flight.vehicle.restart()
+    # Its parameters are those that the launch file has set.
+    add = ["crazyflie_add", "__ns:=/crazyflie", "__name:=crazyflie_add"]
+    with running("rosrun", "crazyflie_driver", *add, stdout=subprocess.DEVNULL) as adding:
+        adding.wait(LIMIT)
+    flight.wait_for_the_vehicle()
 
 
 def kill_the_driver(flight):
@@ -237,9 +282,13 @@ def kill_the_driver(flight):
     begin = flight.observer.now
     os.kill(node_process("/crazyflie_server"), signal.SIGKILL)
     wait_until(lambda: flight.observer.height < 0.03, "the ground", LIMIT)
+    flight.observer.hover(0.5)
+    with Crazyflie(flight.vehicle.uri) as another:
+        state = another.supervisor.read()
     return {
         "heights": flight.observer.range_since(begin),
-        "seconds to the ground": flight.observer.now - begin,
+        "seconds to the ground": flight.observer.now - begin - 0.5,
+        "locked": SupervisorState.LOCKED in state,
     }
 
 
@@ -288,11 +337,21 @@ def fly(core_command, arguments, folder):
             seen["motion capture lost"] = lose_motion_capture(flight)
             seen["second takeoff"] = flight.take_off()
             seen["emergency"] = stop_in_emergency(flight)
-            seen["takeoff after it"] = flight.take_off()
+            flight.lift_off()
             seen["firmware restarted"] = restart_the_firmware(flight)
-            seen["takeoff after that"] = flight.take_off()
+            flight.lift_off()
             seen["Ctrl-C"] = press_ctrl_c(flight, roslaunch)
-
+        with running(*launch, stdout=output, stderr=output):
+            flight.wait_for_the_vehicle()
+            flight.lift_off()
+            seen["battery low"] = empty_the_battery(flight)
+            with another_battery(flight):
+                wait_until(lambda: "refused" not in next_message("/in_flight_status", String), "the server to know", LIMIT)
+                flight.lift_off()
+                seen["emergency of all"] = stop_all_in_emergency(flight)
+                add_the_vehicle_again(flight)
+                flight.lift_off()
+                seen["driver killed"] = kill_the_driver(flight)
     return seen
 
 

@@ -89,7 +89,7 @@ class Watch:
     _reference: float = 0.0
     _blind_since: float = math.inf
     _last: tuple[float, tuple[float, ...]] | None = None
-    _speed: float = 0.0
+    _climb: float = 0.0
     _told: set[str] = field(default_factory=set)
 
     def begin(self) -> None:
@@ -127,8 +127,8 @@ class Watch:
         self.highest = max(self.highest, height - self._reference)
         self.farthest = max(self.farthest, self.distance)
         if height <= 0.001 < before[1][2]:
-            self._touch_down(self._speed)
-        self._speed = speed
+            self._touch_down(-self._climb)
+        self._climb = (height - before[1][2]) / (time - before[0])
         most = self._reference + (DEAF_OVERSHOOT if self.may_fall else OVERSHOOT)
         if height > most and self.may_fly:
             self.say(f"too high: {height:.2f} m, reference {self._reference:.2f} m")

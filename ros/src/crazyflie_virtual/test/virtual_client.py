@@ -6,6 +6,7 @@ import time
 import cflib.crtp
 from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
+from cflib.crtp.crtpstack import CRTPPacket
 
 LIMIT = 10.0
 
@@ -40,7 +41,14 @@ class Client:
 
     def close(self):
         """Hang up."""
+        if self.cf.link is None:
+            return
+        # cflib waits for the next packet, or a second: an echo comes meanwhile.
+        ping = CRTPPacket(0xF0, bytes(9))
+        echo = threading.Timer(0.15, self.cf.link.send_packet, [ping])
+        echo.start()
         self.cf.close_link()
+        echo.cancel()
 
     def wait_for(self, event):
         """Wait until cflib has called back; return the arguments."""

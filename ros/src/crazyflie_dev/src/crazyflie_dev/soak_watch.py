@@ -125,7 +125,9 @@ class Watch:
         self.distance = math.hypot(*position[:2])
         speed = math.dist(position, before[1]) / (time - before[0])
         self.highest = max(self.highest, height - self._reference)
-        self.farthest = max(self.farthest, self.distance)
+        if height > _AIRBORNE:
+            # The ground of the models of 7 states has no friction.
+            self.farthest = max(self.farthest, self.distance)
         if height <= 0.001 < before[1][2]:
             self._touch_down(-self._climb)
         self._climb = (height - before[1][2]) / (time - before[0])
@@ -134,7 +136,7 @@ class Watch:
             self.say(f"too high: {height:.2f} m, reference {self._reference:.2f} m")
         if height > 0.1 and not self.may_fly:
             self.say(f"in the air unasked: {height:.2f} m")
-        if self.distance > FLY_AWAY:
+        if self.distance > FLY_AWAY and height > _AIRBORNE:
             self.say(f"flown away: {self.distance:.2f} m")
         if speed > MOST_SPEED and not self.may_fall:
             self.say(f"too fast: {speed:.2f} m/s")

@@ -155,7 +155,7 @@ def _flood(topic, type_name, rate, content="{}"):
         start = time.monotonic()
         while not select.select([sys.stdin], [], [], 0.0)[0]:
             due = round((time.monotonic() - start) * rate)
-            if due // 1000 != sent // 1000:
+            if rate <= 1000.0 or due // 1000 != sent // 1000:
                 data = prepare()
             publisher.send(data * (due - sent))
             sent = due

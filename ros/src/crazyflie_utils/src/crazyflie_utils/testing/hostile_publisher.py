@@ -6,7 +6,7 @@ many subscribers it has sent how many messages a second:
 
     python3 -m crazyflie_utils.testing.hostile_publisher TOPIC TYPE RATE [CONTENT]
 
-CONTENT is the message in YAML, or how many transforms it has.
+CONTENT is the message in YAML, where "now" is a stamp, or how many transforms it has.
 """
 
 import contextlib
@@ -146,7 +146,8 @@ def _flood(topic, type_name, rate, content="{}"):
         if content.isdigit():
             return frame(crowd(int(content)))
         message = message_type()
-        genpy.message.fill_message_args(message, [yaml.safe_load(content)])
+        now = genpy.Time.from_sec(time.time())
+        genpy.message.fill_message_args(message, [yaml.safe_load(content)], {"now": now})
         return frame(message)
 
     sent, data = 0, prepare()

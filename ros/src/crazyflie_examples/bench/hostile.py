@@ -54,29 +54,43 @@ def main() -> None:
         time.sleep(_DURATION)
         return len(controls) / (time.monotonic() - start)
 
-    print(f"{'attack':<18}{'before':>8}{'control, Hz':>13}{'sent, Hz':>14}   memory, MB, of", *_NODES)
+    print(
+        f"{'attack':<18}{'before':>8}{'control, Hz':>13}{'sent, Hz':>14}   memory, MB, of", *_NODES
+    )
     for kind, command in _ATTACKS.items():
         before = rate()
         attacker = None
         if command:
             attacker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        time.sleep(3.0)
+            time.sleep(3.0)
+            begin(attacker)
+        time.sleep(1.0)
         memory_before = memory()
         under_attack = rate()
-        growth = ", ".join(f"{b:.1f} -> {a:.1f}" for b, a in zip(memory_before, memory()))
+        growth = ", ".join(
+            f"{b:.1f} -> {a:.1f}" for b, a in zip(memory_before, memory(), strict=True)
+        )
         sent = end(attacker) if attacker else ""
         print(f"{kind:<18}{before:>8.1f}{under_attack:>13.1f}{sent:>14}   {growth}", flush=True)
+
+
+def begin(attacker: subprocess.Popen[bytes]) -> None:
+    """Let an attacker begin."""
+    assert attacker.stdin is not None
+    attacker.stdin.write(b"begin\n")
+    attacker.stdin.flush()
 
 
 def end(attacker: subprocess.Popen[bytes]) -> str:
     """End an attacker, and return to how many subscribers it sent how many messages a second."""
     attacker.send_signal(signal.SIGCONT)
     sent, _ = attacker.communicate(b"end\n", timeout=10.0)
-    return " x ".join(sent.decode().split()[1:])
+    return " x ".join(sent.decode().split())
 
 
 def freeze() -> None:
     """Subscribe to what matters, and stop without hanging up."""
+    sys.stdin.readline()
     rospy.init_node("frozen_listener")
     for topic, kind in (
         ("/tf", TFMessage),
@@ -84,8 +98,7 @@ def freeze() -> None:
         ("/control/final", ControlStamped),
     ):
         rospy.Subscriber(topic, kind, lambda _: None)
-    time.sleep(1.0)
-    print("frozen", flush=True)
+    time.sleep(0.5)
     os.kill(os.getpid(), signal.SIGSTOP)
     os._exit(0)
 

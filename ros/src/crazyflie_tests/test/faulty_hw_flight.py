@@ -311,9 +311,7 @@ def fly(core_command, arguments, folder):
     log = folder / "launch.log"
     variables = folder / "log.yaml"
     variables.write_text(_LOG)
-    ports = {
-        name: free_port() for name in ("port", "observer_port", "command_port", "data_port")
-    }
+    ports = {name: free_port() for name in ("port", "observer_port", "command_port", "data_port")}
     launch = ["roslaunch", "--wait", "crazyflie_examples", "virtual_hw_hover.launch", "rviz:=false"]
     launch += [f"{name}:={port}" for name, port in ports.items()]
     launch += ["genericLogTopics:=[truth]", "genericLogTopicFrequencies:=[20]"]
@@ -346,7 +344,11 @@ def fly(core_command, arguments, folder):
             flight.lift_off()
             seen["battery low"] = empty_the_battery(flight)
             with another_battery(flight):
-                wait_until(lambda: "refused" not in next_message("/in_flight_status", String), "the server to know", LIMIT)
+                wait_until(
+                    lambda: "refused" not in next_message("/in_flight_status", String),
+                    "the server to know",
+                    LIMIT,
+                )
                 flight.lift_off()
                 seen["emergency of all"] = stop_all_in_emergency(flight)
                 add_the_vehicle_again(flight)

@@ -138,9 +138,10 @@ def test_of_a_flood_only_the_latest_is_taken(handle, warnings):
     received = heard(handle, "/flood", Int64)
     others = heard(handle, "/flood_not", Int64)
     count = 40_000
-    with HostilePublisher("/flood", Int64) as hostile, HostilePublisher(
-        "/flood_not", Int64
-    ) as proper:
+    with (
+        HostilePublisher("/flood", Int64) as hostile,
+        HostilePublisher("/flood_not", Int64) as proper,
+    ):
         connected(hostile)
         connected(proper)
         for start in range(0, count, 100):
@@ -195,9 +196,7 @@ def test_those_who_are_silent_or_talk_nonsense_keep_nobody_waiting(handle, warni
     strangers = [socket.create_connection(address(handle)) for _ in range(5)]
     for stranger in strangers[2:]:
         stranger.sendall(struct.pack("<I", 2**31) + bytes(100))
-    answer = handle.call_service(
-        "~alive", Trigger, Trigger._request_class(), LIMIT
-    )
+    answer = handle.call_service("~alive", Trigger, Trigger._request_class(), LIMIT)
     assert answer.result(LIMIT).message == "yes"
     for stranger in strangers:
         stranger.close()

@@ -27,7 +27,7 @@ TOUCHDOWN_HEIGHT = 0.05
 """A vehicle less than this above the ground counts as down, m."""
 
 LIFT_OFF_TIME = 3.0
-"""A vehicle that a controller could have lifted for so long, s, and that is still down cannot fly."""
+"""A vehicle that a controller could have lifted for so long, s, and is still down cannot fly."""
 
 DESCENT_MARGIN = 3.0
 """How much longer than calculated a descent may take, s."""

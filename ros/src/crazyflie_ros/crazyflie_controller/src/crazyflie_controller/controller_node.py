@@ -16,7 +16,6 @@ from crazyflie_utils.parameter_types import Number
 from crazyflie_utils.parameters import group
 from crazyflie_utils.refusal import RefusalError
 
-
 _LEAVE_LIMIT = 7.0
 """How long the descent may take when the process is to end, s: it lives on for 10 s."""
 

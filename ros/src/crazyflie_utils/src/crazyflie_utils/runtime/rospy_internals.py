@@ -278,7 +278,7 @@ def bear_hostile_newcomers(report: Report) -> None:
 
     tcpros_base.TCPROSServer._tcp_server_callback = answer_in_a_thread
     server = tcpros_base._tcpros_server
-    if server.tcp_ros_server is not None:
+    if server is not None and server.tcp_ros_server is not None:
         # It holds the method that it was started with.
         server.tcp_ros_server.inbound_handler = server._tcp_server_callback
     tcpros_base.read_ros_handshake_header = read_header_in_time

@@ -1,12 +1,12 @@
 """A publisher that behaves as none should, written on the bare protocol (TCPROS).
 
 It sends prepared bytes in one piece per millisecond, so that it is not what limits a flood.
-As a program it says "flooding" when somebody listens, floods the topic until there is something
-on its standard input, and prints to how many subscribers it has sent how many messages a second:
+As a program it floods a topic from one line on its standard input to the next, and prints to how
+many subscribers it has sent how many messages a second:
 
     python3 -m crazyflie_utils.testing.hostile_publisher TOPIC TYPE RATE [CONTENT]
 
-CONTENT is the message in YAML, or how many transforms it has.
+CONTENT is the message in YAML, where "now" is a stamp, or how many transforms it has.
 """
 
 import contextlib
@@ -113,7 +113,7 @@ class HostilePublisher:
 
 
 class _Slave:
-    def __init__(self, port):
+    def __init__(self, port: int):
         self._port = port
 
     def _dispatch(self, method, _):
@@ -146,19 +146,18 @@ def _flood(topic, type_name, rate, content="{}"):
         if content.isdigit():
             return frame(crowd(int(content)))
         message = message_type()
-        genpy.message.fill_message_args(message, [yaml.safe_load(content)])
+        now = genpy.Time.from_sec(time.time())
+        genpy.message.fill_message_args(message, [yaml.safe_load(content)], {"now": now})
         return frame(message)
 
-    sent, data, is_heard = 0, prepare(), False
+    sent, data = 0, prepare()
     with HostilePublisher(topic, message_type) as publisher:
+        sys.stdin.readline()
         start = time.monotonic()
         while not select.select([sys.stdin], [], [], 0.0)[0]:
             due = round((time.monotonic() - start) * rate)
-            if due // 1000 != sent // 1000:
+            if rate <= 1000.0 or due // 1000 != sent // 1000:
                 data = prepare()
-            if publisher.connections and not is_heard:
-                is_heard = True
-                print("flooding", flush=True)
             publisher.send(data * (due - sent))
             sent = due
             time.sleep(_PERIOD)

@@ -94,9 +94,9 @@ def test_a_removal_in_flight_is_a_landing_and_locks_nothing(flight):
     assert SupervisorState.LOCKED not in flight.seen_by_another()
 
 
-def test_a_streamed_flight_survives_0_8_s_of_silence(flight):
+def test_a_streamed_flight_survives_1_3_s_of_silence(flight):
     flight.climb()
-    flight.virtual.switches.silence = 0.8
+    flight.virtual.switches.silence = 1.3
     count = len(flight.heights)
     flight.run(4.0, HEIGHT)
     assert SupervisorState.FLYING in flight.state
@@ -118,3 +118,16 @@ def test_users_may_announce_the_landing_first(flight):
     flight.server.call("/cf1/takeoff", TakeoffRequest(0, HEIGHT, Duration(1)))
     flight.run(LIMIT, until=lambda: flight.heights[-1] > 0.8 * HEIGHT)
     assert flight.heights[-1] > 0.8 * HEIGHT
+
+
+def test_the_emergency_watchdog_ends_a_flight_without_a_pc(make_server):
+    with virtual_vehicle() as (virtual, uri):
+        flight = Flight(make_server({"emergency_watchdog": True}), virtual, uri)
+        flight.server.call("/cf1/takeoff", TakeoffRequest(0, HEIGHT, Duration(1)))
+        flight.run(2.5)
+        assert virtual.observe().position[2] > 0.8 * HEIGHT
+        # Without a word, as when the PC dies.
+        flight.crazyflie.close()
+        flight.run(2.5)
+        assert virtual.observe().position[2] < 0.05
+        assert SupervisorState.LOCKED in flight.seen_by_another()

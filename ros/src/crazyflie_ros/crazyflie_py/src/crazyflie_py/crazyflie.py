@@ -30,9 +30,10 @@ _JOIN_LIMIT = 0.3
 _STAMP_END = 4
 """A log packet begins with the number of its block and three bytes of time."""
 
-PATIENCE = 0.4
+PATIENCE = 1.0
 """How long, in s, a link on which nothing comes any more is kept: one on which the vehicle is
-heard again needs no set-up, and a new one has to stand before 2 s, when the firmware locks."""
+heard again needs no set-up. Silence of up to 1.4 s ends that way before 2 s, when the firmware
+locks; setting up a new link can take a second on a busy machine."""
 
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
 """Pause after the first failed attempt to connect again, and the longest one, s; each is

@@ -184,6 +184,21 @@ def test_takeoff_without_a_controller_that_follows():
     assert "landing" in states(network)
 
 
+def test_takeoff_of_a_vehicle_that_cannot_fly():
+    """It is locked, or its driver sends it nothing."""
+    network = HoverNetwork(SERVER)
+    network.vehicle.command = lambda thrust: None
+    network.advance(0.5)
+    future = network.call("/takeoff")
+    network.advance_until(future.done, 10.0)
+    with pytest.raises(ServiceError, match="the vehicle has not lifted off; can it fly"):
+        future.result(0)
+    until_on_ground(network)
+    assert "flying" not in states(network)
+    assert network.last("/in_flight_status") == "on ground: the vehicle has not lifted off"
+    assert set(thrusts(network, network.time - 0.3)) == {0.0}
+
+
 # Emergencies.
 
 
@@ -451,6 +466,17 @@ def test_a_server_that_is_to_leave_lands_first(network):
     assert network.vehicle.touchdown_speed < 0.6
     assert flights(network)[-1].endswith(" on ground")
     assert network.last("/in_flight_status") == "on ground: the launch is to end"
+
+
+def test_from_far_above_a_server_that_is_to_leave_lands_faster():
+    network = HoverNetwork({**SERVER, "hover/z": 4.0, "duration/hover": 10.0})
+    network.take_off()
+    assert network.vehicle.z > 3.9
+    begin = network.time
+    network.server.leave()
+    until_on_ground(network)
+    assert network.time - begin < 10.0
+    assert network.vehicle.touchdown_speed < 1.0
 
 
 def test_a_server_that_is_to_leave_aborts_a_takeoff():

@@ -29,11 +29,10 @@ from crazyflie_utils.vectors import from_vector
 NAN = float("nan")
 
 
-def launch(**changes):
+def launch(node=None, **changes):
     process = FakeProcess()
-    node = ControllerNode()
     settings = {"frame": "cf", **parameters(), **changes}
-    assert process.launch(node, "/crazyflie/controller", settings)
+    assert process.launch(node or ControllerNode(), "/crazyflie/controller", settings)
     return process
 
 
@@ -79,6 +78,25 @@ def test_without_anything_it_gives_no_thrust_at_its_frequency():
     process = launch(frequency=20.0)
     process.advance(1.0)
     assert process.published("/crazyflie/cmd_vel") == [Twist()] * 20
+
+
+def test_lands_before_its_process_ends():
+    node = ControllerNode()
+    process = launch(node)
+    show(process)
+    node.leave()
+    assert not process.published("/flights")
+    call(process, "takeoff")
+    show(process)
+    assert process.published("/flights")[-1].data == "/crazyflie/controller in flight"
+    show(process, z=0.1)
+    node.leave()
+    # The descent, whose end it sees, and the thrust that fades for a second.
+    for _ in range(60):
+        show(process)
+    assert process.logged("info")[-1] == "/crazyflie/controller: idle"
+    assert last(process) == (0.0, 0.0, 0.0, 0.0)
+    assert process.published("/flights")[-1].data == "/crazyflie/controller on ground"
 
 
 def test_steers_to_the_goal():

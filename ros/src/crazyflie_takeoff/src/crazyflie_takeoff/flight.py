@@ -26,6 +26,9 @@ ZERO_THRUST_PERIOD = 0.1
 TOUCHDOWN_HEIGHT = 0.05
 """A vehicle less than this above the ground counts as down, m."""
 
+LIFT_OFF_TIME = 3.0
+"""A vehicle that is still down although a controller has had so long to lift it, s, cannot fly."""
+
 DESCENT_MARGIN = 3.0
 """How much longer than calculated a descent may take, s."""
 
@@ -136,6 +139,7 @@ class FlightStateMachine:
         self._entered: float | None = None
         self._hover_sent = False
         self._descent: _Descent | None = None
+        self._descent_time = math.inf
         self._zero_sent = -math.inf
         self._is_lost = is_lost
 
@@ -165,8 +169,13 @@ class FlightStateMachine:
         """Whether `land` makes sense."""
         return self._state in (FlightState.FLYING, FlightState.TAKING_OFF)
 
-    def land(self) -> None:
+    def land(self, within: float = math.inf) -> None:
         """Begin to land.
+
+        Parameters
+        ----------
+        within : float
+            How long the descent may take, s; if need be it is faster than planned.
 
         Raises
         ------
@@ -176,6 +185,7 @@ class FlightStateMachine:
         if not self.may_land:
             raise RefusalError(_REFUSALS[self._state])
         self._enter(self._way_down())
+        self._descent_time = within
 
     def abort(self) -> None:
         """Turn a takeoff into a landing; anything else goes on as it is."""
@@ -234,7 +244,7 @@ class FlightStateMachine:
             self._hover_sent = True
             reference = (*self.plan.hover, 0.0, 0.0, 0.0)
         if elapsed >= self.plan.open_loop + self.plan.settle:
-            self._enter(FlightState.FLYING)
+            self._enter(FlightState.LANDING if self._stays_down(position) else FlightState.FLYING)
         return None, reference
 
     def _fly(self, time, position):
@@ -242,7 +252,8 @@ class FlightStateMachine:
 
     def _descend(self, time, position):
         if position is not None and self._descent is None:
-            self._descent = _Descent(position, self._ground, self.plan.descent_speed)
+            speed = max(self.plan.descent_speed, (position[2] - self._ground) / self._descent_time)
+            self._descent = _Descent(position, self._ground, speed)
         descent = self._descent
         elapsed = time - self._entered
         limit = DESCENT_MARGIN if descent is None else descent.limit
@@ -277,6 +288,7 @@ class FlightStateMachine:
         self._entered = None
         self._hover_sent = False
         self._descent = None
+        self._descent_time = math.inf
         self._zero_sent = -math.inf
         self._is_lost = False
 
@@ -294,6 +306,10 @@ class FlightStateMachine:
     def _is_down(self, position):
         # Who does not know the height has to take it for reached.
         return position is None or position[2] - self._ground < TOUCHDOWN_HEIGHT
+
+    def _stays_down(self, position):
+        may_judge = position is not None and self.plan.settle >= LIFT_OFF_TIME
+        return may_judge and self._is_down(position)
 
     def _zero_thrust(self, time):
         if time - self._zero_sent < ZERO_THRUST_PERIOD - _ROUNDING:

@@ -39,6 +39,10 @@ STATE_LIMIT = 0.5
 RECOVERY_LIMIT = 1.0
 """How long a server that has started looks for the state of the flight, s."""
 
+LEAVE_LIMIT = 7.0
+"""How long the descent may take of a server whose process is to end, s: what it lives on for is
+10 s, with the end of the landing."""
+
 START_LIMIT = 5.0
 """How long after the server's start a takeoff waits for the first state and for a
 controller, s: nodes that are launched together need a while to find each other."""
@@ -114,7 +118,7 @@ class TakeoffServerNode(Node):
         if flight is None or not flight.may_land:
             return
         self._calls.fail(ServiceError(f"takeoff aborted: {self._handle.name} is to end"))
-        flight.land()
+        flight.land(LEAVE_LIMIT)
         self._cause = "the launch is to end"
 
     @override
@@ -293,7 +297,12 @@ class TakeoffServerNode(Node):
             self._serve_waiting()
         if self._flight is not None:
             self._watch_battery(self._flight)
-            self._publish(self._flight.tick(self._handle.time(), self._known_position()))
+            takes_off = self._flight.state is FlightState.TAKING_OFF
+            output = self._flight.tick(self._handle.time(), self._known_position())
+            if takes_off and output.state is FlightState.LANDING:
+                self._cause = "the vehicle has not lifted off"
+                self._calls.fail(ServiceError(f"takeoff aborted: {self._cause}; can it fly?"))
+            self._publish(output)
 
     def _publish(self, output):
         if output.state is not self._published_state:

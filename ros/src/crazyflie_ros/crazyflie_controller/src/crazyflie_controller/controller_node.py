@@ -1,12 +1,13 @@
 """ROS interface of the flight to a goal."""
 
+import contextlib
 from collections.abc import Iterator
 
 from geometry_msgs.msg import PoseStamped, Twist, Vector3
 from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
-from crazyflie_controller.flight import GoToFlight
+from crazyflie_controller.flight import GoToFlight, State
 from crazyflie_controller.go_to import GoToController
 from crazyflie_controller.pid import PidParameters
 from crazyflie_controller.pose_source import PoseParameters, PoseSource, pose
@@ -14,6 +15,9 @@ from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameter_types import Number
 from crazyflie_utils.parameters import group
 from crazyflie_utils.refusal import RefusalError
+
+_LEAVE_LIMIT = 7.0
+"""How long the descent may take when the process is to end, s: it lives on for 10 s."""
 
 
 class ControllerParameters(PoseParameters):
@@ -47,6 +51,11 @@ class ControllerParameters(PoseParameters):
 class ControllerNode(Node):
     """Fly the vehicle that tf knows to the goal of a topic."""
 
+    needed_in_flight = True
+
+    def __init__(self) -> None:
+        self._announced = False
+
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(ControllerParameters, self._reconfigure)
@@ -56,11 +65,19 @@ class ControllerNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
+        self._announce_flight = handle.announce_flights()
         self._source = PoseSource(handle, self._parameters)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)
         handle.subscribe("goal", PoseStamped, self._on_goal, finite="pose")
         handle.timer(1.0 / self._parameters.frequency, self._on_timer)
+
+    @override
+    def leave(self) -> None:
+        """Land: the process is to end."""
+        # On the ground, or landing already.
+        with contextlib.suppress(RefusalError):
+            self._flight.land(_LEAVE_LIMIT)
 
     def _reconfigure(self, parameters):
         self._controller.reconfigure(parameters.pids)
@@ -111,3 +128,7 @@ class ControllerNode(Node):
             self._handle.warn(warning, throttle=1.0)
         if self._flight.state is not before:
             self._handle.info(self._flight.state.value)
+        in_flight = self._flight.state is not State.IDLE
+        if in_flight is not self._announced:
+            self._announced = in_flight
+            self._announce_flight(in_flight)

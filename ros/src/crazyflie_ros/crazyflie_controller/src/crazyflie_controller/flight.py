@@ -87,6 +87,7 @@ class GoToFlight:
         self._setpoint: Setpoint | None = Setpoint()
         self._ground = 0.0
         self._descent_from = _UNKNOWN
+        self._descent_speed = DESCENT_SPEED
         self._touchdown: tuple[float, float] | None = None
 
     @property
@@ -118,8 +119,13 @@ class GoToFlight:
         self._ground = self._pose.z
         self._enter(State.TAKING_OFF)
 
-    def land(self) -> None:
+    def land(self, within: float = math.inf) -> None:
         """Begin to land where the vehicle is.
+
+        Parameters
+        ----------
+        within : float
+            How long the descent may take, s; if need be it is faster than `DESCENT_SPEED`.
 
         Raises
         ------
@@ -129,6 +135,7 @@ class GoToFlight:
         if self._state in (State.IDLE, State.LANDING):
             raise RefusalError(f"the controller is {self._state.value}")
         self._descent_from = self._pose
+        self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / within)
         self._touchdown = None
         if self._state is State.TAKING_OFF:
             self._touch_down()
@@ -183,9 +190,9 @@ class GoToFlight:
             elapsed = self._time - self._entered
             start = self._descent_from
             lowest = min(self._ground - PRESS_DEPTH, start.z)
-            limit = max(start.z - self._ground, 0.0) / DESCENT_SPEED + DESCENT_MARGIN
+            limit = max(start.z - self._ground, 0.0) / self._descent_speed + DESCENT_MARGIN
             if self._pose.z > self._ground + LIFT_OFF_HEIGHT and elapsed <= limit:
-                z = max(start.z - DESCENT_SPEED * elapsed, lowest)
+                z = max(start.z - self._descent_speed * elapsed, lowest)
                 return self._fly_to(start._replace(z=z))
             touchdown = self._touch_down()
         began, thrust = touchdown

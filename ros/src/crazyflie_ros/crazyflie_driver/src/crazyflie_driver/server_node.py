@@ -31,6 +31,8 @@ the end of a landing, which it flies without a link, too."""
 class CrazyflieServerNode(Node):
     """Connect to vehicles side by side, and serve each until it is removed."""
 
+    needed_in_flight = True
+
     def __init__(self) -> None:
         # By URI.
         self._vehicles: dict[str, DriverVehicle] = {}

@@ -1,0 +1,377 @@
+"""Fly the hardware example on virtual hardware, and let what it stands on fail.
+
+Prints what was seen as JSON. Usage: faulty_hw_flight.py [ARGUMENT:=VALUE ...]
+"""
+
+import contextlib
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import rosgraph
+import rospy
+from dynamic_reconfigure.client import Client
+from faulty_flight import LIMIT, Observer, node_process
+from std_msgs.msg import Empty, Float32, String
+from std_srvs.srv import Empty as EmptyService
+
+from crazyflie_dev.flight_operator import FlightError
+from crazyflie_dev.flight_record import Series
+from crazyflie_dev.programs import free_port, running
+from crazyflie_driver.msg import GenericLogData
+from crazyflie_driver.srv import RemoveCrazyflie
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.crazyflie import Crazyflie
+from crazyflie_utils.testing.peer import wait_until
+
+_VARIABLES = ("stateEstimate.z", "stateEstimate.vz", "motor.m1", "motor.m2", "motor.m3", "motor.m4")
+_LOG = "genericLogTopic_truth_Variables: [" + ", ".join((*_VARIABLES, "supervisor.info")) + "]"
+_RESTART = bytes((0xFF, 0xFE, 0xF0, 0x01))
+"""What the radio chip takes for the command to restart the firmware."""
+
+# A battery that is nearly empty is so, and has been for long enough, within a second; what the
+# takeoff server waits for after a takeoff is short.
+_PARAMETERS = {
+    "/takeoff_server/duration/hover": 0.5,
+    "/takeoff_server/battery/low": 3.45,
+    "/takeoff_server/battery/critical": 3.2,
+    "/takeoff_server/battery/duration": 1.0,
+}
+
+
+class Vehicle:
+    """What the virtual vehicle logs: its estimate rests on the truth, not on motion capture."""
+
+    def __init__(self, port):
+        self.uri = f"udp://127.0.0.1:{port}"
+        self._address = ("127.0.0.1", port)
+        self._log = Series((*_VARIABLES, "supervisor.info"))
+        self.words = []
+        rospy.Subscriber("/crazyflie/status", String, lambda status: self.words.append(status.data))
+        rospy.Subscriber("/crazyflie/truth", GenericLogData, self._note)
+
+    def _note(self, message):
+        self._log.append(message.header.stamp.to_sec(), message.values)
+
+    def speaks(self):
+        """Return whether there are log data of the last 0.3 s."""
+        return len(self._log) > 0 and rospy.get_time() - self._log.last_time < 0.3
+
+    @property
+    def height(self):
+        """The latest, m."""
+        return float(self._log.last[0])
+
+    @property
+    def is_locked(self):
+        """Whether only a restart makes it fly again."""
+        return SupervisorState.LOCKED in SupervisorState(int(self._log.last[6]))
+
+    def fastest_descent_since(self, begin):
+        """Return the greatest speed downward since a moment (s), m/s."""
+        return -float(self._log.between(begin, float("inf"))[:, 1].min())
+
+    def highest_pwm_since(self, begin):
+        """Return the greatest of all motors since a moment (s)."""
+        return float(self._log.between(begin, float("inf"))[:, 2:6].max())
+
+    def motors_stop_after(self, begin):
+        """Return how long after a moment (s) all motors stand still for good, s."""
+        runs = self._log.values[:, 2:6].any(axis=1)
+        return max(0.0, float(self._log.times[runs][-1]) - begin)
+
+    def rests(self):
+        """Return whether all motors stand still."""
+        return not self._log.last[2:6].any()
+
+    def restart(self):
+        """Restart the firmware, at once and without a word to its client."""
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
+            radio.sendto(_RESTART, self._address)
+
+
+class Flight:
+    """Takes the hardware example off and looks at it."""
+
+    def __init__(self, port):
+        self.observer = Observer()
+        self.vehicle = Vehicle(port)
+
+    def wait_for_the_vehicle(self):
+        """Wait until the driver has it and motion capture sees it."""
+        wait_until(self.vehicle.speaks, "the vehicle's log data", LIMIT)
+        wait_until(lambda: rospy.get_time() - self.observer.now < 0.2, "the state", LIMIT)
+
+    def lift_off(self):
+        """Take off."""
+        self.observer.takeoff()
+        wait_until(lambda: self.vehicle.height > 0.5, "the vehicle to lift off", LIMIT)
+
+    def take_off(self):
+        """Take off and hover; return the greatest height, m."""
+        begin = self.observer.now
+        self.observer.takeoff()
+        self.observer.hover(4.0)
+        return self.observer.range_since(begin)[1]
+
+    def is_back_at(self, height):
+        """Wait a while for the vehicle to be at a height (m); return where it is."""
+        with contextlib.suppress(AssertionError):
+            wait_until(lambda: abs(self.observer.height - height) < 0.05, "the height", 5.0)
+        return self.observer.height
+
+    def wait_for_the_ground(self):
+        """Wait until the vehicle itself says that it is there."""
+        wait_until(lambda: self.vehicle.height < 0.03, "the ground", LIMIT)
+
+    def refusal(self):
+        """Return what a takeoff is refused with."""
+        try:
+            self.observer.takeoff()
+        except FlightError as error:
+            return str(error)
+        return ""
+
+
+def next_message(topic, message_type):
+    """Return what the next message on a topic, or a latched one, says."""
+    return rospy.wait_for_message(topic, message_type, LIMIT).data
+
+
+def call(service):
+    """Call a service of type Empty."""
+    rospy.wait_for_service(service, LIMIT)
+    rospy.ServiceProxy(service, EmptyService)()
+
+
+def lose_the_link(flight, duration):
+    """Let the link be silent."""
+    begin = flight.observer.now
+    flight.vehicle.words.clear()
+    Client("/virtual_crazyflie", LIMIT).update_configuration({"fault/silence": duration})
+    flight.observer.hover(duration + 1.0)
+    wait_until(flight.vehicle.speaks, "the link", LIMIT)
+    end = flight.is_back_at(1.0)
+    return {
+        "heights": flight.observer.range_since(begin),
+        "height afterwards": end,
+        "locked": flight.vehicle.is_locked,
+        "words": flight.vehicle.words[:],
+    }
+
+
+def lose_motion_capture_for_a_moment(flight):
+    """Let motion capture be silent for 0.3 s."""
+    begin = flight.observer.now
+    motion_capture = Client("/virtual_mocap", LIMIT)
+    motion_capture.update_configuration({"fault/silent": True})
+    time.sleep(0.3)
+    motion_capture.update_configuration({"fault/silent": False})
+    flight.observer.hover(2.0)
+    return {
+        "heights": flight.observer.range_since(begin),
+        "height afterwards": flight.is_back_at(1.0),
+    }
+
+
+def lose_motion_capture(flight):
+    """Let motion capture be silent until the vehicle is down."""
+    begin = rospy.get_time()
+    motion_capture = Client("/virtual_mocap", LIMIT)
+    motion_capture.update_configuration({"fault/silent": True})
+    flight.wait_for_the_ground()
+    refusal = flight.refusal()
+    motion_capture.update_configuration({"fault/silent": False})
+    seen = {
+        "seconds to the ground": rospy.get_time() - begin,
+        "fastest descent": flight.vehicle.fastest_descent_since(begin),
+        "refusal": refusal,
+    }
+    wait_until(flight.vehicle.rests, "the motors to stop", LIMIT)
+    down = rospy.get_time()
+    time.sleep(1.5)
+    return {**seen, "highest PWM afterwards": flight.vehicle.highest_pwm_since(down)}
+
+
+def stop_in_emergency(flight):
+    """Call /emergency in flight, and end it again."""
+    called = rospy.get_time()
+    call("/emergency")
+    flight.wait_for_the_ground()
+    refusal = flight.refusal()
+    time.sleep(max(0.0, called + 2.1 - rospy.get_time()))
+    call("/emergency_reset")
+    return {"refusal": refusal, "seconds": flight.vehicle.motors_stop_after(called)}
+
+
+def restart_the_firmware(flight):
+    """Restart the vehicle while the controller streams."""
+    flight.vehicle.restart()
+    begin = rospy.get_time()
+    time.sleep(0.3)
+    wait_until(flight.vehicle.speaks, "the vehicle's log data", LIMIT)
+    came_back = rospy.get_time() - begin
+    flight.wait_for_the_ground()
+    time.sleep(2.0)
+    seen = {
+        "topics came back after": came_back,
+        "highest PWM": flight.vehicle.highest_pwm_since(begin + 0.3),
+    }
+    flight.observer.land()
+    return seen
+
+
+def empty_the_battery(flight):
+    """Let the battery be nearly empty."""
+    begin = rospy.get_time()
+    Client("/virtual_crazyflie", LIMIT).update_configuration({"fault/low_battery": True})
+    flight.wait_for_the_ground()
+    descent = flight.vehicle.fastest_descent_since(begin)
+    refusal = ""
+    # The landing goes on for a moment, and refuses takeoffs of its own accord.
+    while "battery" not in refusal and rospy.get_time() - begin < LIMIT:
+        refusal = flight.refusal()
+    return {"fastest descent": descent, "refusal": refusal}
+
+
+@contextlib.contextmanager
+def another_battery(flight):
+    """Switch the vehicle off, and on again with another battery for the time of a with block."""
+    os.kill(node_process("/virtual_crazyflie"), signal.SIGTERM)
+    rospy.set_param("/virtual_crazyflie/fault/low_battery", False)
+    wait_until(lambda: not flight.vehicle.speaks(), "the vehicle to be off", LIMIT)
+    vehicle = ["rosrun", "crazyflie_virtual", "virtual_crazyflie", "__name:=virtual_crazyflie"]
+    with running(*vehicle, stdout=subprocess.DEVNULL):
+        wait_until(lambda: next_message("/crazyflie/battery", Float32) > 4.0, "4 V", LIMIT)
+        yield
+
+
+def stop_all_in_emergency(flight):
+    """Stop all vehicles in flight."""
+    publisher = rospy.Publisher("/all/emergency", Empty, queue_size=1)
+    wait_until(lambda: publisher.get_num_connections() >= 2, "driver and filter", LIMIT)
+    begin = rospy.get_time()
+    publisher.publish()
+    flight.wait_for_the_ground()
+    time.sleep(max(0.0, begin + 2.1 - rospy.get_time()))
+    # The filter's stop can be reset, the driver's not.
+    call("/emergency_reset")
+    status = next_message("/crazyflie/status", String)
+    return {"status": status, "seconds": flight.vehicle.motors_stop_after(begin)}
+
+
+def add_the_vehicle_again(flight):
+    """Do what the driver wants done after an emergency stop."""
+    rospy.ServiceProxy("/remove_crazyflie", RemoveCrazyflie)(flight.vehicle.uri)
+    flight.vehicle.restart()
+    # Its parameters are those that the launch file has set.
+    add = ["crazyflie_add", "__ns:=/crazyflie", "__name:=crazyflie_add"]
+    with running("rosrun", "crazyflie_driver", *add, stdout=subprocess.DEVNULL) as adding:
+        adding.wait(LIMIT)
+    flight.wait_for_the_vehicle()
+
+
+def kill_the_driver(flight):
+    """Kill the driver in flight."""
+    begin = flight.observer.now
+    os.kill(node_process("/crazyflie_server"), signal.SIGKILL)
+    wait_until(lambda: flight.observer.height < 0.03, "the ground", LIMIT)
+    flight.observer.hover(0.5)
+    with Crazyflie(flight.vehicle.uri) as another:
+        state = another.supervisor.read()
+    return {
+        "heights": flight.observer.range_since(begin),
+        "seconds to the ground": flight.observer.now - begin - 0.5,
+        "locked": SupervisorState.LOCKED in state,
+    }
+
+
+def press_ctrl_c(flight, roslaunch):
+    """Press Ctrl-C in flight."""
+    begin = flight.observer.now
+    roslaunch.send_signal(signal.SIGINT)
+    status = roslaunch.wait(LIMIT)
+    return {
+        "status of roslaunch": status,
+        "height": flight.observer.height,
+        "fastest descent": flight.observer.fastest_descent_since(begin),
+        "seconds": rospy.get_time() - begin,
+    }
+
+
+def fly(core_command, arguments, folder):
+    """Fly, and return what was seen: name -> figures."""
+    seen = {}
+    log = folder / "launch.log"
+    variables = folder / "log.yaml"
+    variables.write_text(_LOG)
+    ports = {name: free_port() for name in ("port", "observer_port", "command_port", "data_port")}
+    launch = ["roslaunch", "--wait", "crazyflie_examples", "virtual_hw_hover.launch", "rviz:=false"]
+    launch += [f"{name}:={port}" for name, port in ports.items()]
+    launch += ["genericLogTopics:=[truth]", "genericLogTopicFrequencies:=[20]"]
+    launch += [f"genericLogTopicVariables_file:={variables}", *arguments]
+    with (
+        log.open("w") as output,
+        running(*core_command, stdout=output, stderr=output),
+    ):
+        wait_until(rosgraph.is_master_online, "a master", LIMIT)
+        # roslaunch waits for what roscore says of itself.
+        for name, value in {"/run_id": "faulty_hw_flight", **_PARAMETERS}.items():
+            rosgraph.Master("/flight").setParam(name, value)
+
+        with running(*launch, stdout=output, stderr=output) as roslaunch:
+            flight = Flight(ports["port"])
+            flight.wait_for_the_vehicle()
+            seen["first takeoff"] = flight.take_off()
+            seen["link lost for 0.4 s"] = lose_the_link(flight, 0.4)
+            seen["link lost for 1 s"] = lose_the_link(flight, 1.0)
+            seen["motion capture lost for 0.3 s"] = lose_motion_capture_for_a_moment(flight)
+            seen["motion capture lost"] = lose_motion_capture(flight)
+            seen["second takeoff"] = flight.take_off()
+            seen["emergency"] = stop_in_emergency(flight)
+            flight.lift_off()
+            seen["firmware restarted"] = restart_the_firmware(flight)
+            flight.lift_off()
+            seen["Ctrl-C"] = press_ctrl_c(flight, roslaunch)
+        with running(*launch, stdout=output, stderr=output):
+            flight.wait_for_the_vehicle()
+            flight.lift_off()
+            seen["battery low"] = empty_the_battery(flight)
+            with another_battery(flight):
+                wait_until(
+                    lambda: "refused" not in next_message("/in_flight_status", String),
+                    "the server to know",
+                    LIMIT,
+                )
+                flight.lift_off()
+                seen["emergency of all"] = stop_all_in_emergency(flight)
+                add_the_vehicle_again(flight)
+                flight.lift_off()
+                seen["driver killed"] = kill_the_driver(flight)
+    return seen
+
+
+def main(arguments):
+    """Fly and print."""
+    port = free_port(socket.SOCK_STREAM)
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    os.environ["ROS_IP"] = "127.0.0.1"
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        try:
+            seen = fly(["rosmaster", "--core", "-p", port], arguments, folder)
+        except BaseException:
+            print((folder / "launch.log").read_text(), file=sys.stderr)
+            raise
+    print(json.dumps(seen, indent=2))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

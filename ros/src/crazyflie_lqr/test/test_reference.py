@@ -127,3 +127,11 @@ def test_who_repeats_one_that_is_far_away_does_not_lead_the_vehicle_there():
     assert followed(reference, 0.0, np.zeros(7)) == [0.0] * 7
     reference.update(far)
     np.testing.assert_allclose(reference.value(0.0, np.zeros(7))[:3], [3.0, 0.0, 0.06], atol=0.01)
+
+
+def test_another_one_that_is_far_away_is_another_direction():
+    reference = GuardedReference(6, max_jump=3.0)
+    reference.update(np.array([50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert followed(reference, 0.0, np.zeros(7))[:3] == [3.0, 0.0, 0.0]
+    reference.update(np.array([-50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert followed(reference, 0.0, np.zeros(7))[:3] == [-3.0, 0.0, 0.0]

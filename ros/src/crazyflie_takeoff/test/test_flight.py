@@ -207,9 +207,11 @@ def test_flights_can_be_repeated():
     for _ in range(3):
         clock.said.clear()
         flight.takeoff()
+        clock.position = (0.0, 0.0, 1.0)
         clock.run(6.01)
         assert len(clock.references()) == 1
         assert len(clock.toggles()) == 1
+        clock.position = (0.0, 0.0, 0.0)
         flight.land()
         clock.run(1.01)
         assert len(clock.toggles()) == 2

@@ -30,7 +30,7 @@ class GuardedReference:
     max_jump : float, optional
         How far from the vehicle a new reference may be, m. One that is further away becomes a
         place to rest at so far from the vehicle, in the same direction, and is this as long as
-        references are so far away.
+        references come from about there.
     report : callable, optional
         ``report(text)`` is told of that.
     """
@@ -47,6 +47,7 @@ class GuardedReference:
         self._last_valid: LastValid[NDArray[np.float64]] = LastValid()
         self._hold_point: NDArray[np.float64] | None = None
         self._near: NDArray[np.float64] | None = None
+        self._far: NDArray[np.float64] | None = None
         self._is_new = False
         self._has_arrived = False
         self._stamp = 0.0
@@ -124,13 +125,15 @@ class GuardedReference:
     def _within_reach(self, x_ref, x):
         distance = math.dist(x_ref[:3], x[:3])
         if distance <= self.max_jump:
-            self._near = None
+            self._near = self._far = None
             return x_ref
         self._report(
             f"the reference is {distance:.1f} m away; going {self.max_jump:g} m in its direction"
         )
         # Who repeats one that is far away must not lead the vehicle there step by step.
-        if self._near is None:
+        is_repeated = self._far is not None and math.dist(x_ref[:3], self._far[:3]) < self.max_jump
+        if self._near is None or not is_repeated:
+            self._far = x_ref
             self._near = at_rest(x_ref, self._yaw_index)
             # Each factor is at most 1, so that a far one does not overflow.
             direction = x_ref[:3] / distance - x[:3] / distance

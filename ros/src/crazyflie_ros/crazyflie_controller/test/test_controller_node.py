@@ -83,6 +83,7 @@ def test_without_anything_it_gives_no_thrust_at_its_frequency():
 def test_lands_before_its_process_ends():
     node = ControllerNode()
     process = launch(node)
+<<<<<<< HEAD
     node.leave()
     assert not process.published("/flights")
     fly(process)
@@ -92,6 +93,20 @@ def test_lands_before_its_process_ends():
     assert process.logged("info")[-1] == "/crazyflie/controller: landing"
     for _ in range(100):
         show(process, z=0.0)
+=======
+    show(process)
+    node.leave()
+    assert not process.published("/flights")
+    call(process, "takeoff")
+    show(process)
+    assert process.published("/flights")[-1].data == "/crazyflie/controller in flight"
+    show(process, z=0.1)
+    node.leave()
+    # The descent, whose end it sees, and the thrust that fades for a second.
+    for _ in range(60):
+        show(process)
+    assert process.logged("info")[-1] == "/crazyflie/controller: idle"
+>>>>>>> hardware
     assert last(process) == (0.0, 0.0, 0.0, 0.0)
     assert process.published("/flights")[-1].data == "/crazyflie/controller on ground"
 

@@ -92,8 +92,11 @@ def exchange(
         while time.monotonic() < end:
             for topic, message in messages.items():
                 publishers[topic].publish(message)
+            # At a pace: who answers at once must not be flooded.
+            pause = time.monotonic() + 0.01
             with contextlib.suppress(queue.Empty):
-                answer = answers.get(timeout=0.01)
-                if accept(answer):
-                    return answer
+                while (rest := pause - time.monotonic()) > 0.0:
+                    answer = answers.get(timeout=rest)
+                    if accept(answer):
+                        return answer
     raise AssertionError(f"no such answer on {answer_topic} within {LIMIT:g} s")

@@ -83,17 +83,6 @@ def test_without_anything_it_gives_no_thrust_at_its_frequency():
 def test_lands_before_its_process_ends():
     node = ControllerNode()
     process = launch(node)
-<<<<<<< HEAD
-    node.leave()
-    assert not process.published("/flights")
-    fly(process)
-    assert process.published("/flights")[-1].data == "/crazyflie/controller in flight"
-    node.leave()
-    show(process, z=0.1)
-    assert process.logged("info")[-1] == "/crazyflie/controller: landing"
-    for _ in range(100):
-        show(process, z=0.0)
-=======
     show(process)
     node.leave()
     assert not process.published("/flights")
@@ -106,7 +95,6 @@ def test_lands_before_its_process_ends():
     for _ in range(60):
         show(process)
     assert process.logged("info")[-1] == "/crazyflie/controller: idle"
->>>>>>> hardware
     assert last(process) == (0.0, 0.0, 0.0, 0.0)
     assert process.published("/flights")[-1].data == "/crazyflie/controller on ground"
 

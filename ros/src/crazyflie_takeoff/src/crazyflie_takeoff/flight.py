@@ -27,11 +27,7 @@ TOUCHDOWN_HEIGHT = 0.05
 """A vehicle less than this above the ground counts as down, m."""
 
 LIFT_OFF_TIME = 3.0
-<<<<<<< HEAD
-"""A vehicle that a controller could have lifted for so long, s, and is still down cannot fly."""
-=======
 """A vehicle that is still down although a controller has had so long to lift it, s, cannot fly."""
->>>>>>> hardware
 
 DESCENT_MARGIN = 3.0
 """How much longer than calculated a descent may take, s."""

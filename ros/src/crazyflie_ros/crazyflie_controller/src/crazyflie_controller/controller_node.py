@@ -53,12 +53,9 @@ class ControllerNode(Node):
 
     needed_in_flight = True
 
-<<<<<<< HEAD
-=======
     def __init__(self) -> None:
         self._announced = False
 
->>>>>>> hardware
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(ControllerParameters, self._reconfigure)
@@ -131,11 +128,7 @@ class ControllerNode(Node):
             self._handle.warn(warning, throttle=1.0)
         if self._flight.state is not before:
             self._handle.info(self._flight.state.value)
-<<<<<<< HEAD
-            self._announce_flight(self._flight.state is not State.IDLE)
-=======
         in_flight = self._flight.state is not State.IDLE
         if in_flight is not self._announced:
             self._announced = in_flight
             self._announce_flight(in_flight)
->>>>>>> hardware

@@ -5,11 +5,13 @@ import math
 import pytest
 from geometry_msgs.msg import TransformStamped
 from std_msgs.msg import String
+from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_dev.soak import soak
-from crazyflie_dev.soak_faults import FAULTS
+from crazyflie_dev.soak import Soak, soak
+from crazyflie_dev.soak_faults import FAULTS, NODES
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
+from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils.testing import FakeGraph
 
@@ -32,6 +34,27 @@ def test_nothing_makes_the_vehicle_fly_away(result):
 
 def test_nothing_makes_the_quadrotor_fly_away():
     assert soak(100.0, seed=8, dynamics="quadrotor")["violations"] == []
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_no_node_that_is_killed_in_hover_makes_the_thrust_jump(name):
+    run = Soak(seed=1)
+    graph = run.graph
+    takeoff = graph.call("/takeoff", EmptyRequest())
+    graph.advance(10.0)
+    assert takeoff.done() and takeoff.exception() is None
+    thrusts, heights = [], []
+    graph.listen("/control/final", lambda message: thrusts.append(message.control.thrust))
+    graph.kill(name)
+    graph.advance(1.0)
+    run.start(name)
+    for _ in range(100):
+        graph.advance(0.1)
+        heights.append(run.watch.height)
+    assert max(thrusts) < 1.2 * GRAVITY
+    # It flies on, or has come down.
+    assert heights[-1] > 0.9 or (heights[-1] < 0.01 and thrusts[-1] == 0.0)
+    assert run.watch.hardest < 1.0
 
 
 @pytest.fixture

@@ -77,13 +77,14 @@ class Soak:
         self.watch = Watch(self.graph)
         self.faults: Counter[str] = Counter()
         self.refused = self.answered = 0
-        self._flight = Flight(self.graph, self.random, self._start)
+        self._flight = Flight(self.graph, self.random, self.start)
         self.watch.begin()
         for name in self._classes:
-            self._start(name)
+            self.start(name)
         self.graph.advance(2.0)
 
-    def _start(self, name):
+    def start(self, name: str) -> None:
+        """Start a node's process, unless it is alive."""
         if not self.graph.is_alive(name):
             self.graph.start(name, self._classes[name]())
 
@@ -150,7 +151,7 @@ class Soak:
         # A simulator that is started anew has its vehicle where the launch file puts it.
         self.graph.kill(_SIMULATOR)
         self.watch.carried()
-        self._start(_SIMULATOR)
+        self.start(_SIMULATOR)
         self._wait(2.0, timeline)
 
     def _wait(self, duration, timeline):

@@ -21,7 +21,7 @@ CONTROLLER, ESTIMATOR, SERVER, FILTER = (
     "/takeoff_server",
     "/takeoff_control_filter",
 )
-_NODES = (CONTROLLER, ESTIMATOR, SERVER, FILTER)
+NODES = (CONTROLLER, ESTIMATOR, SERVER, FILTER)
 
 EMERGENCY = "emergency"
 
@@ -177,9 +177,9 @@ FAULTS = [
     Fault("stamps are 8 s ahead", _with_each(_shift(8.0)), 0.3, 4.0, blinds=True),
     *(
         Fault(f"{name} is killed", _kill(name), _RESPAWN, _RESPAWN, drops=name == FILTER)
-        for name in _NODES
+        for name in NODES
     ),
-    *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER) for name in _NODES),
+    *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER) for name in NODES),
     Fault("references are not finite", _nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
     Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),
     Fault("references are old", _nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),

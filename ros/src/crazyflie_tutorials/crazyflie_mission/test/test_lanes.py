@@ -72,7 +72,9 @@ def test_back_ends_where_the_way_began():
 
 
 def test_beyond_its_end_a_way_ends():
-    way = Way([Line((0.0, 0.0, 1.0), (2.0, 0.0, 1.0)), Arc((2.0, 1.0, 1.0), 1.0, -math.pi / 2, 1.0)])
+    way = Way(
+        [Line((0.0, 0.0, 1.0), (2.0, 0.0, 1.0)), Arc((2.0, 1.0, 1.0), 1.0, -math.pi / 2, 1.0)]
+    )
     assert way.at(100.0)[0] == pytest.approx((2.0 + math.sin(1.0), 1.0 - math.cos(1.0), 1.0))
     assert way.segment_at(100.0) is way.segments[1]
     assert way.at(-1.0)[0] == (0.0, 0.0, 1.0)
@@ -80,7 +82,12 @@ def test_beyond_its_end_a_way_ends():
 
 @pytest.mark.parametrize(
     ("point", "distance"),
-    [((1.0, 0.3, 1.0), 0.3), ((1.0, 0.0, 0.6), 0.4), ((-3.0, 4.0, 1.0), 5.0), ((5.0, 4.0, 1.0), 5.0)],
+    [
+        ((1.0, 0.3, 1.0), 0.3),
+        ((1.0, 0.0, 0.6), 0.4),
+        ((-3.0, 4.0, 1.0), 5.0),
+        ((5.0, 4.0, 1.0), 5.0),
+    ],
 )
 def test_distance_from_a_lane(point, distance):
     assert Line((0.0, 0.0, 1.0), (2.0, 0.0, 1.0)).distance(point) == pytest.approx(distance)

@@ -134,7 +134,9 @@ def test_its_speed_is_published_as_vel():
     assert {message.name for message in messages} == {"linear"}
     references = flight.process.published("/ref")
     assert messages[50].vel == pytest.approx(
-        math.hypot(references[50].state.x_dot, references[50].state.y_dot, references[50].state.z_dot)
+        math.hypot(
+            references[50].state.x_dot, references[50].state.y_dot, references[50].state.z_dot
+        )
     )
 
 
@@ -307,5 +309,7 @@ def test_the_configuration_is_the_default():
     with_file, without = (FakeProcess(p) for p in (parameters, {}))
     nodes = [SweepNode(), SweepNode()]
     assert with_file.launch(nodes[0], "/sweep")
-    assert without.launch(nodes[1], "/sweep", {"topics/state": "/state", "topics/reference": "/ref"})
+    assert without.launch(
+        nodes[1], "/sweep", {"topics/state": "/state", "topics/reference": "/ref"}
+    )
     assert nodes[0]._parameters.plan() == nodes[1]._parameters.plan()

@@ -35,7 +35,9 @@ def test_oscillator_has_an_interval(x):
 def test_random_velocities_are_in_the_interval(least, width):
     source = random.Random(1)
     for _ in range(20):
-        assert all(least <= v <= least + width for v in random_velocities(least, least + width, source))
+        assert all(
+            least <= v <= least + width for v in random_velocities(least, least + width, source)
+        )
 
 
 def test_random_velocities_fill_the_interval():

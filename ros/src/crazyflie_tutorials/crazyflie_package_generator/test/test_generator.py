@@ -4,10 +4,10 @@ import itertools
 import os
 import re
 import subprocess
+import tomllib
 from pathlib import Path
 
 import pytest
-import tomllib
 
 from crazyflie_dev.parameter_tables import with_tables
 from crazyflie_package_generator.command import main
@@ -80,9 +80,10 @@ def test_structure(overlay):
     }
     assert not (overlay / "src" / "wall_follower" / "msg").exists()
     assert os.access(overlay / "src" / "an_apple" / "exec" / "pear_tree_node", os.X_OK)
-    assert "class PearTreeNode(Node)" in (
-        overlay / "src" / "an_apple" / "src" / "an_apple" / "pear_tree_node.py"
-    ).read_text()
+    assert (
+        "class PearTreeNode(Node)"
+        in (overlay / "src" / "an_apple" / "src" / "an_apple" / "pear_tree_node.py").read_text()
+    )
 
 
 def test_nothing_is_left_to_fill_in(overlay):
@@ -102,7 +103,7 @@ def test_builds_and_passes_its_tests(overlay):
     # No master is used but those that rostest starts.
     environment = {**os.environ, "ROS_IP": "127.0.0.1", "ROS_HOME": str(overlay / "home")}
     for target in ((), ("run_tests", "-j1")):
-        run("catkin_make", *target, folder=overlay, env=environment)
+        run("catkin_make", "-C", overlay, *target, folder=overlay, env=environment)
     results = run("catkin_test_results", "build/test_results", folder=overlay, env=environment)
     # Unit tests, those of the rostest, and rostest's own for each package.
     count = re.search(r"(\d+) tests, 0 errors, 0 failures, 0 skipped", results)

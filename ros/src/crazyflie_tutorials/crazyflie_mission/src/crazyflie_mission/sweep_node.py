@@ -85,7 +85,10 @@ class SweepNode(Node):
     @override
     def make_safe(self) -> None:
         """Let the vehicle hover where the reference is."""
-        if self._sweeper is not None and self._state in (SweepReport.SWEEPING, SweepReport.HOVERING):
+        if self._sweeper is not None and self._state in (
+            SweepReport.SWEEPING,
+            SweepReport.HOVERING,
+        ):
             self._sweeper.speed = 0.0
             self._publish_reference(self._sweeper)
 

@@ -143,7 +143,9 @@ def create(package: Package, folder: Path) -> Path:
     """
     package.check()
     if not folder.is_dir():
-        raise GeneratorError(f"there is no folder {folder}; expected one, such as a workspace's src")
+        raise GeneratorError(
+            f"there is no folder {folder}; expected one, such as a workspace's src"
+        )
     target = folder / package.name
     if target.exists() or target.is_symlink():
         raise GeneratorError(f"there is {target} already; expected the name of a new package")

@@ -24,9 +24,7 @@ def vehicle_name(wanted: str, taken: Container[str]) -> str:
         It is no name, or another vehicle has it.
     """
     if not wanted:
-        return next(
-            name for k in itertools.count(1) if (name := f"crazyflie{k}") not in taken
-        )
+        return next(name for k in itertools.count(1) if (name := f"crazyflie{k}") not in taken)
     if not _NAME.fullmatch(wanted):
         raise RefusalError(
             f"{wanted!r} is no name of a vehicle; expected letters, digits and underscores, the "

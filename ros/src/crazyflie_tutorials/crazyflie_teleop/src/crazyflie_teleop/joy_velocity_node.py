@@ -35,7 +35,10 @@ class JoyVelocityParameters(Parameters):
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
     emergency_service: str | None = parameter(
-        SERVICE, "stops the motors, such as the driver's; without it one lands", None, "srv/emergency"
+        SERVICE,
+        "stops the motors, such as the driver's; without it one lands",
+        None,
+        "srv/emergency",
     )
     axes: AxisParameters = group(AxisParameters, "axes")
     takeoff_button: int = parameter(_NUMBER, "calls takeoff", 2, "buttons/takeoff")
@@ -89,9 +92,7 @@ class JoyVelocityNode(Node):
             self._handle.warn("ignoring a joystick's axes that are not finite", throttle=1.0)
             return
         v = self._axes.velocity(message.axes)
-        self._publisher.publish(
-            Twist(linear=Vector3(v.x, v.y, v.z), angular=Vector3(z=v.yaw_dot))
-        )
+        self._publisher.publish(Twist(linear=Vector3(v.x, v.y, v.z), angular=Vector3(z=v.yaw_dot)))
         pressed = {number for number, is_down in enumerate(message.buttons) if is_down}
         new, self._pressed = pressed - self._pressed, pressed
         parameters = self._parameters

@@ -162,6 +162,8 @@ class VelocityReferenceNode(Node):
 
     def _publish(self, velocity=None):
         pose = self._reference.pose
+        if pose is None:
+            return
         x_dot, y_dot, z_dot = self._reference.velocity if velocity is None else velocity
         message = PositionVelocityYawStateStamped()
         message.header.stamp = self._handle.stamp()

@@ -85,10 +85,7 @@ class SweepNode(Node):
     @override
     def make_safe(self) -> None:
         """Let the vehicle hover where the reference is."""
-        if self._sweeper is not None and self._state in (
-            SweepReport.SWEEPING,
-            SweepReport.HOVERING,
-        ):
+        if self._sweeper is not None and self._is_sweeping():
             self._sweeper.speed = 0.0
             self._publish_reference(self._sweeper)
 
@@ -146,9 +143,10 @@ class SweepNode(Node):
 
     def _land(self, sweeper):
         if not sweeper.is_covered:
+            wanted = self._parameters.coverage
             self._failure = (
-                f"{sweeper.coverage.share:.1%} is covered after {self._parameters.coverage.max_passes}"
-                f" passes; expected {self._parameters.coverage.goal:.1%}"
+                f"{sweeper.coverage.share:.1%} is covered after {wanted.max_passes} passes; "
+                f"expected {wanted.goal:.1%}"
             )
         self._set_state(SweepReport.LANDING)
         self._call(self._parameters.land_service, lambda: self._finish(self._failure))

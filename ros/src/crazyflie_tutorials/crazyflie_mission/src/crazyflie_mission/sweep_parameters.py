@@ -95,8 +95,9 @@ class SweepParameters(Parameters):
             most = getattr(self.area, f"{axis}_max")
             if not least < most:
                 yield f"area/{axis}_min is {least:g}; expected < area/{axis}_max, {most:g} (m)"
-        if self.speed.min > self.speed.max:
-            yield f"speed/min is {self.speed.min:g}; expected <= speed/max, {self.speed.max:g} (m/s)"
+        speed = self.speed
+        if speed.min > speed.max:
+            yield f"speed/min is {speed.min:g}; expected <= speed/max, {speed.max:g} (m/s)"
 
     def plan(self) -> Plan:
         """Return what to fly."""

@@ -45,8 +45,8 @@ def check_name(what: str, name: str) -> None:
     """
     if not _NAME.fullmatch(name) or keyword.iskeyword(name):
         raise GeneratorError(
-            f"{name!r} is no name of a {what}; expected at least two lower case letters, digits and "
-            "single underscores, the first a letter, the last no underscore, no word of Python "
+            f"{name!r} is no name of a {what}; expected at least two lower case letters, digits "
+            "and single underscores, the first a letter, the last no underscore, no word of Python "
             "(REP 144), such as wall_follower"
         )
     if name in sys.stdlib_module_names:

@@ -15,7 +15,7 @@ def vehicle_name(wanted: str, taken: Container[str]) -> str:
     Parameters
     ----------
     wanted : str
-        Of a namespace and a tf frame; empty for the first of crazyflie1, crazyflie2, ... that is free.
+        Of a namespace and a tf frame; empty for the first free one of crazyflie1, crazyflie2, ...
     taken : container of str
 
     Raises

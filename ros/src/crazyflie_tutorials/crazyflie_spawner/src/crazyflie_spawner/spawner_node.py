@@ -103,9 +103,8 @@ class SpawnerNode(Node):
         except RefusalError as reason:
             raise ServiceError(str(reason)) from None
         if not (math.isfinite(request.x) and math.isfinite(request.y)):
-            raise ServiceError(
-                f"the place is ({request.x:g}, {request.y:g}); expected finite numbers (m)"
-            )
+            place = f"({request.x:g}, {request.y:g})"
+            raise ServiceError(f"the place is {place}; expected finite numbers (m)")
         if self._takeoff(name) in self._handle.service_nodes():
             raise ServiceError(f"there is a vehicle {name} already, which was not spawned here")
         return self._spawn(name, request.x, request.y)

@@ -27,7 +27,7 @@ class VehicleProcess:
 
     @property
     def status(self) -> int | None:
-        """Exit status of roslaunch; None while it runs. One that is to end and does not, is killed."""
+        """Exit status of roslaunch, None while it runs; it is killed if `end` had no effect."""
         status = self._process.poll()
         if status is None and self._deadline is not None and time.monotonic() > self._deadline:
             os.killpg(self._process.pid, signal.SIGKILL)

@@ -12,8 +12,14 @@ from std_msgs.msg import String
 from std_srvs.srv import EmptyResponse
 
 from crazyflie_dev import launch_files
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_msgs.msg import (
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_teleop.circle_node import CircleNode
+from crazyflie_teleop.heading_lift_lqr_node import HeadingLiftLqrNode
 from crazyflie_teleop.joy_velocity_node import JoyVelocityNode
 from crazyflie_teleop.takeoff_caller_node import TakeoffCallerNode
 from crazyflie_teleop.velocity_reference_node import VelocityReferenceNode
@@ -130,6 +136,23 @@ def test_bad_limits_are_named():
     assert "limits/min_height is 3; expected <= limits/max_height, 2 (m)" in fake.logged("error")[0]
 
 
+def test_the_controller_follows_the_heading_of_its_reference():
+    _, parameters = launch_files.expand(LAUNCH / "velocity.launch", rviz="false")
+    fake = FakeProcess(parameters)
+    assert fake.launch(HeadingLiftLqrNode(), "/lqr_controller")
+    reference = PositionVelocityYawState(x=0.1, yaw=1.0)
+    topic = "/ref/position_velocity_yaw"
+    for yaw in (0.5, 1.0, 1.5):
+        fake.publish(topic, PositionVelocityYawStateStamped(state=reference))
+        state = PositionVelocityYawState(yaw=yaw)
+        fake.publish("/state", PositionVelocityYawStateStamped(state=state))
+    controls = [message.control for message in fake.published("/control/lqr")]
+    assert controls[0].yaw_dot > 0.0 == controls[1].yaw_dot > controls[2].yaw_dot
+    # Ahead of it and to its right, as it looks now: at 90 degrees it would be to the right only.
+    assert controls[0].pitch > controls[1].pitch > controls[2].pitch > 0.0
+    assert 0.0 < controls[0].roll < controls[1].roll < controls[2].roll
+
+
 def test_circle_says_the_same_over_and_over_and_stops_at_the_end():
     fake = FakeProcess()
     node = CircleNode()
@@ -197,7 +220,10 @@ def test_launch_files(file, flight, composed):
     nodes, parameters = launch_files.expand(
         LAUNCH / f"{file}.launch", flight=flight, composed=composed, rviz="false"
     )
-    classes = {"velocity_reference": VelocityReferenceNode}
+    classes = {
+        "velocity_reference": VelocityReferenceNode,
+        "lqr_controller": HeadingLiftLqrNode,
+    }
     classes |= {"circle": {"circle": CircleNode}, "teleop": {"joy_velocity": JoyVelocityNode}}.get(
         file, {}
     )

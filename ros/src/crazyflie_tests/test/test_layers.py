@@ -8,12 +8,16 @@ from workspaces import TOP
 SOURCES = TOP / "ros" / "src"
 PACKAGES = {
     path.name: path
-    for pattern in ("*/src/*/__init__.py", "crazyflie_ros/*/src/*/__init__.py")
+    for pattern in (
+        "*/src/*/__init__.py",
+        "crazyflie_ros/*/src/*/__init__.py",
+        "crazyflie_tutorials/*/src/*/__init__.py",
+    )
     for path in (init.parent for init in SOURCES.glob(pattern))
 }
 
 LAYERS = [
-    {"crazyflie_msgs", "crazyflie_model"},
+    {"crazyflie_msgs", "crazyflie_model", "crazyflie_mission_msgs"},
     {"crazyflie_utils"},
     {
         "crazyflie_simulator",
@@ -25,9 +29,12 @@ LAYERS = [
         "crazyflie_description",
         "crazyflie_controller",
         "crazyflie_py",
+        "crazyflie_mission",
+        "crazyflie_package_generator",
+        "crazyflie_spawner",
         "mocap_optitrack",
     },
-    {"crazyflie_driver", "crazyflie_tools", "crazyflie_virtual"},
+    {"crazyflie_driver", "crazyflie_teleop", "crazyflie_tools", "crazyflie_virtual"},
     {"crazyflie_demo", "crazyflie_examples"},
     {"uav_trajectory"},
     {"crazyflie", "crazyflie_dev"},

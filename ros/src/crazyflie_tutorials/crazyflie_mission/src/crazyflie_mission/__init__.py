@@ -1,0 +1,1 @@
+"""A mission that sweeps an area in lanes, at velocities that a service gives."""

@@ -1,0 +1,189 @@
+"""A way through a rectangle: parallel lanes with arcs between them."""
+
+import bisect
+import itertools
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from typing_extensions import override
+
+Point = tuple[float, float, float]
+"""x, y, z in m."""
+
+_SLACK = 1e-9
+
+
+@dataclass(frozen=True)
+class Area:
+    """A rectangle along the axes of the fixed frame, m."""
+
+    x_min: float
+    x_max: float
+    y_min: float
+    y_max: float
+
+
+class Segment:
+    """A piece of a way.
+
+    Attributes
+    ----------
+    length : float
+        m.
+    """
+
+    length: float
+
+    @abstractmethod
+    def at(self, s: float) -> tuple[Point, Point]:
+        """Return position (m) and direction (unit vector) after ``s`` metres of it."""
+
+
+class Line(Segment):
+    """A straight piece.
+
+    Parameters
+    ----------
+    begin, end : Point
+        Two different ones.
+    is_lane : bool
+        Whether it sweeps the area; otherwise it only leads somewhere.
+    """
+
+    def __init__(self, begin: Point, end: Point, is_lane: bool = True):
+        self.begin = begin
+        self.end = end
+        self.is_lane = is_lane
+        self.length = math.dist(begin, end)
+        ux, uy, uz = ((e - b) / self.length for b, e in zip(begin, end, strict=True))
+        self._direction = (ux, uy, uz)
+
+    @override
+    def at(self, s: float) -> tuple[Point, Point]:
+        return self._point(s), self._direction
+
+    def distance(self, point: Point) -> float:
+        """Return how far a point is from the line between its ends, m."""
+        offset = (p - b for p, b in zip(point, self.begin, strict=True))
+        along = sum(o * u for o, u in zip(offset, self._direction, strict=True))
+        return math.dist(point, self._point(min(max(along, 0.0), self.length)))
+
+    def _point(self, s):
+        x, y, z = self.begin
+        ux, uy, uz = self._direction
+        return x + s * ux, y + s * uy, z + s * uz
+
+
+class Arc(Segment):
+    """A circular piece, horizontal.
+
+    Parameters
+    ----------
+    centre : Point
+    radius : float
+        m.
+    begin : float
+        Angle of its first point as seen from the centre, rad.
+    turn : float
+        Angle to its last one, rad; positive is counter-clockwise.
+    """
+
+    def __init__(self, centre: Point, radius: float, begin: float, turn: float):
+        self.centre = centre
+        self.radius = radius
+        self.begin = begin
+        self.turn = turn
+        self.length = radius * abs(turn)
+
+    @override
+    def at(self, s: float) -> tuple[Point, Point]:
+        angle = self.begin + self.turn * s / self.length
+        cosine, sine = math.cos(angle), math.sin(angle)
+        sign = math.copysign(1.0, self.turn)
+        x, y, z = self.centre
+        position = (x + self.radius * cosine, y + self.radius * sine, z)
+        return position, (-sign * sine, sign * cosine, 0.0)
+
+
+class Way:
+    """Segments, one behind the other.
+
+    Parameters
+    ----------
+    segments : sequence of Segment
+        At least one.
+    """
+
+    def __init__(self, segments: Sequence[Segment]):
+        self.segments = tuple(segments)
+        self._begins = list(
+            itertools.accumulate((segment.length for segment in segments), initial=0.0)
+        )
+
+    @property
+    def length(self) -> float:
+        """Of all segments, m."""
+        return self._begins[-1]
+
+    def segment_at(self, s: float) -> Segment:
+        """Return the segment after ``s`` metres of the way; the last one beyond its end."""
+        return self.segments[self._number(s)]
+
+    def at(self, s: float) -> tuple[Point, Point]:
+        """Return position (m) and direction (unit vector) after ``s`` metres, within the way."""
+        number = self._number(s)
+        segment = self.segments[number]
+        return segment.at(min(max(s - self._begins[number], 0.0), segment.length))
+
+    def _number(self, s):
+        return min(max(bisect.bisect_right(self._begins, s) - 1, 0), len(self.segments) - 1)
+
+
+def lane_offsets(width: float, lane_width: float) -> list[float]:
+    """Return where lanes lie beside each other, from one side of a strip, m.
+
+    They are as many as are needed, and equally far apart: at most ``lane_width``.
+    """
+    count = max(1, math.ceil(width / lane_width - _SLACK))
+    spacing = width / count
+    return [(k + 0.5) * spacing for k in range(count)]
+
+
+def sweep(area: Area, lane_width: float, height: float) -> Way:
+    """Return the way that sweeps an area: there along x, an arc, back along x, and so on.
+
+    The arcs lie outside of the area: they reach half the distance of two lanes, at most
+    half of ``lane_width``, beyond its ends.
+
+    Parameters
+    ----------
+    area : Area
+    lane_width : float
+        The largest distance of two lanes, m.
+    height : float
+        m.
+    """
+    ys = [area.y_min + offset for offset in lane_offsets(area.y_max - area.y_min, lane_width)]
+    segments: list[Segment] = []
+    for number, y in enumerate(ys):
+        is_forward = number % 2 == 0
+        begin, end = (area.x_min, area.x_max) if is_forward else (area.x_max, area.x_min)
+        segments.append(Line((begin, y, height), (end, y, height)))
+        if number + 1 < len(ys):
+            radius = (ys[number + 1] - y) / 2.0
+            turn = math.pi if is_forward else -math.pi
+            segments.append(Arc((end, y + radius, height), radius, -math.pi / 2.0, turn))
+    return Way(segments)
+
+
+def back(way: Way) -> Way:
+    """Return the same way from its end to its begin."""
+    return Way([_reverse(segment) for segment in reversed(way.segments)])
+
+
+def _reverse(segment):
+    if isinstance(segment, Line):
+        return Line(segment.end, segment.begin, segment.is_lane)
+    return Arc(segment.centre, segment.radius, segment.begin + segment.turn, -segment.turn)

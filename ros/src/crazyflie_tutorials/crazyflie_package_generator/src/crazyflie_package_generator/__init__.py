@@ -1,0 +1,1 @@
+"""Makes packages that build, pass their tests and lint as they come."""

@@ -1,0 +1,169 @@
+"""A package from a template."""
+
+import datetime
+import keyword
+import os
+import re
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import rospkg
+
+TEMPLATE = Path(rospkg.RosPack().get_path("crazyflie_package_generator")) / "template"
+"""The package, with ``@name@`` for what is filled in."""
+
+_NAME = re.compile(r"[a-z](_?[a-z0-9])+")
+_FIELD = re.compile(r"@(\w+)@")
+_IMPORTS = re.compile(r"(?:^from [\w.]+ import .*\n)+", re.MULTILINE)
+_CONDITION = re.compile(r"^@(if|unless) messages@\n(.*?)^@end@\n", re.DOTALL | re.MULTILINE)
+
+
+class GeneratorError(Exception):
+    """The package cannot be made; the text says what was expected. Nothing was written."""
+
+
+def check_name(what: str, name: str) -> None:
+    """Check a name by the rules for packages.
+
+    REP 144: lower case letters, digits and underscores, at least two characters, the first
+    one a letter, no two underscores in a row. It also becomes the name of a Python module.
+
+    Parameters
+    ----------
+    what : str
+        Of which it is the name, for the message.
+    name : str
+
+    Raises
+    ------
+    GeneratorError
+        It does not keep to them.
+    """
+    if not _NAME.fullmatch(name) or keyword.iskeyword(name):
+        raise GeneratorError(
+            f"{name!r} is no name of a {what}; expected at least two lower case letters, digits "
+            "and single underscores, the first a letter, the last no underscore, no word of Python "
+            "(REP 144), such as wall_follower"
+        )
+    if name in sys.stdlib_module_names:
+        raise GeneratorError(
+            f"{name!r} is a module of Python itself, which a {what} of this name would hide; "
+            "expected another name"
+        )
+
+
+@dataclass(frozen=True)
+class Package:
+    """What is filled in.
+
+    Attributes
+    ----------
+    name : str
+        Of the package.
+    node : str
+        Of its node, without ``_node``.
+    messages : bool
+        Whether it has a message of its own.
+    maintainer, email : str
+        For package.xml.
+    """
+
+    name: str
+    node: str
+    messages: bool = False
+    maintainer: str = "nobody yet"
+    email: str = "nobody@example.com"
+
+    def check(self) -> None:
+        """Check the names.
+
+        Raises
+        ------
+        GeneratorError
+            One cannot be used.
+        """
+        check_name("package", self.name)
+        check_name("node", self.node)
+        if self.node.endswith("_node"):
+            raise GeneratorError(
+                f"{self.node!r} is no name of a node; expected it without _node, which is added"
+            )
+        for what, text in (("maintainer", self.maintainer), ("email", self.email)):
+            if not text.strip() or set(text) & set("<>&@\"'" if what == "maintainer" else "<>&\"'"):
+                raise GeneratorError(f"{text!r} is no {what}; expected a text without <, > and &")
+
+    def files(self) -> Iterator[tuple[Path, str]]:
+        """Yield the relative path and the text of every file."""
+        for path in sorted(TEMPLATE.rglob("*.in")):
+            place = path.relative_to(TEMPLATE).with_suffix("")
+            if place.parts[0] == "msg" and not self.messages:
+                continue
+            filled = str(place).replace("PACKAGE", self.name).replace("NODE", self.node)
+            yield Path(filled), self._fill(path.read_text())
+
+    def _fill(self, text):
+        text = _CONDITION.sub(
+            lambda match: match[2] if (match[1] == "if") == self.messages else "", text
+        )
+        title = f"Changelog for package {self.name}"
+        values = {
+            "package": self.name,
+            "node": self.node,
+            "Class": "".join(word.capitalize() for word in self.node.split("_")),
+            "Output": "Smoothed" if self.messages else "Float64",
+            "output_type_name": f"{self.name}/Smoothed" if self.messages else "std_msgs/Float64",
+            "field": "smoothed" if self.messages else "data",
+            "maintainer": self.maintainer,
+            "email": self.email,
+            "date": datetime.date.today().isoformat(),
+            "bar": "^" * len(title),
+        }
+        filled = _FIELD.sub(lambda match: values.get(match[1], match[0]), text)
+        return _IMPORTS.sub(_in_order, filled)
+
+
+def _in_order(imports):
+    # Where a package's imports stand among the workspace's depends on its name.
+    lines = sorted(imports[0].splitlines(keepends=True), key=lambda line: line.split()[1])
+    return "".join(lines)
+
+
+def create(package: Package, folder: Path) -> Path:
+    """Write a package into a folder, such as a workspace's src; return the package's folder.
+
+    Raises
+    ------
+    GeneratorError
+        A name cannot be used, there is such a folder already, or it cannot be written.
+        Nothing is left behind then.
+    """
+    package.check()
+    if not folder.is_dir():
+        raise GeneratorError(
+            f"there is no folder {folder}; expected one, such as a workspace's src"
+        )
+    target = folder / package.name
+    if target.exists() or target.is_symlink():
+        raise GeneratorError(f"there is {target} already; expected the name of a new package")
+    unfinished = None
+    try:
+        # Beside its place, so that it appears there at once and whole.
+        unfinished = Path(tempfile.mkdtemp(prefix=f".{package.name}-", dir=folder))
+        for place, text in package.files():
+            file = unfinished / place
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+            if place.parts[0] == "exec":
+                file.chmod(0o755)
+        unfinished.chmod(0o755)
+        os.rename(unfinished, target)
+    except OSError as error:
+        raise GeneratorError(f"{target} cannot be written: {error}") from None
+    finally:
+        if unfinished is not None:
+            shutil.rmtree(unfinished, ignore_errors=True)
+    return target

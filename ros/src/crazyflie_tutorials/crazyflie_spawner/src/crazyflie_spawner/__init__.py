@@ -1,0 +1,1 @@
+"""Simulated vehicles that come and go while the simulation runs."""

@@ -1,0 +1,178 @@
+"""ROS interface of vehicles that come and go."""
+
+import math
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+
+from typing_extensions import override
+
+from crazyflie_mission_msgs.srv import (
+    RemoveVehicle,
+    RemoveVehicleResponse,
+    SpawnVehicle,
+    SpawnVehicleResponse,
+)
+from crazyflie_spawner.names import vehicle_name
+from crazyflie_spawner.vehicle_process import VehicleProcess
+from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
+from crazyflie_utils.parameter_types import FRAME, SERVICE, TEXT, TIME_STEP, Number, Text
+from crazyflie_utils.refusal import RefusalError
+
+PERIOD = 0.2
+"""Between two looks at the vehicles, s of the machine's clock."""
+
+
+class SpawnerParameters(Parameters):
+    """Parameters of `SpawnerNode`."""
+
+    spawn_service: str = parameter(SERVICE, "a vehicle appears", "spawn", "srv/spawn")
+    remove_service: str = parameter(SERVICE, "a vehicle disappears", "remove", "srv/remove")
+    vehicle: str = parameter(
+        Text(may_be_empty=True), "name of one that is there from the beginning, at (0, 0)", ""
+    )
+    package: str = parameter(TEXT, "of the launch file", "crazyflie_spawner", "launch/package")
+    file: str = parameter(TEXT, "that starts a vehicle", "vehicle.launch", "launch/file")
+    fixed_frame: str = parameter(FRAME, "tf frame of the world", "world", "frames/fixed")
+    simulator_dt: float = parameter(TIME_STEP, "of the simulators", 0.01)
+    start_limit: float = parameter(
+        Number("s", above=0.0), "a vehicle that takes longer to be there is taken down", 30.0
+    )
+
+
+@dataclass
+class Vehicle:
+    """A vehicle that was spawned.
+
+    Attributes
+    ----------
+    process : VehicleProcess
+    ticks_left : int
+        How many looks it still has to be there.
+    spawning : Future
+        The answer to who has asked for it.
+    is_there : bool
+        Whether its takeoff has been offered.
+    removing : list of Future
+        The answers to those who do not want it any more.
+    """
+
+    process: VehicleProcess
+    ticks_left: int
+    spawning: "Future[SpawnVehicleResponse]"
+    is_there: bool = False
+    removing: "list[Future[RemoveVehicleResponse]]" = field(default_factory=list)
+
+
+class SpawnerNode(Node):
+    """Start and end simulated vehicles, each in a namespace of its own, by service.
+
+    Attributes
+    ----------
+    start_process : callable
+        ``start_process(arguments of roslaunch)`` returns a `VehicleProcess`.
+    """
+
+    start_process: Callable[[list[str]], VehicleProcess] = VehicleProcess
+
+    def __init__(self) -> None:
+        self._vehicles: dict[str, Vehicle] = {}
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(SpawnerParameters)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        handle.advertise_service(parameters.spawn_service, SpawnVehicle, self._on_spawn)
+        handle.advertise_service(parameters.remove_service, RemoveVehicle, self._on_remove)
+        handle.timer(PERIOD, self._on_timer, steady=True)
+        if parameters.vehicle:
+            self._spawn(vehicle_name(parameters.vehicle, ()), 0.0, 0.0)
+
+    @override
+    def shutdown(self) -> None:
+        """Have all vehicles end."""
+        for vehicle in self._vehicles.values():
+            vehicle.process.end()
+
+    def _on_spawn(self, request):
+        try:
+            name = vehicle_name(request.name, self._vehicles)
+        except RefusalError as reason:
+            raise ServiceError(str(reason)) from None
+        if not (math.isfinite(request.x) and math.isfinite(request.y)):
+            place = f"({request.x:g}, {request.y:g})"
+            raise ServiceError(f"the place is {place}; expected finite numbers (m)")
+        if self._takeoff(name) in self._handle.service_nodes():
+            raise ServiceError(f"there is a vehicle {name} already, which was not spawned here")
+        return self._spawn(name, request.x, request.y)
+
+    def _spawn(self, name, x, y):
+        parameters = self._parameters
+        arguments = {
+            "name": name,
+            "x": f"{x:.9g}",
+            "y": f"{y:.9g}",
+            "fixed_frame": parameters.fixed_frame,
+            "simulator_dt": f"{parameters.simulator_dt:.9g}",
+            "sim_time": str(self._handle.uses_sim_time).lower(),
+        }
+        process = type(self).start_process(
+            [parameters.package, parameters.file, *(f"{k}:={v}" for k, v in arguments.items())]
+        )
+        future: Future[SpawnVehicleResponse] = Future()
+        self._vehicles[name] = Vehicle(process, math.ceil(parameters.start_limit / PERIOD), future)
+        return future
+
+    def _on_remove(self, request):
+        vehicle = self._vehicles.get(request.name)
+        if vehicle is None:
+            known = ", ".join(sorted(self._vehicles)) or "none"
+            raise ServiceError(f"no vehicle {request.name!r} was spawned; there are: {known}")
+        future: Future[RemoveVehicleResponse] = Future()
+        vehicle.removing.append(future)
+        vehicle.process.end()
+        return future
+
+    def _on_timer(self):
+        services = None
+        for name, vehicle in list(self._vehicles.items()):
+            status = vehicle.process.status
+            if status is not None:
+                self._forget(name, status)
+            elif not vehicle.is_there and not vehicle.removing:
+                services = self._handle.service_nodes() if services is None else services
+                self._look_for(name, vehicle, services)
+
+    def _look_for(self, name, vehicle, services):
+        vehicle.ticks_left -= 1
+        if self._takeoff(name) in services:
+            vehicle.is_there = True
+            vehicle.spawning.set_result(SpawnVehicleResponse(name))
+            self._handle.info(f"{name} is there")
+        elif vehicle.ticks_left <= 0:
+            limit = self._parameters.start_limit
+            vehicle.spawning.set_exception(
+                ServiceError(f"{name} was not there after {limit:g} s, and is taken down")
+            )
+            # Whoever takes it down has no interest in an answer.
+            vehicle.removing.append(Future())
+            vehicle.process.end()
+
+    def _forget(self, name, status):
+        vehicle = self._vehicles.pop(name)
+        if not vehicle.spawning.done():
+            vehicle.spawning.set_exception(
+                ServiceError(f"{name} has ended before it was there (status {status}); see its log")
+            )
+        if vehicle.removing:
+            self._handle.info(f"{name} is gone")
+        else:
+            self._handle.warn(f"{name} has ended by itself (status {status})")
+        for future in vehicle.removing:
+            future.set_result(RemoveVehicleResponse())
+
+    def _takeoff(self, name):
+        return self._handle.resolve(f"/{name}/takeoff")

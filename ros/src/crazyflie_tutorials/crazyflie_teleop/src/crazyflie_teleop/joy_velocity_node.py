@@ -1,0 +1,112 @@
+"""ROS interface of flying by hand: joy to cmd_vel, buttons to takeoff and landing."""
+
+import math
+
+from geometry_msgs.msg import Twist, Vector3
+from sensor_msgs.msg import Joy
+from std_srvs.srv import Empty, EmptyRequest
+from typing_extensions import override
+
+from crazyflie_teleop.joy_velocity import Axes
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameter_types import SERVICE, TOPIC, Integer, Number
+from crazyflie_utils.parameters import group
+
+FLIGHT_LIMIT = 120.0
+"""The longest that takeoff or landing may take, s of the machine's clock."""
+
+_NUMBER = Integer(0, 63)
+
+
+class AxisParameters(Parameters):
+    """Numbers of axes, from 0, as crazyflie_demo's keyboard and gamepads have them."""
+
+    forward: int = parameter(_NUMBER, "flies ahead", 4)
+    left: int = parameter(_NUMBER, "flies to the left", 3)
+    up: int = parameter(_NUMBER, "rises", 1)
+    turn: int = parameter(_NUMBER, "turns to the left", 0)
+
+
+class JoyVelocityParameters(Parameters):
+    """Parameters of `JoyVelocityNode`."""
+
+    joy_topic: str = parameter(TOPIC, "a joystick, or a keyboard", "joy", "topics/joy")
+    cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
+    takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
+    land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
+    emergency_service: str | None = parameter(
+        SERVICE,
+        "stops the motors, such as the driver's; without it one lands",
+        None,
+        "srv/emergency",
+    )
+    axes: AxisParameters = group(AxisParameters, "axes")
+    takeoff_button: int = parameter(_NUMBER, "calls takeoff", 2, "buttons/takeoff")
+    land_button: int = parameter(_NUMBER, "calls land", 0, "buttons/land")
+    emergency_button: int = parameter(_NUMBER, "calls emergency", 1, "buttons/emergency")
+    horizontal: float = parameter(
+        Number("m/s", above=0.0), "speed of a full deflection", 0.5, "speed/horizontal", live=True
+    )
+    vertical: float = parameter(
+        Number("m/s", above=0.0), "speed of a full deflection", 0.3, "speed/vertical", live=True
+    )
+    yaw_dot: float = parameter(
+        Number("rad/s", above=0.0), "yaw rate of a full deflection", 1.0, "speed/yaw_dot", live=True
+    )
+
+
+class JoyVelocityNode(Node):
+    """Publish a velocity for every message of a joystick; when it falls silent, so does this."""
+
+    def __init__(self) -> None:
+        self._pressed: set[int] = set()
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._reconfigure(handle.load(JoyVelocityParameters, self._reconfigure))
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._publisher = handle.publisher(self._parameters.cmd_vel_topic, Twist)
+        handle.subscribe(self._parameters.joy_topic, Joy, self._on_joy)
+
+    @override
+    def make_safe(self) -> None:
+        """Stop the vehicle."""
+        self._publisher.publish(Twist())
+
+    def _reconfigure(self, parameters):
+        self._parameters = p = parameters
+        self._axes = Axes(
+            p.axes.forward,
+            p.axes.left,
+            p.axes.up,
+            p.axes.turn,
+            p.horizontal,
+            p.vertical,
+            p.yaw_dot,
+        )
+
+    def _on_joy(self, message):
+        if not all(map(math.isfinite, message.axes)):
+            self._handle.warn("ignoring a joystick's axes that are not finite", throttle=1.0)
+            return
+        v = self._axes.velocity(message.axes)
+        self._publisher.publish(Twist(linear=Vector3(v.x, v.y, v.z), angular=Vector3(z=v.yaw_dot)))
+        pressed = {number for number, is_down in enumerate(message.buttons) if is_down}
+        new, self._pressed = pressed - self._pressed, pressed
+        parameters = self._parameters
+        if parameters.emergency_button in new:
+            self._call(parameters.emergency_service or parameters.land_service)
+        elif parameters.land_button in new:
+            self._call(parameters.land_service)
+        elif parameters.takeoff_button in new:
+            self._call(parameters.takeoff_service)
+
+    def _call(self, service):
+        def on_reply(reply):
+            if reply.exception() is not None:
+                self._handle.warn(str(reply.exception()))
+
+        future = self._handle.call_service(service, Empty, EmptyRequest(), FLIGHT_LIMIT)
+        future.add_done_callback(self._handle.guard(on_reply))

@@ -1,0 +1,147 @@
+"""A reference that goes where a velocity in its own heading frame leads it."""
+
+import math
+from dataclasses import dataclass, replace
+
+from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
+
+
+@dataclass(frozen=True)
+class Velocity:
+    """A velocity in the heading frame (x forward, y left, z up), m/s; yaw_dot in rad/s."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    yaw_dot: float = 0.0
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A place in the fixed frame, m, and a heading, rad."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a reference keeps to.
+
+    Attributes
+    ----------
+    horizontal, vertical : float
+        Speeds, m/s.
+    yaw_dot : float
+        rad/s.
+    acceleration : float
+        m/s^2, horizontal and vertical.
+    min_height, max_height : float
+        m.
+    """
+
+    horizontal: float
+    vertical: float
+    yaw_dot: float
+    acceleration: float
+    min_height: float
+    max_height: float
+
+
+class VelocityReference:
+    """Integrates velocities, within limits.
+
+    Parameters
+    ----------
+    limits : Limits
+    silence : float
+        A velocity that is older than this, s, counts no more: the reference comes to rest.
+
+    Attributes
+    ----------
+    limits : Limits
+    silence : float
+    pose : Pose or None
+        None until there is one to begin at.
+    """
+
+    def __init__(self, limits: Limits, silence: float):
+        self.limits = limits
+        self.silence = silence
+        self.pose: Pose | None = None
+        self._velocity = Velocity()
+        self._command = Velocity()
+        self._command_time = -math.inf
+
+    def place(self, x: float, y: float, z: float) -> None:
+        """Begin anew at rest at a place; the heading stays, or is 0."""
+        self.pose = Pose(x, y, z, 0.0 if self.pose is None else self.pose.yaw)
+        self.rest()
+
+    def rest(self) -> None:
+        """Stop at once, and forget what was commanded."""
+        self._velocity = Velocity()
+        self._command = Velocity()
+
+    def command(self, velocity: Velocity, time: float) -> None:
+        """Take a velocity that was commanded at ``time`` (s)."""
+        self._command = velocity
+        self._command_time = time
+
+    def is_commanded(self, time: float) -> bool:
+        """Return whether a velocity has been commanded lately."""
+        return 0.0 <= time - self._command_time <= self.silence
+
+    def advance(self, dt: float, time: float) -> None:
+        """Go on for ``dt`` seconds, until ``time`` (s)."""
+        if self.pose is None:
+            return
+        self._velocity = self._approach(self._target(time), dt)
+        v, pose = self._velocity, self.pose
+        # With the heading in the middle of the step a circle is closed.
+        dx, dy = rotate_by_yaw(v.x * dt, v.y * dt, pose.yaw + v.yaw_dot * dt / 2.0)
+        z = pose.z + v.z * dt
+        # Where a place outside was given, it is not left abruptly.
+        lowest = min(self.limits.min_height, pose.z)
+        highest = max(self.limits.max_height, pose.z)
+        if not lowest <= z <= highest:
+            z = min(max(z, lowest), highest)
+            self._velocity = replace(v, z=0.0)
+        self.pose = Pose(pose.x + dx, pose.y + dy, z, wrap_to_pi(pose.yaw + v.yaw_dot * dt))
+
+    @property
+    def velocity(self) -> tuple[float, float, float]:
+        """Velocity of the reference in the fixed frame, m/s."""
+        v = self._velocity
+        yaw = 0.0 if self.pose is None else self.pose.yaw
+        return *rotate_by_yaw(v.x, v.y, yaw), v.z
+
+    def _target(self, time):
+        if not self.is_commanded(time):
+            return Velocity()
+        limits, command = self.limits, self._command
+        speed = math.hypot(command.x, command.y)
+        # The direction stays.
+        scale = min(1.0, limits.horizontal / speed) if speed > 0.0 else 1.0
+        return Velocity(
+            scale * command.x,
+            scale * command.y,
+            _clamp(command.z, limits.vertical),
+            _clamp(command.yaw_dot, limits.yaw_dot),
+        )
+
+    def _approach(self, target, dt):
+        v = self._velocity
+        most = self.limits.acceleration * dt
+        dx, dy = target.x - v.x, target.y - v.y
+        change = math.hypot(dx, dy)
+        part = min(1.0, most / change) if change > 0.0 else 1.0
+        return Velocity(
+            v.x + part * dx, v.y + part * dy, v.z + _clamp(target.z - v.z, most), target.yaw_dot
+        )
+
+
+def _clamp(value, most):
+    return min(max(value, -most), most)

@@ -1,0 +1,173 @@
+"""ROS interface of the velocity reference: cmd_vel in, references of the controller out."""
+
+from collections.abc import Iterator
+
+from geometry_msgs.msg import Twist
+from std_msgs.msg import String
+from typing_extensions import override
+
+from crazyflie_msgs.msg import (
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
+from crazyflie_teleop.velocity_reference import Limits, Velocity, VelocityReference
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameters import group
+from crazyflie_utils.vectors import is_finite
+
+FLYING = "flying"
+"""Flight state of a vehicle that follows references."""
+
+_SPEED = Number("m/s", above=0.0)
+
+
+class LimitParameters(Parameters):
+    """What a reference keeps to."""
+
+    horizontal: float = parameter(_SPEED, "largest speed, x and y together", 0.7, live=True)
+    vertical: float = parameter(_SPEED, "largest speed, z", 0.4, live=True)
+    yaw_dot: float = parameter(Number("rad/s", above=0.0), "largest yaw rate", 1.5, live=True)
+    acceleration: float = parameter(
+        Number("m/s^2", above=0.0), "largest acceleration, also when stopping", 1.0, live=True
+    )
+    min_height: float = parameter(Number("m"), "the reference sinks no lower", 0.3, live=True)
+    max_height: float = parameter(Number("m"), "and rises no higher", 2.0, live=True)
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        if self.min_height > self.max_height:
+            yield (
+                f"limits/min_height is {self.min_height:g}; "
+                f"expected <= limits/max_height, {self.max_height:g} (m)"
+            )
+
+
+class VelocityReferenceParameters(Parameters):
+    """Parameters of `VelocityReferenceNode`."""
+
+    cmd_vel_topic: str = parameter(
+        TOPIC, "velocities in the heading frame, m/s and rad/s", "cmd_vel", "topics/cmd_vel"
+    )
+    reference_topic: str = parameter(
+        TOPIC,
+        "references of others, such as the takeoff server's, which are passed on",
+        name="topics/reference",
+    )
+    controller_reference_topic: str = parameter(
+        TOPIC, "references for the controller go here", name="topics/controller_reference"
+    )
+    flight_state_topic: str = parameter(
+        TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
+    )
+    time_step: float = parameter(TIME_STEP, "between two references", 0.02)
+    silence: float = parameter(
+        TIME_STEP, "after so long without a velocity the vehicle stops", 0.5, live=True
+    )
+    limits: LimitParameters = group(LimitParameters, "limits")
+
+    def limits_of_reference(self) -> Limits:
+        """Return the limits as the algorithm wants them."""
+        each = self.limits
+        return Limits(
+            each.horizontal,
+            each.vertical,
+            each.yaw_dot,
+            each.acceleration,
+            each.min_height,
+            each.max_height,
+        )
+
+
+class VelocityReferenceNode(Node):
+    """Fly a vehicle by velocity: integrate cmd_vel into references while it flies.
+
+    References of others are passed on with the present heading; flying by velocity goes on
+    from there. So takeoff, landing and cmd_vel need one publisher to the controller only.
+    """
+
+    def __init__(self) -> None:
+        self._flight_state = ""
+        self._time = 0.0
+        self._is_moving = False
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(VelocityReferenceParameters, self._reconfigure)
+        self._reference = VelocityReference(
+            self._parameters.limits_of_reference(), self._parameters.silence
+        )
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = handle.publisher(
+            parameters.controller_reference_topic, PositionVelocityYawStateStamped, latch=True
+        )
+        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(
+            parameters.reference_topic,
+            PositionVelocityStateStamped,
+            self._on_reference,
+            finite="state",
+        )
+        handle.subscribe(parameters.cmd_vel_topic, Twist, self._on_cmd_vel)
+        self._time = handle.time()
+        handle.timer(parameters.time_step, self._on_timer)
+
+    @override
+    def make_safe(self) -> None:
+        """Let the vehicle hover where the reference is."""
+        if self._is_moving:
+            self._reference.rest()
+            self._publish()
+
+    def _reconfigure(self, parameters):
+        self._reference.limits = parameters.limits_of_reference()
+        self._reference.silence = parameters.silence
+
+    def _on_flight_state(self, message):
+        self._flight_state = message.data
+        if message.data != FLYING:
+            self._is_moving = False
+            self._reference.rest()
+
+    def _on_reference(self, message):
+        state = message.state
+        self._reference.place(state.x, state.y, state.z)
+        self._publish((state.x_dot, state.y_dot, state.z_dot))
+
+    def _on_cmd_vel(self, message):
+        linear, angular = message.linear, message.angular
+        if not (is_finite(linear) and is_finite(angular)):
+            topic = self._handle.resolve(self._parameters.cmd_vel_topic)
+            self._handle.warn(f"ignoring a message on {topic}: it is not finite", throttle=1.0)
+            return
+        self._reference.command(
+            Velocity(linear.x, linear.y, linear.z, angular.z), self._handle.time()
+        )
+
+    def _on_timer(self):
+        now = self._handle.time()
+        dt, self._time = max(now - self._time, 0.0), now
+        if self._flight_state != FLYING or self._reference.pose is None:
+            return
+        if not self._is_moving and not self._reference.is_commanded(now):
+            return
+        self._reference.advance(dt, now)
+        self._publish()
+        # At rest and without commands it leaves the topic to others.
+        self._is_moving = self._reference.is_commanded(now) or any(self._reference.velocity)
+
+    def _publish(self, velocity=None):
+        pose = self._reference.pose
+        if pose is None:
+            return
+        x_dot, y_dot, z_dot = self._reference.velocity if velocity is None else velocity
+        message = PositionVelocityYawStateStamped()
+        message.header.stamp = self._handle.stamp()
+        message.state = PositionVelocityYawState(
+            pose.x, pose.y, pose.z, x_dot, y_dot, z_dot, pose.yaw
+        )
+        self._publisher.publish(message)

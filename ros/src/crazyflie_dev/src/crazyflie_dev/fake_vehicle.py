@@ -65,6 +65,7 @@ class FakeVehicle:
         self._replies = 0
         self._blocks: dict[int, list[str]] = {}
         self._started: dict[int, tuple[float, float]] = {}
+        self._forgets_logs = threading.Event()
         self._peer: tuple[str, int] | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
@@ -197,7 +198,14 @@ class FakeVehicle:
             self._started.pop(block, None)
         return bytes([command, block, 0])
 
+    def forget_logs(self) -> None:
+        """Send no log data any more, as after a restart between two pings."""
+        self._forgets_logs.set()
+
     def _send_logs(self):
+        if self._forgets_logs.is_set():
+            self._forgets_logs.clear()
+            self._started.clear()
         now = time.monotonic()
         for block, (period, due) in list(self._started.items()):
             if now < due:

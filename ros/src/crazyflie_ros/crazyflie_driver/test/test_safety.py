@@ -161,7 +161,7 @@ def test_a_stale_stream_does_not_start_a_vehicle_that_was_restarted(server, vehi
             break
         vehicle.wait_for(lambda: False, 0.02)
     # Its battery is changed.
-    vehicle._started.clear()
+    vehicle.forget_logs()
     is_(vehicle, READY)
     vehicle.received.clear()
     vehicle.is_frozen = False
@@ -197,7 +197,7 @@ def test_a_flight_goes_on_when_the_vehicle_still_flies(hovering):
 
 def test_a_restart_within_the_time_of_a_ping(server, vehicle):
     server.process.advance(0.1)
-    vehicle._started.clear()
+    vehicle.forget_logs()
     wait_for_words(server, "the log data have stopped although the vehicle answers")
     wait_for_words(server, "ready")
 

@@ -181,7 +181,7 @@ def test_a_frozen_vehicle_is_lost_and_taken_up_again(vehicle, make_link, states)
     with pytest.raises(LinkLostError, match="has not been heard"):
         link.setpoints.stop()
     # As after a restart: it sends nothing by itself.
-    vehicle._started.clear()
+    vehicle.forget_logs()
     while not received.empty():
         received.get()
     vehicle.is_frozen = False
@@ -215,7 +215,7 @@ def test_a_restart_that_pings_do_not_show(vehicle, make_link, states):
     received = queue.Queue()
     link.add_log_block(LogBlock("test", 20, ("pm.vbat",), lambda *data: received.put(data)))
     received.get(timeout=LIMIT)
-    vehicle._started.clear()
+    vehicle.forget_logs()
     vehicle._blocks.clear()
     assert "the log data have stopped although" in states.wait_for(LinkState.LOST)
     states.wait_for(LinkState.CONNECTED)

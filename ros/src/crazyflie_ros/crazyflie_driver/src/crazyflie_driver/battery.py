@@ -47,6 +47,6 @@ class Battery:
 
     def words(self) -> str:
         """Return the state, such as "battery low: 3.12 V"; empty if nothing is wrong."""
-        if self.charge < Charge.LOW:
-            return ""
-        return f"battery {self.charge.name.lower()}: {self.voltage:.2f} V"
+        if self.charge is Charge.CRITICAL:
+            return f"battery critical: {self.voltage:.2f} V"
+        return f"battery low: {self.voltage:.2f} V" if self.charge is Charge.LOW else ""

@@ -13,7 +13,9 @@ def run_doctor(*arguments: str) -> tuple[int, list[str]]:
         text=True,
         timeout=_LIMIT,
     )
-    assert not done.stderr.strip(), done.stderr
+    # What it connects to may make its node warn.
+    errors = [line for line in done.stderr.splitlines() if line and "[WARN]" not in line]
+    assert not errors, done.stderr
     return done.returncode, done.stdout.splitlines()
 
 

@@ -48,11 +48,11 @@ class Attacker:
     def end(self):
         """Return the number of its listeners, and of the messages a second for each."""
         self._process.send_signal(signal.SIGCONT)
-        return [int(word) for word in self._process.communicate(b"end\n", timeout=10.0)[0].split()]
+        return [int(word) for word in self._process.communicate(b"end\n", timeout=30.0)[0].split()]
 
     def kill(self):
         self._process.kill()
-        self._process.wait(10.0)
+        self._process.wait(30.0)
 
 
 @contextlib.contextmanager

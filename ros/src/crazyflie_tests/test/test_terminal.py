@@ -4,7 +4,7 @@ import pytest
 from terminal import CommandError, Terminal
 from workspaces import clean_environment
 
-LIMIT = 10.0
+LIMIT = 30.0
 
 
 @pytest.fixture

@@ -110,9 +110,6 @@ def test_a_streamed_trajectory(observer, tmp_path):
 
 def test_a_script_of_a_user(observer, tmp_path):
     x, y, _ = at_rest(observer)
-    # Three seconds after a landing the firmware refuses commands for a moment.
-    landed = observer.track_until(lambda truth: True)[-1].time
-    observer.track_until(lambda truth: truth.time > landed + 4.0)
     (tmp_path / "script.py").write_text(SCRIPT)
     save(tmp_path / "aside.csv", [piece(2.0, (0.0, 0.0), (0.0, 0.4), (0.0, 0.0))])
     command = [sys.executable, tmp_path / "script.py", tmp_path / "aside.csv"]

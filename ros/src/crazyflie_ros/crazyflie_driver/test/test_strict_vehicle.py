@@ -120,6 +120,20 @@ def test_users_may_announce_the_landing_first(flight):
     assert flight.heights[-1] > 0.8 * HEIGHT
 
 
+def test_a_takeoff_waits_for_the_moment_after_a_landing_in_which_the_firmware_refuses(flight):
+    flight.server.call("/cf1/takeoff", TakeoffRequest(0, HEIGHT, Duration(1)))
+    flight.run(1.5)
+    flight.server.call("/cf1/land", LandRequest(0, 0.0, Duration(1)))
+    supervisor = flight.virtual.vehicle.board.firmware.supervisor
+    end = time.monotonic() + LIMIT
+    while supervisor.can_fly:
+        assert time.monotonic() < end
+        time.sleep(0.001)
+    flight.server.call("/cf1/takeoff", TakeoffRequest(0, HEIGHT, Duration(1)))
+    flight.run(LIMIT, until=lambda: flight.virtual.observe().position[2] > 0.8 * HEIGHT)
+    assert flight.virtual.observe().position[2] > 0.8 * HEIGHT
+
+
 def test_the_emergency_watchdog_ends_a_flight_without_a_pc(make_server):
     with virtual_vehicle() as (virtual, uri):
         flight = Flight(make_server({"emergency_watchdog": True}), virtual, uri)

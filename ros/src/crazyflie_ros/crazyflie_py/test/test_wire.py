@@ -107,10 +107,10 @@ def test_hand_over_takes_the_place_of_the_setpoint_that_waits(vehicle, flying):
 
     def block():
         entered.set()
-        free.wait(5.0)
+        free.wait(30.0)
 
     flying.link().command(block)
-    assert entered.wait(5.0)
+    assert entered.wait(30.0)
     flying.setpoints.position(0.0, 0.0, 1.0, 0.0)
     flying.setpoints.hand_over(1500)
     free.set()

@@ -1,5 +1,6 @@
 """High-level commands to one vehicle, and what keeps them from dropping it."""
 
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, TypeVar
@@ -24,6 +25,10 @@ HOLD = 0.5
 
 _WATCHDOG_PERIOD = 0.2
 """The firmware gives up after 1 s without being fed."""
+
+_REARMING = 0.5
+"""How long a takeoff waits for a vehicle that arms itself, s. Firmware 2026.08 disarms and arms
+itself 3 s after a landing (0.16 s) and every 30 s on the ground (0.08 s)."""
 
 
 class FlightCommands:
@@ -155,13 +160,24 @@ class FlightCommands:
         """
         if self._battery.charge >= Charge.LOW:
             raise ServiceError(f"no takeoff, {self._battery.words()}: charge or change it")
-        state = self._crazyflie.supervisor.read()
+        state = self._state_once_armed()
         if state is None:
             return
         if state & NOT_FLYABLE:
             raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
         if SupervisorState.ARMED not in state:
             self._crazyflie.supervisor.arm()
+
+    def _state_once_armed(self) -> SupervisorState | None:
+        end = time.monotonic() + _REARMING
+        while True:
+            state = self._crazyflie.supervisor.read()
+            rearms = state is not None and SupervisorState.AUTO_ARMED in state
+            if not rearms or state & (SupervisorState.CAN_FLY | NOT_FLYABLE):
+                return state
+            if time.monotonic() > end:
+                return state
+            time.sleep(_REARMING / 10)
 
     def check_battery(self) -> None:
         """Land a high-level flight whose battery is critical, once."""

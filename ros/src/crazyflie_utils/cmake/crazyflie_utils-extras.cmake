@@ -21,13 +21,24 @@ endfunction()
 #
 # :param ARGN: what the names of the tests match, regular expressions
 function(crazyflie_busy_tests)
+  _crazyflie_set_tests_properties("${ARGN}" PROCESSORS 2 COST 1000)
+endfunction()
+
+# Say that tests of this package measure what other tests beside them would change.
+#
+# :param ARGN: what the names of the tests match, regular expressions
+function(crazyflie_lonely_tests)
+  _crazyflie_set_tests_properties("${ARGN}" RUN_SERIAL TRUE COST 2000)
+endfunction()
+
+function(_crazyflie_set_tests_properties patterns)
   get_property(tests DIRECTORY PROPERTY TESTS)
-  foreach(pattern ${ARGN})
+  foreach(pattern ${patterns})
     set(matching ${tests})
     list(FILTER matching INCLUDE REGEX "${pattern}")
     if(NOT matching)
       message(FATAL_ERROR "${PROJECT_NAME} has no test that matches ${pattern}")
     endif()
-    set_tests_properties(${matching} PROPERTIES PROCESSORS 2 COST 1000)
+    set_tests_properties(${matching} PROPERTIES ${ARGN})
   endforeach()
 endfunction()

@@ -22,7 +22,7 @@ from crazyflie_dev.programs import free_port, running
 from crazyflie_utils.runtime import runner
 from crazyflie_utils.testing.peer import wait_until
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 NODES = (
     "/simulator",

@@ -9,7 +9,7 @@ from pages import Block, Page
 from terminal import Terminal
 from workspaces import BUILD_LIMIT, clean_environment
 
-START_LIMIT = 60.0
+START_LIMIT = 120.0
 """The longest that anything may take to appear, s."""
 
 

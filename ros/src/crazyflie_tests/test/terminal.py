@@ -18,7 +18,7 @@ _PROMPT_SETTINGS = {"PROMPT_COMMAND": 'echo "[status $?]"', "PS1": "", "PS2": ""
 
 _INTERRUPT = "\x03"
 
-_SHELL_LIMIT = 30.0
+_SHELL_LIMIT = 60.0
 """How long a shell may take to start, and a command to end after Ctrl-C, s."""
 
 

@@ -22,9 +22,15 @@ def calls_run(page):
     return any("./run " in text for text in typed)
 
 
+def length(path):
+    """Return how many commands a page has."""
+    blocks = Page(path).blocks
+    return sum(len(block.commands) for block in blocks if block.comment.startswith("run"))
+
+
 def in_turns():
     """Return lists of pages: two programs must not build one workspace at a time."""
-    pages = {path: Page(path) for path in PAGES_WITH_COMMANDS}
+    pages = {path: Page(path) for path in sorted(PAGES_WITH_COMMANDS, key=length, reverse=True)}
     changing = [p for p in pages if any(b.comment == "apply" for b in pages[p].blocks)]
     calling = [p for p in pages if p not in changing and calls_run(pages[p])]
     others = [p for p in pages if p not in changing and p not in calling]

@@ -14,7 +14,7 @@ _SCRIPT = Path(__file__).parent / "faulty_flight.py"
 def seen():
     """Fly once, and return what was seen."""
     flight = subprocess.run(
-        [sys.executable, _SCRIPT], capture_output=True, text=True, timeout=180, check=False
+        [sys.executable, _SCRIPT], capture_output=True, text=True, timeout=600, check=False
     )
     assert flight.returncode == 0, flight.stderr[-5000:]
     return json.loads(flight.stdout)

@@ -4,7 +4,7 @@ import pytest
 from terminal import CommandError, Terminal
 from workspaces import clean_environment
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 @pytest.fixture

@@ -3,9 +3,42 @@
 # a machine is, and to try the same examples every time.
 #
 # :param path: folder or file, relative to the package
+# :param APART: files of this folder that are tests of their own, which may run beside it
 function(crazyflie_add_pytest path)
+  cmake_parse_arguments(pytest "" "" "APART" ${ARGN})
   string(REPLACE "/" "_" name "${path}")
   set(report "${CATKIN_TEST_RESULTS_DIR}/${PROJECT_NAME}/pytest-${name}.xml")
-  catkin_run_tests_target("pytest" "${name}" "pytest-${name}.xml"
-    COMMAND "${PYTHON_EXECUTABLE} -m pytest ${CMAKE_CURRENT_SOURCE_DIR}/${path} -q -p no:cacheprovider -p crazyflie_utils.testing.pytest_plugin --junit-xml=${report}")
+  set(command "${PYTHON_EXECUTABLE} -m pytest ${CMAKE_CURRENT_SOURCE_DIR}/${path} -q -p no:cacheprovider -p crazyflie_utils.testing.pytest_plugin --junit-xml=${report}")
+  foreach(file ${pytest_APART})
+    string(APPEND command " --ignore=${CMAKE_CURRENT_SOURCE_DIR}/${path}/${file}")
+    crazyflie_add_pytest(${path}/${file})
+  endforeach()
+  catkin_run_tests_target("pytest" "${name}" "pytest-${name}.xml" COMMAND "${command}")
+endfunction()
+
+# Say that tests of this package keep about a whole processor busy, or fly in many processes in
+# real time: ``ctest -j`` then runs fewer beside them, and begins with them.
+#
+# :param ARGN: what the names of the tests match, regular expressions
+function(crazyflie_busy_tests)
+  _crazyflie_set_tests_properties("${ARGN}" PROCESSORS 2 COST 1000)
+endfunction()
+
+# Say that tests of this package measure what other tests beside them would change.
+#
+# :param ARGN: what the names of the tests match, regular expressions
+function(crazyflie_lonely_tests)
+  _crazyflie_set_tests_properties("${ARGN}" RUN_SERIAL TRUE COST 2000)
+endfunction()
+
+function(_crazyflie_set_tests_properties patterns)
+  get_property(tests DIRECTORY PROPERTY TESTS)
+  foreach(pattern ${patterns})
+    set(matching ${tests})
+    list(FILTER matching INCLUDE REGEX "${pattern}")
+    if(NOT matching)
+      message(FATAL_ERROR "${PROJECT_NAME} has no test that matches ${pattern}")
+    endif()
+    set_tests_properties(${matching} PROPERTIES ${ARGN})
+  endforeach()
 endfunction()

@@ -6,7 +6,7 @@ import pytest
 
 from crazyflie_utils.runtime.executor import Executor, _FairLock
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 
 @pytest.fixture

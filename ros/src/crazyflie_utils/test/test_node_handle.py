@@ -11,7 +11,7 @@ from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, Trig
 from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from crazyflie_utils.runtime.clock import SteadyClock
 from crazyflie_utils.runtime.executor import Executor
 from crazyflie_utils.runtime.timers import SteadyTimers, TimerQueue
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 
 @pytest.fixture

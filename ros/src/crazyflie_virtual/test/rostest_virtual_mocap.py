@@ -7,7 +7,7 @@ import pytest
 import rospy
 from natnet import NatNetClient
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 
 def connected_client():

@@ -10,7 +10,7 @@ from virtual_client import wait_until
 TOP = Path(__file__).resolve().parents[4]
 PROGRAM = TOP / "docs" / "examples" / "cflib_hover" / "hover.py"
 
-LIMIT = 30.0
+LIMIT = 60.0
 """The program flies for 9 s."""
 
 

@@ -11,7 +11,7 @@ from crazyflie_virtual.mocap.server import MocapServer
 from crazyflie_virtual.mocap.settings import MocapSettings
 from crazyflie_virtual.settings import VehicleSettings
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 class Watcher:

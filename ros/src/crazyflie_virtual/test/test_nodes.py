@@ -12,7 +12,7 @@ from crazyflie_utils.testing import FakeProcess
 from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
 from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
 
-LIMIT = 30.0
+LIMIT = 60.0
 QUIET = {"port": 0, "observer/port": 0}
 
 

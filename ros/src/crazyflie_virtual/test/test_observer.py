@@ -9,7 +9,7 @@ from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.observer import Observation, decode
 from crazyflie_virtual.settings import VehicleSettings
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 def test_observations_come_back():

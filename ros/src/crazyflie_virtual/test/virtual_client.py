@@ -8,7 +8,7 @@ from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
 from cflib.crtp.crtpstack import CRTPPacket
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 class Client:

@@ -13,7 +13,7 @@ from mocap_optitrack import library_source as module
 from mocap_optitrack.library_source import LibrarySource
 from mocap_optitrack.source import SourceError
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from mocap_optitrack.natnet_source import NatNetSource
 from mocap_optitrack.parameters import NatNetParameters
 from mocap_optitrack.source import SourceError
 
-LIMIT = 30.0
+LIMIT = 60.0
 GROUP = "239.255.42.99"
 
 

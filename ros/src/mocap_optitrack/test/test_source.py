@@ -10,7 +10,7 @@ from mocap_optitrack import source as module
 from mocap_optitrack.frames import Frame
 from mocap_optitrack.source import Receiver, Source, SourceError
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 class ScriptedSource(Source):

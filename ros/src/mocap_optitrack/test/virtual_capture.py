@@ -9,7 +9,7 @@ import yaml
 from crazyflie_dev.programs import running
 from crazyflie_virtual.observer import Observation
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 _PERIOD = 0.05
 """From one message of the vehicles to the next, s."""

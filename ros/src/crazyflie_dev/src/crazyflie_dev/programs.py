@@ -8,7 +8,7 @@ import subprocess
 from collections.abc import Iterator
 from typing import Any
 
-_END_LIMIT = 20.0
+_END_LIMIT = 60.0
 """How long a program may take to end after each signal, s; roslaunch gives its nodes 15."""
 
 

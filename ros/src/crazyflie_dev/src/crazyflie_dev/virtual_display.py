@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import ImageGrab
 
-_START_LIMIT = 10.0
-_END_LIMIT = 5.0
+_START_LIMIT = 30.0
+_END_LIMIT = 30.0
 
 
 class DisplayError(Exception):

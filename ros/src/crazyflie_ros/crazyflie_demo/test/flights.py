@@ -11,7 +11,7 @@ from crazyflie_demo.joystick import AXIS, BUTTON, EVENT
 from crazyflie_dev.programs import free_port, running
 from crazyflie_virtual.observer import decode
 
-LIMIT = 30.0
+LIMIT = 60.0
 """How long anything may take to come about, s."""
 
 _SCAN = b"\xff"

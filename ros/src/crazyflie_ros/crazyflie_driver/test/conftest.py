@@ -9,7 +9,7 @@ from crazyflie_driver.server_node import CrazyflieServerNode
 from crazyflie_driver.srv import AddCrazyflieRequest, RemoveCrazyflieRequest
 from crazyflie_utils.testing import FakeProcess
 
-LIMIT = 30.0
+LIMIT = 60.0
 """Within this, s, a call of the driver is answered, whatever is wrong with a vehicle."""
 
 LOG = {

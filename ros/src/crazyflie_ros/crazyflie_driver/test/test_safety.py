@@ -22,7 +22,7 @@ from crazyflie_driver.srv import (
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.peer import wait_until
 
-LIMIT = 30.0
+LIMIT = 60.0
 ZERO = struct.pack("<fffH", 0, 0, 0, 0)
 SETPOINTS_STOP = struct.pack("<BI", 0, 0)
 READY, FLYING, HIGH_LEVEL = 0b1010, 0b11010, 0b100011010

@@ -12,7 +12,7 @@ from crazyflie_driver.srv import TakeoffRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.peer import wait_until
 
-LIMIT = 20.0
+LIMIT = 60.0
 ZERO = struct.pack("<fffH", 0, 0, 0, 0)
 
 

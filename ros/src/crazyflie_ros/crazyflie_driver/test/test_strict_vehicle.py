@@ -14,7 +14,7 @@ from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.log import LogBlock
 from crazyflie_virtual.testing import virtual_vehicle
 
-LIMIT = 20.0
+LIMIT = 60.0
 PERIOD = 0.02
 HEIGHT = 0.5
 LOCK_TIME = 2.5

@@ -7,7 +7,7 @@ import pytest
 from crazyflie_driver.worker import MOST_JOBS, Worker
 from crazyflie_utils import ServiceError
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 class Slow:

@@ -25,7 +25,7 @@ from crazyflie_py.errors import (
 from crazyflie_py.link import Limits, Link
 from crazyflie_py.log import LogBlock
 
-LIMIT = 30.0
+LIMIT = 60.0
 QUICK = Limits(first_answer=0.4, stall=0.5)
 
 

@@ -7,7 +7,7 @@ import pytest
 from crazyflie_py.errors import LinkLostError
 from crazyflie_py.outbox import Outbox
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 class Radio:

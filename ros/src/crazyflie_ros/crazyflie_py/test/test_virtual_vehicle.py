@@ -13,7 +13,7 @@ from crazyflie_py.errors import RefusedError
 from crazyflie_py.log import LogBlock
 from crazyflie_virtual.testing import virtual_vehicle
 
-LIMIT = 20.0
+LIMIT = 60.0
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ from crazyflie_mission_msgs.srv import RemoveVehicle, SpawnVehicle
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils.testing import peer
 
-LIMIT = 30.0
+LIMIT = 60.0
 
 
 def call(name, service_type, *arguments):

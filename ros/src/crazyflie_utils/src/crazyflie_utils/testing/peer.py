@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 import genpy
 import rospy
 
-LIMIT = 30.0
+LIMIT = 60.0
 """The longest that a test waits for anything, s."""
 
 

@@ -3,7 +3,7 @@
 In a .test file::
 
     <test pkg="crazyflie_utils" type="pytest_node" test-name="hover"
-          args="$(find my_package)/test/rostest_hover.py" time-limit="60" />
+          args="$(find my_package)/test/rostest_hover.py" time-limit="120" />
 """
 
 import signal

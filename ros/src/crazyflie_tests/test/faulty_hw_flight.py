@@ -83,8 +83,9 @@ class Vehicle:
 
     def motors_stop_after(self, begin):
         """Return how long after a moment (s) all motors stand still for good, s."""
-        runs = self._log.values[:, 2:6].any(axis=1)
-        return max(0.0, float(self._log.times[runs][-1]) - begin)
+        times = self._log.times
+        runs = self._log.values[: len(times), 2:6].any(axis=1)
+        return max(0.0, float(times[runs][-1]) - begin)
 
     def rests(self):
         """Return whether all motors stand still."""

@@ -17,6 +17,8 @@ GROUND_TOLERANCE = 0.01
 class Series:
     """Rows of numbers with the times they belong to, growing.
 
+    One thread may add while another looks.
+
     Parameters
     ----------
     fields : tuple of str
@@ -30,8 +32,9 @@ class Series:
 
     def append(self, time: float, row: ArrayLike) -> None:
         """Add a row, shape (len(fields),), at ``time`` (s)."""
-        self._times.append(time)
+        # In this order, so that each time has its row.
         self._rows.append(row)
+        self._times.append(time)
 
     def __len__(self) -> int:
         return len(self._times)
@@ -43,7 +46,7 @@ class Series:
 
     @property
     def values(self) -> NDArray[np.float64]:
-        """Rows, shape (n, len(fields))."""
+        """Rows, shape (n, len(fields)); more than `times` if some came since that was taken."""
         return np.array(self._rows, dtype=float).reshape(-1, len(self.fields))
 
     def column(self, name: str) -> NDArray[np.float64]:
@@ -53,7 +56,7 @@ class Series:
     def between(self, start: float, end: float) -> NDArray[np.float64]:
         """Return the rows with start <= time <= end (s), shape (m, len(fields))."""
         times = self.times
-        return self.values[(times >= start) & (times <= end)]
+        return self.values[: len(times)][(times >= start) & (times <= end)]
 
     @property
     def last_time(self) -> float:

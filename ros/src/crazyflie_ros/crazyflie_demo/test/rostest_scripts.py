@@ -58,7 +58,8 @@ def piece(duration, *ends):
 
 def flown(observer, flight):
     """Return the positions of a flight, from 0.2 m up to the ground again."""
-    observer.track_until(lambda truth: truth.position[2] > 0.2)
+    observer.track_until(lambda truth: truth.position[2] > 0.2 or flight.poll() is not None)
+    assert flight.poll() is None, "the script has ended before it flew; its output has the reason"
     track = observer.track_until(lambda truth: truth.position[2] < 0.02)
     assert flight.wait(LIMIT) == 0
     return np.array([truth.position for truth in track])
@@ -110,6 +111,9 @@ def test_a_streamed_trajectory(observer, tmp_path):
 
 def test_a_script_of_a_user(observer, tmp_path):
     x, y, _ = at_rest(observer)
+    # The landing that ends a stream takes 2 s, in which the firmware refuses a takeoff.
+    landed = observer.track_until(lambda truth: True)[-1].time
+    observer.track_until(lambda truth: truth.time > landed + 2.0)
     (tmp_path / "script.py").write_text(SCRIPT)
     save(tmp_path / "aside.csv", [piece(2.0, (0.0, 0.0), (0.0, 0.4), (0.0, 0.0))])
     command = [sys.executable, tmp_path / "script.py", tmp_path / "aside.csv"]

@@ -64,13 +64,18 @@ def test_nothing_opens_it_without_a_link():
     assert gate.refusal(5.1, False)
 
 
-def test_a_setpoint_under_way_does_not_override_a_command():
+@pytest.mark.parametrize(
+    ("end", "event"),
+    [
+        (SetpointGate.high_level, "given a high-level command"),
+        (SetpointGate.stop, "stopped by cmd_stop"),
+    ],
+)
+def test_a_setpoint_under_way_does_not_follow_the_end_of_a_stream(end, event):
     gate = SetpointGate()
     stream(gate, 0.0, 1.0)
-    gate.high_level(1.0)
-    assert gate.refusal(1.0 + 0.5 * OVERLAP, False) == (
-        "the vehicle was just given a high-level command"
-    )
+    end(gate, 1.0)
+    assert gate.refusal(1.0 + 0.5 * OVERLAP, False) == f"the vehicle was just {event}"
     assert gate.refusal(1.0 + 0.5 * OVERLAP, True) == ""
     assert gate.refusal(1.0 + 1.5 * OVERLAP, False) == ""
 

@@ -8,6 +8,7 @@ from geometry_msgs.msg import Point, PointStamped, Pose, PoseStamped, Quaternion
 from std_msgs.msg import Empty as EmptyMessage
 
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+from crazyflie_driver.setpoint_gate import OVERLAP
 
 NAN = math.nan
 
@@ -79,6 +80,7 @@ def test_velocities_positions_and_stop(flying):
     for count, (topic, message, data) in enumerate(sends, start=1):
         server.process.publish(f"/cf1/{topic}", message)
         assert vehicle.wait_for_packets(7, 0, count)[-1] == data
+    server.process.advance(OVERLAP)
 
 
 def test_external_poses(flying):

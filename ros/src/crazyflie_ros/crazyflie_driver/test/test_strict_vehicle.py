@@ -5,6 +5,7 @@ import time
 
 import pytest
 from genpy import Duration
+from std_msgs.msg import Empty
 
 from crazyflie_driver.msg import Position
 from crazyflie_driver.srv import LandRequest, NotifySetpointsStopRequest, TakeoffRequest
@@ -103,6 +104,14 @@ def test_a_streamed_flight_survives_a_second_of_silence(flight):
     assert SupervisorState.LOCKED not in flight.state
     assert min(flight.heights[count:]) > 0.5 * HEIGHT
     assert flight.crazyflie.links == 1
+
+
+def test_a_setpoint_that_comes_after_cmd_stop_locks_nothing(flight):
+    flight.run(0.5, 0.0)
+    flight.server.process.publish("/cf1/cmd_stop", Empty())
+    flight.server.process.publish("/cf1/cmd_position", Position())
+    flight.run(LOCK_TIME)
+    assert SupervisorState.LOCKED not in flight.seen_by_another()
 
 
 def test_users_may_announce_the_landing_first(flight):

@@ -3,9 +3,10 @@
 PAUSE = 1.0
 """A stream that has been silent for so long, s, was begun anew by somebody who knows."""
 
-OVERLAP = 0.2
-"""After a high-level command, setpoints that were on their way are not sent for so long, s: a
-single one would take the vehicle from its planner, and stop it 2 s later."""
+OVERLAP = 0.5
+"""After a high-level command or cmd_stop, setpoints that were on their way, since each topic has
+a connection of its own, are not sent for so long, s: a single one would take the vehicle from its
+planner or start its motors, and lock it 2 s later."""
 
 
 class SetpointGate:
@@ -23,6 +24,7 @@ class SetpointGate:
         self._is_waiting = False
         self._latest: float | None = None
         self._high_level_since: float | None = None
+        self._stopped_since: float | None = None
 
     def stop_for_good(self) -> None:
         """Take note of an emergency stop."""
@@ -47,6 +49,10 @@ class SetpointGate:
     def high_level(self, now: float) -> None:
         """Take note that the vehicle was given a high-level command after a stream."""
         self._high_level_since = now
+
+    def stop(self, now: float) -> None:
+        """Take note that a stream was ended by cmd_stop."""
+        self._stopped_since = now
 
     def is_blocking(self, now: float) -> bool:
         """Return whether somebody streams setpoints that are blocked because of a lost link."""
@@ -75,7 +81,10 @@ class SetpointGate:
                 f"{PAUSE:g} s, send zero thrust or call a service"
             )
         self._is_waiting = False
-        since = self._high_level_since
-        if since is not None and now - since < OVERLAP and not is_zero:
-            return "the vehicle was just given a high-level command"
+        for since, event in (
+            (self._high_level_since, "given a high-level command"),
+            (self._stopped_since, "stopped by cmd_stop"),
+        ):
+            if since is not None and now - since < OVERLAP and not is_zero:
+                return f"the vehicle was just {event}"
         return ""

@@ -145,6 +145,8 @@ class SetpointTopics:
             if not send(message):
                 self.ignored += 1
                 return
+            if name == CMD_STOP:
+                self.gate.stop(now)
             self._times.append(now)
             self.is_streaming, self._is_at_rest, self._source = True, at_rest, name
             if self._high_level_end is not None and now < self._high_level_end:

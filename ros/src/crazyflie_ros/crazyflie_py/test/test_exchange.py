@@ -32,11 +32,11 @@ def test_equal_requests_are_answered_in_their_order():
     threads = [threading.Thread(target=ask, args=(name,)) for name in ("first", "second")]
     for thread in threads:
         thread.start()
-        assert asked.acquire(timeout=30.0)
+        assert asked.acquire(timeout=120.0)
     exchange.receive(2, 1, b"\x01 a")
     exchange.receive(2, 1, b"\x01 b")
     for thread in threads:
-        thread.join(timeout=30.0)
+        thread.join(timeout=120.0)
     assert answers == {"first": b"\x01 a", "second": b"\x01 b"}
 
 

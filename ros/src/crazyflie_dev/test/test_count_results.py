@@ -51,7 +51,7 @@ def write(folder, name, text):
 def count(folder):
     """Return the exit status and the lines of the program."""
     command = [sys.executable, "-m", "crazyflie_dev.count_results", str(folder)]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert result.stderr == ""
     return result.returncode, result.stdout.splitlines()
 

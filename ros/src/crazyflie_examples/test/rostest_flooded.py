@@ -48,7 +48,7 @@ class Attacker:
     def end(self):
         """Return the number of its listeners, and of the messages a second for each."""
         self._process.send_signal(signal.SIGCONT)
-        return [int(word) for word in self._process.communicate(b"end\n", timeout=30.0)[0].split()]
+        return [int(word) for word in self._process.communicate(b"end\n", timeout=120.0)[0].split()]
 
     def kill(self):
         self._process.kill()

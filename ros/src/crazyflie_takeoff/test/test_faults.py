@@ -296,7 +296,7 @@ def hammer(process, services, counts):
     outcomes, barrier = [], threading.Barrier(sum(counts))
 
     def ask(service):
-        barrier.wait(10.0)
+        barrier.wait(60.0)
         try:
             outcomes.append((service, process.call(service, EmptyRequest())))
         except ServiceError as refusal:
@@ -310,7 +310,7 @@ def hammer(process, services, counts):
     for thread in threads:
         thread.start()
     for thread in threads:
-        thread.join(10.0)
+        thread.join(60.0)
     return outcomes
 
 

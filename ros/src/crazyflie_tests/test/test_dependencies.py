@@ -48,7 +48,7 @@ def installed_by_the_list():
 @functools.cache
 def owner(path):
     """Return the Debian package that a file belongs to; None for none."""
-    found = subprocess.run(["dpkg", "-S", str(path)], capture_output=True, text=True, timeout=60)
+    found = subprocess.run(["dpkg", "-S", str(path)], capture_output=True, text=True, timeout=120)
     return found.stdout.partition(":")[0] or None
 
 

@@ -124,7 +124,7 @@ def test_arguments_without_a_meaning_are_told():
         [program, *node.args.split(), "__name:=x"],
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=120,
         check=True,
     )
     assert "hw_hover.launch" in told.stderr
@@ -154,7 +154,7 @@ def test_files_that_users_launch_files_find(package):
 def test_xacro_makes_the_models(program, model):
     urdf = Path(PACKAGES.get_path("crazyflie_description")) / "urdf"
     command = [f"{PACKAGES.get_path('xacro')}/{program}", urdf / f"{model}.urdf.xacro"]
-    made = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    made = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
     assert elements(made) == elements((urdf / f"{model}.urdf").read_text())
 
 
@@ -170,7 +170,7 @@ def test_xacro_finds_packages(tmp_path):
         '<xacro:include filename="$(find crazyflie_description)/urdf/crazyflie.urdf" /></robot>'
     )
     command = ["rosrun", "xacro", "xacro", file]
-    made = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
+    made = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
     assert 'link name="base_link"' in made
 
 
@@ -194,5 +194,5 @@ def test_stand_ins_give_way(tmp_path, place, is_there):
     script.write_text(f'set(WORKSPACE "{tmp_path}/own")\n' + loop.replace("joy xacro", "joy"))
     path = f"{tmp_path}/own/src:{real.parent}"
     environment = {**os.environ, "ROS_PACKAGE_PATH": path, "ROS_HOME": str(tmp_path)}
-    subprocess.run(["cmake", "-P", script], env=environment, timeout=60, check=True)
+    subprocess.run(["cmake", "-P", script], env=environment, timeout=120, check=True)
     assert (stand_in / "CATKIN_IGNORE").exists() == is_there

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from workspaces import TOP, clean_environment
 
-LIMIT = 120.0
+LIMIT = 300.0
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ FLY = f"PYTHONPATH={_TOOLS}:$PYTHONPATH python3 {Path(__file__).with_name('fly.p
 FAST = "rviz:=false sim_time:=true real_time_factor:=0 simulator_dt:=0.01 composed:=true"
 """Arguments of sw_hover.launch that fly it in seconds."""
 
-BUILD_LIMIT = 300.0
+BUILD_LIMIT = 900.0
 """The longest that a build may take, s; it takes about 20."""
 
 _NOT_COPIED = (".git", ".venv*", "build", "devel", "install", "out", "__pycache__", ".hypothesis")

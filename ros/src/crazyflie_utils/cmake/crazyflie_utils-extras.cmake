@@ -16,19 +16,21 @@ function(crazyflie_add_pytest path)
   catkin_run_tests_target("pytest" "${name}" "pytest-${name}.xml" COMMAND "${command}")
 endfunction()
 
-# Say that tests of this package keep about a whole processor busy, or fly in many processes in
-# real time: ``ctest -j`` then runs fewer beside them, and begins with them.
+# Say how many halves of a processor tests of this package take: 2 if they compute all the time,
+# 3 if they fly in many processes in real time. Others count as one half, for they mostly wait.
+# ``ctest -j`` then runs fewer beside them, and begins with them.
 #
+# :param halves: of a processor
 # :param ARGN: what the names of the tests match, regular expressions
-function(crazyflie_busy_tests)
-  _crazyflie_set_tests_properties("${ARGN}" PROCESSORS 2 COST 1000)
+function(crazyflie_busy_tests halves)
+  _crazyflie_set_tests_properties("${ARGN}" PROCESSORS ${halves} COST ${halves}000)
 endfunction()
 
 # Say that tests of this package measure what other tests beside them would change.
 #
 # :param ARGN: what the names of the tests match, regular expressions
 function(crazyflie_lonely_tests)
-  _crazyflie_set_tests_properties("${ARGN}" RUN_SERIAL TRUE COST 2000)
+  _crazyflie_set_tests_properties("${ARGN}" RUN_SERIAL TRUE COST 9000)
 endfunction()
 
 function(_crazyflie_set_tests_properties patterns)

@@ -15,7 +15,7 @@ def ros_ip(variables):
         env=variables,
         capture_output=True,
         text=True,
-        timeout=30,
+        timeout=120,
         check=True,
     )
     return dict(line.split("=", 1) for line in done.stdout.splitlines()).get("ROS_IP")

@@ -38,7 +38,7 @@ def test_an_interrupt_is_a_failure(tmp_path):
     tests.write_text(INTERRUPTED)
     arguments = [str(tests), f"--junit-xml={results}", "-p", "no:cacheprovider"]
     run = subprocess.run(
-        [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, timeout=60
+        [sys.executable, "-c", PROGRAM, *arguments], capture_output=True, timeout=120
     )
     assert run.returncode == 1
     [case] = ElementTree.parse(results).getroot().iter("testcase")

@@ -19,7 +19,7 @@ import pytest
 
 from crazyflie_virtual.testing import virtual_vehicle
 
-LIMIT = 150.0
+LIMIT = 300.0
 """What an example may take, s; the longest takes 52 on a machine that has nothing else to do."""
 
 

@@ -69,6 +69,6 @@ def test_programs_need_no_ros(package, server):
         f"import {package}.{server}\n"
         f"runpy.run_module('{package}', run_name='__main__')\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr
     assert "usage:" in done.stdout

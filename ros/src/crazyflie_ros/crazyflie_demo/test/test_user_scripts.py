@@ -97,4 +97,4 @@ def test_a_script_far_away_imports_them(tmp_path):
         "assert crazyflie.Crazyflie is Crazyflie\n"
         "assert uav_trajectory.Trajectory is Trajectory\n"
     )
-    subprocess.run([sys.executable, script], cwd=tmp_path, check=True, timeout=60)
+    subprocess.run([sys.executable, script], cwd=tmp_path, check=True, timeout=120)

@@ -60,7 +60,7 @@ def bounds(model):
 
 def test_urdfdom_reads_it(model):
     command = ["check_urdf", str(URDF / f"{model}.urdf")]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=30)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert result.returncode == 0, result.stdout + result.stderr
     assert "Successfully Parsed XML" in result.stdout
     assert "root Link: base_link has 0 child(ren)" in result.stdout

@@ -51,7 +51,7 @@ def test_a_controller_that_has_parameters_is_waited_for(server, monkeypatch):
     with pytest.raises(TimeoutError):
         adding.result(timeout=0.5)
     services["/cf1/land"] = CONTROLLER
-    adding.result(timeout=30.0)
+    adding.result(timeout=120.0)
     assert {"/cf1/driver/takeoff", "/cf1/driver/land"} < names(server)
     assert not names(server) & {"/cf1/takeoff", "/cf1/land"}
 
@@ -82,5 +82,5 @@ def test_a_vehicle_can_be_removed_while_a_controller_is_waited_for(server, monke
     adding = server.begin_adding(vehicle.uri)
     vehicle.wait_for_packets(4, 0)
     server.remove(vehicle.uri)
-    assert adding.exception(timeout=30.0) is not None
+    assert adding.exception(timeout=120.0) is not None
     assert names(server) == set()

@@ -95,9 +95,9 @@ def test_a_removal_in_flight_is_a_landing_and_locks_nothing(flight):
     assert SupervisorState.LOCKED not in flight.seen_by_another()
 
 
-def test_a_streamed_flight_survives_1_3_s_of_silence(flight):
+def test_a_streamed_flight_survives_a_second_of_silence(flight):
     flight.climb()
-    flight.virtual.switches.silence = 1.3
+    flight.virtual.switches.silence = 1.0
     count = len(flight.heights)
     flight.run(4.0, HEIGHT)
     assert SupervisorState.FLYING in flight.state

@@ -32,11 +32,11 @@ def test_equal_requests_are_answered_in_their_order():
     threads = [threading.Thread(target=ask, args=(name,)) for name in ("first", "second")]
     for thread in threads:
         thread.start()
-        assert asked.acquire(timeout=30.0)
+        assert asked.acquire(timeout=120.0)
     exchange.receive(2, 1, b"\x01 a")
     exchange.receive(2, 1, b"\x01 b")
     for thread in threads:
-        thread.join(timeout=30.0)
+        thread.join(timeout=120.0)
     assert answers == {"first": b"\x01 a", "second": b"\x01 b"}
 
 
@@ -49,7 +49,7 @@ def test_a_lost_request_is_sent_again():
         if len(sent) == 3:
             exchange.receive(4, 2, b"x")
 
-    assert exchange.ask(send, Request(4, 2, b"x", "a test", limit=5.0)) == b"x"
+    assert exchange.ask(send, Request(4, 2, b"x", "a test", limit=60.0)) == b"x"
 
 
 def test_what_must_not_be_done_twice_is_sent_once():

@@ -21,7 +21,7 @@ def test_deprecation_warnings_stay_off(module):
         [sys.executable, "-c", IMPORT.format(module=module)],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=120,
         check=False,
     )
     assert done.returncode == 0, done.stderr

@@ -13,7 +13,7 @@ from crazyflie_dev.parameter_tables import with_tables
 from crazyflie_package_generator.command import main
 from crazyflie_package_generator.generator import GeneratorError, Package, check_name
 
-BUILD_LIMIT = 300.0
+BUILD_LIMIT = 900.0
 PACKAGES = (("wall_follower", "follower", False), ("an_apple", "pear_tree", True))
 """One whose name is behind those of the workspace, and one before them, with a message."""
 

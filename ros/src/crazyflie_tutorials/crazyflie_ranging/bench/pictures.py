@@ -65,7 +65,7 @@ class Flight:
 
     def __init__(self, file: str, **arguments: str):
         path = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "launch" / file
-        common = {"composed": "true", "rviz": "false", "sim_time": "true", "simulator_dt": "0.01"}
+        common = {"composed": "true", "rviz": "false", "simulator_dt": "0.01"}
         _, parameters = launch_files.expand(path, **common, **arguments)
         self.process = FakeProcess(parameters, start=0.0)
         for name, node in NodeClasses()(launch_files.composed_nodes(parameters)).items():
@@ -162,7 +162,7 @@ def follow_object(path: Path) -> None:
     bottom.plot(time, [each.ranges["front"] for each in moments], color=VEHICLE)
     for distance, text in ((0.6, "follows beyond"), (0.3, "backs off below")):
         bottom.axhline(distance, color=GREY, ls="--", lw=0.8)
-        bottom.text(time[-1], distance + 0.01, text, fontsize=8, color=GREY, ha="right")
+        bottom.text(0.0, distance + 0.01, text, fontsize=8, color=GREY)
     bottom.set_ylim(0.0, 0.9)
     bottom.set_ylabel("sensor in front, m")
     figure.savefig(path, dpi=110)
@@ -185,7 +185,9 @@ def obstacle_stop(path: Path) -> None:
     top.legend(loc="upper right", fontsize=8)
     bottom.plot(time, [each.ranges["front"] for each in moments], color=VEHICLE)
     bottom.axhline(0.5, color=GREY, ls="--", lw=0.8)
-    bottom.text(time[-1], 0.53, "distance that is kept", fontsize=8, color=GREY, ha="right")
+    bottom.text(
+        time[-1], 0.45, "distance that is kept", fontsize=8, color=GREY, ha="right", va="top"
+    )
     bottom.set_ylim(0.0, None)
     bottom.set_ylabel("sensor in front, m")
     figure.savefig(path, dpi=110)

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 import rospkg
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Range
 from tf2_msgs.msg import TFMessage
@@ -97,6 +99,15 @@ def test_silent_while_nobody_says_where_the_box_is(simulated):
         simulated.advance(0.05)
     assert simulated.published("/range/front") == []
     assert "box" in simulated.logged("warn")[0]
+
+
+def test_sensors_that_have_failed_are_silent(simulated):
+    fly(simulated, 0.5)
+    count = len(simulated.published("/range/front"))
+    request = ReconfigureRequest(encode_config({"enabled": False}))
+    simulated.call("/simulated_ranger/set_parameters", request)
+    fly(simulated, 0.5)
+    assert len(simulated.published("/range/front")) == count
 
 
 @pytest.mark.parametrize("name", ["world", "sensors"])

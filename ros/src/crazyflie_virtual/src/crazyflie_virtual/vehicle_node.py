@@ -1,5 +1,8 @@
 """ROS interface of a virtual vehicle."""
 
+from functools import partial
+from typing import cast
+
 from typing_extensions import override
 
 from crazyflie_utils import NodeHandle, TransformError
@@ -19,23 +22,21 @@ class VirtualCrazyflieNode(ServerNode):
 
     settings_type = VehicleSettings
     server_type = VehicleServer
-    _server: VehicleServer
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         super().register_callbacks(handle)
-        world = self._server.vehicle.physics.world
-        if world is not None and world.moving:
+        physics = cast(VehicleServer, self._server).vehicle.physics
+        if physics.world is not None and physics.world.moving:
             self._lookup = handle.listen_to_transforms()
-            handle.timer(_LOOK_PERIOD, self._look)
+            handle.timer(_LOOK_PERIOD, partial(self._look, physics, physics.world))
 
-    def _look(self):
-        physics = self._server.vehicle.physics
+    def _look(self, physics, world):
         centres = {}
-        for each in physics.world.moving:
+        for each in world.moving:
             try:
-                place = self._lookup(physics.world.frame, each.name).transform.translation
+                place = self._lookup(world.frame, each.name).transform.translation
             except TransformError:
                 continue
             centres[each.name] = (place.x, place.y, place.z)
-        physics.world = physics.world.placed(centres)
+        physics.world = world.placed(centres)

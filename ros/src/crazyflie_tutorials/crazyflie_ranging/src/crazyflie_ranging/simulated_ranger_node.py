@@ -11,7 +11,7 @@ from crazyflie_ranging.range_publisher import RangePublisher
 from crazyflie_ranging.range_sensors import RangeSensor, SensorFile
 from crazyflie_ranging.ranger import Ranger
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
-from crazyflie_utils.parameter_types import FRAME, TIME_STEP, TOPIC, Integer
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WorldFile
 
@@ -29,6 +29,9 @@ class SimulatedRangerParameters(Parameters):
         TIME_STEP, "when a pose is older, nothing is published that rests on it", 0.5
     )
     seed: int = parameter(Integer(0, 2**31 - 1), "of the noise", 0)
+    enabled: bool = parameter(
+        BOOLEAN, "measure; false: silent, as sensors that have failed", True, live=True
+    )
 
 
 class SimulatedRangerNode(Node):
@@ -36,7 +39,7 @@ class SimulatedRangerNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(SimulatedRangerParameters)
+        self._parameters = handle.load(SimulatedRangerParameters, self._reconfigure)
         numbers = defaultdict(list)
         for number, sensor in enumerate(self._parameters.sensors):
             numbers[sensor.desired_frequency].append(number)
@@ -59,7 +62,12 @@ class SimulatedRangerNode(Node):
         for period, (ranger, numbers) in self._groups.items():
             handle.timer(period, partial(self._on_timer, ranger, numbers))
 
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
+
     def _on_timer(self, ranger, numbers):
+        if not self._parameters.enabled:
+            return
         world = self._parameters.world
         try:
             robot = self._pose(self._parameters.robot_frame)

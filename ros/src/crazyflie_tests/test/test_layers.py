@@ -32,6 +32,7 @@ LAYERS = [
         "crazyflie_mission",
         "crazyflie_package_generator",
         "crazyflie_spawner",
+        "crazyflie_world",
         "mocap_optitrack",
     },
     {"crazyflie_driver", "crazyflie_teleop", "crazyflie_tools", "crazyflie_virtual"},

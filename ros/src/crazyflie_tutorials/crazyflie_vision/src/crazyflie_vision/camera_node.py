@@ -14,7 +14,14 @@ from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 from typing_extensions import override
 
-from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
+from crazyflie_utils import (
+    Node,
+    NodeHandle,
+    ParameterError,
+    Parameters,
+    TransformError,
+    parameter,
+)
 from crazyflie_utils.parameter_types import FRAME, TOPIC, ParameterType
 from crazyflie_vision.camera import CameraParameters, Pinhole, Pose, load, optical_pose
 from crazyflie_vision.images import camera_info, to_message
@@ -75,7 +82,10 @@ class CameraNode(Node):
         camera = self._parameters.camera
         self._pinhole = Pinhole.with_fov(camera.width, camera.height, camera.fov)
         self._mount = optical_pose(camera.mount)
-        self._renderer = Renderer(self._pinhole, self._parameters.world)
+        try:
+            self._renderer = Renderer(self._pinhole, self._parameters.world)
+        except OSError as error:
+            raise ParameterError(f"parameter {handle.resolve('~world')}: {error}") from None
         self._noise = PixelNoise(camera.width, camera.height, camera.noise)
 
     @override

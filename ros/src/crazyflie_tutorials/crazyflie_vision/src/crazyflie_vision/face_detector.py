@@ -34,11 +34,12 @@ class FaceDetector:
     """
 
     def __init__(self, cascade: str = CASCADE, smallest: int = 24, neighbours: int = 4):
+        self._cascade = cv2.CascadeClassifier()
         try:
-            self._cascade = cv2.CascadeClassifier(cascade)
+            is_loaded = self._cascade.load(cascade)
         except cv2.error:
-            self._cascade = cv2.CascadeClassifier()
-        if self._cascade.empty():
+            is_loaded = False
+        if not is_loaded:
             raise OSError(f"{cascade} is no cascade; those of Debian are in opencv-data")
         self.smallest = smallest
         self.neighbours = neighbours

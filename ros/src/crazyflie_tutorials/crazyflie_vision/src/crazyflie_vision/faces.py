@@ -1,8 +1,8 @@
 """What a camera sees of a world's shapes: flat faces, plain or with a picture on them."""
 
 import math
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field, replace
+from functools import cache
 
 import cv2
 import numpy as np
@@ -84,7 +84,8 @@ def face_of(floor: Floor) -> Face:
     return Face(corners, bgr(floor.colour), texture)
 
 
-def load_picture(path: str | Path) -> Image:
+@cache
+def load_picture(path: str) -> Image:
     """Return the picture in a file.
 
     Raises
@@ -92,7 +93,7 @@ def load_picture(path: str | Path) -> Image:
     OSError
         There is none, or it is none that OpenCV can read.
     """
-    picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    picture = cv2.imread(path, cv2.IMREAD_COLOR)
     if picture is None:
         raise OSError(f"{path} is no picture that can be read")
     return picture
@@ -120,6 +121,8 @@ def _faces_of_box(box):
             half * (out + a * right + b * above) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
         ]
         faces.append(Face(np.array(own) @ to_world.T + box.centre, bgr(box.colour)))
+    if box.picture:
+        faces[0] = replace(faces[0], texture=load_picture(box.picture))
     return faces
 
 

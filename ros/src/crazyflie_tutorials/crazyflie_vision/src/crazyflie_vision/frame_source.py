@@ -1,108 +1,134 @@
-"""Where images come from that are not simulated: a webcam, a video file, a folder of images."""
+"""Where images come from that are not simulated: a webcam, a video, a folder of pictures."""
 
-import re
+import itertools
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import cv2
 from numpy.typing import NDArray
+from typing_extensions import override
+
+from crazyflie_vision.faces import load_picture
 
 SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")
-"""Of images in a folder."""
+"""Of pictures in a folder."""
 
 
 class FrameSource:
-    """Images, one after the other.
+    """Images, one after the other."""
 
-    Parameters
-    ----------
-    device : str
-        A number or path of a camera, such as "0" or "/dev/video0"; or the path of a video, of an
-        image, or of a folder of images, which are taken in the order of their names.
-    width, height : int
-        Of the images, pixels: asked of a camera, which may deliver another size; others are scaled.
-    rate : float
-        Images a second that are asked of a camera.
-
-    Attributes
-    ----------
-    is_live : bool
-        Whether it is a camera, whose images come in their own time.
-
-    Raises
-    ------
-    OSError
-        Nothing can be read there; the text says what there is.
-    """
-
-    def __init__(self, device: str, width: int, height: int, rate: float):
-        self._device = device
-        self._size = (width, height)
-        self.is_live = device.isdecimal() or bool(re.match("/dev/", device))
-        path = Path(device)
-        if self.is_live:
-            self._capture = _camera(device, width, height, rate)
-        elif path.is_dir() or path.suffix.lower() in SUFFIXES:
-            self._images = _images(path)
-            self._next = 0
-        elif path.is_file():
-            self._capture = cv2.VideoCapture(device)
-            if not self._capture.isOpened():
-                raise OSError(f"{device} is no video that OpenCV can read")
-        else:
-            raise OSError(f"there is no camera, video, image or folder {device}")
+    is_live: ClassVar[bool] = False
+    """Whether images come in their own time."""
 
     def read(self) -> NDArray[Any]:
         """Return the next image, shape (height, width, 3): blue, green, red.
-
-        Waits for a camera; after the last image of a file or folder the first one comes again.
 
         Raises
         ------
         OSError
             There is none any more.
         """
-        image = self._read()
-        if image is None:
-            raise OSError(f"no more images come from {self._device}")
-        if self.is_live or (image.shape[1], image.shape[0]) == self._size:
-            return image
-        return cv2.resize(image, self._size, interpolation=cv2.INTER_AREA)
+        raise NotImplementedError
 
-    def close(self) -> None:
-        """Let a camera go."""
-        if self.is_live:
-            self._capture.release()
 
-    def _read(self):
-        if hasattr(self, "_images"):
-            self._next += 1
-            return self._images[(self._next - 1) % len(self._images)]
+class Webcam(FrameSource):
+    """A camera, which is waited for.
+
+    Parameters
+    ----------
+    device : str
+        Its number or path, such as "0" or "/dev/video0".
+    width, height : int
+        Of the images, pixels, and
+    rate : float
+        how many in a second: all are asked for, and the camera does what it can.
+
+    Raises
+    ------
+    OSError
+        It cannot be used; the text says which cameras there are.
+    """
+
+    is_live = True
+
+    def __init__(self, device: str, width: int, height: int, rate: float):
+        self._device = device
+        self._capture = cv2.VideoCapture(int(device) if device.isdecimal() else device)
+        if not self._capture.isOpened():
+            present = ", ".join(sorted(map(str, Path("/dev").glob("video*")))) or "none"
+            raise OSError(f"there is no camera {device}, or it is in use; there are: {present}")
+        self._capture.set(cv2.CAP_PROP_FRAME_WIDTH, width)
+        self._capture.set(cv2.CAP_PROP_FRAME_HEIGHT, height)
+        self._capture.set(cv2.CAP_PROP_FPS, rate)
+
+    @override
+    def read(self) -> NDArray[Any]:
         is_read, image = self._capture.read()
-        if not is_read and not self.is_live:
+        if not is_read:
+            raise OSError(f"camera {self._device} gives no more images; was it unplugged?")
+        return image
+
+
+class Video(FrameSource):
+    """A video file, over and over.
+
+    Raises
+    ------
+    OSError
+        It is none that OpenCV can read.
+    """
+
+    def __init__(self, path: Path):
+        self._path = path
+        self._capture = cv2.VideoCapture(str(path))
+        if not self._capture.isOpened():
+            raise OSError(f"{path} is no video that can be read")
+
+    @override
+    def read(self) -> NDArray[Any]:
+        is_read, image = self._capture.read()
+        if not is_read:
             self._capture.set(cv2.CAP_PROP_POS_FRAMES, 0)
             is_read, image = self._capture.read()
-        return image if is_read else None
+        if not is_read:
+            raise OSError(f"{self._path} has no images")
+        return image
 
 
-def _camera(device, width, height, rate):
-    capture = cv2.VideoCapture(int(device) if device.isdecimal() else device)
-    if not capture.isOpened():
-        present = ", ".join(sorted(map(str, Path("/dev").glob("video*")))) or "none"
-        raise OSError(f"there is no camera {device}, or it is in use; present: {present}")
-    capture.set(cv2.CAP_PROP_FRAME_WIDTH, width)
-    capture.set(cv2.CAP_PROP_FRAME_HEIGHT, height)
-    capture.set(cv2.CAP_PROP_FPS, rate)
-    return capture
+class Pictures(FrameSource):
+    """A picture, or all of a folder in the order of their names, over and over.
+
+    Raises
+    ------
+    OSError
+        There is none, or one cannot be read.
+    """
+
+    def __init__(self, path: Path):
+        paths = sorted(path.iterdir()) if path.is_dir() else [path]
+        images = [load_picture(str(each)) for each in paths if each.suffix.lower() in SUFFIXES]
+        if not images:
+            raise OSError(f"there are no pictures ({', '.join(SUFFIXES)}) in {path}")
+        self._images = itertools.cycle(images)
+
+    @override
+    def read(self) -> NDArray[Any]:
+        return next(self._images)
 
 
-def _images(path):
-    paths = [path] if path.is_file() else sorted(path.iterdir()) if path.is_dir() else []
-    paths = [each for each in paths if each.suffix.lower() in SUFFIXES]
-    if not paths:
-        raise OSError(f"there are no images ({', '.join(SUFFIXES)}) in {path}")
-    images = [cv2.imread(str(each), cv2.IMREAD_COLOR) for each in paths]
-    for each, image in zip(paths, images, strict=True):
-        if image is None:
-            raise OSError(f"{each} is no image that OpenCV can read")
-    return images
+def open_source(device: str, width: int, height: int, rate: float) -> FrameSource:
+    """Return a webcam, see `Webcam`; or what there is at a path.
+
+    Raises
+    ------
+    OSError
+        Nothing that gives images.
+    """
+    if device.isdecimal() or device.startswith("/dev/"):
+        return Webcam(device, width, height, rate)
+    path = Path(device)
+    if path.is_dir() or path.suffix.lower() in SUFFIXES:
+        return Pictures(path)
+    if path.is_file():
+        return Video(path)
+    raise OSError(f"there is no camera, video, picture or folder {device!r}")

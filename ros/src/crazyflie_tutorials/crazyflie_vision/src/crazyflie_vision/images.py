@@ -23,12 +23,13 @@ def to_array(message: Image) -> NDArray[np.uint8]:
     ValueError
         It has an encoding that has no such meaning, or too little data.
     """
+    what = f"an image of {message.width} x {message.height}, {message.encoding!r}"
+    if message.width == 0 or message.height == 0:
+        raise ValueError(f"{what}: it is empty")
     try:
         return _BRIDGE.imgmsg_to_cv2(message, COLOUR)
     except (CvBridgeError, TypeError, cv2.error) as error:
-        raise ValueError(
-            f"an image of {message.width} x {message.height}, {message.encoding!r}: {error}"
-        ) from None
+        raise ValueError(f"{what}: {error}") from None
 
 
 def to_message(image: NDArray[np.uint8], header: Header) -> Image:

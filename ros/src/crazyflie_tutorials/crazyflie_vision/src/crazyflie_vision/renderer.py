@@ -41,6 +41,11 @@ class Renderer:
     camera : Pinhole
     world : World
         What has no path is prepared once.
+
+    Raises
+    ------
+    OSError
+        A picture of a box cannot be read.
     """
 
     def __init__(self, camera: Pinhole, world: World):
@@ -51,6 +56,9 @@ class Renderer:
         self._floor = face_of(world.floor)
         self._still = [each for each in world.objects if each.path is None]
         self._still_faces = [face for each in self._still for face in faces_of(each)]
+        for each in world.moving:
+            # Its pictures are kept, or complained about, now.
+            faces_of(each)
 
     def render(self, pose: Pose, moving: Iterable[Shape] = ()) -> Image:
         """Return what is seen.
@@ -156,8 +164,13 @@ class Renderer:
 
     def _patch(self, left, top, right, bottom):
         # Rows and columns of the image within limits; None for none.
-        columns = slice(max(math.floor(left), 0), min(math.ceil(right) + 1, self._camera.width))
-        rows = slice(max(math.floor(top), 0), min(math.ceil(bottom) + 1, self._camera.height))
+        columns, rows = (
+            slice(math.floor(max(first, 0.0)), math.ceil(min(last + 1.0, count)))
+            for first, last, count in (
+                (left, right, self._camera.width),
+                (top, bottom, self._camera.height),
+            )
+        )
         if columns.start >= columns.stop or rows.start >= rows.stop:
             return None
         return rows, columns

@@ -1,4 +1,4 @@
-"""A vehicle that takes off by itself and follows something on a known path, as seen by a rostest."""
+"""A vehicle that takes off by itself and follows something on a known path."""
 
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ import math
 import cv2
 import numpy as np
 import pytest
-from crazyflie_world.shapes import Ball, Box, Cylinder, wall
-from crazyflie_world.world import Floor, World
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -14,6 +12,8 @@ from scipy.spatial.transform import Rotation
 from crazyflie_vision.camera import MountParameters, Pinhole, Pose, optical_pose
 from crazyflie_vision.noise import PixelNoise
 from crazyflie_vision.renderer import SKY, Renderer
+from crazyflie_world.shapes import Ball, Box, Cylinder, wall
+from crazyflie_world.world import Floor, World
 
 CAMERA = Pinhole.with_fov(320, 240, 75.0)
 FLOOR = Floor((8.0, 8.0))
@@ -161,9 +161,7 @@ def test_any_pose_gives_an_image(position, roll, pitch, yaw):
         wall("wall", (-3.0, 2.0), (3.0, 2.0), 2.5, 0.1),
     )
     with np.errstate(all="raise", under="ignore"):
-        image = render(
-            objects, looking(roll, pitch, yaw, position), Floor((5.0, 5.0), "speckles")
-        )
+        image = render(objects, looking(roll, pitch, yaw, position), Floor((5.0, 5.0), "speckles"))
     assert image.shape == (240, 320, 3)
     assert image.dtype == np.uint8
 

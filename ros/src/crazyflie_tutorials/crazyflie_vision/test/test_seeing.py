@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from test_camera import CONFIG
 
 from crazyflie_vision import filters
 from crazyflie_vision.colour_tracker import ColourBounds, find
 from crazyflie_vision.face_detector import FaceDetector
 from crazyflie_vision.noise import PixelNoise
 from crazyflie_vision.target import Target, draw
-from test_camera import CONFIG
 
 ORANGE = (13, 102, 242)
 ORANGES = ColourBounds(0, 20, 140, 255, 70, 255)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import Point, PointStamped, Quaternion, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import CameraInfo, Image
-from tf2_msgs.msg import TFMessage
 from test_camera import CONFIG
+from tf2_msgs.msg import TFMessage
 
 from crazyflie_dev import launch_files
 from crazyflie_model.angles import quaternion_from_rpy
@@ -109,21 +109,21 @@ def test_from_the_world_to_a_velocity(camera):
     assert camera.launch(FollowNode(), "/follow", {"radius": 0.1})
     # To the right of where it looks, below and farther away.
     camera.advance(0.01)
-    say(camera, "ball", 1.4, -0.3, 0.9)
+    say(camera, "ball", 1.2, -0.25, 0.9)
     camera.advance(0.13)
     (target,) = camera.published("/target")
     assert target.header.stamp.to_sec() == pytest.approx(100.1)
     f = 160.0 / math.tan(math.radians(37.5))
-    assert target.point.x == pytest.approx(159.5 + f * 0.3 / 1.37, abs=1.0)
-    assert target.point.y == pytest.approx(119.5 + f * 0.11 / 1.37, abs=1.0)
-    assert target.point.z == pytest.approx(f * 0.1 / 1.37, rel=0.06)
+    assert target.point.x == pytest.approx(159.5 + f * 0.25 / 1.17, abs=1.0)
+    assert target.point.y == pytest.approx(119.5 + f * 0.11 / 1.17, abs=1.0)
+    assert target.point.z == pytest.approx(f * 0.1 / 1.17, rel=0.06)
     assert len(camera.published("/tracker/image")) == 1
     camera.advance(0.02)
     velocity = camera.published("/cmd_vel")[-1]
-    assert velocity.linear.x == pytest.approx(0.37, abs=0.08)
+    assert velocity.linear.x == pytest.approx(1.5 * 0.17, abs=0.1)
     assert velocity.linear.y == 0.0
-    assert velocity.linear.z == pytest.approx(-0.11, abs=0.02)
-    assert velocity.angular.z == pytest.approx(-1.5 * math.atan(0.3 / 1.37), abs=0.02)
+    assert velocity.linear.z == pytest.approx(-1.5 * 0.11, abs=0.03)
+    assert velocity.angular.z == pytest.approx(-2.5 * math.atan(0.25 / 1.17), abs=0.03)
 
 
 def test_bounds_of_the_colour_may_change(camera):

@@ -5,13 +5,13 @@ import threading
 import cv2
 import numpy as np
 import pytest
+from test_camera import CONFIG
 
 from crazyflie_dev import launch_files
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_vision.frame_source import FrameSource, open_source
 from crazyflie_vision.images import to_array
 from crazyflie_vision.webcam_node import WebcamNode
-from test_camera import CONFIG
 
 LEVELS = (50, 100, 150)
 

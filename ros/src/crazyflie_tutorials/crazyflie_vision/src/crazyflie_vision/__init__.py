@@ -1,1 +1,1 @@
-"""Seeing: a simulated camera and a real one, image filters, trackers, and following what they see."""
+"""Seeing: a simulated camera and a webcam, image filters, trackers, and following."""

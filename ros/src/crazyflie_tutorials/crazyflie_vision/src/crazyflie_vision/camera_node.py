@@ -5,9 +5,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from crazyflie_world.shapes import Shape
-from crazyflie_world.world import World
-from crazyflie_world.world_file import WorldFile
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import CameraInfo, Image
@@ -27,6 +24,9 @@ from crazyflie_vision.camera import CameraParameters, Pinhole, Pose, load, optic
 from crazyflie_vision.images import camera_info, to_message
 from crazyflie_vision.noise import PixelNoise
 from crazyflie_vision.renderer import Renderer
+from crazyflie_world.shapes import Shape
+from crazyflie_world.world import World
+from crazyflie_world.world_file import WorldFile
 
 _EARLY = 1e-6
 """By which a message may be, s: less than anyone can notice, more than the rounding of times."""
@@ -106,7 +106,9 @@ class CameraNode(Node):
 
     def _expose(self):
         try:
-            vehicle = _pose(self._lookup(self._parameters.world.frame, self._parameters.vehicle_frame))
+            vehicle = _pose(
+                self._lookup(self._parameters.world.frame, self._parameters.vehicle_frame)
+            )
             moving = tuple(self._moving())
         except TransformError as error:
             self._handle.warn(f"no image: {error}", throttle=5.0)

@@ -6,9 +6,10 @@ from functools import cache
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
+
 from crazyflie_world.shapes import Box, Colour, Cylinder, Shape
 from crazyflie_world.world import Floor
-from numpy.typing import NDArray
 
 Image = NDArray[np.uint8]
 """Rows, columns and, for colour, blue, green, red."""

@@ -40,7 +40,7 @@ class FilterNode(ImageNode):
         raise NotImplementedError
 
     @override
-    def on_image(self, image, header):
+    def on_image(self, image, header) -> None:
         if self._publisher.has_subscribers():
             self._publisher.publish(to_message(self.apply(image), header))
 

@@ -4,7 +4,6 @@ import math
 from dataclasses import dataclass
 
 from crazyflie_teleop.velocity_reference import Velocity
-
 from crazyflie_vision.target import Target
 
 

@@ -2,11 +2,11 @@
 
 import math
 
-from crazyflie_teleop.velocity_reference import Velocity
 from geometry_msgs.msg import PointStamped, Twist, Vector3
 from sensor_msgs.msg import CameraInfo
 from typing_extensions import override
 
+from crazyflie_teleop.velocity_reference import Velocity
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
 from crazyflie_utils.parameters import group
@@ -21,9 +21,11 @@ _SPEED = Number("m/s", minimum=0.0)
 class GainParameters(Parameters):
     """How fast errors are to vanish."""
 
-    forward: float = parameter(_GAIN, "velocity ahead over what is missing in distance", 1.0, live=True)
-    up: float = parameter(_GAIN, "velocity upwards over what is missing in height", 1.0, live=True)
-    turn: float = parameter(_GAIN, "yaw rate over the angle to the target", 1.5, live=True)
+    forward: float = parameter(
+        _GAIN, "velocity ahead over what is missing in distance", 1.5, live=True
+    )
+    up: float = parameter(_GAIN, "velocity upwards over what is missing in height", 1.5, live=True)
+    turn: float = parameter(_GAIN, "yaw rate over the angle to the target", 2.5, live=True)
 
 
 class SpeedParameters(Parameters):

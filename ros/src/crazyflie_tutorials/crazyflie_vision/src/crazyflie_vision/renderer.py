@@ -10,8 +10,6 @@ from collections.abc import Iterable
 
 import cv2
 import numpy as np
-from crazyflie_world.shapes import Ball, Shape
-from crazyflie_world.world import World
 
 from crazyflie_vision.camera import Pinhole, Pose
 from crazyflie_vision.faces import (
@@ -23,6 +21,8 @@ from crazyflie_vision.faces import (
     face_of,
     faces_of,
 )
+from crazyflie_world.shapes import Ball, Shape
+from crazyflie_world.world import World
 
 NEAR = 0.02
 """What is nearer to the camera's plane is not seen, m."""
@@ -52,7 +52,9 @@ class Renderer:
         self._camera = camera
         cx, cy = camera.centre
         self._x = ((np.arange(camera.width) - cx) / camera.focal_length).astype(np.float32)
-        self._y = ((np.arange(camera.height) - cy) / camera.focal_length).astype(np.float32)[:, None]
+        self._y = ((np.arange(camera.height) - cy) / camera.focal_length).astype(np.float32)[
+            :, None
+        ]
         self._floor = face_of(world.floor)
         self._still = [each for each in world.objects if each.path is None]
         self._still_faces = [face for each in self._still for face in faces_of(each)]
@@ -190,7 +192,7 @@ def _clipped(corners):
     if np.all(corners[:, 2] >= NEAR):
         return corners
     kept = []
-    for begin, end in zip(np.roll(corners, 1, axis=0), corners):
+    for begin, end in zip(np.roll(corners, 1, axis=0), corners, strict=False):
         share = begin[2] - NEAR, end[2] - NEAR
         if (share[0] >= 0.0) != (share[1] >= 0.0):
             kept.append(begin + (end - begin) * share[0] / (share[0] - share[1]))

@@ -52,7 +52,7 @@ class TrackerNode(ImageNode):
         raise NotImplementedError
 
     @override
-    def on_image(self, image, header):
+    def on_image(self, image, header) -> None:
         target = self.find(image)
         if target is not None:
             point = Point(target.x, target.y, target.radius)

@@ -48,9 +48,7 @@ class WebcamNode(Node):
         each = self._parameters = handle.load(WebcamParameters)
         self._pinhole = Pinhole.with_fov(each.width, each.height, each.fov)
         try:
-            self._source: FrameSource = open_source(
-                each.device, each.width, each.height, each.rate
-            )
+            self._source: FrameSource = open_source(each.device, each.width, each.height, each.rate)
         except OSError as error:
             raise ParameterError(f"parameter {handle.resolve('~device')}: {error}") from None
 

@@ -259,7 +259,9 @@ def _with_picture(shape: Shape, entry: Entry) -> Shape:
         return shape
     picture = entry.file.parent / shape.picture
     if not picture.is_file():
-        raise entry["picture"].error(f"is {shape.picture!r}; expected a file, and {picture} is none")
+        raise entry["picture"].error(
+            f"is {shape.picture!r}; expected a file, and {picture} is none"
+        )
     return replace(shape, picture=str(picture))
 
 

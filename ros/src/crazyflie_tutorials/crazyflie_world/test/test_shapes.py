@@ -54,7 +54,7 @@ def test_distances(shape, origin, direction, expected):
     assert distance(shape, origin, direction) == pytest.approx(expected)
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(st.tuples(UNIT, UNIT, UNIT), st.tuples(UNIT, UNIT, UNIT))
 def test_where_a_ray_enters_is_the_surface(offset, origin):
     """Aimed at a point within, seen from outside: the entrance is on the surface."""

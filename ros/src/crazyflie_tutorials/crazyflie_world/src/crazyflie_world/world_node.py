@@ -25,10 +25,10 @@ class WorldNodeParameters(Parameters):
     poses_topic: str = parameter(
         TOPIC, "below it, each moving object has NAME/pose", "world", name="topics/poses"
     )
-    flight_state_topic: str = parameter(
+    flight_state_topic: str | None = parameter(
         TOPIC,
         "the takeoff server's flight state: paths begin when a vehicle flies; by default at once",
-        "",
+        None,
         name="topics/flight_state",
     )
     time_step: float = parameter(TIME_STEP, "between two poses", 0.02)

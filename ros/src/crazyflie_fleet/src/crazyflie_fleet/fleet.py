@@ -136,6 +136,8 @@ def close_pairs(
         m; a metre of height counts for `DOWNWASH` metres less.
     """
     radii = np.asarray(buffers, dtype=float)
+    if len(radii) < 2:
+        return
     scaled = np.array(positions, dtype=float).reshape(-1, 3)
     scaled[:, 2] /= DOWNWASH
     pairs = cKDTree(scaled).query_pairs(2.0 * float(radii.max()), output_type="ndarray")

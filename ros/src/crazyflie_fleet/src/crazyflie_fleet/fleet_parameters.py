@@ -80,6 +80,6 @@ class FlyParameters(FleetParameters):
     common: Mapping[str, Any] = parameter(
         NodeParameters(), "parameters of every vehicle's nodes, node by node", name="nodes"
     )
-    by_model: Mapping[str, Any] = parameter(
-        NodeParameters(), "those of vehicles of one model, which come before them", {}, "models"
+    by_model: Mapping[str, Any] | None = parameter(
+        NodeParameters(), "those of vehicles of one model, which come before them", None, "models"
     )

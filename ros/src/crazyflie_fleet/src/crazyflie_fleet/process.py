@@ -22,7 +22,7 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     vehicles = tuple(fleet[name] for name in own)
     nodes: dict[str, Node] = {}
     for number, vehicle in enumerate(vehicles):
-        by_model = told.by_model.get(vehicle.settings.model, {})
+        by_model = (told.by_model or {}).get(vehicle.settings.model, {})
         common = merged(told.common, by_model)
         tree = parameters(vehicle, told.fixed_frame, common)
         if number > 0:

@@ -77,6 +77,13 @@ class FlyParameters(FleetParameters):
     """What the process that flies vehicles is told."""
 
     is_simulated: bool = parameter(BOOLEAN, "simulate the vehicles, too", name="simulated")
+    flies_together: bool = parameter(
+        BOOLEAN,
+        "one simulator, estimator and controller for all simulated vehicles of one model of 7 "
+        "states; else each has its own, with all their parameters",
+        True,
+        "together",
+    )
     common: Mapping[str, Any] = parameter(
         NodeParameters(), "parameters of every vehicle's nodes, node by node", name="nodes"
     )

@@ -108,6 +108,19 @@ class Fleet:
         """Names of the vehicles that take part."""
         return tuple(vehicle.name for vehicle in self.vehicles)
 
+    def at_ports(self, first_port: int) -> "Fleet":
+        """Return the same vehicles at UDP ports of this computer, one after the other."""
+        vehicles = tuple(
+            dataclasses.replace(
+                vehicle,
+                settings=dataclasses.replace(
+                    vehicle.settings, uri=f"udp://127.0.0.1:{first_port + number}"
+                ),
+            )
+            for number, vehicle in enumerate(self.vehicles)
+        )
+        return dataclasses.replace(self, vehicles=vehicles)
+
     def __getitem__(self, name: str) -> Vehicle:
         """Return a vehicle that takes part; raises KeyError."""
         for vehicle in self.vehicles:

@@ -43,6 +43,13 @@ class FleetParameters(Parameters):
         "*",
         "fleet/machine",
     )
+    virtual_port: int = parameter(
+        Integer(0, 65535),
+        "the vehicles are virtual: the k-th listens at this UDP port + k, whatever its address; 0 "
+        "for real ones",
+        0,
+        "fleet/virtual_port",
+    )
     fixed_frame: str = parameter(FRAME, "tf frame of the world", "world", "frames/fixed")
 
     def fleet(self) -> Fleet:
@@ -53,7 +60,8 @@ class FleetParameters(Parameters):
         ParameterError
             About everything that is wrong with the file.
         """
-        return fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
+        fleet = fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
+        return fleet.at_ports(self.virtual_port) if self.virtual_port else fleet
 
     def own_names(self, fleet: Fleet) -> tuple[str, ...]:
         """Return the names of the vehicles that are flown here.

@@ -5,7 +5,9 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from std_msgs.msg import String
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from std_msgs.msg import Header, String
+from tf2_msgs.msg import TFMessage
 from typing_extensions import override
 
 from crazyflie_driver.srv import GoTo, GoToResponse
@@ -82,6 +84,7 @@ class ReferencesNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._waiting = handle.publisher(parameters.waiting_topic, String, latch=True)
+        self._publish_mocap_frames(handle)
         for vehicle in self._vehicles:
             below = f"/{vehicle.name}/"
             publisher = handle.publisher(below + SAFE_REFERENCE, PositionVelocityStateStamped)
@@ -102,6 +105,20 @@ class ReferencesNode(Node):
             handle.subscribe(below + FLIGHT_STATE, String, partial(self._on_flight_state, led))
         handle.timer(parameters.way_period, self._on_way_timer)
         handle.timer(parameters.watch_period, self._on_watch_timer)
+
+    def _publish_mocap_frames(self, handle):
+        # What motion capture calls a vehicle is the vehicle.
+        identity = Transform(Vector3(), Quaternion(w=1.0))
+        transforms = [
+            TransformStamped(
+                Header(0, handle.stamp(), vehicle.mocap_frame), vehicle.name, identity
+            )
+            for vehicle in self._vehicles
+            if vehicle.mocap_frame != vehicle.name
+        ]
+        if transforms:
+            static = handle.publisher("/tf_static", TFMessage, latch=True)
+            static.publish(TFMessage(transforms))
 
     # What it hears.
 

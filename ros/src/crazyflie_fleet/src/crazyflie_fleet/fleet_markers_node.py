@@ -20,6 +20,9 @@ _ROTOR = 0.0325
 
 _TEXT_SIZE = 0.12
 
+PERIOD = 1.0
+"""Between two messages, s: RViz forgets a marker that comes before its frame."""
+
 
 class FleetMarkersParameters(FleetParameters):
     """Parameters of `FleetMarkersNode`."""
@@ -43,18 +46,20 @@ class FleetMarkersNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        self._publisher = handle.publisher(parameters.markers_topic, MarkerArray, latch=True)
-        self._publish(frozenset())
+        self._publisher = handle.publisher(parameters.markers_topic, MarkerArray)
+        self._waiting: frozenset[str] = frozenset()
         handle.subscribe(parameters.waiting_topic, String, self._on_waiting)
+        handle.timer(PERIOD, self._publish, steady=True)
 
     def _on_waiting(self, message):
-        self._publish(frozenset(message.data.split()))
+        self._waiting = frozenset(message.data.split())
+        self._publish()
 
-    def _publish(self, waiting):
+    def _publish(self):
         markers = [
             marker
             for number, vehicle in enumerate(self._fleet.vehicles)
-            for marker in _markers(number, vehicle, vehicle.name in waiting)
+            for marker in _markers(number, vehicle, vehicle.name in self._waiting)
         ]
         self._publisher.publish(MarkerArray(markers))
 

@@ -137,7 +137,7 @@ class Settings(Parameters):
         Number("V", minimum=0.0), "with less the vehicle is landed", 3.0, "battery/voltage_critical"
     )
     mocap_enabled: bool = parameter(
-        BOOLEAN, "whether motion capture sees it", True, "motion_capture/enabled"
+        BOOLEAN, "crazyswarm2's; has no effect here", True, "motion_capture/enabled"
     )
     mocap_frame: str | None = parameter(
         FRAME, "motion capture's frame; by default the vehicle's name", None, "motion_capture/frame"

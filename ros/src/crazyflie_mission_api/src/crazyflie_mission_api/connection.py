@@ -1,0 +1,262 @@
+"""Vehicles and time as a team needs them, by ROS."""
+
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import genpy
+from geometry_msgs.msg import Point, PoseStamped
+from std_msgs.msg import String
+from std_srvs.srv import Empty, EmptyRequest
+
+from crazyflie_driver import srv
+from crazyflie_driver.msg import FullState
+from crazyflie_mission_api.conversions import full_state_message, to_message
+from crazyflie_mission_api.course import Course
+from crazyflie_mission_api.limits import EVERYWHERE, Bounds, MissionError
+from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_model.angles import Triple
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils.parameter_types import FINITE
+from crazyflie_utils.runtime.transforms import TransformError
+
+CALL_LIMIT = 30.0
+"""How long a service may take, s of the machine's clock."""
+
+MEMORY = 31
+"""Pieces that the memory of a vehicle holds."""
+
+_FROZEN = 10.0
+"""How long simulated time may stand still, s of the machine's clock."""
+
+_FRESH = 1.0
+"""A position older than this is not known, s."""
+
+_ON_GROUND = 0.1
+"""Height above where it stood at which a vehicle has landed, m."""
+
+_STREAM_STEP = 0.02
+"""From one setpoint of a stream to the next, s."""
+
+
+class RosClock:
+    """The time of a process, real or simulated.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    has_ended : callable
+        ``has_ended()`` is true when ROS has shut down.
+    """
+
+    def __init__(self, handle: NodeHandle, has_ended: Callable[[], bool]):
+        self._handle = handle
+        self._has_ended = has_ended
+        self._tick = threading.Condition()
+        handle.timer(0.02, self._wake)
+
+    def time(self) -> float:
+        """Return the time, s."""
+        return self._handle.time()
+
+    def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
+        """Wait until ``condition()`` or ``deadline`` (s); return the condition."""
+        last, moved_at = self.time(), time.monotonic()
+        while not (done := condition()) and (now := self.time()) < deadline:
+            if self._has_ended():
+                raise MissionError("ROS has shut down; expected it to live as long as the mission")
+            if now != last:
+                last, moved_at = now, time.monotonic()
+            elif time.monotonic() - moved_at > _FROZEN:
+                raise MissionError(f"no /clock for {_FROZEN:g} s; is the simulation running?")
+            with self._tick:
+                self._tick.wait(0.1)
+        return done
+
+    def _wake(self):
+        with self._tick:
+            self._tick.notify_all()
+
+
+class RosVehicle:
+    """A vehicle by the services of the driver, or by those of `HighLevelNode`.
+
+    Parameters
+    ----------
+    name : str
+    handle : NodeHandle
+    services : dict of str to str
+        Where its services are: go_to, takeoff and so on to absolute names.
+    is_driven : bool
+        Whether the driver flies it, and not a controller.
+    """
+
+    def __init__(self, name: str, handle: NodeHandle, services: dict[str, str], is_driven: bool):
+        self.name = name
+        self.bounds = fence(handle, prefix(name))
+        self._handle = handle
+        self._services = services
+        self._is_driven = is_driven
+        self._position: Triple | None = None
+        self._seen_at = 0.0
+        self._ground = 0.0
+        self._status = ""
+        self._flight_state = ""
+        self._stream: Course | None = None
+        self._prepared: Pieces | None = None
+        top = prefix(name)
+        self._lookup = handle.listen_to_transforms() if is_driven else None
+        if is_driven:
+            handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
+            handle.subscribe(f"{top}/status", String, self._on_status)
+            self._setpoints = handle.publisher(f"{top}/cmd_full_state", FullState)
+            handle.timer(_STREAM_STEP, self._send_setpoint)
+        else:
+            state = PositionVelocityYawStateStamped
+            handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
+            handle.subscribe(f"{top}/in_flight_state", String, self._on_flight_state)
+            handle.subscribe(f"{top}/in_flight_status", String, self._on_status)
+
+    # Where it is, and how it is.
+
+    def position(self) -> Triple | None:
+        """Return where it is, m; None when nobody has said so for a second."""
+        if self._lookup is not None and not self._is_fresh():
+            try:
+                found = self._lookup("world", self.name).transform.translation
+            except TransformError:
+                return None
+            return (found.x, found.y, found.z)
+        return self._position if self._is_fresh() else None
+
+    def _is_fresh(self):
+        return self._position is not None and self._handle.time() - self._seen_at < _FRESH
+
+    def trouble(self) -> str:
+        """Return why it cannot fly on; an empty text when it can."""
+        if self._is_driven:
+            bad = ("lost", "cannot fly", "emergency", "disconnected")
+            return self._status if self._status.startswith(bad) else ""
+        if self._flight_state in ("on_ground", "landing", "descending"):
+            return f"it does not fly any more: {self._status or self._flight_state}"
+        return ""
+
+    def has_landed(self) -> bool:
+        """Return whether it stands, as far as that is known."""
+        if not self._is_driven:
+            return self._flight_state == "on_ground"
+        place = self.position()
+        return place is not None and place[2] < self._ground + _ON_GROUND
+
+    def _on_pose(self, message):
+        p = message.pose.position
+        self._position, self._seen_at = (p.x, p.y, p.z), self._handle.time()
+
+    def _on_state(self, message):
+        s = message.state
+        self._position, self._seen_at = (s.x, s.y, s.z), self._handle.time()
+
+    def _on_status(self, message):
+        self._status = message.data
+
+    def _on_flight_state(self, message):
+        self._flight_state = message.data
+
+    # Commands.
+
+    def take_off(self, height: float, duration: float) -> "Future[Any]":
+        """Climb straight up."""
+        place = self.position()
+        self._ground = 0.0 if place is None else place[2]
+        if not self._is_driven:
+            # Until the server says so, the vehicle is not one that has ended its flight.
+            self._flight_state = ""
+        return self._call("takeoff", srv.Takeoff, 0, height, _seconds(duration))
+
+    def land(self, duration: float) -> "Future[Any]":
+        """Sink straight down."""
+        self._stream = None
+        return self._call("land", srv.Land, 0, self._ground, _seconds(duration))
+
+    def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
+        """Fly to a point."""
+        self._stream = None
+        return self._call("go_to", srv.GoTo, 0, False, Point(*goal), yaw, _seconds(duration))
+
+    def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
+        """Take a trajectory, to be uploaded or streamed."""
+        self._prepared = pieces if stream and self._is_driven else None
+        if self._prepared is not None:
+            return _done(None)
+        if self._is_driven and len(pieces) > MEMORY:
+            return _done(
+                ServiceError(
+                    f"the trajectory has {len(pieces)} pieces; expected at most {MEMORY}, which is "
+                    "what the vehicle's memory holds, or stream=True"
+                )
+            )
+        messages = [to_message(piece) for piece in pieces]
+        return self._call("upload_trajectory", srv.UploadTrajectory, 0, 0, messages)
+
+    def start(self) -> "Future[Any]":
+        """Fly the trajectory that was prepared last."""
+        if self._prepared is not None:
+            self._stream = Course(self._prepared, self._handle.time())
+            return _done(None)
+        return self._call("start_trajectory", srv.StartTrajectory, 0, 0, 1.0, False, False)
+
+    def emergency(self) -> "Future[Any]":
+        """Stop the motors."""
+        self._stream = None
+        return self._handle.call_service(
+            self._services["emergency"], Empty, EmptyRequest(), CALL_LIMIT
+        )
+
+    def _call(self, name, service_type, *arguments):
+        request = service_type._request_class(*arguments)
+        return self._handle.call_service(self._services[name], service_type, request, CALL_LIMIT)
+
+    def _send_setpoint(self):
+        stream, now = self._stream, self._handle.time()
+        if stream is None:
+            return
+        goal = stream.goal(now)
+        if now < stream.end:
+            message = full_state_message(goal)
+            message.header.stamp = self._handle.stamp()
+            self._setpoints.publish(message)
+            return
+        # The driver says "setpoints stop" before a command; from there on the vehicle stays.
+        self.go_to(goal.position, goal.yaw, 0.5)
+
+
+def prefix(name: str) -> str:
+    """Return the namespace of a vehicle; that of "/" is the root."""
+    return "" if name == "/" else f"/{name}"
+
+
+def fence(handle: NodeHandle, top: str) -> Bounds:
+    """Return the box of a vehicle's geofence, if it has one."""
+    corners = [
+        [handle.get_param(f"{top}/geofence/box/{side}/{axis}", FINITE, None) for axis in "xyz"]
+        for side in ("min", "max")
+    ]
+    if None in corners[0] + corners[1]:
+        return EVERYWHERE
+    return Bounds((corners[0][0], corners[0][1], corners[0][2]), tuple(corners[1]))
+
+
+def _seconds(duration):
+    return genpy.Duration.from_sec(duration)
+
+
+def _done(error):
+    future: Future[Any] = Future()
+    if error is None:
+        future.set_result(None)
+    else:
+        future.set_exception(error)
+    return future

@@ -4,20 +4,17 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from numpy.polynomial import polynomial
 
-from crazyflie_mission_api.follower import at_rest
 from crazyflie_mission_api.formations import nearest
 from crazyflie_mission_api.limits import Array, MissionError
-from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_mission_api.trajectories import Pieces, straight
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal
-from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece
+from crazyflie_virtual.firmware.trajectory import Trajectory
 
 _STEP = 0.05
 """Of time, s, at which distances are looked at."""
-
-_AT_REST = 0.01
-"""Duration, s, of the piece that is no way at all."""
 
 
 class Course:
@@ -37,7 +34,7 @@ class Course:
     @classmethod
     def rest(cls, position: Triple, yaw: float = 0.0) -> "Course":
         """Return the course of a vehicle that stays."""
-        return cls([smooth_piece(at_rest(position, yaw), position, yaw, _AT_REST)], -math.inf)
+        return cls(straight(position, position, yaw, yaw), -math.inf)
 
     @property
     def end(self) -> float:
@@ -55,13 +52,14 @@ class Course:
 
     def positions(self, times: Array) -> Array:
         """Return where the vehicle should be, shape (n, 3), m."""
-        end = self._trajectory.duration
+        if self.end <= times[0]:
+            return np.tile(self.destination.position, (len(times), 1))
         places = np.empty((len(times), 3))
-        local = np.clip(times - self.begin, 0.0, end)
+        local = np.clip(times - self.begin, 0.0, self._trajectory.duration)
         for piece in self._trajectory.pieces:
-            goal = piece.evaluate(local)
             inside = local >= 0.0
-            places[inside] = np.stack(goal.position, axis=-1)[inside]
+            for axis, coefficients in enumerate(piece.axes[:3]):
+                places[inside, axis] = polynomial.polyval(local[inside], coefficients)
             local = local - piece.duration
         return places
 

@@ -1,5 +1,6 @@
 """The driver's high-level services for a vehicle that the workspace's controller flies."""
 
+import math
 from concurrent.futures import Future
 from typing import Any
 
@@ -103,8 +104,8 @@ class HighLevelNode(Node):
             self._on_state,
             finite="state",
         )
-        handle.subscribe("~cmd_full_state", FullState, self._on_setpoint, finite="pose")
-        handle.subscribe("~cmd_position", Position, self._on_setpoint, finite="x")
+        handle.subscribe("~cmd_full_state", FullState, self._on_setpoint)
+        handle.subscribe("~cmd_position", Position, self._on_setpoint)
         handle.timer(parameters.time_step, self._on_timer)
 
     @override
@@ -128,7 +129,7 @@ class HighLevelNode(Node):
         if message.data == _FLYING:
             command, self._next = self._next, None
             if command is not None:
-                self._begin(*command)
+                self._begin_unasked(*command)
         else:
             self._follower.forget()
             self._is_moving = False
@@ -148,8 +149,14 @@ class HighLevelNode(Node):
     # Commands.
 
     def _on_takeoff(self, request):
+        duration = request.duration.to_sec()
+        if not (request.height > 0.0 and math.isfinite(request.height) and duration > 0.0):
+            raise ServiceError(
+                f"height and duration are {request.height:g} m and {duration:g} s; expected "
+                "more than 0"
+            )
         x, y, _ = self._where().position
-        goal = ((x, y, request.height), self._where().yaw, request.duration.to_sec())
+        goal = ((x, y, request.height), self._where().yaw, duration)
         answer = self._call(self._parameters.takeoff, srv.TakeoffResponse)
         self._next = (Follower.go_to, *goal)
         return answer
@@ -168,9 +175,11 @@ class HighLevelNode(Node):
         self._waiting.append(obeyed)
 
         def finish(done):
+            error = done.exception()
+            if error is not None and answer.done():
+                self._handle.error(str(error))
             if answer.done():
                 return
-            error = done.exception()
             if error is None:
                 answer.set_result(response_type())
             else:
@@ -238,11 +247,20 @@ class HighLevelNode(Node):
         self._streamed = None
         self._is_moving = True
 
+    def _begin_unasked(self, command, *arguments):
+        try:
+            self._begin(command, *arguments)
+        except ServiceError as reason:
+            self._handle.error(f"not done: {reason}")
+
     # Setpoints.
 
     def _on_setpoint(self, message):
-        if self._flight_state == _FLYING:
-            self._streamed = setpoint_goal(message)
+        goal = setpoint_goal(message)
+        if not all(map(math.isfinite, (*goal.position, *goal.velocity, goal.yaw))):
+            self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
+        elif self._flight_state == _FLYING:
+            self._streamed = goal
             self._streamed_at = self._handle.time()
             self._publish(self._streamed)
 
@@ -251,7 +269,7 @@ class HighLevelNode(Node):
             last = at_rest(self._streamed.position, self._streamed.yaw)
             self._streamed = None
             self._follower.forget()
-            self._begin(Follower.go_to, last.position, last.yaw, 0.5)
+            self._begin_unasked(Follower.go_to, last.position, last.yaw, 0.5)
 
     def _on_timer(self):
         now = self._handle.time()

@@ -5,13 +5,11 @@ from concurrent.futures import Future
 from typing import Any
 
 from crazyflie_mission_api.course import Course
-from crazyflie_mission_api.follower import at_rest
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, MissionError
 from crazyflie_mission_api.roster import Rules
 from crazyflie_mission_api.team import Team
-from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_mission_api.trajectories import Pieces, straight
 from crazyflie_model.angles import Triple
-from crazyflie_virtual.firmware.trajectory import smooth_piece
 
 _STEP = 0.05
 """Of time, s."""
@@ -83,8 +81,7 @@ class RehearsedVehicle:
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
         """Fly to a point."""
         start = self._course.goal(self._clock.time())
-        begin = at_rest(start.position, start.yaw)
-        return self._fly([smooth_piece(begin, goal, yaw, duration)])
+        return self._fly(straight(start.position, goal, start.yaw, yaw, duration))
 
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
         """Take a trajectory."""

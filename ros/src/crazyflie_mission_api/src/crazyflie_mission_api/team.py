@@ -9,11 +9,9 @@ from typing import Any
 
 from crazyflie_mission_api import formations, trajectories
 from crazyflie_mission_api.course import Course, check_apart
-from crazyflie_mission_api.follower import at_rest
 from crazyflie_mission_api.limits import Array, MissionError, number, point
 from crazyflie_mission_api.roster import Roster, refuse, text
 from crazyflie_mission_api.trajectories import Pieces
-from crazyflie_virtual.firmware.trajectory import smooth_piece
 
 Point = Sequence[float]
 
@@ -41,7 +39,7 @@ class Team(Roster):
             x, y, z = self.position(name)
             bounds = self.fence(name)
             bounds.check((x, y, height), f"{name}: takeoff to ({x:.2f}, {y:.2f}, {height:g})")
-            way = _way((x, y, z), (x, y, height), 1.0)
+            way = trajectories.straight((x, y, z), (x, y, height))
             climb = max(_SHORTEST_CLIMB, self._quickest(way))
             courses[name] = Course(trajectories.stretched(way, climb), self.time())
         self._check_apart(courses)
@@ -86,7 +84,7 @@ class Team(Roster):
         yaw = number(yaw, "go_to: yaw")
         starts = {name: self._rest_of(name, "go_to") for name in places}
         ways = {
-            name: _way(starts[name].position, goal, 1.0, starts[name].yaw, yaw)
+            name: trajectories.straight(starts[name].position, goal, starts[name].yaw, yaw)
             for name, goal in places.items()
         }
         if duration is None:
@@ -220,7 +218,3 @@ class Team(Roster):
         refuse(what, failures)
         if wait:
             team.arrive()
-
-
-def _way(start, goal, duration, start_yaw=0.0, yaw=0.0):
-    return [smooth_piece(at_rest(start, start_yaw), goal, yaw, duration)]

@@ -7,13 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from crazyflie_mission_api.limits import Array, Bounds, Limits, MissionError
+from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.units import GRAVITY
 
 Pieces = Sequence[PolynomialPiece]
 """A trajectory: as in the CSV files of crazyflie_demo and in a vehicle's memory."""
 
-SAMPLES = 50
+SAMPLES = 30
 """Points of a piece at which it is looked at."""
 
 
@@ -126,6 +127,23 @@ def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str) -> None:
             f"{what}: the {words} is {value:.3g} {_UNITS[name]} at {time:.2f} s; expected at "
             f"{side} {getattr(limits, name):g} {_UNITS[name]}; a timescale > 1 makes it slower"
         )
+
+
+_REST_TO_REST = (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0)
+"""From 0 to 1 in 1 s, with three derivatives that are 0 at both ends: as the firmware goes."""
+
+
+def straight(
+    start: Triple, goal: Triple, start_yaw: float = 0.0, yaw: float = 0.0, seconds: float = 1.0
+) -> list[PolynomialPiece]:
+    """Return the way from rest to rest, m; the turn, rad, is the shorter one."""
+    turn = math.remainder(yaw - start_yaw, 2.0 * math.pi)
+    ways = [b - a for a, b in zip(start, goal, strict=True)]
+    axes = (
+        [begin, *(way * c for c in _REST_TO_REST[1:])]
+        for begin, way in zip((*start, start_yaw), (*ways, turn), strict=True)
+    )
+    return stretched([PolynomialPiece(1.0, *axes)], seconds)
 
 
 def stretched(pieces: Pieces, factor: float) -> list[PolynomialPiece]:

@@ -171,9 +171,6 @@ class RosVehicle:
         """Climb straight up."""
         place = self.position()
         self._ground = 0.0 if place is None else place[2]
-        if not self._is_driven:
-            # Until the server says so, the vehicle is not one that has ended its flight.
-            self._flight_state = ""
         return self._call("takeoff", srv.Takeoff, 0, height, _seconds(duration))
 
     def land(self, duration: float) -> "Future[Any]":

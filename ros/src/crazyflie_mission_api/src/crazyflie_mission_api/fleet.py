@@ -173,7 +173,7 @@ def _vehicle(process, handle, name, services):
     commander = f"{top}/high_level"
     if f"{commander}/go_to" in services:
         return RosVehicle(name, handle, _below(commander), is_driven=False)
-    driver = services.get(f"{top}/go_to")
+    driver = services.get(f"{top}/upload_trajectory")
     if driver is not None and services.get(f"{top}/takeoff") == driver:
         return RosVehicle(name, handle, _below(top), is_driven=True)
     if {f"{top}/takeoff", f"{top}/land"} <= services.keys():

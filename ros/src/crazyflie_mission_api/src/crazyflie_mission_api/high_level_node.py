@@ -27,7 +27,7 @@ STATE_LIMIT = 0.5
 _CALL_LIMIT = 60.0
 """How long a takeoff or landing of the takeoff server may take, s of the machine's clock."""
 
-_FLYING, _TAKING_OFF, _ON_GROUND = "flying", "taking_off", "on_ground"
+_FLYING, _TAKING_OFF, _DESCENDING, _LANDING = "flying", "taking_off", "descending", "landing"
 
 
 class HighLevelParameters(Parameters):
@@ -70,7 +70,7 @@ class HighLevelNode(Node):
         self._streamed_at = 0.0
         # What was told during a takeoff, for its end.
         self._next: tuple[Any, ...] | None = None
-        self._waiting: list[Future[Any]] = []
+        self._landings: list[Future[Any]] = []
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -134,10 +134,11 @@ class HighLevelNode(Node):
             self._follower.forget()
             self._is_moving = False
             self._streamed = None
-        waiting, self._waiting = self._waiting, []
-        for answer in waiting:
-            if not answer.done():
-                answer.set_result(None)
+        if message.data in (_DESCENDING, _LANDING):
+            landings, self._landings = self._landings, []
+            for answer in landings:
+                if not answer.done():
+                    answer.set_result(srv.LandResponse())
 
     def _where(self):
         age = self._handle.time() - self._measured_at
@@ -155,44 +156,46 @@ class HighLevelNode(Node):
                 f"height and duration are {request.height:g} m and {duration:g} s; expected "
                 "more than 0"
             )
-        x, y, _ = self._where().position
-        goal = ((x, y, request.height), self._where().yaw, duration)
-        answer = self._call(self._parameters.takeoff, srv.TakeoffResponse)
-        self._next = (Follower.go_to, *goal)
-        return answer
+        start = self._where()
+        x, y, _ = start.position
+        call = self._call(self._parameters.takeoff, srv.TakeoffResponse)
+        self._next = (Follower.go_to, (x, y, request.height), start.yaw, duration)
+        call.add_done_callback(self._forget_refused)
+        return call
+
+    def _forget_refused(self, call):
+        if call.exception() is not None:
+            self._next = None
 
     def _on_land(self, _):
-        return self._call(self._parameters.land, srv.LandResponse)
+        answer = self._call(self._parameters.land, srv.LandResponse)
+        # The server answers after the landing, the driver when it begins.
+        self._landings.append(answer)
+        return answer
 
     def _on_emergency(self, _):
         self._follower.forget()
         return self._call(self._parameters.emergency, EmptyResponse)
 
     def _call(self, service, response_type):
-        # Answered when the vehicle obeys, not when it is there, as the driver does.
         answer: Future[Any] = Future()
-        obeyed: Future[Any] = Future()
-        self._waiting.append(obeyed)
 
         def finish(done):
             error = done.exception()
-            if error is not None and answer.done():
-                self._handle.error(str(error))
             if answer.done():
-                return
-            if error is None:
+                if error is not None:
+                    self._handle.error(str(error))
+            elif error is None:
                 answer.set_result(response_type())
             else:
-                self._next = None
                 answer.set_exception(error)
 
         call = self._handle.call_service(service, Empty, EmptyRequest(), _CALL_LIMIT)
         call.add_done_callback(finish)
-        obeyed.add_done_callback(finish)
         return answer
 
     def _on_stop(self, _):
-        if self._flight_state not in (_ON_GROUND, ""):
+        if self._flight_state in (_FLYING, _TAKING_OFF):
             raise ServiceError(
                 f"the vehicle is {self._flight_state.replace('_', ' ')}; expected it to have "
                 "landed: stop would let it fall, which is what emergency is for"

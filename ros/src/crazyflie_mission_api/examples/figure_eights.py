@@ -10,7 +10,7 @@ import sys
 from crazyflie_demo.figure8 import figure8
 from crazyflie_mission_api import Fleet, Limits
 from crazyflie_mission_api.rehearsal import Team
-from crazyflie_mission_api.trajectories import Pieces, moved
+from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.polynomials import PolynomialPiece
 
 LIMITS = Limits(speed=1.0, acceleration=1.5)

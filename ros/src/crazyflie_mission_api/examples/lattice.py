@@ -52,7 +52,9 @@ if __name__ == "__main__":
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 100
     names = [f"cf{k}" for k in range(1, number + 1)]
     if sys.argv[2:] == ["rehearse"]:
-        rehearsal = Rehearsal(dict(zip(names, map(tuple, square(number).tolist()), strict=True)), Rules(LIMITS))
+        rehearsal = Rehearsal(
+            dict(zip(names, map(tuple, square(number).tolist()), strict=True)), Rules(LIMITS)
+        )
         mission(rehearsal)
         print(f"{number} vehicles, {rehearsal.time():.0f} s, nobody meets")
     else:

@@ -55,14 +55,14 @@ def _places(courses, times):
     return places
 
 
-def _follow(starts, places, velocities, K):
+def _follow(starts, places, velocities, gains):
     model = Coupled7D()
     x = [*starts.T, *np.zeros((4, len(starts)))]
     errors, distances, at_limit = [], [], []
     for k, (place, velocity) in enumerate(zip(places, velocities, strict=True)):
         error = np.stack(x, axis=-1)
         error[:, :6] -= np.hstack([place, velocity])
-        u = error @ K.T + [0.0, 0.0, 0.0, GRAVITY]
+        u = error @ gains.T + [0.0, 0.0, 0.0, GRAVITY]
         limited = np.clip(
             u, [-MAX_TILT, -MAX_TILT, -9.0, MIN_THRUST], [MAX_TILT, MAX_TILT, 9.0, MAX_THRUST]
         )

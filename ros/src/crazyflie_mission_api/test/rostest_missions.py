@@ -1,79 +1,80 @@
-"""Missions of simulated vehicles, as fast as it goes."""
+"""Missions of simulated vehicles, as fast as it goes: the README's, and eight figures of eight."""
+
+import contextlib
+import math
+import os
+import re
+import runpy
+import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import rospkg
+import rospy
+from std_msgs.msg import String
 
-from crazyflie_demo.figure8 import figure8
-from crazyflie_mission_api import Bounds, Fleet, Limits, MissionError, plan
-from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_utils.testing import peer
 
-NAMES = ["cf1", "cf2", "cf3"]
-ROOM = Bounds((-2.0, -2.0, 0.0), (4.0, 3.0, 2.5))
-
-
-@pytest.fixture(scope="module")
-def fleet():
-    """Return the fleet; whatever a test does, all have landed in the end."""
-    limits = Limits(speed=1.0, acceleration=1.5)
-    with Fleet(NAMES, ROOM, limits, process=ros_process(), patience=60.0) as made:
-        yield made
+PACKAGE = Path(rospkg.RosPack().get_path("crazyflie_mission_api"))
+LIMIT = 100.0
+"""How long a mission may take, s."""
 
 
-def place(fleet, name):
-    """Return where a vehicle is."""
-    return np.array(fleet.position(name))
+@contextlib.contextmanager
+def recorded(names):
+    """Record where vehicles are: name -> list of positions."""
+    tracks = {name: [] for name in names}
+
+    def note(message, track):
+        track.append((message.state.x, message.state.y, message.state.z))
+
+    subscribers = [
+        rospy.Subscriber(f"/{name}/state", PositionVelocityYawStateStamped, note, track)
+        for name, track in tracks.items()
+    ]
+    peer.wait_until(lambda: all(tracks.values()), "states")
+    try:
+        yield tracks
+    finally:
+        for subscriber in subscribers:
+            subscriber.unregister()
 
 
-def test_a_mission(fleet):
-    seen = {}
-
-    def mission(team):
-        team.takeoff(0.8)
-        seen["takeoff"] = place(team, "cf2")
-        team.go_to({"cf1": (0.0, 1.0, 1.0), "cf3": (2.0, 1.0, 1.2)})
-        seen["go_to"] = place(team, "cf3")
-        team["cf1"].follow(figure8(), relative=True, wait=False)
-        team["cf2"].follow(plan([(1, 0, 0.8), (1.3, -0.5, 1.2), (1, -1, 1)]))
-        seen["cf2"] = place(team, "cf2")
-        team.arrive()
-        seen["cf1"] = place(team, "cf1")
-        team.formation([(0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (2.0, 0.0, 1.0)])
-        seen["formation"] = place(team, "cf1")
-        team.land()
-
-    fleet.fly(mission)
-    # The rehearsal has seen the same places first.
-    assert seen["takeoff"] == pytest.approx([1.0, 0.0, 0.8], abs=0.16)
-    assert seen["go_to"] == pytest.approx([2.0, 1.0, 1.2], abs=0.16)
-    assert seen["cf2"] == pytest.approx([1.0, -1.0, 1.0], abs=0.16)
-    assert seen["cf1"] == pytest.approx([0.0, 1.0, 1.0], abs=0.16)
-    assert seen["formation"] == pytest.approx([0.0, 0.0, 1.0], abs=0.16)
-    assert fleet.flying == []
-    assert max(place(fleet, name)[2] for name in NAMES) < 0.05
+def run(script, *arguments):
+    """Run a script to its end; it must succeed."""
+    subprocess.run([sys.executable, script, *arguments], check=True, timeout=LIMIT)
 
 
-def test_what_is_wrong_is_known_before_anything_flies(fleet):
-    def mission(team):
-        team.takeoff(0.8)
-        team.go_to({"cf2": (1.0, 5.0, 1.0)})
-
-    with pytest.raises(MissionError, match="cf2: go_to is out of bounds: y is 5 m"):
-        fleet.fly(mission)
-    assert fleet.flying == []
-    assert max(place(fleet, name)[2] for name in NAMES) < 0.05
+def nearest(track, point):
+    """Return how near a vehicle has come to a point, m."""
+    return min(math.dist(position, point) for position in track)
 
 
-def test_a_vehicle_that_lands_by_itself_is_noticed(fleet):
-    some = fleet["cf1", "cf3"]
-    some.takeoff(0.8)
-    some._handle.call_service("/cf3/land", *_land(), 30.0).result(30.0)
-    with pytest.raises(MissionError, match="cf3: it does not fly any more"):
-        some.wait(60.0)
-    fleet.land()
-    assert place(fleet, "cf1")[2] < 0.05
+def offset(track, dx, dy, z):
+    """Return a point by where the vehicle stood, m."""
+    x, y, _ = track[0]
+    return (x + dx, y + dy, z)
 
 
-def _land():
-    from std_srvs.srv import Empty, EmptyRequest
+def test_eight_figures_of_eight():
+    names = [f"cf{k}" for k in range(1, 9)]
+    with recorded(names) as tracks:
+        run(PACKAGE / "examples" / "figure_eights.py", *names)
+    for k, track in enumerate(tracks.values()):
+        side = 1.0 if k % 2 == 0 else -1.0
+        quarter = (0.75 * math.sin(math.pi / 4.0), side * 0.375, 1.0)
+        assert nearest(track, offset(track, *quarter)) < 0.15
+        assert np.ptp(np.array(track), axis=0) == pytest.approx([1.5, 0.75, 1.0], abs=0.2)
+        assert track[-1] == pytest.approx(track[0], abs=0.1)
 
-    return Empty, EmptyRequest()
+
+def test_the_script_of_the_readme(tmp_path):
+    text = re.search(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(), re.S).group(1)
+    script = tmp_path / "mission.py"
+    script.write_text(text.replace('["cf1", "cf2"]', '["cf1", "cf2"]'))
+    with recorded(["cf1", "cf2"]) as tracks:
+        run(script)

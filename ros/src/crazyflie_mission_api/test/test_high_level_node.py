@@ -188,9 +188,7 @@ REFUSED = {
         "start_trajectory", srv.StartTrajectory, 0, 7, 1.0, False, False
     ),
     "has no pieces": lambda b: b.call("upload_trajectory", srv.UploadTrajectory, 0, 0, []),
-    "height and duration are 0 m": lambda b: b.call(
-        "takeoff", srv.Takeoff, 0, 0.0, SECONDS(1.0)
-    ),
+    "height and duration are 0 m": lambda b: b.call("takeoff", srv.Takeoff, 0, 0.0, SECONDS(1.0)),
     "the vehicle is flying; expected it to have landed": lambda b: b.call("stop", srv.Stop, 0),
     "the vehicle is on ground; expected it to fly": lambda b: (
         b.be("on_ground"),

@@ -85,7 +85,9 @@ def test_whatever_the_waypoints_the_limits_hold(waypoints):
     pieces = plan(waypoints, LIMITS)
     assert excess(pieces, LIMITS) == {}
     # And it is no slower than it must be: at least one limit is nearly reached.
-    quicker = Limits(**{key: 0.9 * value for key, value in vars(LIMITS).items() if "thrust" not in key})
+    quicker = Limits(
+        **{key: 0.9 * value for key, value in vars(LIMITS).items() if "thrust" not in key}
+    )
     assert excess(pieces, quicker) or duration(pieces) < 1.0
 
 

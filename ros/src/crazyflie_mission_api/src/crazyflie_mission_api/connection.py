@@ -38,6 +38,9 @@ _FRESH = 1.0
 _ON_GROUND = 0.1
 """Height above where it stood at which a vehicle has landed, m."""
 
+_HIGH_LEVEL = "commander/enHighLevel"
+"""The parameter of a vehicle that has it take high-level commands."""
+
 _STREAM_STEP = 0.02
 """From one setpoint of a stream to the next, s."""
 
@@ -171,12 +174,29 @@ class RosVehicle:
         """Climb straight up."""
         place = self.position()
         self._ground = 0.0 if place is None else place[2]
-        return self._call("takeoff", srv.Takeoff, 0, height, _seconds(duration))
+
+        def climb():
+            return self._call("takeoff", srv.Takeoff, 0, height, _seconds(duration))
+
+        if not self._is_driven:
+            return climb()
+        # The first call waits for the driver to have read the parameters, which it sets then.
+        return in_turn(lambda: self._update(), lambda: self._update(_HIGH_LEVEL), climb)
+
+    def _update(self, *parameters):
+        for name in parameters:
+            self._handle.set_param(f"{prefix(self.name)}/{name}", 1)
+        return self._call("update_params", srv.UpdateParams, list(parameters))
 
     def land(self, duration: float) -> "Future[Any]":
         """Sink straight down."""
         self._stream = None
         return self._call("land", srv.Land, 0, self._ground, _seconds(duration))
+
+    def rest(self) -> None:
+        """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
+        if self._is_driven:
+            self._call("stop", srv.Stop, 0)
 
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
         """Fly to a point."""
@@ -228,6 +248,22 @@ class RosVehicle:
             return
         # The driver says "setpoints stop" before a command; from there on the vehicle stays.
         self.go_to(goal.position, goal.yaw, 0.5)
+
+
+def in_turn(*calls: Callable[[], "Future[Any]"]) -> "Future[Any]":
+    """Make calls one after the other; return the outcome of the last one, or of one that fails."""
+    outcome: Future[Any] = Future()
+
+    def go_on(done, left):
+        if done.exception() is not None:
+            outcome.set_exception(done.exception())
+        elif not left:
+            outcome.set_result(done.result())
+        else:
+            left[0]().add_done_callback(lambda next_one: go_on(next_one, left[1:]))
+
+    calls[0]().add_done_callback(lambda first: go_on(first, calls[1:]))
+    return outcome
 
 
 def prefix(name: str) -> str:

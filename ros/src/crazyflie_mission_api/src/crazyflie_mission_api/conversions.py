@@ -36,9 +36,7 @@ def reference_message(
     if has_yaw:
         state = PositionVelocityYawState(*goal.position, *goal.velocity, goal.yaw)
         return PositionVelocityYawStateStamped(state=state)
-    return PositionVelocityStateStamped(
-        state=PositionVelocityState(*goal.position, *goal.velocity)
-    )
+    return PositionVelocityStateStamped(state=PositionVelocityState(*goal.position, *goal.velocity))
 
 
 def full_state_message(goal: Goal[float]) -> FullState:

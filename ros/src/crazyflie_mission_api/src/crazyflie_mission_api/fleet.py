@@ -11,7 +11,7 @@ from typing import Any
 import rosgraph
 from typing_extensions import override
 
-from crazyflie_mission_api.connection import CALL_LIMIT, RosClock, RosVehicle, prefix
+from crazyflie_mission_api.connection import RosClock, RosVehicle, prefix
 from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
 from crazyflie_mission_api.rehearsal import rehearse
@@ -21,7 +21,16 @@ from crazyflie_utils import NodeHandle
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.runner import begin_script
 
-_SERVICES = ("takeoff", "land", "go_to", "upload_trajectory", "start_trajectory", "emergency")
+_SERVICES = (
+    "takeoff",
+    "land",
+    "go_to",
+    "upload_trajectory",
+    "start_trajectory",
+    "stop",
+    "emergency",
+    "update_params",
+)
 
 _POLL = 0.2
 """How often it is looked whether a vehicle is there, s."""
@@ -177,12 +186,17 @@ def _vehicle(process, handle, name, services):
     if driver is not None and services.get(f"{top}/takeoff") == driver:
         return RosVehicle(name, handle, _below(top), is_driven=True)
     if {f"{top}/takeoff", f"{top}/land"} <= services.keys():
-        types = dict(rosgraph.Master(handle.name).getTopicTypes())
-        handle.set_param(f"{commander}/reference/yaw", types.get(f"{top}/ref") == _YAW_STATE)
+        has_yaw = topic_types(handle).get(f"{top}/ref") == _YAW_STATE
+        handle.set_param(f"{commander}/reference/yaw", has_yaw)
         if not HighLevelNode().initialize(process.handle(commander)):
             raise MissionError(f"{commander} could not be started; its reason is in the log")
         return RosVehicle(name, handle, _below(commander), is_driven=False)
     return None
+
+
+def topic_types(handle: NodeHandle) -> dict[str, str]:
+    """Return the types of all topics, as the master knows them."""
+    return dict(rosgraph.Master(handle.name).getTopicTypes())
 
 
 def _below(top):

@@ -158,8 +158,8 @@ class HighLevelNode(Node):
             )
         start = self._where()
         x, y, _ = start.position
-        call = self._call(self._parameters.takeoff, srv.TakeoffResponse)
         self._next = (Follower.go_to, (x, y, request.height), start.yaw, duration)
+        call = self._call(self._parameters.takeoff, srv.TakeoffResponse)
         call.add_done_callback(self._forget_refused)
         return call
 

@@ -78,6 +78,9 @@ class RehearsedVehicle:
         self._flies = False
         return self.go_to((x, y, 0.0), 0.0, duration)
 
+    def rest(self) -> None:
+        """Do nothing."""
+
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
         """Fly to a point."""
         start = self._course.goal(self._clock.time())

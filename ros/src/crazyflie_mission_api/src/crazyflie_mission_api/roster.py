@@ -6,9 +6,7 @@ import copy
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
-
-from typing_extensions import Self
+from typing import Any, Self
 
 from crazyflie_mission_api.course import Course
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError, number
@@ -129,6 +127,7 @@ class Roster:
         )
         for name in landing:
             if self._vehicles[name].has_landed():
+                self._vehicles[name].rest()
                 del self._courses[name]
             else:
                 failures[name] = f"not on the ground {self.rules.patience:g} s after it should be"

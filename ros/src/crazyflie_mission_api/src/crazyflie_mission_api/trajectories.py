@@ -1,4 +1,4 @@
-"""Trajectories of polynomials: what they ask of a vehicle, where they lead, how they are changed."""
+"""Trajectories of polynomials: what they ask of a vehicle, and how they are changed."""
 
 import math
 from collections.abc import Sequence

@@ -39,6 +39,9 @@ class Vehicle(Protocol):
     def land(self, duration: float) -> "Future[Any]":
         """Sink straight down to the ground in a duration (s), more or less."""
 
+    def rest(self) -> None:
+        """Be told that it has landed."""
+
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
         """Fly to a point (m) and heading (rad) in a duration (s)."""
 

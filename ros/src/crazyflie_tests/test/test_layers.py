@@ -35,6 +35,7 @@ LAYERS = [
         "mocap_optitrack",
     },
     {"crazyflie_driver", "crazyflie_teleop", "crazyflie_tools", "crazyflie_virtual"},
+    {"crazyflie_fleet"},
     {"crazyflie_demo", "crazyflie_examples"},
     {"uav_trajectory"},
     {"crazyflie", "crazyflie_dev"},

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from crazyflie_utils.node import Node
     from crazyflie_utils.parameters import ParameterError, Parameters, parameter
     from crazyflie_utils.runtime.handle import NodeHandle
-    from crazyflie_utils.runtime.runner import run, run_composed
+    from crazyflie_utils.runtime.runner import run, run_composed, run_nodes
     from crazyflie_utils.runtime.transforms import TransformError
     from crazyflie_utils.runtime.transport import ServiceError
 
@@ -25,6 +25,7 @@ _HOME = {
     "parameter": "crazyflie_utils.parameters",
     "run": "crazyflie_utils.runtime.runner",
     "run_composed": "crazyflie_utils.runtime.runner",
+    "run_nodes": "crazyflie_utils.runtime.runner",
 }
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "parameter",
     "run",
     "run_composed",
+    "run_nodes",
 ]
 
 

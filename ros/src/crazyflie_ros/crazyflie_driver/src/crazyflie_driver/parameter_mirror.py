@@ -9,6 +9,9 @@ from crazyflie_utils.parameter_types import ParameterType
 
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
+_COMMANDS = ("kalman.resetEstimation",)
+"""Parameters that do something once instead of keeping a value: not for a vehicle in the air."""
+
 
 class ParameterMirror:
     """Copy the firmware's parameters to ROS, and back on demand; all methods block.
@@ -25,6 +28,18 @@ class ParameterMirror:
         self._handle = handle
         self._prefix = prefix
         self._crazyflie = crazyflie
+        self._written: dict[str, int | float] = {}
+
+    def write_again(self) -> None:
+        """Write what `write` has written since the start: a vehicle that was off has forgotten it.
+
+        Raises
+        ------
+        CrazyflieError
+        """
+        for name, value in self._written.items():
+            if name not in _COMMANDS:
+                self._crazyflie.parameters.write(name, value)
 
     def publish(self) -> int:
         """Set the ROS parameters to the firmware's values; return how many there are."""
@@ -64,6 +79,7 @@ class ParameterMirror:
         full_name = f"{self._prefix}/{group}/{parameter}"
         value = self._handle.get_param(full_name, _FirmwareValue())
         confirmed = self._crazyflie.parameters.write(f"{group}.{parameter}", value)
+        self._written[f"{group}.{parameter}"] = value
         self._handle.set_param(full_name, _portable(confirmed))
 
 

@@ -346,6 +346,7 @@ class DriverVehicle:
             # It is the link of before.
             return
         self._links = self.crazyflie.links
+        self._mirror.write_again()
         if self.parameters.enable_parameters:
             self._mirror.publish()
         self._open_thrust_lock(is_new=False)

@@ -19,6 +19,7 @@ from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import BOOLEAN, GraphName, ParameterType
 from crazyflie_utils.parameters import ParameterError, Parameters, parameter
 from crazyflie_utils.runtime.flights import Flights
+from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.runtime.master_watch import MasterWatch
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.ros_transport import RosTransport
@@ -50,7 +51,7 @@ def run(node_class: type, default_name: str) -> None:
     default_name : str
         Name of the node unless the launch file gives another.
     """
-    _run(begin(default_name), lambda handle: {handle.name: node_class()})
+    run_nodes(default_name, lambda handle: {handle.name: node_class()})
 
 
 def run_composed(default_name: str) -> None:
@@ -65,6 +66,20 @@ def run_composed(default_name: str) -> None:
         classes = handle.load(ComposedParameters).nodes
         return {handle.resolve(name): make() for name, make in classes.items()}
 
+    run_nodes(default_name, make_nodes)
+
+
+def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, Node]]) -> None:
+    """Run the nodes that a function makes; does not return.
+
+    Parameters
+    ----------
+    default_name : str
+        Name of the process's own node unless the launch file gives another.
+    make_nodes : callable
+        ``make_nodes(handle)``, with the handle of that node, returns all nodes by absolute name.
+        What it raises ends the process with status 1.
+    """
     _run(begin(default_name), make_nodes)
 
 

@@ -1,0 +1,88 @@
+"""A node that has the driver add the vehicles of a fleet, and ends."""
+
+from functools import partial
+
+from typing_extensions import override
+
+from crazyflie_driver.srv import AddCrazyflie, UpdateParams, UpdateParamsRequest
+from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS, VehicleParameters
+from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.fleet_parameters import FleetParameters
+from crazyflie_utils import Node, NodeHandle, ParameterError
+
+ADD = "/add_crazyflie"
+
+LIMIT = 60.0
+"""How long, in s, the driver may take to come up, to connect, and to write parameters."""
+
+
+def connection(vehicle: Vehicle) -> VehicleParameters:
+    """Return how a vehicle is connected, and what is published of it."""
+    switches = {
+        f"enable_logging_{topic}": topic in vehicle.default_topics for topic in STANDARD_TOPICS
+    }
+    topics = vehicle.log_topics
+    return VehicleParameters.from_mapping(
+        {
+            "uri": vehicle.uri,
+            "tf_prefix": vehicle.name,
+            **switches,
+            "genericLogTopics": [topic.name for topic in topics],
+            "genericLogTopicFrequencies": [round(1000.0 / topic.frequency) for topic in topics],
+            "genericLogTopic_NAME_Variables": [list(topic.variables) for topic in topics],
+        }
+    )
+
+
+class FleetAddNode(Node):
+    """Have vehicles connected and their firmware parameters written.
+
+    The process ends with status 0 when all of them are there, else with 1, and names the others.
+    The driver itself writes the parameters again when a lost link is back.
+    """
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        parameters = handle.load(FleetParameters)
+        fleet = parameters.fleet()
+        self._vehicles = [fleet[name] for name in parameters.own_names(fleet)]
+        missing = [vehicle.name for vehicle in self._vehicles if vehicle.uri is None]
+        if missing:
+            raise ParameterError(f"{parameters.file}: no uri of {', '.join(missing)}; expected one")
+        self._connections = {vehicle.name: connection(vehicle) for vehicle in self._vehicles}
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._open = {vehicle.name for vehicle in self._vehicles}
+        self._failed: list[str] = []
+        for vehicle in self._vehicles:
+            request = self._connections[vehicle.name].request()
+            answer = handle.call_service(ADD, AddCrazyflie, request, LIMIT)
+            answer.add_done_callback(partial(self._on_added, vehicle))
+
+    def _on_added(self, vehicle, done):
+        error = done.exception()
+        if error is not None or not vehicle.firmware_params:
+            self._finish(vehicle, error)
+            return
+        names = []
+        for name, value in vehicle.firmware_params.items():
+            names.append(name.replace(".", "/"))
+            self._handle.set_param(f"/{vehicle.name}/{names[-1]}", value)
+        answer = self._handle.call_service(
+            f"/{vehicle.name}/update_params", UpdateParams, UpdateParamsRequest(names), LIMIT
+        )
+        answer.add_done_callback(lambda done: self._finish(vehicle, done.exception()))
+
+    def _finish(self, vehicle, error):
+        if error is None:
+            self._handle.info(f"{vehicle.name} is connected, {vehicle.uri}")
+        else:
+            self._failed.append(vehicle.name)
+            self._handle.error(f"{vehicle.name}, {vehicle.uri}: {error}")
+        self._open.discard(vehicle.name)
+        if self._open:
+            return
+        if self._failed:
+            self._handle.error(f"not all vehicles are there: {', '.join(sorted(self._failed))}")
+        self._handle.end(1 if self._failed else 0)

@@ -1,0 +1,106 @@
+"""Many simulated vehicles of one model, all of them advanced by the same numpy operations."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from crazyflie_model.dynamics import STEP, SevenDimensional
+from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
+
+_LEVEL_STEPS = round(LEVEL_AGE / STEP)
+_OFF_STEPS = round(OFF_AGE / STEP)
+_NEVER = np.iinfo(np.int64).max
+
+
+class BatchVehicles:
+    """Vehicles that each do what `crazyflie_simulator.vehicle.SimulatedVehicle` does, on one clock.
+
+    Parameters
+    ----------
+    dynamics : SevenDimensional
+    positions : array_like, shape (n, 3)
+        Where they stand at the beginning, m, fixed frame.
+    time : float
+        Their time at the beginning, s.
+    """
+
+    def __init__(self, dynamics: SevenDimensional, positions: ArrayLike, time: float):
+        columns = np.array(positions, dtype=float).T
+        self._dynamics = dynamics
+        self._n = columns.shape[1]
+        # Components are arrays, also those that are alike for all at the beginning.
+        self._x = [np.array(np.broadcast_to(c, self._n)) for c in dynamics.initial_state(columns)]
+        self._u = np.zeros((4, self._n))
+        self._since = np.full(self._n, _NEVER)
+        self._next_u = np.zeros((4, self._n))
+        self._next_since = np.full(self._n, _NEVER)
+        self._start = time
+        self._steps = 0
+
+    @property
+    def time(self) -> float:
+        """Time of the states, s: a whole number of steps after the beginning."""
+        return self._start + self._steps * STEP
+
+    @property
+    def states(self) -> NDArray[np.float64]:
+        """States, shape (n, 7)."""
+        return np.stack(self._x, axis=1)
+
+    @property
+    def tilts(self) -> NDArray[np.float64]:
+        """Roll and pitch, rad, shape (n, 2)."""
+        return self._effective_control()[:2].T
+
+    def command(self, vehicle: int, u: Sequence[float], time: float) -> None:
+        """Give one vehicle a control (4 numbers), which counts from ``time`` (s) on.
+
+        Of several that come between two calls of `advance_to` the last one counts.
+        """
+        self._next_u[:, vehicle] = u
+        self._next_since[vehicle] = max(math.floor((time - self._start) / STEP + 1e-6), 0)
+
+    def skip(self, duration: float) -> None:
+        """Have ``duration`` (s) passed without anything having happened."""
+        self._start += duration
+
+    def advance_to(self, time: float) -> None:
+        """Integrate to the last whole step before ``time`` (s).
+
+        A ``time`` in the past counts as a reset of the clock: the vehicles go on from there.
+        """
+        steps = math.floor((time - self.time) / STEP + 1e-6)
+        if steps < -1:
+            self._start, self._steps = time, 0
+            self._since[self._since != _NEVER] = 0
+            self._next_since[self._next_since != _NEVER] = 0
+        for _ in range(steps):
+            self._take_commands()
+            self._step()
+        self._take_commands()
+
+    def _take_commands(self):
+        due = self._next_since <= self._steps
+        if due.any():
+            self._u[:, due] = self._next_u[:, due]
+            self._since[due] = self._steps
+            self._next_since[due] = _NEVER
+
+    def _step(self):
+        moved = self._dynamics.step(self._steps, self._x, list(self._effective_control()))
+        obeys = self._since != _NEVER
+        # A vehicle stays put until its first control.
+        self._x = moved if obeys.all() else [*map(lambda a, b: np.where(obeys, a, b), moved, self._x)]
+        self._steps += 1
+
+    def _effective_control(self):
+        # Without controls the vehicle does what the firmware does.
+        age = self._steps - self._since
+        is_old = (age >= _LEVEL_STEPS) & (self._since != _NEVER)
+        if not is_old.any():
+            return self._u
+        u = np.where(is_old, 0.0, self._u)
+        u[3] = np.where(age >= _OFF_STEPS, u[3], self._u[3])
+        return u

@@ -1,0 +1,161 @@
+"""Vehicles that fly together."""
+
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from crazyflie_fleet.settings import MachineSettings, RobotSettings
+
+DOWNWASH = 2.0
+"""How much farther apart one above the other two vehicles have to be than side by side: the
+air that rotors throw down takes lift from who flies below."""
+
+
+@dataclass(frozen=True)
+class LogTopic:
+    """A topic of firmware variables.
+
+    Attributes
+    ----------
+    name : str
+        Below the vehicle's namespace.
+    frequency : float
+        Hz.
+    variables : tuple of str
+        Such as "pm.vbat".
+    """
+
+    name: str
+    frequency: float
+    variables: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """One vehicle.
+
+    Attributes
+    ----------
+    name : str
+        Its namespace and its tf frame.
+    position : tuple of float
+        Where it stands before takeoff: x, y, z in m, fixed frame.
+    settings : RobotSettings
+        What else is said of it, its type's and everybody's included.
+    firmware_params : dict of str to float
+        "group.name" to value, written after each connection.
+    default_topics : tuple of str
+        Standard topics that the driver publishes of it.
+    log_topics : tuple of LogTopic
+    """
+
+    name: str
+    position: tuple[float, float, float]
+    settings: RobotSettings
+    firmware_params: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    default_topics: tuple[str, ...] = ("battery",)
+    log_topics: tuple[LogTopic, ...] = ()
+
+    @property
+    def uri(self) -> str | None:
+        """Its address; None if it has none."""
+        return self.settings.uri
+
+    @property
+    def buffer(self) -> float:
+        """Radius of the space that is its own, m; `DOWNWASH` times as high."""
+        return self.settings.buffer
+
+    @property
+    def hover_point(self) -> tuple[float, float, float]:
+        """Where a takeoff ends, m."""
+        x, y, z = self.position
+        return x, y, z + self.settings.hover_height
+
+    @property
+    def mocap_frame(self) -> str:
+        """What motion capture calls it."""
+        return self.settings.mocap_frame or self.name
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """The vehicles that take part.
+
+    Attributes
+    ----------
+    vehicles : tuple of Vehicle
+        Those that are enabled, in the order of the file.
+    disabled : tuple of str
+        Names of the others.
+    machines : dict of str to MachineSettings
+        Other computers.
+    remarks : tuple of str
+        What is accepted and has no effect: file, line and why.
+    """
+
+    vehicles: tuple[Vehicle, ...]
+    disabled: tuple[str, ...] = ()
+    machines: Mapping[str, MachineSettings] = dataclasses.field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the vehicles that take part."""
+        return tuple(vehicle.name for vehicle in self.vehicles)
+
+    def at_ports(self, first_port: int) -> "Fleet":
+        """Return the same vehicles at UDP ports of this computer, one after the other."""
+        vehicles = tuple(
+            dataclasses.replace(
+                vehicle,
+                settings=dataclasses.replace(
+                    vehicle.settings, uri=f"udp://127.0.0.1:{first_port + number}"
+                ),
+            )
+            for number, vehicle in enumerate(self.vehicles)
+        )
+        return dataclasses.replace(self, vehicles=vehicles)
+
+    def __getitem__(self, name: str) -> Vehicle:
+        """Return a vehicle that takes part; raises KeyError."""
+        for vehicle in self.vehicles:
+            if vehicle.name == name:
+                return vehicle
+        raise KeyError(name)
+
+
+def close_pairs(
+    positions: npt.NDArray[np.float64], buffers: Sequence[float] | npt.NDArray[np.float64]
+) -> Iterator[tuple[int, int, float, float]]:
+    """Yield the pairs of places that are closer than the buffers of who is there.
+
+    Parameters
+    ----------
+    positions : (n, 3) array
+        x, y, z in m.
+    buffers : (n,) array
+        Radii, m.
+
+    Yields
+    ------
+    i, j : int
+        With i < j.
+    distance, allowed : float
+        m; a metre of height counts for `DOWNWASH` metres less.
+    """
+    radii = np.asarray(buffers, dtype=float)
+    if len(radii) < 2:
+        return
+    scaled = np.array(positions, dtype=float).reshape(-1, 3)
+    scaled[:, 2] /= DOWNWASH
+    pairs = cKDTree(scaled).query_pairs(2.0 * float(radii.max()), output_type="ndarray")
+    distances = np.linalg.norm(scaled[pairs[:, 0]] - scaled[pairs[:, 1]], axis=1)
+    allowed = radii[pairs[:, 0]] + radii[pairs[:, 1]]
+    for (i, j), distance, limit in zip(pairs, distances, allowed, strict=True):
+        if distance < limit:
+            yield int(i), int(j), float(distance), float(limit)

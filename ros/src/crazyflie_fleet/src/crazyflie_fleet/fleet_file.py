@@ -1,0 +1,272 @@
+"""The file that names the vehicles of a fleet, laid out as crazyswarm2's crazyflies.yaml."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from crazyflie_fleet.fleet import Fleet, LogTopic, Vehicle, close_pairs
+from crazyflie_fleet.settings import (
+    DEFAULT_TOPICS,
+    DefaultTopicSettings,
+    FirmwareNumber,
+    LogTopicSettings,
+    MachineSettings,
+    RobotSettings,
+    Settings,
+    VehicleName,
+    same_vehicle,
+)
+from crazyflie_utils import ParameterError
+from crazyflie_utils.parameter_types import BOOLEAN, ParameterType
+from crazyflie_utils.yaml_file import Entry
+from crazyflie_utils.yaml_file import load as load_yaml
+
+FIRST_PORT = 19850
+"""UDP port of a grid's first vehicle."""
+
+_TOP = ("robots", "robot_types", "all", "machines", "fileversion")
+_FIRMWARE = ("firmware_params", "firmware_logging")
+_LOGGING = ("enabled", "default_topics", "custom_topics")
+_FIRMWARE_NUMBER = FirmwareNumber()
+
+
+def load(path: str | Path) -> Fleet:
+    """Return the fleet that a file describes.
+
+    Raises
+    ------
+    ParameterError
+        About everything that is wrong: file, line, and what was expected.
+    """
+    return _Reading(load_yaml(path)).fleet()
+
+
+def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> Fleet:
+    """Return n vehicles cf1, cf2, ... in rows around the origin.
+
+    Parameters
+    ----------
+    n : int
+    spacing : float
+        From one to the next, m.
+    first_port : int
+        UDP port of the first one; the others have the next ones.
+
+    Raises
+    ------
+    ParameterError
+        There is no such grid.
+    """
+    if n < 1 or not 1 <= first_port <= 65536 - n:
+        raise ParameterError(
+            f"a grid of {n} vehicles from port {first_port} on; expected at least one vehicle, and "
+            "ports below 65536"
+        )
+    columns = math.ceil(math.sqrt(n))
+    middle = (math.ceil(n / columns) - 1) / 2, (columns - 1) / 2
+    vehicles = []
+    for k in range(n):
+        row, column = divmod(k, columns)
+        position = (row - middle[0]) * spacing, (column - middle[1]) * spacing, 0.0
+        settings = RobotSettings.from_mapping(
+            {"initial_position": position, "uri": f"udp://127.0.0.1:{first_port + k}"}
+        )
+        vehicles.append(Vehicle(f"cf{k + 1}", position, settings))
+    for _, _, distance, limit in _close(vehicles):
+        raise ParameterError(
+            f"a grid with {distance:g} m from one vehicle to the next; expected at least "
+            f"{limit:g} m, their collision buffers"
+        )
+    return Fleet(tuple(vehicles))
+
+
+class _Reading:
+    """One reading of a file; complaints gather, so that a user mends all in one go.
+
+    Parameters
+    ----------
+    top : Entry
+    """
+
+    def __init__(self, top: Entry):
+        self._top = top
+        self._parts = top.entries()
+        self._complaints: list[str] = []
+        self._remarks: dict[int, str] = {}
+
+    def fleet(self) -> Fleet:
+        """Return the fleet, or raise `ParameterError`."""
+        for key, entry in self._parts.items():
+            if key not in _TOP:
+                self._complain(entry, f"is not known; expected one of {', '.join(_TOP)}")
+        robots = self._top["robots"].entries()
+        types = self._entries("robot_types")
+        everybody = self._parts.get("all")
+        machines = {
+            name: self._read(entry, MachineSettings)
+            for name, entry in self._entries("machines").items()
+        }
+        # What vehicles inherit is checked where it stands: it is wrong once, not in each of them.
+        for entry in types.values():
+            self._check(entry, Settings)
+        if everybody is not None:
+            self._check(everybody, Settings, "broadcasts")
+        for name, entry in robots.items():
+            self._check_type(VehicleName(), name, entry)
+            self._check(entry, RobotSettings)
+            self._check_choice(entry, "type", types)
+        for entry in (*robots.values(), *types.values(), *([everybody] if everybody else [])):
+            self._check_choice(entry, "machine", machines)
+        self._end_if_wrong()
+        vehicles = [self._vehicle(name, entry, types, everybody) for name, entry in robots.items()]
+        self._end_if_wrong()
+        enabled = [vehicle for vehicle in vehicles if vehicle.settings.enabled]
+        self._check_apart(enabled, robots)
+        self._end_if_wrong()
+        disabled = [vehicle.name for vehicle in vehicles if not vehicle.settings.enabled]
+        if not enabled:
+            raise self._top["robots"].error("has no vehicle that is enabled; expected one at least")
+        return Fleet(tuple(enabled), tuple(disabled), machines, tuple(self._remarks.values()))
+
+    def _entries(self, key):
+        return self._parts[key].entries() if key in self._parts else {}
+
+    # What is wrong.
+
+    def _complain(self, entry, text):
+        self._complaints += entry.error(text).complaints
+
+    def _end_if_wrong(self):
+        if self._complaints:
+            raise ParameterError(*dict.fromkeys(self._complaints))
+
+    def _read(self, entry, settings, *besides):
+        try:
+            return entry.read(settings, besides)
+        except ParameterError as error:
+            self._complaints += error.complaints
+            return None
+
+    def _check(self, entry, settings, *besides):
+        if self._read(entry, settings, *_FIRMWARE, *besides) is None:
+            return
+        try:
+            self._firmware(entry)
+        except ParameterError as error:
+            self._complaints += error.complaints
+
+    def _check_type(self, expected: ParameterType, value, entry):
+        try:
+            return expected(value)
+        except ValueError:
+            self._complain(entry, f"is {value!r}; expected {expected}")
+            return None
+
+    def _check_choice(self, entry, key, known):
+        if isinstance(entry.node, yaml.MappingNode) and key in entry:
+            chosen = entry[key]
+            if chosen.value and chosen.value not in list(known):
+                expected = (
+                    f"one of {', '.join(known)}" if known else f"none, as there are no {key}s"
+                )
+                self._complain(chosen, f"is {chosen.value!r}; expected {expected}")
+
+    def _check_apart(self, vehicles, robots):
+        seen: dict[str, str] = {}
+        for vehicle in vehicles:
+            if vehicle.uri is None:
+                continue
+            other = seen.setdefault(same_vehicle(vehicle.uri), vehicle.name)
+            if other != vehicle.name:
+                line = robots[other]["uri"].line
+                self._complain(
+                    robots[vehicle.name]["uri"],
+                    f"is {vehicle.uri}, as that of {other} in line {line}; expected an address "
+                    "of its own",
+                )
+        for i, j, distance, limit in _close(vehicles):
+            first, second = (robots[vehicles[k].name]["initial_position"] for k in (i, j))
+            self._complain(
+                second,
+                f"is {distance:.3g} m from that of {vehicles[i].name} in line {first.line}; expected "
+                f"at least {limit:.3g} m, their collision buffers",
+            )
+
+    # What vehicles are.
+
+    def _vehicle(self, name, robot, types, everybody):
+        layers = [everybody, types.get(robot["type"].value) if "type" in robot else None, robot]
+        node = _merged([layer.node for layer in layers if layer is not None])
+        merged = Entry(robot.file, robot.name, node)
+        settings = self._read(merged, RobotSettings, *_FIRMWARE, "broadcasts")
+        if settings is None:
+            return None
+        return Vehicle(name, settings.position, settings, *self._firmware(merged))
+
+    def _firmware(self, entry):
+        parts = entry.entries()
+        params = {}
+        if "firmware_params" in parts:
+            for group, inner in parts["firmware_params"].entries().items():
+                for key, value in inner.entries().items():
+                    params[f"{group}.{key}"] = self._check_type(
+                        _FIRMWARE_NUMBER, value.value, value
+                    )
+        if "firmware_logging" not in parts:
+            return params, ("battery",), ()
+        return params, *self._logging(parts["firmware_logging"])
+
+    def _logging(self, entry):
+        parts = entry.entries()
+        for key, inner in parts.items():
+            if key not in _LOGGING:
+                self._complain(inner, f"is not known; expected one of {', '.join(_LOGGING)}")
+        standard = []
+        for key, inner in (
+            parts["default_topics"].entries() if "default_topics" in parts else {}
+        ).items():
+            if key not in DEFAULT_TOPICS:
+                self._complain(inner, f"is not known; expected one of {', '.join(DEFAULT_TOPICS)}")
+            elif not DEFAULT_TOPICS[key]:
+                remark = inner.error("is not offered by the driver, and left out")
+                self._remarks.setdefault(inner.line, str(remark))
+            elif self._read(inner, DefaultTopicSettings) is not None:
+                standard.append(DEFAULT_TOPICS[key])
+        custom = []
+        for key, inner in (
+            parts["custom_topics"].entries() if "custom_topics" in parts else {}
+        ).items():
+            topic = self._read(inner, LogTopicSettings)
+            self._check_type(VehicleName(), key, inner)
+            if topic is not None:
+                custom.append(LogTopic(key, topic.frequency, topic.variables))
+        enabled = "enabled" not in parts or self._check_type(
+            BOOLEAN, parts["enabled"].value, parts["enabled"]
+        )
+        # Without its battery a vehicle is not safe: it is watched whatever the file says.
+        names = ("battery", *standard) if enabled else ("battery",)
+        return tuple(dict.fromkeys(names)), tuple(custom) if enabled else ()
+
+
+def _close(vehicles):
+    if not vehicles:
+        return []
+    positions = np.array([vehicle.position for vehicle in vehicles])
+    return sorted(close_pairs(positions, [vehicle.buffer for vehicle in vehicles]))
+
+
+def _merged(nodes):
+    """Return a mapping with what all say, the last one first; each value keeps its line."""
+    if not all(isinstance(node, yaml.MappingNode) for node in nodes):
+        return nodes[-1]
+    values: dict[str, list] = {}
+    keys = {}
+    for node in nodes:
+        for key, value in node.value:
+            keys[key.value] = key
+            values.setdefault(key.value, []).append(value)
+    merged = [(keys[name], _merged(layers)) for name, layers in values.items()]
+    last = nodes[-1]
+    return yaml.MappingNode(last.tag, merged, last.start_mark, last.end_mark)

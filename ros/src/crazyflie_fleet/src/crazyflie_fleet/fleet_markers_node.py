@@ -1,0 +1,86 @@
+"""What RViz shows of a fleet: bodies, buffers and names."""
+
+from geometry_msgs.msg import Point, Vector3
+from std_msgs.msg import ColorRGBA, String
+from typing_extensions import override
+from visualization_msgs.msg import Marker, MarkerArray
+
+from crazyflie_fleet.fleet import DOWNWASH, Vehicle
+from crazyflie_fleet.fleet_parameters import FleetParameters
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameter_types import TOPIC
+
+BODY = ColorRGBA(0.15, 0.17, 0.20, 1.0)
+NAME = ColorRGBA(0.05, 0.25, 0.60, 1.0)
+FREE = ColorRGBA(0.05, 0.45, 0.90, 0.12)
+WAITING = ColorRGBA(0.85, 0.15, 0.10, 0.45)
+
+_ROTOR = 0.0325
+"""From the middle to a rotor, along x and along y, m."""
+
+_TEXT_SIZE = 0.12
+
+PERIOD = 1.0
+"""Between two messages, s: RViz forgets a marker that comes before its frame."""
+
+
+class FleetMarkersParameters(FleetParameters):
+    """Parameters of `FleetMarkersNode`."""
+
+    waiting_topic: str = parameter(
+        TOPIC, "who waits for whom", "/fleet/waiting", "topics/waiting"
+    )
+    markers_topic: str = parameter(
+        TOPIC, "where markers go", "/fleet/markers", "topics/markers"
+    )
+
+
+class FleetMarkersNode(Node):
+    """Publish markers that RViz itself moves with the vehicles' frames."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(FleetMarkersParameters)
+        self._fleet = self._parameters.fleet()
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = handle.publisher(parameters.markers_topic, MarkerArray)
+        self._waiting: frozenset[str] = frozenset()
+        handle.subscribe(parameters.waiting_topic, String, self._on_waiting)
+        handle.timer(PERIOD, self._publish, steady=True)
+
+    def _on_waiting(self, message):
+        self._waiting = frozenset(message.data.split())
+        self._publish()
+
+    def _publish(self):
+        markers = [
+            marker
+            for number, vehicle in enumerate(self._fleet.vehicles)
+            for marker in _markers(number, vehicle, vehicle.name in self._waiting)
+        ]
+        self._publisher.publish(MarkerArray(markers))
+
+
+def _markers(number: int, vehicle: Vehicle, waits: bool) -> list[Marker]:
+    radius = vehicle.buffer
+    body = _marker("bodies", number, vehicle, Marker.SPHERE_LIST, BODY, (0.05, 0.05, 0.05))
+    body.points = [Point(x, y, 0.0) for x in (-_ROTOR, _ROTOR) for y in (-_ROTOR, _ROTOR)]
+    size = (2.0 * radius, 2.0 * radius, 2.0 * radius * DOWNWASH)
+    buffer = _marker("buffers", number, vehicle, Marker.SPHERE, WAITING if waits else FREE, size)
+    name = _marker(
+        "names", number, vehicle, Marker.TEXT_VIEW_FACING, NAME, (0.0, 0.0, _TEXT_SIZE)
+    )
+    name.text = vehicle.name
+    name.pose.position.z = 0.15
+    return [body, buffer, name]
+
+
+def _marker(namespace, number, vehicle, kind, colour, size):
+    marker = Marker(ns=namespace, id=number, type=kind, color=colour, scale=Vector3(*size))
+    marker.header.frame_id = vehicle.name
+    marker.frame_locked = True
+    marker.pose.orientation.w = 1.0
+    return marker

@@ -1,0 +1,100 @@
+"""What the nodes of a fleet are told; all of them read the same fleet."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from typing_extensions import override
+
+from crazyflie_fleet import fleet_file
+from crazyflie_fleet.fleet import Fleet
+from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME, Integer, Number, ParameterType, Text
+
+
+class NodeParameters(ParameterType):
+    """Parameters of other nodes, which check them themselves."""
+
+    label = "dictionary"
+
+    @override
+    def __call__(self, value: Any) -> Mapping[str, Any]:
+        if not isinstance(value, dict) or not all(isinstance(each, dict) for each in value.values()):
+            raise ValueError
+        return value
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "a dictionary of dictionaries"
+
+
+class FleetParameters(Parameters):
+    """Which vehicles there are."""
+
+    file: str = parameter(
+        Text(may_be_empty=True), "names the vehicles; empty for a grid of `n`", "", "fleet/file"
+    )
+    n: int = parameter(Integer(1, 1000), "vehicles of the grid", 5, "fleet/n")
+    spacing: float = parameter(
+        Number("m", above=0.0), "from one vehicle of the grid to the next", 1.0, "fleet/spacing"
+    )
+    machine: str = parameter(
+        Text(may_be_empty=True),
+        "only the vehicles of this machine are flown here; `*` for all",
+        "*",
+        "fleet/machine",
+    )
+    virtual_port: int = parameter(
+        Integer(0, 65535),
+        "the vehicles are virtual: the k-th listens at this UDP port + k, whatever its address; 0 "
+        "for real ones",
+        0,
+        "fleet/virtual_port",
+    )
+    fixed_frame: str = parameter(FRAME, "tf frame of the world", "world", "frames/fixed")
+
+    def fleet(self) -> Fleet:
+        """Return all vehicles, those of other machines included.
+
+        Raises
+        ------
+        ParameterError
+            About everything that is wrong with the file.
+        """
+        fleet = fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
+        return fleet.at_ports(self.virtual_port) if self.virtual_port else fleet
+
+    def own_names(self, fleet: Fleet) -> tuple[str, ...]:
+        """Return the names of the vehicles that are flown here.
+
+        Raises
+        ------
+        ParameterError
+            There is none.
+        """
+        if self.machine == "*":
+            return fleet.names
+        names = tuple(v.name for v in fleet.vehicles if v.settings.machine == self.machine)
+        if not names:
+            raise ParameterError(
+                f"no vehicle of {self.file} is flown by the machine {self.machine!r}"
+            )
+        return names
+
+
+class FlyParameters(FleetParameters):
+    """What the process that flies vehicles is told."""
+
+    is_simulated: bool = parameter(BOOLEAN, "simulate the vehicles, too", name="simulated")
+    flies_together: bool = parameter(
+        BOOLEAN,
+        "one simulator, estimator and controller for all simulated vehicles of one model of 7 "
+        "states; else each has its own, with all their parameters",
+        True,
+        "together",
+    )
+    common: Mapping[str, Any] = parameter(
+        NodeParameters(), "parameters of every vehicle's nodes, node by node", name="nodes"
+    )
+    by_model: Mapping[str, Any] | None = parameter(
+        NodeParameters(), "those of vehicles of one model, which come before them", None, "models"
+    )

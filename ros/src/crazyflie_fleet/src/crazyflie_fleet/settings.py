@@ -1,0 +1,182 @@
+"""What a fleet file may say: the declared settings of vehicles, and what their values may be."""
+
+import math
+import re
+from collections.abc import Iterable
+from typing import Any
+
+from typing_extensions import override
+
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameter_types import (
+    BOOLEAN,
+    FRAME,
+    POSITION,
+    TEXT,
+    ListOf,
+    Number,
+    ParameterType,
+    Text,
+)
+
+RESERVED = ("all",)
+"""Names that vehicles cannot have: /all/takeoff is everybody's."""
+
+DEFAULT_TOPICS = {
+    "imu": "imu",
+    "temperature": "temperature",
+    "magnetic_field": "magnetic_field",
+    "pressure": "pressure",
+    "battery": "battery",
+    "pose": "pose",
+    "packets": "packets",
+    "status": "battery",
+    "odom": "",
+    "scan": "",
+}
+"""Key in ``default_topics`` -> standard topic of the driver; empty where it has none."""
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_URI = re.compile(
+    r"radio://(?P<dongle>[0-9A-Fa-f*]+)/(?P<channel>\d+)/(?P<rate>250K|1M|2M)"
+    r"(/(?P<address>[0-9A-Fa-f]{1,10}))?(\?.*)?|udp://[^/:\s]+:\d+|usb://\d+"
+)
+
+
+class VehicleName(ParameterType):
+    """The name of a vehicle: of its namespace and of its frame."""
+
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str) or not _NAME.fullmatch(value) or value in RESERVED:
+            raise ValueError
+        return value
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "letters, digits and underscores, the first a letter, and not 'all'"
+
+
+class Uri(ParameterType):
+    """The address of a vehicle."""
+
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str) or not _URI.fullmatch(value):
+            raise ValueError
+        return value
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "radio://DONGLE/CHANNEL/RATE/ADDRESS, udp://HOST:PORT or usb://NUMBER"
+
+
+def same_vehicle(uri: str) -> str:
+    """Return a key that two addresses of the same vehicle share, whatever the dongle."""
+    match = _URI.fullmatch(uri)
+    if match is None or match["channel"] is None:
+        return uri
+    address = int(match["address"] or "E7E7E7E7E7", 16)
+    return f"radio {int(match['channel'])} {match['rate']} {address:010X}"
+
+
+class FirmwareNumber(ParameterType):
+    """The value of a firmware parameter; 1e-3, which YAML takes for a text, is a number too."""
+
+    label = "float"
+
+    @override
+    def __call__(self, value: Any) -> int | float:
+        if isinstance(value, str):
+            value = float(value)
+        if not isinstance(value, (int, float)) or not math.isfinite(value):
+            raise ValueError
+        return int(value) if isinstance(value, bool) else value
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return "a finite number"
+
+
+class LogTopicSettings(Parameters):
+    """A topic of firmware variables."""
+
+    frequency: float = parameter(Number("Hz", minimum=0.4, maximum=100.0), "messages per second")
+    variables: tuple[str, ...] = parameter(ListOf(TEXT), "such as pm.vbat", name="vars")
+
+
+class DefaultTopicSettings(Parameters):
+    """A standard topic; it comes at the driver's own rate."""
+
+    frequency: float = parameter(Number("Hz", above=0.0), "has no effect here", 10.0)
+
+
+class Settings(Parameters):
+    """What a vehicle, its type, or ``all`` may say; the nearest one counts."""
+
+    model: str = parameter(
+        Text(("near_hover", "coupled_7d", "quadrotor")), "dynamics in simulation", "near_hover"
+    )
+    buffer: float = parameter(
+        Number("m", above=0.0), "radius of the space that is the vehicle's own", 0.15
+    )
+    hover_height: float = parameter(
+        Number("m", above=0.0), "where a takeoff ends, above the start point", 1.0
+    )
+    machine: str = parameter(
+        Text(may_be_empty=True), "computer that flies it, of `machines`; empty for this one", ""
+    )
+    voltage_warning: float = parameter(
+        Number("V", minimum=0.0), "with less takeoff is refused", 3.2, "battery/voltage_warning"
+    )
+    voltage_critical: float = parameter(
+        Number("V", minimum=0.0), "with less the vehicle is landed", 3.0, "battery/voltage_critical"
+    )
+    mocap_enabled: bool = parameter(
+        BOOLEAN, "crazyswarm2's; has no effect here", True, "motion_capture/enabled"
+    )
+    mocap_frame: str | None = parameter(
+        FRAME, "motion capture's frame; by default the vehicle's name", None, "motion_capture/frame"
+    )
+    mocap_tracking: str = parameter(
+        TEXT, "crazyswarm2's; has no effect here", "vendor", "motion_capture/tracking"
+    )
+    mocap_marker: str = parameter(
+        TEXT, "crazyswarm2's; has no effect here", "default", "motion_capture/marker"
+    )
+    mocap_dynamics: str = parameter(
+        TEXT, "crazyswarm2's; has no effect here", "default", "motion_capture/dynamics"
+    )
+    big_quad: bool = parameter(BOOLEAN, "crazyswarm2's; has no effect here", False)
+    reference_frame: str = parameter(TEXT, "crazyswarm2's; has no effect here", "world")
+
+    @override
+    def complaints(self) -> Iterable[str]:
+        if self.voltage_critical > self.voltage_warning:
+            yield (
+                f"battery/voltage_critical is {self.voltage_critical:g}; expected not more than "
+                f"voltage_warning, {self.voltage_warning:g} (V)"
+            )
+
+
+class RobotSettings(Settings):
+    """What stands about one vehicle below ``robots``."""
+
+    enabled: bool = parameter(BOOLEAN, "whether it takes part", True)
+    uri: str | None = parameter(Uri(), "its address; not needed in simulation", None)
+    position: tuple[float, float, float] = parameter(
+        POSITION, "where it stands before takeoff", name="initial_position"
+    )
+    type: str | None = parameter(TEXT, "of `robot_types`", None)
+
+
+class MachineSettings(Parameters):
+    """Another computer, as roslaunch's tag ``machine`` has it."""
+
+    address: str = parameter(TEXT, "name or number in the network")
+    env_loader: str = parameter(TEXT, "script there that sets ROS's environment")
+    user: str | None = parameter(TEXT, "who logs in there by ssh", None)

@@ -1,0 +1,116 @@
+"""The nodes that fly one vehicle, and their parameters."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
+from crazyflie_fleet.fleet import Vehicle
+from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
+    PositionVelocityYawStateLiftLqrNode,
+)
+from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
+from crazyflie_simulator.simulator_node import NearHoverSimulatorCoupled7DNode, NearHoverSimulatorNode
+from crazyflie_state_estimator.estimator_node import PositionVelocityYawStateEstimatorNode
+from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
+from crazyflie_utils import Node
+
+Tree = dict[str, Any]
+"""Parameters as the parameter server has them."""
+
+REFERENCE, SAFE_REFERENCE = "ref", "ref_safe"
+STATE, LQR_CONTROL = "state", "control/lqr"
+TAKEOFF_CONTROL, FINAL_CONTROL = "control/takeoff", "control/final"
+IN_FLIGHT = "in_flight"
+FLIGHT_STATE = f"{IN_FLIGHT}_state"
+"""Topics and services of a vehicle, below its name."""
+
+SIMULATORS: dict[str, type[Node]] = {
+    "near_hover": NearHoverSimulatorNode,
+    "coupled_7d": NearHoverSimulatorCoupled7DNode,
+    "quadrotor": QuadrotorSimulatorNode,
+}
+
+HOVER_STACK: dict[str, type[Node]] = {
+    "state_estimator": PositionVelocityYawStateEstimatorNode,
+    "lqr_controller": PositionVelocityYawStateLiftLqrNode,
+    "takeoff_server": TakeoffServerNode,
+    "takeoff_control_filter": TakeoffControlFilterNode,
+}
+
+
+def node_classes(vehicle: Vehicle, is_simulated: bool) -> dict[str, type[Node]]:
+    """Return the classes of a vehicle's nodes, by their names below the vehicle's."""
+    if is_simulated:
+        return {"simulator": SIMULATORS[vehicle.settings.model], **HOVER_STACK}
+    return {"cmd_vel_converter": CmdVelConverterNode, **HOVER_STACK}
+
+
+def parameters(vehicle: Vehicle, fixed_frame: str, common: Mapping[str, Any]) -> Tree:
+    """Return the parameters of a vehicle's nodes, node by node.
+
+    Parameters
+    ----------
+    vehicle : Vehicle
+    fixed_frame : str
+    common : mapping
+        What those of all vehicles have in common, node by node.
+    """
+    frames = {"fixed": fixed_frame, "robot": vehicle.name}
+    hover, settings = vehicle.hover_point, vehicle.settings
+    own: Tree = {
+        "simulator": {
+            "frames": frames,
+            "init": dict(zip("xyz", vehicle.position, strict=True)),
+            "topics": {"control": FINAL_CONTROL},
+        },
+        "cmd_vel_converter": {"topics": {"control": FINAL_CONTROL, "cmd_vel": "cmd_vel"}},
+        "state_estimator": {
+            "x_dim": 7,
+            "frames": frames,
+            "topics": {"state": STATE, "control": FINAL_CONTROL},
+        },
+        "lqr_controller": {
+            "x_dim": 7,
+            "u_dim": 4,
+            "topics": {
+                "reference": SAFE_REFERENCE,
+                "descent_reference": f"{REFERENCE}_descent",
+                "state": STATE,
+                "control": LQR_CONTROL,
+                "flight_state": FLIGHT_STATE,
+            },
+        },
+        "takeoff_server": {
+            "hover": dict(zip("xyz", hover, strict=True)),
+            "topics": {
+                "reference": REFERENCE,
+                "control": TAKEOFF_CONTROL,
+                "in_flight": IN_FLIGHT,
+                "state": STATE,
+                "battery": "battery",
+            },
+            "srv": {"takeoff": "takeoff", "land": "land"},
+            "battery": {"low": settings.voltage_warning, "critical": settings.voltage_critical},
+        },
+        "takeoff_control_filter": {
+            "topics": {
+                "takeoff_control": TAKEOFF_CONTROL,
+                "commanded_control": LQR_CONTROL,
+                "final_control": FINAL_CONTROL,
+                "in_flight": IN_FLIGHT,
+                "state": STATE,
+            },
+            "srv": {"emergency": "emergency", "emergency_reset": "emergency_reset"},
+        },
+    }
+    return merged(common, own)
+
+
+def merged(first: Mapping[str, Any], second: Mapping[str, Any]) -> Tree:
+    """Return both trees in one; where both have a value, it is that of the second."""
+    tree = dict(first)
+    for key, value in second.items():
+        is_branch = isinstance(value, Mapping) and isinstance(tree.get(key), Mapping)
+        tree[key] = merged(tree[key], value) if is_branch else value
+    return tree

@@ -1,0 +1,231 @@
+"""ROS interface of many vehicles that are simulated, estimated and controlled together.
+
+For each vehicle it is what a simulator, an estimator and a controller are, with the same topics.
+"""
+
+from functools import partial
+
+import numpy as np
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
+from numpy.typing import NDArray
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+from typing_extensions import override
+
+from crazyflie_fleet.batch_feedback import YAW, batch_control, is_memoryless
+from crazyflie_fleet.batch_vehicles import BatchVehicles
+from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.stack import FINAL_CONTROL, LQR_CONTROL, REFERENCE, SAFE_REFERENCE, STATE
+from crazyflie_lqr.gain_file import MatrixFile, VectorFile
+from crazyflie_lqr.reference import GuardedReference
+from crazyflie_model.angles import quaternion_from_rpy, wrap_to_pi
+from crazyflie_model.dynamics import Coupled7D, NearHover, SevenDimensional
+from crazyflie_msgs.msg import (
+    Control,
+    ControlStamped,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
+from crazyflie_simulator.simulator_node import MAX_CATCH_UP
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, Number
+from crazyflie_utils.vectors import to_vector
+
+MODELS: dict[str, type[SevenDimensional]] = {"near_hover": NearHover, "coupled_7d": Coupled7D}
+"""Models of which vehicles can be flown together."""
+
+
+class SwarmParameters(Parameters):
+    """Parameters of `SwarmNode`, named as those of the nodes that it stands for."""
+
+    time_step: float = parameter(
+        TIME_STEP, "from one pose, state and control to the next", name="simulator/time_step"
+    )
+    publishes_clock: bool = parameter(
+        BOOLEAN, "be the source of simulated time", False, "simulator/clock/publish"
+    )
+    real_time_factor: float = parameter(
+        Number(minimum=0.0),
+        "how fast simulated time passes at most; 0 is as fast as possible",
+        1.0,
+        "simulator/clock/real_time_factor",
+    )
+    fixed_frame: str = parameter(FRAME, "tf frame of the world", "world", "frames/fixed")
+    K: NDArray[np.float64] = parameter(
+        MatrixFile(4, 7), "gain file, 4 rows of 7 numbers", name="lqr_controller/K_file"
+    )
+    u_ref: NDArray[np.float64] = parameter(
+        VectorFile(4), "control at the reference", name="lqr_controller/u_ref_file"
+    )
+    max_jump: float = parameter(
+        Number("m", above=0.0),
+        "how far from its vehicle a new reference may be",
+        3.0,
+        "lqr_controller/reference/max_jump",
+    )
+
+
+class SwarmNode(Node):
+    """Fly vehicles of one model of 7 states; each has its own topics.
+
+    Parameters
+    ----------
+    vehicles : sequence of Vehicle
+    model : str
+        Of `MODELS`.
+    """
+
+    needed_in_flight = True
+
+    def __init__(self, vehicles: tuple[Vehicle, ...], model: str):
+        self._vehicles = vehicles
+        self._model = model
+        self._ticks = 0
+        self._measured: tuple[float, NDArray[np.float64]] | None = None
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(SwarmParameters)
+        if not is_memoryless(self._parameters.K, self._parameters.u_ref):
+            raise ParameterError(
+                f"{handle.name}: the gains' height loop overshoots, so that each vehicle needs a "
+                "controller of its own; fly it with together:=false"
+            )
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._start = handle.time()
+        places = [vehicle.position for vehicle in self._vehicles]
+        self._batch = BatchVehicles(MODELS[self._model](), places, self._start)
+        self._references = []
+        self._states, self._controls = [], []
+        self._tf = handle.publisher("/tf", TFMessage)
+        if parameters.publishes_clock:
+            self._set_clock = handle.clock_publisher()
+        for number, vehicle in enumerate(self._vehicles):
+            self._register_vehicle(handle, number, f"/{vehicle.name}/")
+        if parameters.publishes_clock:
+            factor = parameters.real_time_factor
+            period = parameters.time_step / factor if factor > 0.0 else 0.0
+            handle.timer(period, self._on_clock_timer, steady=True)
+        else:
+            handle.timer(parameters.time_step, lambda: self._fly_to(handle.time()))
+
+    def _register_vehicle(self, handle, number, below):
+        def warn(text: str) -> None:
+            handle.warn(below + SAFE_REFERENCE + ": " + text, throttle=1.0, key=(below, "jump"))
+
+        reference = GuardedReference(YAW, self._parameters.max_jump, warn)
+        self._references.append(reference)
+        self._states.append(handle.publisher(below + STATE, PositionVelocityYawStateStamped))
+        self._controls.append(handle.publisher(below + LQR_CONTROL, ControlStamped))
+        handle.subscribe(
+            below + FINAL_CONTROL,
+            ControlStamped,
+            partial(self._on_control, number),
+            finite="control",
+        )
+        handle.subscribe(
+            below + SAFE_REFERENCE,
+            PositionVelocityStateStamped,
+            partial(self._on_reference, reference),
+            finite="state",
+            on_invalid=lambda: reference.invalidate(handle.time()),
+        )
+        handle.subscribe(
+            f"{below}{REFERENCE}_descent",
+            PositionVelocityStateStamped,
+            partial(self._on_descent, reference),
+            finite="state",
+        )
+
+    def _on_control(self, number, message):
+        control = message.control
+        u = (control.roll, control.pitch, control.yaw_dot, control.thrust)
+        self._batch.command(number, u, self._handle.time())
+
+    def _on_reference(self, reference, message):
+        x_ref = np.append(to_vector(message.state), 0.0)
+        reference.update(x_ref, message.header.stamp.to_sec(), self._handle.stamp().to_sec())
+
+    def _on_descent(self, reference, message):
+        reference.descend(np.append(to_vector(message.state), 0.0), self._handle.time())
+
+    # What time brings.
+
+    def _on_clock_timer(self):
+        self._ticks += 1
+        now = self._start + self._ticks * self._parameters.time_step
+        self._fly_to(now)
+        self._set_clock(now)
+
+    def _fly_to(self, now):
+        skipped = now - self._batch.time - max(MAX_CATCH_UP, self._parameters.time_step)
+        if skipped > 0.0:
+            self._batch.skip(skipped)
+            self._handle.warn(
+                f"time has moved by {skipped:.1f} s too much to simulate; the vehicles skip that",
+                throttle=1.0,
+                key="skipped time",
+            )
+        self._batch.advance_to(now)
+        time = self._batch.time
+        if self._measured is not None and time == self._measured[0]:
+            return
+        states = self._batch.states
+        header = Header(0, self._handle.stamp(time), self._parameters.fixed_frame)
+        if self._tf.has_subscribers():
+            self._tf.publish(TFMessage(self._transforms(header, states)))
+        before, self._measured = self._measured, (time, states)
+        if before is not None and time > before[0]:
+            self._control(header, _estimates(*before, time, states))
+
+    def _transforms(self, header, states):
+        tilts = self._batch.tilts.tolist()
+        return [
+            TransformStamped(
+                header,
+                vehicle.name,
+                Transform(
+                    Vector3(x, y, z), Quaternion(*quaternion_from_rpy(roll, pitch, yaw))
+                ),
+            )
+            for vehicle, (x, y, z, _, _, _, yaw), (roll, pitch) in zip(
+                self._vehicles, states.tolist(), tilts, strict=True
+            )
+        ]
+
+    def _control(self, header, estimates):
+        rows = estimates.tolist()
+        for publisher, row in zip(self._states, rows, strict=True):
+            if publisher.has_subscribers():
+                state = PositionVelocityYawState(*row)
+                publisher.publish(PositionVelocityYawStateStamped(header, state))
+        now = self._handle.time()
+        found = [
+            (number, x_ref)
+            for number, reference in enumerate(self._references)
+            if (x_ref := reference.value(now, estimates[number])) is not None
+        ]
+        if not found:
+            return
+        numbers, x_refs = zip(*found, strict=True)
+        parameters = self._parameters
+        controls = batch_control(
+            parameters.K, parameters.u_ref, estimates[list(numbers)], np.array(x_refs)
+        )
+        header = Header(0, header.stamp, "")
+        for number, row in zip(numbers, controls.tolist(), strict=True):
+            self._controls[number].publish(ControlStamped(header, Control(*row)))
+
+
+def _estimates(
+    time_before: float, before: NDArray[np.float64], time: float, states: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return the states as finite differences of poses know them, shape (n, 7)."""
+    estimates = states.copy()
+    estimates[:, 3:6] = (states[:, :3] - before[:, :3]) / (time - time_before)
+    estimates[:, YAW] = wrap_to_pi(states[:, YAW])
+    return estimates

@@ -1,0 +1,78 @@
+"""A process of virtual vehicles, and of a motion capture system that sees them."""
+
+from crazyflie_fleet.fleet_parameters import FleetParameters
+from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
+from crazyflie_utils.parameter_types import Integer, Number
+from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
+from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
+from mocap_optitrack.mocap_node import MocapNode
+
+_UDP_PORT = Integer(1, 65535)
+_FRACTION = Number(minimum=-0.5, maximum=0.5)
+
+
+class VirtualFleetParameters(FleetParameters):
+    """What the process is told."""
+
+    observer_port: int = parameter(_UDP_PORT, "UDP port of the vehicles' true poses", 19800)
+    command_port: int = parameter(_UDP_PORT, "UDP port of motion capture", 1510)
+    data_port: int = parameter(_UDP_PORT, "UDP port of its stream", 1511)
+    mass_error: float = parameter(_FRACTION, "how much heavier than nominal they are", 0.05)
+    thrust_error: float = parameter(_FRACTION, "how much more their rotors lift", -0.05)
+    position_noise: float = parameter(Number("m", minimum=0.0), "of motion capture", 0.0002)
+    attitude_noise: float = parameter(Number("rad", minimum=0.0), "of motion capture", 0.001)
+
+
+def make_nodes(handle: NodeHandle) -> dict[str, Node]:
+    """Return all nodes of the process by name, and set the parameters that they will load.
+
+    Raises
+    ------
+    ParameterError
+        A parameter, or the fleet file, is wrong.
+    """
+    told = handle.load(VirtualFleetParameters)
+    if not told.virtual_port:
+        raise ParameterError(f"parameter {handle.name}/fleet/virtual_port is 0; expected a port")
+    nodes: dict[str, Node] = {}
+    bodies = {}
+    for number, vehicle in enumerate(told.fleet().vehicles):
+        x, y, z = vehicle.position
+        if z != 0.0:
+            handle.warn(f"{vehicle.name} stands on the ground, and not at a height of {z:g} m")
+        name = f"{handle.name}/{vehicle.name}"
+        handle.set_param(
+            name,
+            {
+                "port": told.virtual_port + number,
+                "init": {"x": x, "y": y},
+                "mass_error": told.mass_error,
+                "thrust_error": told.thrust_error,
+                "seed": number,
+                "observer": {
+                    "port": told.observer_port,
+                    "name": vehicle.name,
+                    "id": number + 1,
+                },
+            },
+        )
+        nodes[name] = VirtualCrazyflieNode()
+        bodies[vehicle.name] = {
+            "parent_frame_id": told.fixed_frame,
+            "child_frame_id": vehicle.mocap_frame,
+        }
+    ports = {"command_port": told.command_port, "data_port": told.data_port}
+    noise = {"position": told.position_noise, "attitude": told.attitude_noise}
+    own = {**ports, "observer": {"port": told.observer_port}, "noise": noise}
+    handle.set_param(f"{handle.name}/mocap", own)
+    nodes[f"{handle.name}/mocap"] = VirtualMocapNode()
+    local = {"server_address": "127.0.0.1", "local_address": "127.0.0.1"}
+    client = {
+        "backend": "natnet",
+        "up_axis": "z",
+        "rigid_bodies": bodies,
+        "optitrack_config": {**ports, **local},
+    }
+    handle.set_param("/mocap_node", client)
+    nodes["/mocap_node"] = MocapNode()
+    return nodes

@@ -1,0 +1,51 @@
+"""The way from one point of rest to another."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crazyflie_utils.refusal import RefusalError
+
+MAX_SPEED = 2.0
+"""Fastest that a way may be, m/s: controllers with the default gains follow it."""
+
+_PEAK = 15.0 / 8.0
+"""Peak speed of a minimum-jerk way, in distances per duration."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A straight line that begins and ends at rest, with the least jerk.
+
+    Position along it is 10 s^3 - 15 s^4 + 6 s^5 with s = t / duration (Flash and Hogan, The
+    coordination of arm movements, 1985).
+
+    Attributes
+    ----------
+    start, goal : (3,) array
+        m.
+    duration : float
+        s, > 0.
+    """
+
+    start: NDArray[np.float64]
+    goal: NDArray[np.float64]
+    duration: float
+
+    def __post_init__(self) -> None:
+        """Raise `RefusalError` if it would be too fast."""
+        distance = float(np.linalg.norm(self.goal - self.start))
+        needed = _PEAK * distance / MAX_SPEED
+        if not 0.0 < self.duration or needed > self.duration:
+            raise RefusalError(
+                f"{distance:.2f} m in {self.duration:g} s; expected a duration of at least "
+                f"{needed:.2f} s (at most {MAX_SPEED:g} m/s)"
+            )
+
+    def at(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return position (m) and velocity (m/s), shape (3,), some time (s) after the start."""
+        s = min(max(time / self.duration, 0.0), 1.0)
+        path = self.goal - self.start
+        position = self.start + path * (s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
+        return position, path * (30.0 * s * s * (1.0 - s) ** 2 / self.duration)

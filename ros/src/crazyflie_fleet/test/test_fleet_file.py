@@ -1,0 +1,224 @@
+"""Fleet files: what is read, what is inherited, what is refused, and where messages point."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rospkg
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crazyflie_fleet import fleet_file
+from crazyflie_fleet.fleet import DOWNWASH, LogTopic, close_pairs
+from crazyflie_fleet.settings import same_vehicle
+from crazyflie_utils import ParameterError
+
+EXAMPLE = Path(rospkg.RosPack().get_path("crazyflie_fleet")) / "config" / "example.yaml"
+
+TWO = """\
+robots:
+  cf1:
+    uri: radio://0/80/2M/E7E7E7E701
+    initial_position: [0, 0, 0]
+  cf2:
+    uri: radio://0/80/2M/E7E7E7E702
+    initial_position: [0, 1, 0]
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load(text):
+        path = tmp_path / "fleet.yaml"
+        path.write_text(text)
+        return fleet_file.load(path)
+
+    return load
+
+
+def complaints_of(load, text):
+    with pytest.raises(ParameterError) as caught:
+        load(text)
+    return [text.partition("fleet.yaml")[2] for text in caught.value.complaints]
+
+
+def test_the_example():
+    fleet = fleet_file.load(EXAMPLE)
+    assert fleet.names == ("cf1", "cf2")
+    assert fleet.disabled == ("cf3",)
+    second = fleet["cf2"]
+    assert second.position == (0.0, 1.0, 0.0)
+    assert second.hover_point == (0.0, 1.0, 1.0)
+    assert second.uri == "radio://0/80/2M/E7E7E7E702"
+    assert second.mocap_frame == "cf2"
+    assert second.firmware_params["locSrv.extPosStdDev"] == 0.001
+    assert second.log_topics == (
+        LogTopic("motors", 10.0, ("motor.m1", "motor.m2", "motor.m3", "motor.m4")),
+    )
+    assert second.default_topics == ("battery", "pose")
+    assert fleet["cf1"].log_topics == ()
+    assert fleet.remarks == ()
+
+
+def test_the_nearest_one_counts(load):
+    fleet = load(
+        TWO
+        + "    type: big\n    firmware_params: {a: {x: 3}}\n"
+        + "robot_types:\n  big: {buffer: 0.4, hover_height: 2, firmware_params: {a: {x: 2, y: 2}}}\n"
+        + "all: {buffer: 0.1, firmware_params: {a: {x: 1, y: 1, z: 1}}}\n"
+    )
+    assert [vehicle.buffer for vehicle in fleet.vehicles] == [0.1, 0.4]
+    assert fleet["cf1"].firmware_params == {"a.x": 1, "a.y": 1, "a.z": 1}
+    assert fleet["cf2"].firmware_params == {"a.x": 3, "a.y": 2, "a.z": 1}
+    assert fleet["cf2"].settings.hover_height == 2.0
+
+
+def test_what_has_no_effect_is_remarked(load):
+    logging = "all:\n  broadcasts: {num_repeats: 15}\n  firmware_logging:\n    default_topics:\n"
+    fleet = load(TWO + logging + "      odom: {frequency: 10}\n      status: {frequency: 1}\n")
+    (remark,) = fleet.remarks
+    assert remark.endswith(
+        "fleet.yaml:12: all/firmware_logging/default_topics/odom is not offered by the driver, "
+        "and left out"
+    )
+    assert fleet["cf1"].default_topics == ("battery",)
+
+
+def test_logging_may_be_off(load):
+    off = "all: {firmware_logging: {enabled: false, default_topics: {imu: {}}}}\n"
+    assert load(TWO + off)["cf1"].default_topics == ("battery",)
+
+
+def test_simulated_vehicles_need_no_address(load):
+    assert load("robots: {a: {initial_position: [0, 0, 0]}}\n")["a"].uri is None
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (
+            TWO.replace("cf2", "cf1"),
+            ":6: robots/cf1 is there twice, first in line 3",
+        ),
+        (
+            TWO.replace("radio://0/80/2M/E7E7E7E701", "udp://a:1").replace(
+                "radio://0/80/2M/E7E7E7E702", "udp://a:1"
+            ),
+            ":6: robots/cf2/uri is udp://a:1, as that of cf1 in line 3; expected an address ",
+        ),
+        (
+            TWO.replace("[0, 1, 0]", "[0, 0.2, 0]"),
+            ":7: robots/cf2/initial_position is 0.2 m from that of cf1 in line 4; expected at "
+            "least 0.3 m, their collision buffers",
+        ),
+        (TWO + "    colour: red\n", ":8: robots/cf2/colour is not known; expected one of "),
+        (
+            TWO + "    type: cf21\n",
+            ":8: robots/cf2/type is 'cf21'; expected none, as there are no types",
+        ),
+        (
+            TWO + "    type: b\nrobot_types: {a: {}}\n",
+            ":8: robots/cf2/type is 'b'; expected one of a",
+        ),
+        (TWO + "robot_typs: {}\n", ":8: robot_typs is not known; expected one of robots, "),
+        (TWO + "all: {buffer: 0}\n", ":8) is 0; expected a finite number > 0 (m)"),
+        (TWO + "all: {bufer: 1}\n", ":8: all/bufer is not known; expected one of "),
+        (
+            TWO + "all: {firmware_params: {a: {b: much}}}\n",
+            ":8: all/firmware_params/a/b is 'much'; expected a finite number",
+        ),
+        (
+            TWO + "all: {firmware_params: {a: 3}}\n",
+            ":8: all/firmware_params/a is 3; expected a mapping",
+        ),
+        (
+            TWO + "all: {firmware_logging: {default_topics: {smell: {}}}}\n",
+            ":8: all/firmware_logging/default_topics/smell is not known; expected one of imu, ",
+        ),
+        (
+            TWO + "all: {firmware_logging: {custom_topics: {a: {frequency: 1000, vars: [b.c]}}}}\n",
+            ":8) is 1000; expected a finite number >= 0.4 and <= 100 (Hz)",
+        ),
+        (TWO.replace("cf2", "all"), ":6: robots/all is 'all'; expected letters, digits and "),
+        (TWO.replace("cf2", "cf-2"), ":6: robots/cf-2 is 'cf-2'; expected letters, digits and "),
+        (
+            TWO.replace("80/2M", "80/3M", 1),
+            ":3) is 'radio://0/80/3M/E7E7E7E701'; expected radio://DONGLE/CHANNEL/RATE/ADDRESS",
+        ),
+        (TWO + "    enabled: maybe\n", ":8) is 'maybe'; expected true or false"),
+        (TWO + "    initial_position: [0, 1]\n", ":8: robots/cf2/initial_position is there twice"),
+        (
+            "robots: {a: {}}\n",
+            ":1) is not set; expected a list of 3, each entry a finite number (m)",
+        ),
+        (
+            "robots: {a: {enabled: false, initial_position: [0, 0, 0]}}\n",
+            ":1: robots has no vehicle that is enabled",
+        ),
+        (
+            TWO + "all: {battery: {voltage_critical: 3.5}}\n",
+            ":8: all: battery/voltage_critical is 3.5; expected not more than ",
+        ),
+        (TWO + "    machine: far\n", ":8: robots/cf2/machine is 'far'; expected none, as there"),
+        ("cf1: {}\n", ":1: the file has no robots; it has cf1"),
+    ],
+)
+def test_what_is_wrong_is_named_with_its_line(load, text, expected):
+    assert complaints_of(load, text)[0].startswith(expected)
+
+
+def test_what_is_inherited_is_wrong_once(load):
+    assert len(complaints_of(load, TWO + "all: {buffer: -1, model: box}\n")) == 2
+
+
+def test_disabled_vehicles_may_be_anywhere(load):
+    assert load(TWO.replace("[0, 1, 0]", "[0, 0, 0]\n    enabled: false")).names == ("cf1",)
+
+
+def test_addresses_are_of_vehicles_and_not_of_dongles():
+    assert same_vehicle("radio://0/80/2M/E7E7E7E701") == same_vehicle("radio://1/80/2M/e7e7e7e701")
+    assert same_vehicle("radio://0/80/2M/E7E7E7E701") != same_vehicle("radio://0/81/2M/E7E7E7E701")
+    assert same_vehicle("radio://0/80/2M") == same_vehicle("radio://0/80/2M/E7E7E7E7E7")
+
+
+@given(st.integers(1, 120))
+def test_a_grid(n):
+    fleet = fleet_file.grid(n)
+    assert len(set(fleet.names)) == len({vehicle.uri for vehicle in fleet.vehicles}) == n
+    places = np.array([vehicle.position for vehicle in fleet.vehicles])
+    assert len({*map(tuple, places)}) == n
+    assert np.abs(places).max() <= math.sqrt(n) / 2 + 0.5
+
+
+@pytest.mark.parametrize(("arguments", "text"), [((0,), "at least one"), ((9, 0.2), "0.2 m from")])
+def test_no_grid(arguments, text):
+    with pytest.raises(ParameterError, match=text):
+        fleet_file.grid(*arguments)
+
+
+COORDINATE = st.floats(-1.0, 1.0)
+
+
+@given(
+    st.lists(
+        st.tuples(COORDINATE, COORDINATE, COORDINATE, st.floats(0.05, 0.5)), min_size=1, max_size=12
+    )
+)
+def test_pairs_are_those_that_overlap(rows):
+    table = np.array(rows)
+    scaled = table[:, :3] / (1.0, 1.0, DOWNWASH)
+    expected = {
+        (i, j)
+        for j in range(len(rows))
+        for i in range(j)
+        if math.dist(scaled[i], scaled[j]) < table[i, 3] + table[j, 3] - 1e-12
+    }
+    assert expected <= {pair[:2] for pair in close_pairs(table[:, :3], table[:, 3])}
+
+
+def test_one_above_the_other_needs_more_distance():
+    apart = ((0.0, 0.0, 0.0), (0.0, 0.5, 0.0))
+    above = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5))
+    assert not list(close_pairs(np.array(apart), [0.2, 0.2]))
+    assert [pair[:2] for pair in close_pairs(np.array(above), [0.2, 0.2])] == [(0, 1)]

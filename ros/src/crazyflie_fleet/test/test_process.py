@@ -1,0 +1,142 @@
+"""The process that flies a fleet, without ROS: all nodes on hand-moved time."""
+
+from concurrent.futures import Future
+from pathlib import Path
+
+import pytest
+import rospkg
+import rospy
+from geometry_msgs.msg import Point
+from std_srvs.srv import EmptyRequest
+
+from crazyflie_driver.srv import GoToRequest
+from crazyflie_fleet.process import make_nodes
+from crazyflie_utils import ParameterError, ServiceError
+from crazyflie_utils.testing import FakeProcess
+
+GAINS = Path(rospkg.RosPack().get_path("crazyflie_lqr")) / "config"
+NODES = {
+    "simulator": {"time_step": 0.02},
+    "state_estimator": {"time_step": 0.02},
+    "takeoff_server": {"duration": {"hover": 3.0}},
+    "lqr_controller": {
+        "K_file": str(GAINS / "K_hover.txt"),
+        "u_ref_file": str(GAINS / "u_ref_hover.txt"),
+    },
+}
+
+
+class Swarm:
+    """A simulated fleet."""
+
+    def __init__(self, nodes=NODES, **parameters):
+        self.process = FakeProcess()
+        self.process.transport.set_param(
+            "/fleet", {"simulated": True, "nodes": nodes, **parameters}
+        )
+        self.nodes = make_nodes(self.process.handle("/fleet"))
+        for name, node in self.nodes.items():
+            assert self.process.launch(node, name), self.process.logged("error")
+        self.process.advance(0.6)
+
+    def call(self, service, request=None, seconds=4.1):
+        answer = self.process.call(service, request or EmptyRequest())
+        if isinstance(answer, Future):
+            self.process.advance(seconds)
+            answer = answer.result(0)
+        return answer
+
+    def position(self, name):
+        state = self.process.published(f"/{name}/state")[-1].state
+        return state.x, state.y, state.z
+
+
+def go_to(z, relative):
+    return GoToRequest(0, relative, Point(0.3, 0.0, z), 0.0, rospy.Duration(2.0))
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_all_take_off_go_and_land(together):
+    swarm = Swarm(together=together, fleet={"n": 3})
+    swarm.call("/all/takeoff")
+    assert swarm.position("cf3") == pytest.approx((0.5, -0.5, 1.0), abs=0.1)
+    swarm.call("/all/go_to", go_to(0.2, relative=True))
+    swarm.process.advance(2.5)
+    assert swarm.position("cf1") == pytest.approx((-0.2, -0.5, 1.2), abs=0.1)
+    with pytest.raises(ServiceError, match="3 of 3 vehicles: cf1: .*refused"):
+        swarm.call("/takeoff_all")
+    swarm.call("/cf2/land", seconds=6.0)
+    assert swarm.position("cf2")[2] == pytest.approx(0.0, abs=0.02)
+    with pytest.raises(ServiceError, match="1 of 3 vehicles: cf2: /cf2/land refused"):
+        swarm.call("/land_all", seconds=6.0)
+    assert swarm.position("cf3")[2] == pytest.approx(0.0, abs=0.02)
+
+
+def test_together_they_fly_as_each_alone():
+    flights = []
+    for together in (True, False):
+        swarm = Swarm(together=together, fleet={"n": 2})
+        swarm.call("/all/takeoff")
+        states = [m.state for m in swarm.process.published("/cf2/state")]
+        flights.append([(s.x, s.y, s.z, s.x_dot, s.y_dot, s.z_dot, s.yaw) for s in states])
+    first, second = flights
+    # Who does all at once answers a pose at once, and not at the next tick of an estimator.
+    assert first[-1] == pytest.approx(second[-1], abs=1e-3)
+    assert max(row[2] for row in first) == pytest.approx(max(row[2] for row in second), abs=0.02)
+
+
+def test_one_message_on_tf_for_all():
+    swarm = Swarm(fleet={"n": 4})
+    count = len(swarm.process.published("/tf"))
+    swarm.process.advance(0.1)
+    messages = swarm.process.published("/tf")[count:]
+    assert len(messages) == 5
+    assert [t.child_frame_id for t in messages[-1].transforms] == ["cf1", "cf2", "cf3", "cf4"]
+
+
+def test_all_cannot_go_to_one_place():
+    swarm = Swarm(fleet={"n": 2})
+    with pytest.raises(ServiceError, match="all vehicles cannot go to one place; expected relat"):
+        swarm.call("/all/go_to", go_to(1.0, relative=False))
+
+
+def test_emergency_stops_all():
+    swarm = Swarm(fleet={"n": 2})
+    swarm.call("/all/takeoff")
+    swarm.call("/all/emergency")
+    swarm.process.advance(1.0)
+    assert swarm.position("cf1")[2] == swarm.position("cf2")[2] == 0.0
+
+
+def test_models_are_mixed(tmp_path):
+    file = tmp_path / "fleet.yaml"
+    file.write_text(
+        "robots:\n  a: {initial_position: [0, 0, 0], model: coupled_7d}\n"
+        "  b: {initial_position: [0, 1, 0]}\n"
+        "  c: {initial_position: [0, 2, 0], model: quadrotor}\n"
+    )
+    quadrotor = {"lqr_controller": {"K_file": str(GAINS / "K_quadrotor.txt")}}
+    swarm = Swarm(fleet={"file": str(file)}, models={"quadrotor": quadrotor})
+    assert {"/fleet/near_hover", "/fleet/coupled_7d", "/c/simulator"} <= set(swarm.nodes)
+    assert "/a/simulator" not in swarm.nodes
+    swarm.call("/all/takeoff")
+    for name, y in (("a", 0.0), ("b", 1.0), ("c", 2.0)):
+        assert swarm.position(name) == pytest.approx((0.0, y, 1.0), abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "text"),
+    [
+        ({"fleet": {"file": "/none.yaml"}}, "/none.yaml: cannot be read"),
+        ({"fleet": {"n": 0}}, "/fleet/fleet/n is 0; expected an integer from 1 to 1000"),
+        ({"fleet": {"machine": "x"}}, "is flown by the machine 'x'"),
+        (
+            {"nodes": {**NODES, "simulator": {"time_step": 0.02, "mocap": {"dropout": 0.1}}}},
+            "/fleet/nodes/simulator/mocap/dropout has no effect on vehicles that are flown tog",
+        ),
+        ({"nodes": 3}, "/fleet/nodes is 3; expected a dictionary of dictionaries"),
+    ],
+)
+def test_bad_parameters(parameters, text):
+    with pytest.raises(ParameterError, match=text):
+        Swarm(**parameters)

@@ -1,0 +1,148 @@
+"""The node that leads vehicles along ways, and apart."""
+
+import math
+
+import pytest
+import rospy
+from geometry_msgs.msg import Point
+from std_msgs.msg import String
+
+from crazyflie_driver.srv import GoToRequest
+from crazyflie_fleet import fleet_file
+from crazyflie_fleet.references_node import ReferencesNode
+from crazyflie_msgs.msg import (
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
+from crazyflie_utils import ServiceError
+from crazyflie_utils.testing import FakeProcess
+
+
+class Flight:
+    """Two vehicles, cf1 and cf2, 1 m apart along y."""
+
+    def __init__(self):
+        self.process = FakeProcess()
+        node = ReferencesNode(fleet_file.grid(2).vehicles, "world")
+        assert self.process.launch(node, "/fleet/references")
+        for name, y in (("cf1", 0.0), ("cf2", 1.0)):
+            self.process.publish(f"/{name}/in_flight_state", String("flying"))
+            self.see(name, y)
+
+    def see(self, name, y):
+        state = PositionVelocityYawState(y=y, z=1.0)
+        self.process.publish(f"/{name}/state", PositionVelocityYawStateStamped(state=state))
+
+    def want(self, name, y):
+        state = PositionVelocityState(y=y, z=1.0)
+        message = PositionVelocityStateStamped(state=state)
+        message.header.stamp = self.process.clock.stamp()
+        self.process.publish(f"/{name}/ref", message)
+        return message
+
+    def go_to(self, name="cf1", goal=(0.0, 0.5, 1.0), seconds=2.0, yaw=0.0, relative=False):
+        return self.process.call(
+            f"/{name}/go_to",
+            GoToRequest(0, relative, Point(*goal), yaw, rospy.Duration(seconds)),
+        )
+
+    def followed(self, name):
+        return self.process.published(f"/{name}/ref_safe")
+
+
+@pytest.fixture
+def flight():
+    return Flight()
+
+
+def test_references_pass_as_they_are(flight):
+    wanted = flight.want("cf1", 0.3)
+    assert flight.followed("cf1") == [wanted]
+    invalid = PositionVelocityStateStamped(state=PositionVelocityState(x=math.nan))
+    flight.process.publish("/cf1/ref", invalid)
+    assert math.isnan(flight.followed("cf1")[-1].state.x)
+
+
+def test_who_would_come_too_close_waits_where_it_is(flight):
+    flight.want("cf1", 0.9)
+    flight.see("cf1", 0.8)
+    flight.process.advance(0.06)
+    held = flight.followed("cf1")[-1]
+    assert (held.state.y, held.state.y_dot) == (0.8, 0.0)
+    flight.want("cf1", 0.95)
+    assert flight.followed("cf1")[-1] is held
+    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    assert flight.process.logged("warn") == [
+        "/fleet/references: cf1 and cf2 are 0.20 m apart and must not come closer than 0.30 m: "
+        "whom its reference leads nearer waits"
+    ]
+
+
+def test_it_goes_on_when_there_is_room(flight):
+    flight.want("cf1", 0.9)
+    flight.see("cf1", 0.8)
+    flight.process.advance(0.06)
+    flight.see("cf2", 2.0)
+    flight.process.advance(0.06)
+    again = flight.followed("cf1")[-1]
+    assert again.state.y == 0.9
+    assert again.header.stamp > flight.followed("cf1")[0].header.stamp
+    assert flight.process.published("/fleet/waiting")[-1].data == ""
+
+
+def test_a_way_back_is_open(flight):
+    flight.want("cf1", 0.9)
+    flight.see("cf1", 0.8)
+    flight.process.advance(0.06)
+    flight.want("cf1", 0.0)
+    flight.process.advance(0.06)
+    assert flight.followed("cf1")[-1].state.y == 0.0
+
+
+def test_go_to(flight):
+    flight.want("cf1", 0.0)
+    flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
+    flight.process.advance(1.0)
+    middle = flight.followed("cf1")[-1].state
+    assert (middle.y, middle.z) == (pytest.approx(0.25, abs=0.01), 1.0)
+    assert middle.y_dot == pytest.approx(0.5 / 2.0 * 15.0 / 8.0, abs=0.01)
+    flight.process.advance(1.1)
+    end = flight.followed("cf1")[-1].state
+    assert (end.y, end.y_dot) == (pytest.approx(0.5), 0.0)
+    assert len(flight.followed("cf1")) == pytest.approx(101, abs=1)
+
+
+def test_go_to_relative_and_another_reference_ends_it(flight):
+    flight.go_to("cf2", goal=(0.0, 0.5, 0.0), relative=True)
+    flight.process.advance(0.5)
+    assert 1.0 < flight.followed("cf2")[-1].state.y < 1.5
+    wanted = flight.want("cf2", 1.2)
+    flight.process.advance(0.5)
+    assert flight.followed("cf2")[-1] is wanted
+
+
+def test_a_landing_ends_a_way(flight):
+    flight.go_to()
+    flight.process.advance(0.1)
+    flight.process.publish("/cf1/in_flight_state", String("descending"))
+    count = len(flight.followed("cf1"))
+    flight.process.advance(1.0)
+    assert len(flight.followed("cf1")) == count
+
+
+def test_go_to_is_refused(flight):
+    with pytest.raises(ServiceError, match=r"/cf1/go_to refused: 0.50 m in 0.1 s; expected a dur"):
+        flight.go_to(seconds=0.1)
+    with pytest.raises(ServiceError, match="expected finite numbers"):
+        flight.go_to(goal=(math.nan, 0.0, 1.0))
+    with pytest.raises(ServiceError, match="the yaw is 1; expected 0"):
+        flight.go_to(yaw=1.0)
+    flight.process.advance(0.6)
+    with pytest.raises(ServiceError, match="/cf1/go_to refused: the vehicle is not in flight"):
+        flight.go_to()
+    flight.process.publish("/cf2/in_flight_state", String("on_ground"))
+    flight.see("cf2", 1.0)
+    with pytest.raises(ServiceError, match="/cf2/go_to refused: the vehicle is not in flight"):
+        flight.go_to("cf2")

@@ -1,0 +1,98 @@
+"""Who waits so that no two vehicles meet, and the ways they are led along."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crazyflie_fleet.separation import LOOK_AHEAD, Separation
+from crazyflie_fleet.way import MAX_SPEED, Way
+from crazyflie_utils.refusal import RefusalError
+
+STILL = np.zeros((2, 3))
+APART = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 1.0]])
+CLOSE = np.array([[0.0, 0.0, 1.0], [0.0, 0.25, 1.0]])
+
+
+def waiting(positions, velocities, goals, buffers=(0.15, 0.15)):
+    waits, pairs = Separation(buffers).waiting(*map(np.array, (positions, velocities, goals)))
+    return waits.tolist(), [(pair.first, pair.second) for pair in pairs]
+
+
+def test_vehicles_that_are_apart_go_where_they_want():
+    assert waiting(APART, STILL, APART[::-1]) == ([False, False], [])
+
+
+def test_who_is_led_nearer_waits():
+    assert waiting(CLOSE, STILL, [CLOSE[1], [0.0, 1.0, 1.0]]) == ([True, False], [(0, 1)])
+    assert waiting(CLOSE, STILL, [CLOSE[1], CLOSE[0]]) == ([True, True], [(0, 1)])
+
+
+def test_a_pair_may_part():
+    assert waiting(CLOSE, STILL, [[0.0, -1.0, 1.0], [0.0, 1.0, 1.0]])[0] == [False, False]
+
+
+def test_speed_counts():
+    towards = np.array([[0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+    near = np.array([[0.0, 0.0, 1.0], [0.0, 0.29 + 2.0 * LOOK_AHEAD, 1.0]])
+    assert waiting(near, towards, near[::-1])[0] == [True, True]
+    assert waiting(near, STILL, near[::-1])[0] == [False, False]
+
+
+def test_one_above_the_other_needs_more_distance():
+    above = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.5]])
+    assert waiting(above, STILL, above[::-1])[0] == [True, True]
+
+
+def test_who_waits_goes_on_only_with_some_more_distance():
+    separation = Separation([0.15, 0.15])
+    wanted = CLOSE[::-1]
+    assert separation.waiting(CLOSE, STILL, wanted)[0].all()
+    just_apart = np.array([[0.0, 0.0, 1.0], [0.0, 0.31, 1.0]])
+    assert separation.waiting(just_apart, STILL, just_apart[::-1])[0].all()
+    far_enough = np.array([[0.0, 0.0, 1.0], [0.0, 0.34, 1.0]])
+    assert not separation.waiting(far_enough, STILL, far_enough[::-1])[0].any()
+
+
+def test_who_is_not_seen_is_not_regarded():
+    unseen = np.array([[0.0, 0.0, 1.0], [np.nan] * 3])
+    assert waiting(unseen, STILL, unseen) == ([False, False], [])
+
+
+COORDINATE = st.floats(-3.0, 3.0)
+PLACE = st.tuples(COORDINATE, COORDINATE, COORDINATE)
+
+
+@given(st.lists(st.tuples(PLACE, PLACE), min_size=2, max_size=8))
+def test_nobody_is_led_nearer_to_one_who_is_too_close(rows):
+    positions, goals = (np.array(part) for part in zip(*rows, strict=True))
+    waits, _ = waiting(positions, np.zeros_like(positions), goals, [0.4] * len(rows))
+    scale = np.array([1.0, 1.0, 0.5])
+    for i in range(len(rows)):
+        for j in range(len(rows)):
+            between = (positions[j] - positions[i]) * scale
+            leads_nearer = (goals[i] - positions[i]) * scale @ between > 1e-9
+            if i != j and np.linalg.norm(between) < 0.8 - 1e-9 and leads_nearer:
+                assert waits[i]
+
+
+@given(PLACE, PLACE, st.floats(0.0, 1.0))
+def test_a_way_is_smooth_and_not_too_fast(start, goal, share):
+    start, goal = np.array(start), np.array(goal)
+    duration = 15.0 / 8.0 * float(np.linalg.norm(goal - start)) / MAX_SPEED + 0.1
+    way = Way(start, goal, duration)
+    assert way.at(0.0)[0] == pytest.approx(start)
+    assert way.at(2.0 * duration)[0] == pytest.approx(goal)
+    for time in (0.0, duration):
+        assert way.at(time)[1] == pytest.approx(np.zeros(3))
+    time = share * duration
+    position, velocity = way.at(time)
+    assert np.linalg.norm(velocity) <= MAX_SPEED
+    step = 1e-6
+    assert (way.at(time + step)[0] - position) / step == pytest.approx(velocity, abs=1e-3)
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, 0.9, float("nan")])
+def test_no_way(duration):
+    with pytest.raises(RefusalError, match="expected a duration of at least 0.94 s"):
+        Way(np.zeros(3), np.array([1.0, 0.0, 0.0]), duration)

@@ -23,7 +23,7 @@ from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.parameter_types import FINITE
 from crazyflie_utils.runtime.transforms import TransformError
 
-CALL_LIMIT = 30.0
+CALL_LIMIT = 60.0
 """How long a service may take, s of the machine's clock."""
 
 MEMORY = 31

@@ -24,7 +24,7 @@ from crazyflie_utils.refusal import RefusalError
 STATE_LIMIT = 0.5
 """A state older than this says nothing, and nor does a setpoint, s."""
 
-_CALL_LIMIT = 60.0
+_CALL_LIMIT = 58.0
 """How long a takeoff or landing of the takeoff server may take, s of the machine's clock."""
 
 _FLYING, _TAKING_OFF, _DESCENDING, _LANDING = "flying", "taking_off", "descending", "landing"

@@ -32,7 +32,7 @@ class Team(Roster):
     def takeoff(self, height: float = 1.0, wait: bool = True) -> None:
         """Climb straight up to a height, m."""
         height = number(height, "takeoff: height", 0.1)
-        courses = {}
+        ways = {}
         for name in self._vehicles:
             if name in self._courses:
                 raise MissionError(f"{name}: takeoff: it flies already; expected it on the ground")
@@ -41,18 +41,19 @@ class Team(Roster):
             bounds.check((x, y, height), f"{name}: takeoff to ({x:.2f}, {y:.2f}, {height:g})")
             way = trajectories.straight((x, y, z), (x, y, height))
             climb = max(_SHORTEST_CLIMB, self._quickest(way))
-            courses[name] = Course(trajectories.stretched(way, climb), self.time())
-        self._check_apart(courses)
+            ways[name] = trajectories.stretched(way, climb)
+        self._check_apart({name: Course(way, self.time()) for name, way in ways.items()})
         # Noted first: what has begun to take off must be landed whatever happens.
-        self._courses.update(courses)
+        self._courses.update({name: Course(way, self.time()) for name, way in ways.items()})
 
         def take_off(name):
-            course = courses[name]
-            return self._vehicles[name].take_off(height, course.end - course.begin)
+            return self._vehicles[name].take_off(height, trajectories.duration(ways[name]))
 
         failures = self._answers(take_off)
-        for name in failures:
-            if self._vehicles[name].has_landed():
+        for name, way in ways.items():
+            # A takeoff server answers after some time, with the height still to be reached.
+            self._courses[name] = Course(way, self.time())
+            if name in failures and self._vehicles[name].has_landed():
                 del self._courses[name]
         refuse("takeoff", failures)
         if wait:

@@ -5,8 +5,9 @@ Run it in a shell that has sourced the workspace:
 
     python3 ros/src/crazyflie_fleet/bench/swarm.py 10 50 100
 
-The vehicles take off and hover in real time, their process on one core. From outside come the periods
-of the final control of three of them; from /proc the processor time of the process. Nothing is
+The vehicles take off and hover in real time, their process on one core. Periods of the final
+control of three of them come from outside;
+the processor time of the process comes from /proc. Nothing is
 asserted: the figures depend on the machine and on its other work.
 """
 
@@ -34,7 +35,13 @@ _TICKS = os.sysconf("SC_CLK_TCK")
 def main() -> int:
     """Measure as the command line asks, and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("numbers", nargs="+", type=int, metavar="N", help="of vehicles; NAME:=VALUE is passed to sw_swarm.launch")
+    parser.add_argument(
+        "numbers",
+        nargs="+",
+        type=int,
+        metavar="N",
+        help="of vehicles; NAME:=VALUE is passed to sw_swarm.launch",
+    )
     parser.add_argument("--seconds", type=float, default=20.0, help="of hovering (20)")
     parser.add_argument("--core", type=int, default=0, help="that flies them (0)")
     parser.add_argument("--json", type=Path, help="write the figures there, too")
@@ -73,7 +80,9 @@ def _measure_and_print(n, options, rest):
             return 1
     _result_file(os.getppid()).write_text(json.dumps(row))
     print(
-        "{n:4d} {start:6.1f} {cpu:6.1f} {p50:5.1f} {p99:5.1f} {max:8.1f} {memory:4.0f}".format(**row),
+        "{n:4d} {start:6.1f} {cpu:6.1f} {p50:5.1f} {p99:5.1f} {max:8.1f} {memory:4.0f}".format(
+            **row
+        ),
         flush=True,
     )
     return 0

@@ -23,9 +23,7 @@ K = np.array(
 PLACES = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.5), (0.0, 1.0, 0.0)]
 ANGLE = st.floats(-0.3, 0.3)
 CONTROL = st.tuples(ANGLE, ANGLE, st.floats(-2.0, 2.0), st.floats(0.0, 16.0))
-EVENT = st.one_of(
-    st.tuples(st.integers(0, 2), CONTROL), st.sampled_from([0.004, 0.01, 0.2, 0.6])
-)
+EVENT = st.one_of(st.tuples(st.integers(0, 2), CONTROL), st.sampled_from([0.004, 0.01, 0.2, 0.6]))
 
 
 @pytest.mark.parametrize("dynamics", [NearHover(), Coupled7D()])
@@ -85,7 +83,9 @@ STATE = st.lists(st.floats(-5.0, 5.0), min_size=7, max_size=7)
 @given(st.lists(st.tuples(STATE, STATE), min_size=1, max_size=4))
 def test_controls(rows):
     x, x_ref = (np.array(part) for part in zip(*rows, strict=True))
-    alone = [IntegralStateFeedback(K, U_REF, 6).control(*row, 0.0) for row in zip(x, x_ref, strict=True)]
+    alone = [
+        IntegralStateFeedback(K, U_REF, 6).control(*row, 0.0) for row in zip(x, x_ref, strict=True)
+    ]
     assert batch_control(K, U_REF, x, x_ref) == pytest.approx(np.array(alone), abs=1e-9)
 
 

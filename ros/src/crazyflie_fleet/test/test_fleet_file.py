@@ -65,7 +65,8 @@ def test_the_nearest_one_counts(load):
     fleet = load(
         TWO
         + "    type: big\n    firmware_params: {a: {x: 3}}\n"
-        + "robot_types:\n  big: {buffer: 0.4, hover_height: 2, firmware_params: {a: {x: 2, y: 2}}}\n"
+        + "robot_types:\n  big: {buffer: 0.4, hover_height: 2, firmware_params: "
+        + "{a: {x: 2, y: 2}}}\n"
         + "all: {buffer: 0.1, firmware_params: {a: {x: 1, y: 1, z: 1}}}\n"
     )
     assert [vehicle.buffer for vehicle in fleet.vehicles] == [0.1, 0.4]

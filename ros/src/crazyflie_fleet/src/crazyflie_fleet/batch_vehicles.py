@@ -31,7 +31,9 @@ class BatchVehicles:
         self._dynamics = dynamics
         self._n = columns.shape[1]
         # Components are arrays, also those that are alike for all at the beginning.
-        self._x = [np.array(np.broadcast_to(c, self._n)) for c in dynamics.initial_state(columns)]
+        self._x = [
+            np.array(np.broadcast_to(c, self._n)) for c in dynamics.initial_state(list(columns))
+        ]
         self._u = np.zeros((4, self._n))
         self._since = np.full(self._n, _NEVER)
         self._next_u = np.zeros((4, self._n))
@@ -92,7 +94,9 @@ class BatchVehicles:
         moved = self._dynamics.step(self._steps, self._x, list(self._effective_control()))
         obeys = self._since != _NEVER
         # A vehicle stays put until its first control.
-        self._x = moved if obeys.all() else [*map(lambda a, b: np.where(obeys, a, b), moved, self._x)]
+        self._x = (
+            moved if obeys.all() else [*map(lambda a, b: np.where(obeys, a, b), moved, self._x)]
+        )
         self._steps += 1
 
     def _effective_control(self):

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -157,7 +158,7 @@ class _Reading:
         except ParameterError as error:
             self._complaints += error.complaints
 
-    def _check_type(self, expected: ParameterType, value, entry):
+    def _check_type(self, expected: ParameterType, value: Any, entry: Entry) -> Any:
         try:
             return expected(value)
         except ValueError:
@@ -190,8 +191,8 @@ class _Reading:
             first, second = (robots[vehicles[k].name]["initial_position"] for k in (i, j))
             self._complain(
                 second,
-                f"is {distance:.3g} m from that of {vehicles[i].name} in line {first.line}; expected "
-                f"at least {limit:.3g} m, their collision buffers",
+                f"is {distance:.3g} m from that of {vehicles[i].name} in line {first.line}; "
+                f"expected at least {limit:.3g} m, their collision buffers",
             )
 
     # What vehicles are.
@@ -261,7 +262,7 @@ def _merged(nodes):
     """Return a mapping with what all say, the last one first; each value keeps its line."""
     if not all(isinstance(node, yaml.MappingNode) for node in nodes):
         return nodes[-1]
-    values: dict[str, list] = {}
+    values: dict[str, list[yaml.Node]] = {}
     keys = {}
     for node in nodes:
         for key, value in node.value:

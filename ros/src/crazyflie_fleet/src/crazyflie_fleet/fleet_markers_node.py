@@ -27,12 +27,8 @@ PERIOD = 1.0
 class FleetMarkersParameters(FleetParameters):
     """Parameters of `FleetMarkersNode`."""
 
-    waiting_topic: str = parameter(
-        TOPIC, "who waits for whom", "/fleet/waiting", "topics/waiting"
-    )
-    markers_topic: str = parameter(
-        TOPIC, "where markers go", "/fleet/markers", "topics/markers"
-    )
+    waiting_topic: str = parameter(TOPIC, "who waits for whom", "/fleet/waiting", "topics/waiting")
+    markers_topic: str = parameter(TOPIC, "where markers go", "/fleet/markers", "topics/markers")
 
 
 class FleetMarkersNode(Node):
@@ -70,9 +66,7 @@ def _markers(number: int, vehicle: Vehicle, waits: bool) -> list[Marker]:
     body.points = [Point(x, y, 0.0) for x in (-_ROTOR, _ROTOR) for y in (-_ROTOR, _ROTOR)]
     size = (2.0 * radius, 2.0 * radius, 2.0 * radius * DOWNWASH)
     buffer = _marker("buffers", number, vehicle, Marker.SPHERE, WAITING if waits else FREE, size)
-    name = _marker(
-        "names", number, vehicle, Marker.TEXT_VIEW_FACING, NAME, (0.0, 0.0, _TEXT_SIZE)
-    )
+    name = _marker("names", number, vehicle, Marker.TEXT_VIEW_FACING, NAME, (0.0, 0.0, _TEXT_SIZE))
     name.text = vehicle.name
     name.pose.position.z = 0.15
     return [body, buffer, name]

@@ -18,7 +18,9 @@ class NodeParameters(ParameterType):
 
     @override
     def __call__(self, value: Any) -> Mapping[str, Any]:
-        if not isinstance(value, dict) or not all(isinstance(each, dict) for each in value.values()):
+        if not isinstance(value, dict) or not all(
+            isinstance(each, dict) for each in value.values()
+        ):
             raise ValueError
         return value
 

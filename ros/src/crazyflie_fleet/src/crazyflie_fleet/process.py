@@ -58,7 +58,7 @@ class _Plan:
     def _add_swarm(self, model: str, vehicles: tuple[Vehicle, ...]) -> None:
         name = f"{self._handle.name}/{model}"
         tree = self._common(model)
-        own = {key: tree[key] for key in ("simulator", "lqr_controller") if key in tree}
+        own: Tree = {key: tree[key] for key in ("simulator", "lqr_controller") if key in tree}
         known = {declaration.name for declaration in SwarmParameters.declarations()}
         unknown = [path for path in _paths(own) if path not in known]
         if unknown:
@@ -69,7 +69,9 @@ class _Plan:
                     for path in unknown
                 )
             )
-        self._add(name, SwarmNode(vehicles, model), {**own, "frames": {"fixed": self._told.fixed_frame}})
+        self._add(
+            name, SwarmNode(vehicles, model), {**own, "frames": {"fixed": self._told.fixed_frame}}
+        )
         self._has_clock = True
 
     def _add_vehicle(self, vehicle: Vehicle) -> None:

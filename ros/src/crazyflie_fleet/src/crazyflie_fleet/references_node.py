@@ -37,9 +37,7 @@ class ReferencesParameters(Parameters):
 
     way_period: float = parameter(TIME_STEP, "from one reference of a way to the next", 0.02)
     watch_period: float = parameter(TIME_STEP, "from one look at the distances to the next", 0.05)
-    waiting_topic: str = parameter(
-        TOPIC, "who waits for whom", "/fleet/waiting", "topics/waiting"
-    )
+    waiting_topic: str = parameter(TOPIC, "who waits for whom", "/fleet/waiting", "topics/waiting")
 
 
 @dataclass
@@ -110,9 +108,7 @@ class ReferencesNode(Node):
         # What motion capture calls a vehicle is the vehicle.
         identity = Transform(Vector3(), Quaternion(w=1.0))
         transforms = [
-            TransformStamped(
-                Header(0, handle.stamp(), vehicle.mocap_frame), vehicle.name, identity
-            )
+            TransformStamped(Header(0, handle.stamp(), vehicle.mocap_frame), vehicle.name, identity)
             for vehicle in self._vehicles
             if vehicle.mocap_frame != vehicle.name
         ]

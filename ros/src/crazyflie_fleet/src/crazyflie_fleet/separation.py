@@ -77,9 +77,7 @@ class Separation:
         buffers = self._buffers[known] * np.where(self._waiting[known], RELEASE, 1.0)
         now, soon = positions[known], (positions + LOOK_AHEAD * velocities)[known]
         waiting = np.zeros_like(self._waiting)
-        pairs = {
-            (i, j) for places in (now, soon) for i, j, _, _ in close_pairs(places, buffers)
-        }
+        pairs = {(i, j) for places in (now, soon) for i, j, _, _ in close_pairs(places, buffers)}
         found = []
         for a, b in sorted(pairs):
             i, j = int(known[a]), int(known[b])

@@ -9,7 +9,10 @@ from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
 )
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
-from crazyflie_simulator.simulator_node import NearHoverSimulatorCoupled7DNode, NearHoverSimulatorNode
+from crazyflie_simulator.simulator_node import (
+    NearHoverSimulatorCoupled7DNode,
+    NearHoverSimulatorNode,
+)
 from crazyflie_state_estimator.estimator_node import PositionVelocityYawStateEstimatorNode
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode

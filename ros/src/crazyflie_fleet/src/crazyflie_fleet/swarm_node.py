@@ -30,6 +30,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_simulator.simulator_node import MAX_CATCH_UP
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, Number
+from crazyflie_utils.runtime.topics import Publisher
 from crazyflie_utils.vectors import to_vector
 
 MODELS: dict[str, type[SevenDimensional]] = {"near_hover": NearHover, "coupled_7d": Coupled7D}
@@ -83,6 +84,9 @@ class SwarmNode(Node):
         self._model = model
         self._ticks = 0
         self._measured: tuple[float, NDArray[np.float64]] | None = None
+        self._references: list[GuardedReference] = []
+        self._states: list[Publisher] = []
+        self._controls: list[Publisher] = []
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -99,8 +103,6 @@ class SwarmNode(Node):
         self._start = handle.time()
         places = [vehicle.position for vehicle in self._vehicles]
         self._batch = BatchVehicles(MODELS[self._model](), places, self._start)
-        self._references = []
-        self._states, self._controls = [], []
         self._tf = handle.publisher("/tf", TFMessage)
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
@@ -188,9 +190,7 @@ class SwarmNode(Node):
             TransformStamped(
                 header,
                 vehicle.name,
-                Transform(
-                    Vector3(x, y, z), Quaternion(*quaternion_from_rpy(roll, pitch, yaw))
-                ),
+                Transform(Vector3(x, y, z), Quaternion(*quaternion_from_rpy(roll, pitch, yaw))),
             )
             for vehicle, (x, y, z, _, _, _, yaw), (roll, pitch) in zip(
                 self._vehicles, states.tolist(), tilts, strict=True

@@ -144,6 +144,16 @@ def test_a_fence_counts(process, stack, driven):
         fleet["cf2"].go_to((1.0, 1.8, 1.0))
 
 
+def test_names_of_a_fleet_file(process, stack, driven, tmp_path):
+    path = tmp_path / "two.yaml"
+    robots = "robots:\n  cf1: {initial_position: [0, 0, 0]}\n  cf2: {initial_position: [1, 0, 0]}\n"
+    path.write_text(robots)
+    assert Fleet(path, process=process, limit=0.5).names == NAMES
+    path.write_text(robots + "  cf3: {initial_position: [1, 0]}\n")
+    with pytest.raises(MissionError, match=r"two.yaml:4"):
+        Fleet(str(path), process=process, limit=0.5)
+
+
 @pytest.mark.parametrize(
     ("names", "text"),
     [

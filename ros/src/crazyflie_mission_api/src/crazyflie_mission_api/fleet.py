@@ -11,13 +11,14 @@ from typing import Any
 import rosgraph
 from typing_extensions import override
 
+from crazyflie_fleet import fleet_file
 from crazyflie_mission_api.connection import RosClock, RosVehicle, prefix
 from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
 from crazyflie_mission_api.rehearsal import rehearse
 from crazyflie_mission_api.roster import Rules
 from crazyflie_mission_api.team import Team
-from crazyflie_utils import NodeHandle
+from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.runner import begin_script
 
@@ -48,8 +49,8 @@ class Fleet(Team):
 
     Parameters
     ----------
-    names : str or Path or sequence of str
-        Names of vehicles; or a fleet file.
+    names : sequence of str, or str or Path
+        Names of vehicles; or a fleet file (see `crazyflie_fleet.fleet_file`), NAME.yaml.
     bounds : Bounds, optional
         Where they may fly; a vehicle's geofence counts as well.
     limits : Limits, optional
@@ -143,6 +144,11 @@ def names_of(names: str | Path | Sequence[str]) -> list[str]:
     MissionError
         There are none, or one twice.
     """
+    if isinstance(names, Path) or (isinstance(names, str) and names.endswith((".yaml", ".yml"))):
+        try:
+            return list(fleet_file.load(names).names)
+        except ParameterError as error:
+            raise MissionError(str(error)) from None
     chosen = [names] if isinstance(names, str) else list(names)
     if not chosen or any(not isinstance(name, str) or not name for name in chosen):
         raise MissionError(f"the vehicles are {names!r}; expected names, such as ['cf1', 'cf2']")
@@ -152,10 +158,10 @@ def names_of(names: str | Path | Sequence[str]) -> list[str]:
     return chosen
 
 
-def _connect(process: Process, handle: NodeHandle, names, limit):
+def _connect(process, handle, names, limit):
     end = time.monotonic() + limit
     missing = list(names)
-    found: dict[str, RosVehicle] = {}
+    found = {}
     while missing:
         services = handle.service_nodes()
         for name in list(missing):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future
-from typing import Any
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from crazyflie_mission_api import formations, trajectories
 from crazyflie_mission_api.course import Course, check_apart
@@ -38,7 +38,9 @@ class Team(Roster):
                 raise MissionError(f"{name}: takeoff: it flies already; expected it on the ground")
             x, y, z = self.position(name)
             bounds = self.fence(name)
-            bounds.check((x, y, height), f"{name}: takeoff to ({x:.2f}, {y:.2f}, {height:g})")
+            bounds.check(
+                np.array([x, y, height]), f"{name}: takeoff to ({x:.2f}, {y:.2f}, {height:g})"
+            )
             way = trajectories.straight((x, y, z), (x, y, height))
             climb = max(_SHORTEST_CLIMB, self._quickest(way))
             ways[name] = trajectories.stretched(way, climb)
@@ -165,7 +167,7 @@ class Team(Roster):
                 "for each vehicle"
             )
         starts = {name: self._rest_of(name, "formation").position for name in self._vehicles}
-        chosen = formations.assign(starts, goals)
+        chosen = formations.assign(starts, np.array(goals))
         self.go_to(chosen, duration=duration, wait=wait)
         return chosen
 
@@ -210,7 +212,7 @@ class Team(Roster):
     def _check_apart(self, courses):
         check_apart({**self._courses, **courses}, self.time(), self.rules.separation)
 
-    def _fly(self, ways, what, command: Callable[[str], Future[Any]], wait):
+    def _fly(self, ways, what, command, wait):
         team = self._some(ways)
         begin = self.time()
         failures = team._answers(command)

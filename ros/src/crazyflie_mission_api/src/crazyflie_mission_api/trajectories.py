@@ -45,7 +45,7 @@ class Samples:
         columns: list[list[Array]] = [[], [], [], [], [], []]
         begin = 0.0
         for piece in pieces:
-            time = np.linspace(0.0, piece.duration, SAMPLES)
+            time = np.linspace(0.0, piece.duration, SAMPLES, dtype=np.float64)
             goal = piece.evaluate(time)
             vectors = (goal.position, goal.velocity, goal.acceleration)
             values = [begin + time, *(np.stack(v, axis=-1) for v in vectors)]
@@ -159,14 +159,13 @@ def stretched(pieces: Pieces, factor: float) -> list[PolynomialPiece]:
 
 def moved(pieces: Pieces, offset: Sequence[float]) -> list[PolynomialPiece]:
     """Return the trajectory with an offset (x, y, z), m, added to all positions."""
-    return [
-        PolynomialPiece(
-            piece.duration,
-            *([axis[0] + d, *axis[1:]] for axis, d in zip(piece.axes[:3], offset, strict=True)),
-            piece.yaw,
-        )
-        for piece in pieces
-    ]
+    by_axis = (*offset, 0.0)
+
+    def move(piece):
+        axes = ([axis[0] + d, *axis[1:]] for axis, d in zip(piece.axes, by_axis, strict=True))
+        return PolynomialPiece(piece.duration, *axes)
+
+    return [move(piece) for piece in pieces]
 
 
 def duration(pieces: Pieces) -> float:

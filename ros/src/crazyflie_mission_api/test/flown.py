@@ -10,7 +10,7 @@ import rospy
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils.testing import peer
 
-LIMIT = 300.0
+LIMIT = 120.0
 """How long a script may take, s."""
 
 

@@ -1,7 +1,5 @@
-"""Vehicles and time as a team needs them, by ROS."""
+"""Vehicles as a team needs them, by ROS."""
 
-import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
@@ -15,7 +13,7 @@ from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState
 from crazyflie_mission_api.conversions import full_state_message, to_message
 from crazyflie_mission_api.course import Course
-from crazyflie_mission_api.limits import EVERYWHERE, Bounds, MissionError
+from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
@@ -29,59 +27,20 @@ CALL_LIMIT = 60.0
 MEMORY = 31
 """Pieces that the memory of a vehicle holds."""
 
-_FROZEN = 10.0
-"""How long simulated time may stand still, s of the machine's clock."""
-
 _FRESH = 1.0
 """A position older than this is not known, s."""
 
 _ON_GROUND = 0.1
 """Height above where it stood at which a vehicle has landed, m."""
 
+_SETTLING = 0.5
+"""After a landing should be at its end, s."""
+
 _HIGH_LEVEL = "commander/enHighLevel"
 """The parameter of a vehicle that has it take high-level commands."""
 
 _STREAM_STEP = 0.02
 """From one setpoint of a stream to the next, s."""
-
-
-class RosClock:
-    """The time of a process, real or simulated.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    has_ended : callable
-        ``has_ended()`` is true when ROS has shut down.
-    """
-
-    def __init__(self, handle: NodeHandle, has_ended: Callable[[], bool]):
-        self._handle = handle
-        self._has_ended = has_ended
-        self._tick = threading.Condition()
-        handle.timer(0.02, self._wake)
-
-    def time(self) -> float:
-        """Return the time, s."""
-        return self._handle.time()
-
-    def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
-        """Wait until ``condition()`` or ``deadline`` (s); return the condition."""
-        last, moved_at = self.time(), time.monotonic()
-        while not (done := condition()) and (now := self.time()) < deadline:
-            if self._has_ended():
-                raise MissionError("ROS has shut down; expected it to live as long as the mission")
-            if now != last:
-                last, moved_at = now, time.monotonic()
-            elif time.monotonic() - moved_at > _FROZEN:
-                raise MissionError(f"no /clock for {_FROZEN:g} s; is the simulation running?")
-            with self._tick:
-                self._tick.wait(0.1)
-        return done
-
-    def _wake(self):
-        with self._tick:
-            self._tick.notify_all()
 
 
 class RosVehicle:
@@ -106,6 +65,7 @@ class RosVehicle:
         self._position: Triple | None = None
         self._seen_at = 0.0
         self._ground = 0.0
+        self._landing_end = 0.0
         self._status = ""
         self._flight_state = ""
         self._stream: Course | None = None
@@ -152,7 +112,9 @@ class RosVehicle:
         if not self._is_driven:
             return self._flight_state == "on_ground"
         place = self.position()
-        return place is not None and place[2] < self._ground + _ON_GROUND
+        is_down = place is not None and place[2] < self._ground + _ON_GROUND
+        # Whoever is told then stops the motors: not on the last centimetres.
+        return is_down and self._handle.time() >= self._landing_end
 
     def _on_pose(self, message):
         p = message.pose.position
@@ -191,6 +153,7 @@ class RosVehicle:
     def land(self, duration: float) -> "Future[Any]":
         """Sink straight down."""
         self._stream = None
+        self._landing_end = self._handle.time() + duration + _SETTLING
         return self._call("land", srv.Land, 0, self._ground, _seconds(duration))
 
     def rest(self) -> None:

@@ -12,10 +12,11 @@ import rosgraph
 from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
-from crazyflie_mission_api.connection import RosClock, RosVehicle, prefix
+from crazyflie_mission_api.connection import RosVehicle, prefix
 from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
 from crazyflie_mission_api.rehearsal import rehearse
+from crazyflie_mission_api.ros_clock import RosClock
 from crazyflie_mission_api.roster import Rules
 from crazyflie_mission_api.team import Team
 from crazyflie_utils import NodeHandle, ParameterError

@@ -37,11 +37,9 @@ class Team(Roster):
             if name in self._courses:
                 raise MissionError(f"{name}: takeoff: it flies already; expected it on the ground")
             x, y, z = self.position(name)
-            bounds = self.fence(name)
-            bounds.check(
-                np.array([x, y, height]), f"{name}: takeoff to ({x:.2f}, {y:.2f}, {height:g})"
-            )
-            way = trajectories.straight((x, y, z), (x, y, height))
+            goal = (x, y, height)
+            self.fence(name).check(np.array(goal), f"{name}: takeoff to {text(goal)}")
+            way = trajectories.straight((x, y, z), goal)
             climb = max(_SHORTEST_CLIMB, self._quickest(way))
             ways[name] = trajectories.stretched(way, climb)
         self._check_apart({name: Course(way, self.time()) for name, way in ways.items()})

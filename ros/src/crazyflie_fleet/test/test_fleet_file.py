@@ -161,7 +161,7 @@ def test_simulated_vehicles_need_no_address(load):
             TWO + "all: {battery: {voltage_critical: 3.5}}\n",
             ":8: all: battery/voltage_critical is 3.5; expected not more than ",
         ),
-        (TWO + "    machine: far\n", ":8: robots/cf2/machine is 'far'; expected none, as there"),
+        (TWO + "    machine: far\n", ":8: robots/cf2/machine is 'far'; expected one of local"),
         ("cf1: {}\n", ":1: the file has no robots; it has cf1"),
     ],
 )

@@ -10,6 +10,7 @@ import yaml
 from crazyflie_fleet.fleet import Fleet, LogTopic, Vehicle, close_pairs
 from crazyflie_fleet.settings import (
     DEFAULT_TOPICS,
+    LOCAL,
     DefaultTopicSettings,
     FirmwareNumber,
     LogTopicSettings,
@@ -119,7 +120,7 @@ class _Reading:
             self._check(entry, RobotSettings)
             self._check_choice(entry, "type", types)
         for entry in (*robots.values(), *types.values(), *([everybody] if everybody else [])):
-            self._check_choice(entry, "machine", machines)
+            self._check_choice(entry, "machine", (LOCAL, *machines))
         self._end_if_wrong()
         vehicles = [self._vehicle(name, entry, types, everybody) for name, entry in robots.items()]
         self._end_if_wrong()

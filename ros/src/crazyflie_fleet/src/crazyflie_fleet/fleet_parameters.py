@@ -8,7 +8,15 @@ from typing_extensions import override
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet import Fleet
 from crazyflie_utils import ParameterError, Parameters, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME, Integer, Number, ParameterType, Text
+from crazyflie_utils.parameter_types import (
+    BOOLEAN,
+    FRAME,
+    TEXT,
+    Integer,
+    Number,
+    ParameterType,
+    Text,
+)
 
 
 class NodeParameters(ParameterType):
@@ -40,10 +48,7 @@ class FleetParameters(Parameters):
         Number("m", above=0.0), "from one vehicle of the grid to the next", 1.0, "fleet/spacing"
     )
     machine: str = parameter(
-        Text(may_be_empty=True),
-        "only the vehicles of this machine are flown here; `*` for all",
-        "*",
-        "fleet/machine",
+        TEXT, "only the vehicles of this machine are flown here; `*` for all", "*", "fleet/machine"
     )
     virtual_port: int = parameter(
         Integer(0, 65535),

@@ -98,7 +98,6 @@ class ReferencesNode(Node):
                 below + STATE,
                 PositionVelocityYawStateStamped,
                 partial(self._on_state, led),
-                finite="state",
             )
             handle.subscribe(below + FLIGHT_STATE, String, partial(self._on_flight_state, led))
         handle.timer(parameters.way_period, self._on_way_timer)
@@ -188,7 +187,8 @@ class ReferencesNode(Node):
 
     def _knows(self, led):
         age = self._handle.time() - led.state_time
-        return led.state is not None and 0.0 <= age < STATE_LIMIT
+        is_fresh = led.state is not None and 0.0 <= age < STATE_LIMIT
+        return is_fresh and bool(np.isfinite(_position(led.state)).all())
 
     def _on_watch_timer(self):
         n = len(self._led)

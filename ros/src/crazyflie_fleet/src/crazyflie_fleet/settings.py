@@ -22,6 +22,9 @@ from crazyflie_utils.parameter_types import (
 RESERVED = ("all",)
 """Names that vehicles cannot have: /all/takeoff is everybody's."""
 
+LOCAL = "local"
+"""The machine of vehicles that do not name one."""
+
 DEFAULT_TOPICS = {
     "imu": "imu",
     "temperature": "temperature",
@@ -128,7 +131,7 @@ class Settings(Parameters):
         Number("m", above=0.0), "where a takeoff ends, above the start point", 1.0
     )
     machine: str = parameter(
-        Text(may_be_empty=True), "computer that flies it, of `machines`; empty for this one", ""
+        TEXT, "computer that flies it, of `machines`; `local` is always one of them", LOCAL
     )
     voltage_warning: float = parameter(
         Number("V", minimum=0.0), "with less takeoff is refused", 3.2, "battery/voltage_warning"

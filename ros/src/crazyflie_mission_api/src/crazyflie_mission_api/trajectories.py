@@ -50,7 +50,7 @@ class Samples:
             vectors = (goal.position, goal.velocity, goal.acceleration)
             values = [begin + time, *(np.stack(v, axis=-1) for v in vectors)]
             for column, value in zip(columns, [*values, goal.yaw, goal.yaw_rate], strict=True):
-                column.append(value)
+                column.append(np.asarray(value, dtype=np.float64))
             begin += piece.duration
         return cls(*map(np.concatenate, columns))
 

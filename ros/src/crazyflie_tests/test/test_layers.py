@@ -38,7 +38,7 @@ LAYERS = [
     {"crazyflie_driver", "crazyflie_teleop", "crazyflie_tools", "crazyflie_virtual"},
     {"crazyflie_fleet"},
     {"crazyflie_demo", "crazyflie_examples", "crazyflie_ranging", "crazyflie_vision"},
-    {"uav_trajectory"},
+    {"crazyflie_mission_api", "uav_trajectory"},
     {"crazyflie", "crazyflie_dev"},
 ]
 """From the bottom: a package imports from lower layers only."""

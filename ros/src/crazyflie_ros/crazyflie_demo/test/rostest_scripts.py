@@ -32,6 +32,7 @@ cf.goTo(goal=[0.4, 0.0, 0.0], yaw=0.0, duration=1.5, relative=True)
 rospy.sleep(2.0)
 cf.startTrajectory(0, timescale=1.0)
 rospy.sleep(trajectory.duration + 0.5)
+assert 3.0 < cf.getVoltage() < 4.3
 cf.land(targetHeight=0.0, duration=1.5)
 rospy.sleep(2.0)
 cf.stop()

@@ -4,23 +4,41 @@ The module that users' scripts import by this name. Such a script is a node of i
 calls rospy.init_node first; so this is plain rospy, and its methods block.
 """
 
+import contextlib
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import rospy
 import tf2_ros
-from geometry_msgs.msg import Point
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from numpy.typing import NDArray
+from std_msgs.msg import Empty, Float32
+from std_srvs.srv import Empty as EmptyService
 from uav_trajectory import Trajectory
 
 from crazyflie_driver import srv
-from crazyflie_driver.msg import TrajectoryPolynomialPiece
+from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece, VelocityWorld
+from crazyflie_model.angles import quaternion_from_rpy
 
 _WORLD = "world"
 _TF_LIMIT = 10.0
 
+_COMMANDER = "high_level"
+"""Below a vehicle's name: who offers the driver's services for one that a controller of this
+workspace flies, high_level_node of crazyflie_mission_api."""
+
+_SETPOINTS = {
+    "cmd_full_state": FullState,
+    "cmd_position": Position,
+    "cmd_velocity_world": VelocityWorld,
+    "cmd_stop": Empty,
+}
+
 _SERVICES = {
+    "emergency": EmptyService,
+    "notify_setpoints_stop": srv.NotifySetpointsStop,
     "update_params": srv.UpdateParams,
     "set_group_mask": srv.SetGroupMask,
     "takeoff": srv.Takeoff,
@@ -33,7 +51,7 @@ _SERVICES = {
 
 
 class Crazyflie:
-    """A vehicle that the driver flies; waits until it is connected.
+    """A vehicle that the driver flies, or a simulated one; waits until it is there.
 
     A command returns when the vehicle has got it, not when it has been carried out.
 
@@ -57,11 +75,14 @@ class Crazyflie:
         self.tf = tf
         self._buffer: tf2_ros.Buffer | None = None
         self._services = {}
+        top = _commander(self.prefix)
         for name, service_type in _SERVICES.items():
-            full_name = f"{self.prefix}/{name}"
-            rospy.loginfo("waiting for %s", rospy.resolve_name(full_name))
-            rospy.wait_for_service(full_name)
-            self._services[name] = rospy.ServiceProxy(full_name, service_type)
+            rospy.wait_for_service(f"{top}/{name}")
+            self._services[name] = rospy.ServiceProxy(f"{top}/{name}", service_type)
+        self._setpoints = {
+            name: rospy.Publisher(f"{top}/{name}", message_type, queue_size=1)
+            for name, message_type in _SETPOINTS.items()
+        }
         # Answered when the driver has read the parameters; what is set earlier is overwritten.
         self._call("update_params", [])
 
@@ -83,6 +104,18 @@ class Crazyflie:
     def stop(self, groupMask: int = 0) -> None:  # noqa: N803
         """Stop the motors."""
         self._call("stop", groupMask)
+
+    def emergency(self) -> None:
+        """Stop the motors at once, for good."""
+        self._call("emergency")
+
+    def notifySetpointsStop(  # noqa: N802
+        self,
+        remainValidMillisecs: int = 100,  # noqa: N803
+        groupMask: int = 0,  # noqa: N803
+    ) -> None:
+        """Go back from setpoints to commands; the last setpoint counts for some ms more."""
+        self._call("notify_setpoints_stop", groupMask, remainValidMillisecs)
 
     def goTo(  # noqa: N802
         self,
@@ -152,6 +185,51 @@ class Crazyflie:
             self._listener = tf2_ros.TransformListener(self._buffer)
         return self._buffer
 
+    def getVoltage(self) -> float:  # noqa: N802
+        """Return the voltage of the battery, V.
+
+        Raises
+        ------
+        rospy.ROSException
+            Nobody has said so for 10 s.
+        """
+        return rospy.wait_for_message(f"{self.prefix}/battery", Float32, _TF_LIMIT).data
+
+    # Setpoints: the firmware gives up 0.5 s after the last one.
+
+    def cmdFullState(  # noqa: N802
+        self,
+        pos: Sequence[float],
+        vel: Sequence[float],
+        acc: Sequence[float],
+        yaw: float,
+        omega: Sequence[float],
+    ) -> None:
+        """Be at a position, m, with velocity and acceleration, yaw (rad) and body rates (rad/s)."""
+        message = FullState(
+            pose=Pose(Point(*pos), Quaternion(*quaternion_from_rpy(0.0, 0.0, yaw))),
+            twist=Twist(Vector3(*vel), Vector3(*omega)),
+            acc=Vector3(*acc),
+        )
+        self._send("cmd_full_state", message)
+
+    def cmdPosition(self, pos: Sequence[float], yaw: float = 0.0) -> None:  # noqa: N802
+        """Be at a position, m, and a yaw, rad."""
+        self._send("cmd_position", Position(None, *pos, math.degrees(yaw)))
+
+    def cmdVelocityWorld(self, vel: Sequence[float], yawRate: float) -> None:  # noqa: N802, N803
+        """Fly at a velocity, m/s, and turn at a rate, degrees/s, as the driver has it."""
+        self._send("cmd_velocity_world", VelocityWorld(None, Vector3(*vel), yawRate))
+
+    def cmdStop(self) -> None:  # noqa: N802
+        """Stop the motors, as a setpoint."""
+        self._setpoints["cmd_stop"].publish(Empty())
+
+    def _send(self, name, message):
+        message.header.stamp = rospy.Time.now()
+        message.header.frame_id = _WORLD
+        self._setpoints[name].publish(message)
+
     def getParam(self, name: str) -> Any:  # noqa: N802
         """Return a firmware parameter GROUP/NAME."""
         return rospy.get_param(f"{self.prefix}/{name}")
@@ -165,3 +243,16 @@ class Crazyflie:
         for name, value in params.items():
             rospy.set_param(f"{self.prefix}/{name}", value)
         self._call("update_params", list(params))
+
+
+def _commander(prefix):
+    """Return where the services of a vehicle are, as soon as they are there."""
+    tops = (f"{prefix}/{_COMMANDER}", prefix)
+    rospy.loginfo("waiting for update_params below %s or %s", *map(rospy.resolve_name, tops))
+    while True:
+        for top in tops:
+            with contextlib.suppress(rospy.ROSException):
+                rospy.wait_for_service(f"{top}/update_params", 0.2)
+                return top
+            if rospy.is_shutdown():
+                raise rospy.ROSInterruptException("ROS has shut down")

@@ -140,6 +140,34 @@ def begin(default_name: str) -> Process:
     return ros_process()
 
 
+def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
+    """Make a user's script a ROS node, unless it is one already.
+
+    Ctrl-C remains what it is in Python; ROS does not end by it.
+
+    Returns
+    -------
+    Process
+        Not yet started. When ROS has shut down, it has an exit status.
+    callable
+        ``end()`` stops the process, and the ROS node if it was made here.
+    """
+    is_own = not rospy.core.is_initialized()
+    if is_own:
+        _wait_for_master()
+        rospy.init_node(default_name, anonymous=True, disable_signals=True)
+    process = ros_process()
+    rospy.on_shutdown(lambda: process.end(0))
+
+    def end() -> None:
+        process.stop()
+        if is_own:
+            time.sleep(_FLUSH_TIME)
+            rospy.signal_shutdown("the script has ended")
+
+    return process, end
+
+
 def ros_process() -> Process:
     """Return what the nodes of this process share, when it is a ROS node already."""
     transport = RosTransport()

@@ -1,0 +1,37 @@
+#!/usr/bin/env python
+"""Eight vehicles fly figures of eight side by side, every other one the other way round.
+
+Usage: figure_eights.py [NAME ...], the vehicles; by default cf1 ... cf8. They have to stand 1.8 m
+apart along x and 1.2 m along y.
+"""
+
+import sys
+
+from crazyflie_demo.figure8 import figure8
+from crazyflie_mission_api import Fleet, Limits
+from crazyflie_mission_api.rehearsal import Team
+from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_model.polynomials import PolynomialPiece
+
+LIMITS = Limits(speed=1.0, acceleration=1.5)
+
+
+def mirrored(pieces: Pieces) -> list[PolynomialPiece]:
+    """Return a trajectory with left and right exchanged."""
+    return [
+        PolynomialPiece(piece.duration, piece.x, [-c for c in piece.y], piece.z, piece.yaw)
+        for piece in pieces
+    ]
+
+
+def mission(fleet: Team) -> None:
+    """Fly it."""
+    fleet.takeoff(1.0)
+    ways = (figure8(), mirrored(figure8()))
+    fleet.follow({name: ways[k % 2] for k, name in enumerate(fleet.names)}, relative=True)
+    fleet.land()
+
+
+if __name__ == "__main__":
+    with Fleet(sys.argv[1:] or [f"cf{k}" for k in range(1, 9)], limits=LIMITS) as team:
+        team.fly(mission)

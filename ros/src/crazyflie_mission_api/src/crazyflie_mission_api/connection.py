@@ -1,0 +1,258 @@
+"""Vehicles as a team needs them, by ROS."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+import genpy
+from geometry_msgs.msg import Point, PoseStamped
+from std_msgs.msg import String
+from std_srvs.srv import Empty, EmptyRequest
+
+from crazyflie_driver import srv
+from crazyflie_driver.msg import FullState
+from crazyflie_mission_api.conversions import full_state_message, to_message
+from crazyflie_mission_api.course import Course
+from crazyflie_mission_api.limits import EVERYWHERE, Bounds
+from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_model.angles import Triple
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils.parameter_types import FINITE
+from crazyflie_utils.runtime.transforms import TransformError
+
+CALL_LIMIT = 60.0
+"""How long a service may take, s of the machine's clock."""
+
+MEMORY = 31
+"""Pieces that the memory of a vehicle holds."""
+
+_FRESH = 1.0
+"""A position older than this is not known, s."""
+
+_ON_GROUND = 0.1
+"""Height above where it stood at which a vehicle has landed, m."""
+
+_SETTLING = 0.5
+"""After a landing should be at its end, s."""
+
+_HIGH_LEVEL = "commander/enHighLevel"
+"""The parameter of a vehicle that has it take high-level commands."""
+
+_STREAM_STEP = 0.02
+"""From one setpoint of a stream to the next, s."""
+
+
+class RosVehicle:
+    """A vehicle by the services of the driver, or by those of `HighLevelNode`.
+
+    Parameters
+    ----------
+    name : str
+    handle : NodeHandle
+    services : dict of str to str
+        Where its services are: go_to, takeoff and so on to absolute names.
+    is_driven : bool
+        Whether the driver flies it, and not a controller.
+    """
+
+    def __init__(self, name: str, handle: NodeHandle, services: dict[str, str], is_driven: bool):
+        self.name = name
+        self.bounds = fence(handle, prefix(name))
+        self._handle = handle
+        self._services = services
+        self._is_driven = is_driven
+        self._position: Triple | None = None
+        self._seen_at = 0.0
+        self._ground = 0.0
+        self._landing_end = 0.0
+        self._status = ""
+        self._flight_state = ""
+        self._stream: Course | None = None
+        self._prepared: Pieces | None = None
+        top = prefix(name)
+        self._lookup = handle.listen_to_transforms() if is_driven else None
+        if is_driven:
+            handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
+            handle.subscribe(f"{top}/status", String, self._on_status)
+            self._setpoints = handle.publisher(f"{top}/cmd_full_state", FullState)
+            handle.timer(_STREAM_STEP, self._send_setpoint)
+        else:
+            state = PositionVelocityYawStateStamped
+            handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
+            handle.subscribe(f"{top}/in_flight_state", String, self._on_flight_state)
+            handle.subscribe(f"{top}/in_flight_status", String, self._on_status)
+
+    # Where it is, and how it is.
+
+    def position(self) -> Triple | None:
+        """Return where it is, m; None when nobody has said so for a second."""
+        if self._lookup is not None and not self._is_fresh():
+            try:
+                found = self._lookup("world", self.name).transform.translation
+            except TransformError:
+                return None
+            return (found.x, found.y, found.z)
+        return self._position if self._is_fresh() else None
+
+    def _is_fresh(self):
+        return self._position is not None and self._handle.time() - self._seen_at < _FRESH
+
+    def trouble(self) -> str:
+        """Return why it cannot fly on; an empty text when it can."""
+        if self._is_driven:
+            bad = ("lost", "cannot fly", "emergency", "disconnected")
+            return self._status if self._status.startswith(bad) else ""
+        if self._flight_state in ("on_ground", "landing", "descending"):
+            return f"it does not fly any more: {self._status or self._flight_state}"
+        return ""
+
+    def has_landed(self) -> bool:
+        """Return whether it stands, as far as that is known."""
+        if not self._is_driven:
+            return self._flight_state == "on_ground"
+        place = self.position()
+        is_down = place is not None and place[2] < self._ground + _ON_GROUND
+        # Whoever is told then stops the motors: not on the last centimetres.
+        return is_down and self._handle.time() >= self._landing_end
+
+    def _on_pose(self, message):
+        p = message.pose.position
+        self._position, self._seen_at = (p.x, p.y, p.z), self._handle.time()
+
+    def _on_state(self, message):
+        s = message.state
+        self._position, self._seen_at = (s.x, s.y, s.z), self._handle.time()
+
+    def _on_status(self, message):
+        self._status = message.data
+
+    def _on_flight_state(self, message):
+        self._flight_state = message.data
+
+    # Commands.
+
+    def take_off(self, height: float, duration: float) -> "Future[Any]":
+        """Climb straight up."""
+        place = self.position()
+        self._ground = 0.0 if place is None else place[2]
+
+        def climb():
+            return self._call("takeoff", srv.Takeoff, 0, height, _seconds(duration))
+
+        if not self._is_driven:
+            return climb()
+        # The first call waits for the driver to have read the parameters, which it sets then.
+        return in_turn(lambda: self._update(), lambda: self._update(_HIGH_LEVEL), climb)
+
+    def _update(self, *parameters):
+        for name in parameters:
+            self._handle.set_param(f"{prefix(self.name)}/{name}", 1)
+        return self._call("update_params", srv.UpdateParams, list(parameters))
+
+    def land(self, duration: float) -> "Future[Any]":
+        """Sink straight down."""
+        self._stream = None
+        self._landing_end = self._handle.time() + duration + _SETTLING
+        return self._call("land", srv.Land, 0, self._ground, _seconds(duration))
+
+    def rest(self) -> None:
+        """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
+        if self._is_driven:
+            self._call("stop", srv.Stop, 0)
+
+    def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
+        """Fly to a point."""
+        self._stream = None
+        return self._call("go_to", srv.GoTo, 0, False, Point(*goal), yaw, _seconds(duration))
+
+    def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
+        """Take a trajectory, to be uploaded or streamed."""
+        self._prepared = pieces if stream and self._is_driven else None
+        if self._prepared is not None:
+            return _done(None)
+        if self._is_driven and len(pieces) > MEMORY:
+            return _done(
+                ServiceError(
+                    f"the trajectory has {len(pieces)} pieces; expected at most {MEMORY}, which is "
+                    "what the vehicle's memory holds, or stream=True"
+                )
+            )
+        messages = [to_message(piece) for piece in pieces]
+        return self._call("upload_trajectory", srv.UploadTrajectory, 0, 0, messages)
+
+    def start(self) -> "Future[Any]":
+        """Fly the trajectory that was prepared last."""
+        if self._prepared is not None:
+            self._stream = Course(self._prepared, self._handle.time())
+            return _done(None)
+        return self._call("start_trajectory", srv.StartTrajectory, 0, 0, 1.0, False, False)
+
+    def emergency(self) -> "Future[Any]":
+        """Stop the motors."""
+        self._stream = None
+        return self._handle.call_service(
+            self._services["emergency"], Empty, EmptyRequest(), CALL_LIMIT
+        )
+
+    def _call(self, name, service_type, *arguments):
+        request = service_type._request_class(*arguments)
+        return self._handle.call_service(self._services[name], service_type, request, CALL_LIMIT)
+
+    def _send_setpoint(self):
+        stream, now = self._stream, self._handle.time()
+        if stream is None:
+            return
+        goal = stream.goal(now)
+        if now < stream.end:
+            message = full_state_message(goal)
+            message.header.stamp = self._handle.stamp()
+            self._setpoints.publish(message)
+            return
+        # The driver says "setpoints stop" before a command; from there on the vehicle stays.
+        self.go_to(goal.position, goal.yaw, 0.5)
+
+
+def in_turn(*calls: Callable[[], "Future[Any]"]) -> "Future[Any]":
+    """Make calls one after the other; return the outcome of the last one, or of one that fails."""
+    outcome: Future[Any] = Future()
+
+    def go_on(done, left):
+        if done.exception() is not None:
+            outcome.set_exception(done.exception())
+        elif not left:
+            outcome.set_result(done.result())
+        else:
+            left[0]().add_done_callback(lambda next_one: go_on(next_one, left[1:]))
+
+    calls[0]().add_done_callback(lambda first: go_on(first, calls[1:]))
+    return outcome
+
+
+def prefix(name: str) -> str:
+    """Return the namespace of a vehicle; that of "/" is the root."""
+    return "" if name == "/" else f"/{name}"
+
+
+def fence(handle: NodeHandle, top: str) -> Bounds:
+    """Return the box of a vehicle's geofence, if it has one."""
+    corners = [
+        [handle.get_param(f"{top}/geofence/box/{side}/{axis}", FINITE, None) for axis in "xyz"]
+        for side in ("min", "max")
+    ]
+    if None in corners[0] + corners[1]:
+        return EVERYWHERE
+    return Bounds((corners[0][0], corners[0][1], corners[0][2]), tuple(corners[1]))
+
+
+def _seconds(duration):
+    return genpy.Duration.from_sec(duration)
+
+
+def _done(error):
+    future: Future[Any] = Future()
+    if error is None:
+        future.set_result(None)
+    else:
+        future.set_exception(error)
+    return future

@@ -1,0 +1,69 @@
+"""Goals and pieces of trajectories as messages, and back."""
+
+import math
+
+import genpy
+from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
+
+from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece
+from crazyflie_mission_api.follower import at_rest
+from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_model.polynomials import COEFFICIENTS, Goal, PolynomialPiece
+from crazyflie_msgs.msg import (
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
+
+
+def to_message(piece: PolynomialPiece) -> TrajectoryPolynomialPiece:
+    """Return what the service upload_trajectory takes."""
+    axes = ([*axis, *[0.0] * (COEFFICIENTS - len(axis))] for axis in piece.axes)
+    return TrajectoryPolynomialPiece(*axes, genpy.Duration.from_sec(piece.duration))
+
+
+def from_message(message: TrajectoryPolynomialPiece) -> PolynomialPiece:
+    """Return the piece that somebody uploads."""
+    axes = (message.poly_x, message.poly_y, message.poly_z, message.poly_yaw)
+    return PolynomialPiece(message.duration.to_sec(), *axes)
+
+
+def reference_message(
+    goal: Goal[float], has_yaw: bool
+) -> PositionVelocityYawStateStamped | PositionVelocityStateStamped:
+    """Return a controller's reference, without a stamp."""
+    if has_yaw:
+        state = PositionVelocityYawState(*goal.position, *goal.velocity, goal.yaw)
+        return PositionVelocityYawStateStamped(state=state)
+    return PositionVelocityStateStamped(state=PositionVelocityState(*goal.position, *goal.velocity))
+
+
+def full_state_message(goal: Goal[float]) -> FullState:
+    """Return the driver's setpoint, without a stamp."""
+    message = FullState(
+        pose=Pose(Point(*goal.position), Quaternion(*quaternion_from_rpy(0.0, 0.0, goal.yaw))),
+        twist=Twist(Vector3(*goal.velocity), Vector3(0.0, 0.0, goal.yaw_rate)),
+        acc=Vector3(*goal.acceleration),
+    )
+    message.header.frame_id = "world"
+    return message
+
+
+def setpoint_goal(message: FullState | Position) -> Goal[float]:
+    """Return the goal that a setpoint of position means."""
+    if isinstance(message, Position):
+        return at_rest((message.x, message.y, message.z), math.radians(message.yaw))
+    p, v, a, q = (
+        message.pose.position,
+        message.twist.linear,
+        message.acc,
+        message.pose.orientation,
+    )
+    return Goal(
+        (p.x, p.y, p.z),
+        (v.x, v.y, v.z),
+        (a.x, a.y, a.z),
+        2.0 * math.atan2(q.z, q.w),
+        message.twist.angular.z,
+    )

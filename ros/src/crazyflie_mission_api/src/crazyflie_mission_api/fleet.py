@@ -1,0 +1,218 @@
+"""A team by ROS: simulated, virtual and real vehicles."""
+
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import rosgraph
+from typing_extensions import override
+
+from crazyflie_fleet import fleet_file
+from crazyflie_mission_api.connection import RosVehicle, prefix
+from crazyflie_mission_api.high_level_node import HighLevelNode
+from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
+from crazyflie_mission_api.rehearsal import rehearse
+from crazyflie_mission_api.ros_clock import RosClock
+from crazyflie_mission_api.roster import Rules
+from crazyflie_mission_api.team import Team
+from crazyflie_utils import NodeHandle, ParameterError
+from crazyflie_utils.runtime.process import Process
+from crazyflie_utils.runtime.runner import begin_script
+
+_SERVICES = (
+    "takeoff",
+    "land",
+    "go_to",
+    "upload_trajectory",
+    "start_trajectory",
+    "stop",
+    "emergency",
+    "update_params",
+)
+
+_POLL = 0.2
+"""How often it is looked whether a vehicle is there, s."""
+
+_YAW_STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
+
+
+class Fleet(Team):
+    """The vehicles of a mission, as they are on the ROS graph.
+
+    A vehicle ``NAME`` is flown by the services that it offers: those of a `HighLevelNode`,
+    ``/NAME/high_level/go_to`` and so on; or the driver's, ``/NAME/go_to``; or, where there is
+    only a takeoff server, by a `HighLevelNode` in this process. ``"/"`` is a vehicle without a
+    namespace. To be used in a with block, at the end of which all have landed.
+
+    Parameters
+    ----------
+    names : sequence of str, or str or Path
+        Names of vehicles; or a fleet file (see `crazyflie_fleet.fleet_file`), NAME.yaml.
+    bounds : Bounds, optional
+        Where they may fly; a vehicle's geofence counts as well.
+    limits : Limits, optional
+        Of trajectories.
+    separation, tolerance, patience : float
+        See `Rules`.
+    limit : float
+        How long to wait for the vehicles to be there, s of the machine's clock.
+    process : Process, optional
+        By default this script becomes a node, unless it is one.
+
+    Raises
+    ------
+    MissionError
+        A vehicle is not there; the text says what was looked for.
+    """
+
+    def __init__(
+        self,
+        names: str | Path | Sequence[str],
+        bounds: Bounds = EVERYWHERE,
+        limits: Limits | None = None,
+        separation: float = 0.3,
+        tolerance: float = 0.15,
+        patience: float = 15.0,
+        limit: float = 30.0,
+        process: Process | None = None,
+    ):
+        chosen = names_of(names)
+        self._end: Callable[[], None] = lambda: None
+        if process is None:
+            process, self._end = begin_script("mission")
+            _catch_signals()
+        self._handle = process.handle("/mission")
+        try:
+            vehicles = _connect(process, self._handle, chosen, limit)
+            clock = RosClock(self._handle, lambda: process.exit_status is not None)
+            rules = Rules(limits or Limits(), bounds, separation, tolerance, patience)
+            super().__init__(vehicles, clock, rules)
+            process.start()
+            self._await_positions(limit)
+        except BaseException:
+            self._end()
+            raise
+
+    def rehearse(self, mission: Callable[[Team], Any]) -> float:
+        """Check ``mission(fleet)`` without flying; return how long it takes, s.
+
+        Raises
+        ------
+        MissionError
+            What the mission would have run into.
+        """
+        return rehearse(self, mission)
+
+    def fly(self, mission: Callable[[Team], Any]) -> None:
+        """Rehearse ``mission(fleet)``; if nothing is wrong with it, fly it."""
+        duration = self.rehearse(mission)
+        self._handle.info(f"{', '.join(self.names)}: a mission of about {duration:.0f} s")
+        mission(self)
+
+    @override
+    def __exit__(self, kind: type[BaseException] | None, error: Any, traceback: Any) -> None:
+        """Land who still flies, whatever has happened, and say who cannot be landed."""
+        try:
+            if self.flying:
+                why = f" after {error!r}" if error is not None else ""
+                self._handle.warn(f"landing {', '.join(self.flying)}{why}")
+                self.land()
+        finally:
+            if self.flying:
+                self._handle.error(f"MAY STILL FLY: {', '.join(self.flying)}")
+            self._end()
+
+    def _await_positions(self, limit):
+        end = time.monotonic() + limit
+        while missing := [name for name in self.names if self._vehicles[name].position() is None]:
+            if time.monotonic() > end:
+                raise MissionError(
+                    f"{', '.join(missing)}: nobody has said where they are for {limit:g} s; "
+                    "expected a state, or for the driver's vehicles a pose or a tf frame"
+                )
+            time.sleep(0.01)
+
+
+def names_of(names: str | Path | Sequence[str]) -> list[str]:
+    """Return the names of vehicles, which may be those in a fleet file.
+
+    Raises
+    ------
+    MissionError
+        There are none, or one twice.
+    """
+    if isinstance(names, Path) or (isinstance(names, str) and names.endswith((".yaml", ".yml"))):
+        try:
+            return list(fleet_file.load(names).names)
+        except ParameterError as error:
+            raise MissionError(str(error)) from None
+    chosen = [names] if isinstance(names, str) else list(names)
+    if not chosen or any(not isinstance(name, str) or not name for name in chosen):
+        raise MissionError(f"the vehicles are {names!r}; expected names, such as ['cf1', 'cf2']")
+    for name in chosen:
+        if chosen.count(name) > 1:
+            raise MissionError(f"there are two vehicles {name!r}; expected different names")
+    return chosen
+
+
+def _connect(process, handle, names, limit):
+    end = time.monotonic() + limit
+    missing = list(names)
+    found = {}
+    while missing:
+        services = handle.service_nodes()
+        for name in list(missing):
+            vehicle = _vehicle(process, handle, name, services)
+            if vehicle is not None:
+                found[name] = vehicle
+                missing.remove(name)
+        if missing and time.monotonic() > end:
+            tops = ", ".join(prefix(name) for name in missing)
+            there = sorted(
+                {s.rpartition("/takeoff")[0].strip("/") or "/" for s in services if "takeoff" in s}
+            )
+            raise MissionError(
+                f"no takeoff and land, and no go_to, below {tops} after {limit:g} s; takeoff is "
+                f"offered by: {', '.join(there) or 'nobody'}"
+            )
+        if missing:
+            time.sleep(_POLL)
+    return [found[name] for name in names]
+
+
+def _vehicle(process, handle, name, services):
+    top = prefix(name)
+    commander = f"{top}/high_level"
+    if f"{commander}/go_to" in services:
+        return RosVehicle(name, handle, _below(commander), is_driven=False)
+    driver = services.get(f"{top}/upload_trajectory")
+    if driver is not None and services.get(f"{top}/takeoff") == driver:
+        return RosVehicle(name, handle, _below(top), is_driven=True)
+    if {f"{top}/takeoff", f"{top}/land"} <= services.keys():
+        has_yaw = topic_types(handle).get(f"{top}/ref") == _YAW_STATE
+        handle.set_param(f"{commander}/reference/yaw", has_yaw)
+        if not HighLevelNode().initialize(process.handle(commander)):
+            raise MissionError(f"{commander} could not be started; its reason is in the log")
+        return RosVehicle(name, handle, _below(commander), is_driven=False)
+    return None
+
+
+def topic_types(handle: NodeHandle) -> dict[str, str]:
+    """Return the types of all topics, as the master knows them."""
+    return dict(rosgraph.Master(handle.name).getTopicTypes())
+
+
+def _below(top):
+    return {service: f"{top}/{service}" for service in _SERVICES}
+
+
+def _catch_signals():
+    # What ends a script must end its with block, which lands; also where it is a node of rospy's.
+    if threading.current_thread() is not threading.main_thread():
+        return
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))

@@ -1,0 +1,118 @@
+"""What a high-level commander refers a controller to: rest, ways, trajectories."""
+
+import math
+from collections.abc import Sequence
+
+from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_model.angles import Triple
+from crazyflie_model.polynomials import Goal
+from crazyflie_utils.refusal import RefusalError
+from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece
+
+NEAR = 0.5
+"""A new way begins at the present goal if the vehicle is so near to it, m; otherwise, as
+somebody else has moved the vehicle, where this is."""
+
+
+def at_rest(position: Sequence[float], yaw: float) -> Goal[float]:
+    """Return the goal of a vehicle that is to stay, m and rad."""
+    x, y, z = position
+    return Goal((x, y, z), (0.0,) * 3, (0.0,) * 3, yaw, 0.0)
+
+
+class Follower:
+    """The goal of one vehicle, by time.
+
+    Commands are those of the firmware's high-level commander, and so is the way that they
+    are flown. All raise `RefusalError` when they make no sense.
+    """
+
+    def __init__(self) -> None:
+        self._uploads: dict[int, Pieces] = {}
+        self._trajectory: Trajectory | None = None
+        self._begin = 0.0
+
+    def forget(self) -> None:
+        """Have no goal; trajectories that were uploaded stay."""
+        self._trajectory = None
+
+    def is_moving(self, time: float) -> bool:
+        """Return whether a way or a trajectory is not at its end yet."""
+        return self._trajectory is not None and time < self._begin + self._trajectory.duration
+
+    def goal(self, time: float) -> Goal[float] | None:
+        """Return the goal at ``time`` (s), at rest after the end; None before any command."""
+        return None if self._trajectory is None else self._trajectory.evaluate(time - self._begin)
+
+    def go_to(
+        self,
+        time: float,
+        measured: Goal[float],
+        position: Triple,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+    ) -> None:
+        """Fly to a position (m) and heading (rad), or by them, in ``duration`` (s).
+
+        ``measured`` is where the vehicle is.
+        """
+        _check(*position, yaw)
+        if not (math.isfinite(duration) and duration > 0.0):
+            raise RefusalError(f"the duration is {duration:g} s; expected more than 0 s")
+        start = self._start(time, measured)
+        if relative:
+            x, y, z = start.position
+            position = (x + position[0], y + position[1], z + position[2])
+            yaw += start.yaw
+        self._fly(time, Trajectory((smooth_piece(start, position, yaw, duration),)))
+
+    def upload(self, number: int, pieces: Pieces) -> None:
+        """Keep a trajectory under a number."""
+        if not pieces:
+            raise RefusalError("the trajectory has no pieces")
+        for piece in pieces:
+            _check(*(c for axis in piece.axes for c in axis))
+            if not piece.duration > 0.0:
+                raise RefusalError(f"a piece lasts {piece.duration:g} s; expected more than 0 s")
+        self._uploads[number] = tuple(pieces)
+
+    def start(
+        self,
+        time: float,
+        measured: Goal[float],
+        number: int,
+        timescale: float = 1.0,
+        backwards: bool = False,
+        relative: bool = False,
+    ) -> None:
+        """Fly a trajectory; ``relative``: as if it began at the present goal."""
+        if number not in self._uploads:
+            raise RefusalError(f"no trajectory {number} was uploaded")
+        if not (math.isfinite(timescale) and timescale > 0.0):
+            raise RefusalError(f"the timescale is {timescale:g}; expected more than 0")
+        trajectory = Trajectory(tuple(self._uploads[number]), timescale, backwards)
+        if relative:
+            trajectory = trajectory.moved_to(self._start(time, measured).position, None)
+        self._fly(time, trajectory)
+
+    def stay(self, time: float, measured: Goal[float]) -> None:
+        """Stay where the present goal is."""
+        start = self._start(time, measured)
+        self._fly(time, Trajectory((smooth_piece(start, start.position, start.yaw, 0.5),)))
+
+    def _start(self, time, measured):
+        present = self.goal(time)
+        if present is None or math.dist(present.position, measured.position) > NEAR:
+            return measured
+        return present
+
+    def _fly(self, time, trajectory):
+        self._trajectory = trajectory
+        self._begin = time
+
+
+def _check(*numbers):
+    for number in numbers:
+        if not math.isfinite(number):
+            raise RefusalError(f"{number:g} is among the numbers; expected finite ones")

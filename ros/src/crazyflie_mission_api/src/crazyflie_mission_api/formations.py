@@ -1,0 +1,78 @@
+"""Formations: where their places are, who flies to which, and how near vehicles come."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist, pdist
+
+from crazyflie_mission_api.limits import Array
+
+Point = tuple[float, float, float]
+
+
+def lattice(
+    counts: tuple[int, int, int], spacing: float, center: Sequence[float] = (0.0, 0.0, 1.0)
+) -> Array:
+    """Return the places of a box of vehicles.
+
+    Parameters
+    ----------
+    counts : tuple, 3 components
+        How many along x, y and z.
+    spacing : float
+        Between neighbours, m.
+    center : sequence, 3 components
+        m.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        m.
+    """
+    axes = [spacing * (np.arange(count) - (count - 1) / 2.0) for count in counts]
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3) + center
+
+
+def circle(n: int, radius: float, center: Sequence[float] = (0.0, 0.0, 1.0)) -> Array:
+    """Return ``n`` places on a circle about a vertical axis, shape (n, 3), m."""
+    angles = 2.0 * math.pi * np.arange(n) / n
+    flat = np.stack([radius * np.cos(angles), radius * np.sin(angles), np.zeros(n)], axis=1)
+    return flat + center
+
+
+def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Point]:
+    """Return which vehicle flies to which goal, such that the sum of squared ways is least.
+
+    Vehicles that then fly straight there in the same time, in the same rhythm, come no nearer than
+    min(start distance, goal distance) / sqrt(2): Turpin, Michael and Kumar, CAPT: Concurrent
+    Assignment and Planning of Trajectories for Multiple Robots (IJRR 2014).
+
+    Parameters
+    ----------
+    places : mapping of str to x, y, z
+        Where each vehicle is, m.
+    goals : ndarray, shape (n, 3)
+        As many as vehicles, m.
+    """
+    starts = np.array([*places.values()], dtype=float)
+    rows, columns = linear_sum_assignment(cdist(starts, goals, "sqeuclidean"))
+    names = [*places]
+    return {names[row]: tuple(goals[column]) for row, column in zip(rows, columns, strict=True)}
+
+
+def nearest(names: Sequence[str], positions: Array) -> tuple[float, str, str]:
+    """Return the least distance of two vehicles, m, and who they are.
+
+    Parameters
+    ----------
+    names : sequence of str
+        At least two.
+    positions : ndarray, shape (n, 3)
+        m.
+    """
+    distances = pdist(positions)
+    least = int(distances.argmin())
+    one, two = np.triu_indices(len(names), 1)
+    return float(distances[least]), names[one[least]], names[two[least]]

@@ -1,0 +1,292 @@
+"""The driver's high-level services for a vehicle that the workspace's controller flies."""
+
+import math
+from concurrent.futures import Future
+from typing import Any
+
+from std_msgs.msg import String
+from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+from typing_extensions import override
+
+from crazyflie_driver import srv
+from crazyflie_driver.msg import FullState, Position
+from crazyflie_mission_api.conversions import from_message, reference_message, setpoint_goal
+from crazyflie_mission_api.follower import Follower, at_rest
+from crazyflie_model.polynomials import Goal
+from crazyflie_msgs.msg import (
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
+from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
+from crazyflie_utils.parameter_types import BOOLEAN, SERVICE, TIME_STEP, TOPIC
+from crazyflie_utils.refusal import RefusalError
+
+STATE_LIMIT = 0.5
+"""A state older than this says nothing, and nor does a setpoint, s."""
+
+_CALL_LIMIT = 58.0
+"""How long a takeoff or landing of the takeoff server may take, s of the machine's clock."""
+
+_FLYING, _TAKING_OFF, _DESCENDING, _LANDING = "flying", "taking_off", "descending", "landing"
+
+
+class HighLevelParameters(Parameters):
+    """Parameters of `HighLevelNode`."""
+
+    reference_topic: str = parameter(TOPIC, "references of the controller", "ref", "topics/ref")
+    has_yaw: bool = parameter(
+        BOOLEAN,
+        "references are PositionVelocityYawStateStamped, and not PositionVelocityStateStamped",
+        default=False,
+        name="reference/yaw",
+    )
+    state_topic: str = parameter(TOPIC, "where the vehicle is", "state", "topics/state")
+    flight_state_topic: str = parameter(
+        TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
+    )
+    takeoff: str = parameter(SERVICE, "the takeoff server's", "takeoff", "srv/takeoff")
+    land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
+    emergency: str = parameter(SERVICE, "stops the motors", "emergency", "srv/emergency")
+    time_step: float = parameter(TIME_STEP, "from one reference to the next", 0.02)
+
+
+class HighLevelNode(Node):
+    """Fly a vehicle by high-level commands: make references for its controller.
+
+    In its own namespace it offers what the driver offers for a real vehicle, so that whoever
+    flies by these services flies simulated vehicles as well. On the ground and during takeoff
+    and landing it is silent.
+    """
+
+    needed_in_flight = True
+
+    def __init__(self) -> None:
+        self._follower = Follower()
+        self._flight_state = ""
+        self._measured: Goal[float] | None = None
+        self._measured_at = 0.0
+        self._is_moving = False
+        self._streamed: Goal[float] | None = None
+        self._streamed_at = 0.0
+        # What was told during a takeoff, for its end.
+        self._next: tuple[Any, ...] | None = None
+        self._landings: list[Future[Any]] = []
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(HighLevelParameters)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        message_type = (
+            PositionVelocityYawStateStamped if parameters.has_yaw else PositionVelocityStateStamped
+        )
+        self._reference = handle.publisher(parameters.reference_topic, message_type)
+        for name, service_type, callback in (
+            ("takeoff", srv.Takeoff, self._on_takeoff),
+            ("land", srv.Land, self._on_land),
+            ("stop", srv.Stop, self._on_stop),
+            ("emergency", Empty, self._on_emergency),
+            ("go_to", srv.GoTo, self._on_go_to),
+            ("upload_trajectory", srv.UploadTrajectory, self._on_upload),
+            ("start_trajectory", srv.StartTrajectory, self._on_start),
+            ("notify_setpoints_stop", srv.NotifySetpointsStop, self._on_setpoints_stop),
+            # There are no groups and no firmware here.
+            ("set_group_mask", srv.SetGroupMask, lambda _: srv.SetGroupMaskResponse()),
+            ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
+        ):
+            handle.advertise_service(f"~{name}", service_type, callback)
+        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(
+            parameters.state_topic,
+            PositionVelocityYawStateStamped,
+            self._on_state,
+            finite="state",
+        )
+        handle.subscribe("~cmd_full_state", FullState, self._on_setpoint)
+        handle.subscribe("~cmd_position", Position, self._on_setpoint)
+        handle.timer(parameters.time_step, self._on_timer)
+
+    @override
+    def make_safe(self) -> None:
+        """Leave the controller a reference at rest."""
+        goal = self._follower.goal(self._handle.time())
+        if self._flight_state == _FLYING and self._is_moving and goal is not None:
+            self._publish(at_rest(goal.position, goal.yaw))
+        self._follower.forget()
+        self._is_moving = False
+
+    # What the vehicle does.
+
+    def _on_state(self, message):
+        s = message.state
+        self._measured = at_rest((s.x, s.y, s.z), s.yaw if self._parameters.has_yaw else 0.0)
+        self._measured_at = self._handle.time()
+
+    def _on_flight_state(self, message):
+        self._flight_state = message.data
+        if message.data == _FLYING:
+            command, self._next = self._next, None
+            if command is not None:
+                self._begin_unasked(*command)
+        else:
+            self._follower.forget()
+            self._is_moving = False
+            self._streamed = None
+        if message.data in (_DESCENDING, _LANDING):
+            landings, self._landings = self._landings, []
+            for answer in landings:
+                if not answer.done():
+                    answer.set_result(srv.LandResponse())
+
+    def _where(self):
+        age = self._handle.time() - self._measured_at
+        if self._measured is None or not 0.0 <= age < STATE_LIMIT:
+            topic = self._handle.resolve(self._parameters.state_topic)
+            raise ServiceError(f"no state has come on {topic} for {STATE_LIMIT:g} s")
+        return self._measured
+
+    # Commands.
+
+    def _on_takeoff(self, request):
+        duration = request.duration.to_sec()
+        if not (request.height > 0.0 and math.isfinite(request.height) and duration > 0.0):
+            raise ServiceError(
+                f"height and duration are {request.height:g} m and {duration:g} s; expected "
+                "more than 0"
+            )
+        start = self._where()
+        x, y, _ = start.position
+        self._next = (Follower.go_to, (x, y, request.height), start.yaw, duration)
+        call = self._call(self._parameters.takeoff, srv.TakeoffResponse)
+        call.add_done_callback(self._forget_refused)
+        return call
+
+    def _forget_refused(self, call):
+        if call.exception() is not None:
+            self._next = None
+
+    def _on_land(self, _):
+        answer = self._call(self._parameters.land, srv.LandResponse)
+        # The server answers after the landing, the driver when it begins.
+        self._landings.append(answer)
+        return answer
+
+    def _on_emergency(self, _):
+        self._follower.forget()
+        return self._call(self._parameters.emergency, EmptyResponse)
+
+    def _call(self, service, response_type):
+        answer: Future[Any] = Future()
+
+        def finish(done):
+            error = done.exception()
+            if answer.done():
+                if error is not None:
+                    self._handle.error(str(error))
+            elif error is None:
+                answer.set_result(response_type())
+            else:
+                answer.set_exception(error)
+
+        call = self._handle.call_service(service, Empty, EmptyRequest(), _CALL_LIMIT)
+        call.add_done_callback(finish)
+        return answer
+
+    def _on_stop(self, _):
+        if self._flight_state in (_FLYING, _TAKING_OFF):
+            raise ServiceError(
+                f"the vehicle is {self._flight_state.replace('_', ' ')}; expected it to have "
+                "landed: stop would let it fall, which is what emergency is for"
+            )
+        return srv.StopResponse()
+
+    def _on_go_to(self, request):
+        if request.yaw and not self._parameters.has_yaw:
+            raise ServiceError(
+                f"yaw is {request.yaw:g} rad, and the controller keeps the heading 0; expected 0"
+            )
+        goal = (request.goal.x, request.goal.y, request.goal.z)
+        duration = request.duration.to_sec()
+        self._obey(Follower.go_to, goal, request.yaw, duration, request.relative)
+        return srv.GoToResponse()
+
+    def _on_upload(self, request):
+        try:
+            self._follower.upload(request.trajectoryId, [from_message(p) for p in request.pieces])
+        except RefusalError as reason:
+            raise ServiceError(str(reason)) from None
+        return srv.UploadTrajectoryResponse()
+
+    def _on_start(self, request):
+        self._obey(
+            Follower.start,
+            request.trajectoryId,
+            request.timescale,
+            request.reversed,
+            request.relative,
+        )
+        return srv.StartTrajectoryResponse()
+
+    def _on_setpoints_stop(self, _):
+        self._end_stream()
+        return srv.NotifySetpointsStopResponse()
+
+    def _obey(self, command, *arguments):
+        if self._flight_state == _TAKING_OFF:
+            self._next = (command, *arguments)
+        elif self._flight_state == _FLYING:
+            self._begin(command, *arguments)
+        else:
+            state = self._flight_state.replace("_", " ") or "not known to fly"
+            raise ServiceError(f"the vehicle is {state}; expected it to fly")
+
+    def _begin(self, command, *arguments):
+        try:
+            command(self._follower, self._handle.time(), self._where(), *arguments)
+        except RefusalError as reason:
+            raise ServiceError(str(reason)) from None
+        self._streamed = None
+        self._is_moving = True
+
+    def _begin_unasked(self, command, *arguments):
+        try:
+            self._begin(command, *arguments)
+        except ServiceError as reason:
+            self._handle.error(f"not done: {reason}")
+
+    # Setpoints.
+
+    def _on_setpoint(self, message):
+        goal = setpoint_goal(message)
+        if not all(map(math.isfinite, (*goal.position, *goal.velocity, goal.yaw))):
+            self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
+        elif self._flight_state == _FLYING:
+            self._streamed = goal
+            self._streamed_at = self._handle.time()
+            self._publish(self._streamed)
+
+    def _end_stream(self):
+        if self._streamed is not None:
+            last = at_rest(self._streamed.position, self._streamed.yaw)
+            self._streamed = None
+            self._follower.forget()
+            self._begin_unasked(Follower.go_to, last.position, last.yaw, 0.5)
+
+    def _on_timer(self):
+        now = self._handle.time()
+        if self._streamed is not None and not 0.0 <= now - self._streamed_at < STATE_LIMIT:
+            self._end_stream()
+        if not self._is_moving:
+            return
+        goal = self._follower.goal(now)
+        # The last one, at rest, is published, too.
+        self._is_moving = self._follower.is_moving(now)
+        if goal is not None:
+            self._publish(goal)
+
+    def _publish(self, goal):
+        message = reference_message(goal, self._parameters.has_yaw)
+        message.header.stamp = self._handle.stamp()
+        self._reference.publish(message)

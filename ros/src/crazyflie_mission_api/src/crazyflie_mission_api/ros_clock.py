@@ -1,0 +1,50 @@
+"""Time as a team needs it, by ROS."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from crazyflie_mission_api.limits import MissionError
+from crazyflie_utils import NodeHandle
+
+_FROZEN = 10.0
+"""How long simulated time may stand still, s of the machine's clock."""
+
+
+class RosClock:
+    """The time of a process, real or simulated.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    has_ended : callable
+        ``has_ended()`` is true when ROS has shut down.
+    """
+
+    def __init__(self, handle: NodeHandle, has_ended: Callable[[], bool]):
+        self._handle = handle
+        self._has_ended = has_ended
+        self._tick = threading.Condition()
+        handle.timer(0.02, self._wake)
+
+    def time(self) -> float:
+        """Return the time, s."""
+        return self._handle.time()
+
+    def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
+        """Wait until ``condition()`` or ``deadline`` (s); return the condition."""
+        last, moved_at = self.time(), time.monotonic()
+        while not (done := condition()) and (now := self.time()) < deadline:
+            if self._has_ended():
+                raise MissionError("ROS has shut down; expected it to live as long as the mission")
+            if now != last:
+                last, moved_at = now, time.monotonic()
+            elif time.monotonic() - moved_at > _FROZEN:
+                raise MissionError(f"no /clock for {_FROZEN:g} s; is the simulation running?")
+            with self._tick:
+                self._tick.wait(0.1)
+        return done
+
+    def _wake(self):
+        with self._tick:
+            self._tick.notify_all()

@@ -1,0 +1,221 @@
+"""Missions: what a script says to vehicles, checked before they move."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from crazyflie_mission_api import formations, trajectories
+from crazyflie_mission_api.course import Course, check_apart
+from crazyflie_mission_api.limits import Array, MissionError, number, point
+from crazyflie_mission_api.roster import Roster, refuse, text
+from crazyflie_mission_api.trajectories import Pieces
+
+Point = Sequence[float]
+
+_SHORTEST_CLIMB = 2.0
+"""s."""
+
+
+class Team(Roster):
+    """Vehicles that fly a mission; each command is for all of them.
+
+    ``team["cf1"]`` and ``team["cf1", "cf2"]`` are teams of some, with the same commands. A
+    command is checked as a whole before anything moves. It returns when it has been carried out;
+    with ``wait=False`` when it has begun, and `arrive` waits.
+    """
+
+    # Commands.
+
+    def takeoff(self, height: float = 1.0, wait: bool = True) -> None:
+        """Climb straight up to a height, m."""
+        height = number(height, "takeoff: height", 0.1)
+        ways = {}
+        for name in self._vehicles:
+            if name in self._courses:
+                raise MissionError(f"{name}: takeoff: it flies already; expected it on the ground")
+            x, y, z = self.position(name)
+            goal = (x, y, height)
+            self.fence(name).check(np.array(goal), f"{name}: takeoff to {text(goal)}")
+            way = trajectories.straight((x, y, z), goal)
+            climb = max(_SHORTEST_CLIMB, self._quickest(way))
+            ways[name] = trajectories.stretched(way, climb)
+        self._check_apart({name: Course(way, self.time()) for name, way in ways.items()})
+        # Noted first: what has begun to take off must be landed whatever happens.
+        self._courses.update({name: Course(way, self.time()) for name, way in ways.items()})
+
+        def take_off(name):
+            return self._vehicles[name].take_off(height, trajectories.duration(ways[name]))
+
+        failures = self._answers(take_off)
+        for name, way in ways.items():
+            # A takeoff server answers after some time, with the height still to be reached.
+            self._courses[name] = Course(way, self.time())
+            if name in failures and self._vehicles[name].has_landed():
+                del self._courses[name]
+        refuse("takeoff", failures)
+        if wait:
+            self.arrive()
+
+    def go_to(
+        self,
+        goals: Point | Mapping[str, Point],
+        yaw: float = 0.0,
+        duration: float | None = None,
+        relative: bool = False,
+        wait: bool = True,
+    ) -> None:
+        """Fly straight to points, all in the same time.
+
+        Parameters
+        ----------
+        goals : x, y, z, or mapping of str to x, y, z
+            m; for several vehicles by name. One point for several of them only if relative.
+        yaw : float
+            rad.
+        duration : float, optional
+            s; by default as short as the limits allow.
+        relative : bool
+            Goals count from where each vehicle was told to be.
+        wait : bool
+        """
+        places = self._goals(goals, relative)
+        yaw = number(yaw, "go_to: yaw")
+        starts = {name: self._rest_of(name, "go_to") for name in places}
+        ways = {
+            name: trajectories.straight(starts[name].position, goal, starts[name].yaw, yaw)
+            for name, goal in places.items()
+        }
+        if duration is None:
+            shortest = (self._quickest(way) for way in ways.values())
+            duration = max(1.0, *shortest)
+        seconds = number(duration, "go_to: duration", 1e-3)
+        ways = {name: trajectories.stretched(way, seconds) for name, way in ways.items()}
+        self._check(ways, "go_to")
+
+        def command(name):
+            return self._vehicles[name].go_to(places[name], yaw, seconds)
+
+        self._fly(ways, "go_to", command, wait)
+
+    def follow(
+        self,
+        paths: Pieces | Mapping[str, Pieces],
+        timescale: float = 1.0,
+        relative: bool = False,
+        stream: bool = False,
+        wait: bool = True,
+    ) -> None:
+        """Fly along trajectories, which all begin at the same time.
+
+        Parameters
+        ----------
+        paths : sequence of PolynomialPiece, or mapping of str to such
+            As `minimum_snap.plan` and files of trajectories have them.
+        timescale : float
+            2 takes twice as long.
+        relative : bool
+            As if it began where the vehicle was told to be; otherwise it has to begin there.
+        stream : bool
+            Send a real vehicle setpoint by setpoint; otherwise pieces are uploaded.
+        wait : bool
+        """
+        factor = number(timescale, "follow: timescale", 1e-3)
+        given = paths if isinstance(paths, Mapping) else dict.fromkeys(self._vehicles, paths)
+        self._check_names(given)
+        ways = {}
+        for name, pieces in given.items():
+            what = f"{name}: trajectory"
+            trajectories.check_numbers(pieces, what)
+            start = self._rest_of(name, "follow").position
+            way = trajectories.stretched(pieces, factor)
+            first = way[0].evaluate(0.0).position
+            if relative:
+                offset = [a - b for a, b in zip(start, first, strict=True)]
+                way = trajectories.moved(way, offset)
+            elif math.dist(first, start) > self.rules.tolerance:
+                raise MissionError(
+                    f"{what} begins at {text(first)}, {math.dist(first, start):.2f} m from where "
+                    f"the vehicle is, {text(start)}; expected at most {self.rules.tolerance:g} m"
+                )
+            ways[name] = way
+        self._check(ways, "trajectory")
+        chosen = self._some(ways)
+        chosen._tell("upload", lambda name: self._vehicles[name].prepare(ways[name], stream))
+        self._fly(ways, "follow", lambda name: self._vehicles[name].start(), wait)
+
+    def formation(
+        self, places: Array | Sequence[Point], duration: float | None = None, wait: bool = True
+    ) -> dict[str, tuple[float, float, float]]:
+        """Fly to places in a way that nobody meets; return who has gone where.
+
+        Parameters
+        ----------
+        places : array_like, shape (n, 3)
+            As many as vehicles, m.
+        duration, wait
+            As for `go_to`.
+        """
+        goals = [point(place, f"formation: place {k}") for k, place in enumerate(places, start=1)]
+        if len(goals) != len(self._vehicles):
+            raise MissionError(
+                f"formation: there are {len(goals)} places; expected {len(self._vehicles)}, one "
+                "for each vehicle"
+            )
+        starts = {name: self._rest_of(name, "formation").position for name in self._vehicles}
+        chosen = formations.assign(starts, np.array(goals))
+        self.go_to(chosen, duration=duration, wait=wait)
+        return chosen
+
+    # What commands have in common.
+
+    def _goals(self, goals, relative):
+        if not isinstance(goals, Mapping):
+            if len(self._vehicles) > 1 and not relative:
+                raise MissionError(
+                    f"go_to: one goal {goals!r} for {len(self._vehicles)} vehicles; expected "
+                    "a goal for each: {name: (x, y, z)}"
+                )
+            goals = dict.fromkeys(self._vehicles, goals)
+        self._check_names(goals)
+        places = {name: point(goal, f"{name}: goal") for name, goal in goals.items()}
+        if relative:
+            places = {
+                name: goal + self._rest_of(name, "go_to").position for name, goal in places.items()
+            }
+        return {name: tuple(map(float, goal)) for name, goal in places.items()}
+
+    def _rest_of(self, name, command):
+        if name not in self._courses:
+            raise MissionError(f"{name}: {command}: it is on the ground; expected takeoff before")
+        left = self._courses[name].end - self.time()
+        if left > 0.0:
+            raise MissionError(
+                f"{name}: {command}: it is on its way for another {left:.1f} s; expected arrive() "
+                "before"
+            )
+        return self._courses[name].destination
+
+    def _quickest(self, way):
+        return trajectories.duration(trajectories.within_limits(way, self.rules.limits))
+
+    def _check(self, ways, what):
+        for name, way in ways.items():
+            trajectories.check(way, self.rules.limits, self.fence(name), f"{name}: {what}")
+        now = self.time()
+        self._check_apart({name: Course(way, now) for name, way in ways.items()})
+
+    def _check_apart(self, courses):
+        check_apart({**self._courses, **courses}, self.time(), self.rules.separation)
+
+    def _fly(self, ways, what, command, wait):
+        team = self._some(ways)
+        begin = self.time()
+        failures = team._answers(command)
+        begun = {name: Course(way, begin) for name, way in ways.items() if name not in failures}
+        self._courses.update(begun)
+        refuse(what, failures)
+        if wait:
+            team.arrive()

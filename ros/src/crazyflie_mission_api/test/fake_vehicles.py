@@ -1,0 +1,118 @@
+"""Vehicles on a fake process: what a takeoff server and a controller do, and what a driver does."""
+
+from geometry_msgs.msg import PoseStamped
+from std_msgs.msg import String
+from std_srvs.srv import Empty, EmptyResponse
+
+from crazyflie_driver import srv
+from crazyflie_driver.msg import FullState
+from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
+from crazyflie_utils import ServiceError
+
+
+class Stack:
+    """A vehicle that is at once where its reference is."""
+
+    def __init__(self, process, name, position):
+        self.position = list(position)
+        self.refusal = ""
+        handle = process.handle(f"/{name}/stack")
+        self._state = handle.publisher("state", PositionVelocityYawStateStamped)
+        self._flight_state = handle.publisher("in_flight_state", String, latch=True)
+        handle.advertise_service("takeoff", Empty, self._on_takeoff)
+        handle.advertise_service("land", Empty, self._on_land)
+        handle.advertise_service("emergency", Empty, self._on_land)
+        handle.subscribe("ref", PositionVelocityStateStamped, self._on_reference)
+        handle.timer(0.05, self._on_timer)
+        self.be("on_ground")
+
+    def be(self, state):
+        """Tell a flight state."""
+        self._flight_state.publish(String(state))
+
+    def _on_takeoff(self, _):
+        if self.refusal:
+            raise ServiceError(self.refusal)
+        self.position[2] = 1.0
+        self._on_timer()
+        self.be("taking_off")
+        self.be("flying")
+        return EmptyResponse()
+
+    def _on_land(self, _):
+        self.position[2] = 0.0
+        self.be("descending")
+        self.be("on_ground")
+        return EmptyResponse()
+
+    def _on_reference(self, message):
+        s = message.state
+        self.position = [s.x, s.y, s.z]
+
+    def _on_timer(self):
+        message = PositionVelocityYawStateStamped()
+        message.state.x, message.state.y, message.state.z = self.position
+        self._state.publish(message)
+
+
+class Driven:
+    """A vehicle that is at once where it was told to be, behind the driver's services."""
+
+    def __init__(self, process, name, position):
+        self.position = list(position)
+        self.requests = []
+        self.setpoints = []
+        handle = process.handle(f"/{name}/driver")
+        self._pose = handle.publisher("pose", PoseStamped)
+        self._status = handle.publisher("status", String, latch=True)
+        for service, service_type in (
+            ("takeoff", srv.Takeoff),
+            ("land", srv.Land),
+            ("go_to", srv.GoTo),
+            ("upload_trajectory", srv.UploadTrajectory),
+            ("start_trajectory", srv.StartTrajectory),
+            ("stop", srv.Stop),
+            ("update_params", srv.UpdateParams),
+            ("emergency", Empty),
+        ):
+            handle.advertise_service(service, service_type, self._answer(service, service_type))
+        handle.subscribe("cmd_full_state", FullState, self._on_setpoint)
+        handle.timer(0.05, self._on_timer)
+
+    def tell(self, status):
+        """Say how the vehicle is."""
+        self._status.publish(String(status))
+
+    def called(self):
+        """Return the names of the services that were called."""
+        return [name for name, _ in self.requests]
+
+    def _answer(self, name, service_type):
+        def answer(request):
+            self.requests.append((name, request))
+            if name in ("takeoff", "land"):
+                self.position[2] = request.height
+            elif name == "go_to":
+                goal = request.goal
+                self.position = [goal.x, goal.y, goal.z]
+            elif name == "start_trajectory":
+                last = self.requests[-2][1].pieces[-1]
+                seconds = last.duration.to_sec()
+                self.position = [
+                    sum(c * seconds**k for k, c in enumerate(axis))
+                    for axis in (last.poly_x, last.poly_y, last.poly_z)
+                ]
+            return service_type._response_class()
+
+        return answer
+
+    def _on_setpoint(self, message):
+        self.setpoints.append(message)
+        p = message.pose.position
+        self.position = [p.x, p.y, p.z]
+
+    def _on_timer(self):
+        message = PoseStamped()
+        p = message.pose.position
+        p.x, p.y, p.z = self.position
+        self._pose.publish(message)

@@ -1,0 +1,101 @@
+"""Missions of two simulated vehicles, as fast as it goes; they stand at y = -0.5 and 0.5 m."""
+
+import re
+import signal
+from pathlib import Path
+
+import pytest
+import rospkg
+from flown import LIMIT, nearest, recorded, run, script
+
+from crazyflie_utils.testing import peer
+
+PACKAGE = Path(rospkg.RosPack().get_path("crazyflie_mission_api"))
+
+WAITING = """
+from crazyflie_mission_api import Bounds, Fleet, MissionError
+
+def mission(fleet):
+    fleet.takeoff(1.0)
+    fleet["cf2"].go_to((0.0, 5.0, 1.0))
+
+with Fleet(["cf1", "cf2"], bounds=Bounds((-2, -2, 0), (2, 2, 2))) as fleet:
+    try:
+        fleet.fly(mission)
+    except MissionError as error:
+        assert "cf2: go_to is out of bounds: y is 5 m; expected -2 to 2 m" in str(error)
+    assert fleet.flying == []
+    assert fleet.position("cf1")[2] < 0.05
+    fleet.takeoff(0.8)
+    fleet.wait(1e6)
+"""
+
+OLD = """
+import rospy
+from crazyflie import Crazyflie
+
+rospy.init_node("script")
+cf = Crazyflie("cf1", "/cf1")
+cf.setParam("commander/enHighLevel", 1)
+cf.takeoff(targetHeight=0.6, duration=2.0)
+rospy.sleep(2.5)
+cf.goTo(goal=[0.5, 0.0, 0.0], yaw=0.0, duration=2.0, relative=True)
+rospy.sleep(2.5)
+assert abs(cf.position()[0] - 0.5) < 0.15, cf.position()
+for k in range(100):
+    cf.cmdPosition((0.5, -0.5 - 0.005 * k, 0.6))
+    rospy.sleep(0.02)
+cf.notifySetpointsStop()
+rospy.sleep(2.0)
+cf.land(targetHeight=0.0, duration=2.0)
+rospy.sleep(5.0)
+cf.stop()
+"""
+
+
+def written(tmp_path, text):
+    """Return the path of a script."""
+    path = tmp_path / "mission.py"
+    path.write_text(text)
+    return path
+
+
+def landed(tracks):
+    """Return whether both stand."""
+    return all(track[-1][2] < 0.05 for track in tracks.values())
+
+
+def test_the_script_of_the_readme(tmp_path):
+    text = re.search(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(), re.S).group(1)
+    with recorded(["cf1", "cf2"]) as tracks:
+        status, errors = run(written(tmp_path, text))
+        assert (status, errors) == (0, "")
+        assert landed(tracks)
+    assert nearest(tracks["cf1"], (0.5, -1.0, 1.2)) < 0.16
+    for point in ((0.5, 1.0, 1.4), (0.0, 1.5, 1.0)):
+        assert nearest(tracks["cf2"], point) < 0.16
+    ends = sorted(track[-1][0] for track in tracks.values())
+    assert ends == pytest.approx([-0.5, 0.5], abs=0.16)
+
+
+def test_ctrl_c_lands_and_what_is_wrong_is_known_before(tmp_path):
+    with recorded(["cf1", "cf2"]) as tracks, script(written(tmp_path, WAITING)) as process:
+        try:
+            peer.wait_until(lambda: all(t[-1][2] > 0.7 for t in tracks.values()), "takeoff", LIMIT)
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=LIMIT)
+        finally:
+            process.kill()
+        assert "KeyboardInterrupt" in errors
+        assert landed(tracks)
+
+
+def test_a_script_for_the_sdk_flies_a_simulated_vehicle(tmp_path):
+    with recorded(["cf1"]) as tracks:
+        x, y, _ = tracks["cf1"][-1]
+        text = OLD.replace("[0] - 0.5", f"[0] - {x + 0.5:.3f}")
+        text = text.replace("(0.5, -0.5 -", f"({x + 0.5:.3f}, {y:.3f} -")
+        status, errors = run(written(tmp_path, text))
+        assert (status, errors) == (0, "")
+        assert landed(tracks)
+    assert tracks["cf1"][-1] == pytest.approx([x + 0.5, y - 0.5, 0.0], abs=0.16)

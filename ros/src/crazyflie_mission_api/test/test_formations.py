@@ -1,0 +1,68 @@
+"""Formations, and the lattice of a hundred, flown by the model under its controller."""
+
+import runpy
+
+import model_flight
+import numpy as np
+import pytest
+import rospkg
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.distance import pdist
+
+from crazyflie_mission_api import Rehearsal
+from crazyflie_mission_api.formations import assign, circle, lattice, nearest
+from crazyflie_mission_api.roster import Rules
+
+PACKAGES = rospkg.RosPack()
+GAINS = PACKAGES.get_path("crazyflie_lqr") + "/config/K_soft.txt"
+EXAMPLES = PACKAGES.get_path("crazyflie_mission_api") + "/examples"
+
+
+def test_places():
+    box = lattice((2, 3, 4), 0.5, (1.0, 0.0, 2.0))
+    assert box.shape == (24, 3)
+    assert pdist(box).min() == pytest.approx(0.5)
+    np.testing.assert_allclose(box.mean(axis=0), (1.0, 0.0, 2.0))
+    ring = circle(8, 1.0)
+    np.testing.assert_allclose(np.hypot(ring[:, 0], ring[:, 1]), 1.0)
+    assert len({tuple(place) for place in ring.round(6).tolist()}) == 8
+
+
+def test_who_is_nearest():
+    places = np.array([(0.0, 0, 0), (3.0, 0, 0), (3.0, 0.4, 0)])
+    assert nearest(["a", "b", "c"], places) == (pytest.approx(0.4), "b", "c")
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10**6))
+def test_nobody_meets_on_straight_ways_in_the_same_rhythm(seed):
+    # CAPT: with starts and goals a apart, at least a / sqrt(2).
+    draw = np.random.default_rng(seed)
+    starts, goals = (draw.permutation(lattice((3, 3, 1), 1.0))[:6] for _ in range(2))
+    names = [f"cf{k}" for k in range(6)]
+    chosen = assign(dict(zip(names, map(tuple, starts), strict=True)), goals)
+    assert sorted(chosen.values()) == sorted(map(tuple, goals.tolist()))
+    ends = np.array([chosen[name] for name in names])
+    for s in np.linspace(0.0, 1.0, 21):
+        assert pdist(starts + s * (ends - starts)).min() > 1.0 / np.sqrt(2.0) - 1e-9
+
+
+@pytest.mark.parametrize("n", [1, 7])
+def test_the_lattice_of_any_number(n):
+    example = runpy.run_path(f"{EXAMPLES}/lattice.py")
+    starts = {f"cf{k}": tuple(place) for k, place in enumerate(example["square"](n).tolist())}
+    team = Rehearsal(starts, Rules(example["LIMITS"]))
+    example["mission"](team)
+    assert team.flying == []
+    assert {tuple(np.round(team.position(name), 6)) for name in starts} == set(starts.values())
+
+
+def test_a_hundred_vehicles_fly_the_lattice():
+    example = runpy.run_path(f"{EXAMPLES}/lattice.py")
+    starts = {f"cf{k}": tuple(place) for k, place in enumerate(example["square"](100).tolist())}
+    team = Rehearsal(starts, Rules(example["LIMITS"]))
+    flight = model_flight.fly(team, example["mission"], GAINS)
+    assert flight.error < 0.5
+    assert flight.distance > 0.5
+    assert flight.at_limit == 0.0

@@ -1,0 +1,205 @@
+"""The driver's services for a vehicle under the workspace's controller, on a fake process."""
+
+import math
+
+import genpy
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point
+from std_msgs.msg import String
+from std_srvs.srv import EmptyResponse
+
+from crazyflie_driver import srv
+from crazyflie_driver.msg import Position
+from crazyflie_mission_api.conversions import full_state_message, setpoint_goal, to_message
+from crazyflie_mission_api.high_level_node import HighLevelNode
+from crazyflie_mission_api.minimum_snap import plan
+from crazyflie_model.polynomials import Goal
+from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
+from crazyflie_utils import ServiceError
+from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.vectors import to_vector
+
+TOP = "/cf1/high_level"
+SECONDS = genpy.Duration.from_sec
+
+
+class Bench:
+    """A node, and what it meets: takeoff server, estimator."""
+
+    def __init__(self, **parameters):
+        self.process = FakeProcess()
+        handle = self.process.handle("/cf1/takeoff_server")
+        self.called = []
+        for name in ("takeoff", "land", "emergency"):
+            handle.advertise_service(name, srv.Stop, lambda _, name=name: self._answer(name))
+        self.node = HighLevelNode()
+        assert self.process.launch(self.node, TOP, parameters)
+
+    def _answer(self, name):
+        self.called.append(name)
+        return EmptyResponse()
+
+    def be(self, state, position=(0.0, 0.0, 1.0)):
+        """Tell where the vehicle is, and its flight state."""
+        self.see(position)
+        self.process.publish("/cf1/in_flight_state", String(state))
+
+    def see(self, position):
+        """Tell where the vehicle is."""
+        state = PositionVelocityYawState(*position, 0.0, 0.0, 0.0, 0.0)
+        self.process.publish("/cf1/state", PositionVelocityYawStateStamped(state=state))
+
+    def call(self, service, service_type, *arguments):
+        """Call one of the services."""
+        return self.process.call(f"{TOP}/{service}", service_type._request_class(*arguments))
+
+    def go_to(self, goal, yaw=0.0, duration=2.0, relative=False):
+        """Call go_to."""
+        return self.call("go_to", srv.GoTo, 0, relative, Point(*goal), yaw, SECONDS(duration))
+
+    def fly(self, duration):
+        """Let a vehicle that follows its references fly, and return these."""
+        for _ in range(round(duration / 0.1)):
+            self.process.advance(0.1)
+            if self.references():
+                self.see(self.references()[-1][:3])
+        return np.array(self.references())
+
+    def references(self):
+        """Return all references so far."""
+        return [to_vector(message.state) for message in self.process.published("/cf1/ref")]
+
+
+@pytest.fixture
+def bench():
+    """Return a vehicle that flies at (0, 0, 1)."""
+    made = Bench()
+    made.be("flying")
+    return made
+
+
+def test_goes_where_it_is_told_and_falls_silent(bench):
+    bench.go_to((1.0, 0.0, 1.5))
+    references = bench.fly(3.0)
+    assert references[0] == pytest.approx([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], abs=1e-3)
+    assert references[-1] == pytest.approx([1.0, 0.0, 1.5, 0.0, 0.0, 0.0])
+    assert references[:, 3].max() == pytest.approx(35.0 / 16.0 / 2.0, rel=0.01)
+    assert len(references) == pytest.approx(101, abs=2)
+    bench.go_to((0.5, 0.0, 0.0), relative=True)
+    assert bench.fly(2.1)[-1][:3] == pytest.approx([1.5, 0.0, 1.5])
+
+
+def test_a_new_way_begins_as_the_old_one_is(bench):
+    bench.go_to((1.0, 0.0, 1.0))
+    before = bench.fly(1.0)[-1]
+    bench.go_to((0.0, 1.0, 1.0))
+    bench.process.advance(0.02)
+    after = bench.references()[-1]
+    assert after[3] == pytest.approx(before[3], abs=0.1)
+    assert bench.fly(2.1)[-1][:3] == pytest.approx([0.0, 1.0, 1.0])
+
+
+def test_somebody_else_has_moved_it(bench):
+    bench.go_to((1.0, 0.0, 1.0))
+    bench.fly(2.2)
+    bench.see((-1.0, 0.0, 1.0))
+    bench.go_to((-1.0, 0.0, 1.2))
+    bench.process.advance(0.02)
+    assert bench.references()[-1][0] == pytest.approx(-1.0)
+
+
+def test_trajectories_are_uploaded_and_flown(bench):
+    pieces = plan([(0, 0, 1), (1, 0, 1), (1, 1, 1)])
+    bench.call("upload_trajectory", srv.UploadTrajectory, 3, 0, [to_message(p) for p in pieces])
+    bench.call("start_trajectory", srv.StartTrajectory, 0, 3, 0.5, False, False)
+    duration = 0.5 * sum(piece.duration for piece in pieces)
+    references = bench.fly(duration + 0.2)
+    assert references[-1][:3] == pytest.approx([1.0, 1.0, 1.0], abs=1e-5)
+    nearest = np.linalg.norm(references[:, :3] - [1.0, 0.0, 1.0], axis=1).min()
+    assert nearest < 0.02
+
+
+def test_takes_off_by_the_takeoff_server_and_then_climbs():
+    bench = Bench()
+    bench.be("on_ground", (0.3, 0.0, 0.0))
+    bench.call("takeoff", srv.Takeoff, 0, 0.6, SECONDS(2.0))
+    assert bench.called == ["takeoff"]
+    bench.be("taking_off", (0.3, 0.0, 0.1))
+    assert bench.fly(1.0).size == 0
+    bench.be("flying", (0.3, 0.0, 1.0))
+    assert bench.fly(2.1)[-1][:3] == pytest.approx([0.3, 0.0, 0.6])
+
+
+def test_what_is_told_during_a_takeoff_counts_after_it():
+    bench = Bench()
+    bench.be("on_ground", (0.0, 0.0, 0.0))
+    bench.call("takeoff", srv.Takeoff, 0, 0.6, SECONDS(2.0))
+    bench.be("taking_off", (0.0, 0.0, 0.1))
+    bench.go_to((1.0, 0.0, 1.0))
+    bench.be("flying")
+    assert bench.fly(2.1)[-1][:3] == pytest.approx([1.0, 0.0, 1.0])
+
+
+def test_is_silent_while_the_vehicle_lands(bench):
+    bench.go_to((1.0, 0.0, 1.0))
+    bench.fly(1.0)
+    bench.call("land", srv.Land, 0, 0.0, SECONDS(2.0))
+    bench.be("descending")
+    count = len(bench.references())
+    bench.process.advance(1.0)
+    assert bench.called == ["land"]
+    assert len(bench.references()) == count
+
+
+def test_setpoints_are_followed_until_they_stop(bench):
+    goal = Goal((0.5, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 0.0), 0.3, 0.0)
+    assert setpoint_goal(full_state_message(goal)).yaw == pytest.approx(0.3)
+    bench.process.publish(f"{TOP}/cmd_full_state", full_state_message(goal))
+    assert bench.references()[-1] == pytest.approx([0.5, 0.0, 1.0, 0.2, 0.0, 0.0])
+    bench.see((0.5, 0.0, 1.0))
+    assert bench.fly(1.2)[-1] == pytest.approx([0.5, 0.0, 1.0, 0.0, 0.0, 0.0])
+    for x in (0.4, math.nan):
+        bench.process.publish(f"{TOP}/cmd_position", Position(x=x, z=1.0))
+    assert bench.references()[-1] == pytest.approx([0.4, 0.0, 1.0, 0.0, 0.0, 0.0], abs=1e-6)
+
+
+def test_references_have_a_heading_for_controllers_that_follow_it():
+    bench = Bench(**{"reference/yaw": True})
+    bench.be("flying")
+    bench.go_to((0.0, 0.0, 1.0), yaw=0.5)
+    assert bench.fly(2.1)[-1][6] == pytest.approx(0.5)
+
+
+def test_ends_at_rest(bench):
+    bench.go_to((1.0, 0.0, 1.0))
+    assert bench.fly(1.0)[-1][3] > 0.5
+    bench.node.shutdown()
+    assert bench.references()[-1][3:] == pytest.approx([0.0, 0.0, 0.0])
+    assert bench.references()[-1][0] == pytest.approx(0.5, abs=0.02)
+
+
+REFUSED = {
+    "no state has come on /cf1/state": lambda b: (b.process.advance(1.0), b.go_to((1, 0, 1))),
+    "yaw is 0.5 rad, and the controller keeps the heading 0": lambda b: b.go_to((1, 0, 1), 0.5),
+    "nan is among the numbers": lambda b: b.go_to((math.nan, 0, 1)),
+    "the duration is 0 s; expected more": lambda b: b.go_to((1, 0, 1), duration=0.0),
+    "no trajectory 7 was uploaded": lambda b: b.call(
+        "start_trajectory", srv.StartTrajectory, 0, 7, 1.0, False, False
+    ),
+    "has no pieces": lambda b: b.call("upload_trajectory", srv.UploadTrajectory, 0, 0, []),
+    "height and duration are 0 m": lambda b: b.call("takeoff", srv.Takeoff, 0, 0.0, SECONDS(1.0)),
+    "the vehicle is flying; expected it to have landed": lambda b: b.call("stop", srv.Stop, 0),
+    "the vehicle is on ground; expected it to fly": lambda b: (
+        b.be("on_ground"),
+        b.go_to((1, 0, 1)),
+    ),
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_makes_no_sense_is_refused(bench, text):
+    with pytest.raises(ServiceError, match=text):
+        REFUSED[text](bench)
+    bench.process.advance(0.1)
+    assert bench.references() == []

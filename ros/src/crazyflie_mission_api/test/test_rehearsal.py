@@ -1,0 +1,164 @@
+"""Missions without vehicles: what is refused, and what it says."""
+
+import math
+
+import numpy as np
+import pytest
+
+from crazyflie_demo.figure8 import figure8
+from crazyflie_mission_api import Bounds, Limits, MissionError, Rehearsal, plan
+from crazyflie_mission_api.rehearsal import rehearse
+from crazyflie_mission_api.roster import Rules
+from crazyflie_mission_api.trajectories import duration, moved, stretched
+
+ROOM = Bounds((-2.0, -2.0, 0.0), (2.0, 2.0, 2.0))
+STARTS = {"cf1": (0.0, 0.0, 0.0), "cf2": (1.0, 0.0, 0.0)}
+
+
+@pytest.fixture
+def team():
+    """Return two vehicles on the ground of a room."""
+    return Rehearsal(STARTS, Rules(bounds=ROOM))
+
+
+@pytest.fixture
+def flying(team):
+    """Return two vehicles that hover at 1 m."""
+    team.takeoff(1.0)
+    return team
+
+
+def test_a_mission_from_takeoff_to_landing(team):
+    with team:
+        team.takeoff(1.0)
+        assert team.flying == ["cf1", "cf2"]
+        assert team.position("cf2") == pytest.approx((1.0, 0.0, 1.0))
+        team.go_to({"cf1": (-1.0, 0.0, 1.0), "cf2": (1.0, 1.0, 1.5)})
+        assert team.position("cf1") == pytest.approx((-1.0, 0.0, 1.0))
+        team["cf2"].go_to((0.0, 0.5, 0.0), relative=True)
+        assert team.position("cf2") == pytest.approx((1.0, 1.5, 1.5))
+        team["cf1"].follow(plan([(-1, 0, 1), (-1, 1, 1), (-1.5, 0, 1)]))
+        assert team.position("cf1") == pytest.approx((-1.5, 0.0, 1.0))
+        team.go_to((0.0, 0.0, -0.2), relative=True)
+        assert team.position("cf1") == pytest.approx((-1.5, 0.0, 0.8))
+    assert team.flying == []
+    assert team.position("cf1") == pytest.approx((-1.5, 0.0, 0.0))
+
+
+def test_the_way_takes_as_long_as_the_limits_demand(flying):
+    begin = flying.time()
+    flying["cf1"].go_to((-1.0, 0.0, 1.0))
+    # The polynomial from rest to rest is 35/16 times as fast in its middle as on average.
+    assert flying.time() - begin == pytest.approx(35.0 / 16.0 / 0.5, abs=0.06)
+
+
+def test_some_fly_while_others_wait(flying):
+    flying["cf1"].go_to((-1.0, 0.0, 1.0), wait=False)
+    assert flying.position("cf1") == pytest.approx((0.0, 0.0, 1.0))
+    flying["cf2"].go_to((1.0, 0.2, 1.0))
+    with pytest.raises(MissionError, match=r"cf1: go_to: it is on its way for another \d\.\d s"):
+        flying["cf1"].go_to((0.0, 0.0, 1.0))
+    flying.arrive()
+    assert flying.position("cf1") == pytest.approx((-1.0, 0.0, 1.0))
+
+
+def test_a_trajectory_can_be_slower_and_elsewhere(flying):
+    flying["cf1"].go_to((-1.0, 0.0, 1.0))
+    begin = flying.time()
+    flying["cf1"].follow(figure8(), timescale=2.0, relative=True)
+    assert flying.time() - begin == pytest.approx(20.0)
+    assert flying.position("cf1") == pytest.approx((-1.0, 0.0, 1.0))
+
+
+def test_a_formation_sends_everybody_to_the_place_that_suits(flying):
+    gone = flying.formation([(1.0, 1.0, 1.0), (0.0, 1.0, 1.0)])
+    assert gone == {"cf1": (0.0, 1.0, 1.0), "cf2": (1.0, 1.0, 1.0)}
+
+
+def test_an_error_in_flight_ends_with_a_landing(team):
+    with pytest.raises(ZeroDivisionError), team:
+        team.takeoff(1.0)
+        team.wait(1 / 0)
+    assert team.flying == []
+    assert team.position("cf1")[2] == pytest.approx(0.0)
+
+
+def test_an_emergency_is_no_landing(flying):
+    flying["cf1"].emergency()
+    assert flying.flying == ["cf2"]
+    assert flying.position("cf1")[2] == 0.0
+
+
+def test_a_mission_is_rehearsed_where_the_vehicles_are(team):
+    def mission(fleet):
+        fleet.takeoff(1.0)
+        fleet.go_to({"cf1": (0.0, 3.0, 1.0)})
+
+    with pytest.raises(MissionError, match=r"cf1: go_to is out of bounds: y is 3 m; expected -2"):
+        rehearse(team, mission)
+    assert team.flying == []
+    assert rehearse(team, lambda fleet: fleet.takeoff(1.0)) > 4.0
+
+
+BAD = {
+    "there is no vehicle 'cf3'; expected one of cf1, cf2": lambda t: t["cf3"],
+    "cf1: takeoff: it flies already": lambda t: t.takeoff(1.0),
+    r"go_to: one goal \(0, 0, 1\) for 2 vehicles": lambda t: t.go_to((0, 0, 1)),
+    "cf1: goal is 5; expected x, y, z": lambda t: t.go_to({"cf1": 5}),
+    r"cf1: goal is \(0, nan, 1\)": lambda t: t.go_to({"cf1": (0, math.nan, 1)}),
+    "cf2: go_to is out of bounds: x is 3 m; expected -2 to 2 m": lambda t: t["cf2"].go_to(
+        (3, 0, 1)
+    ),
+    r"cf1 and cf2 would be 0\.\d+ m apart, \d\.\d s from now": lambda t: t["cf1"].go_to(
+        (0.9, 0, 1)
+    ),
+    "cf1: go_to: the speed is .* m/s at .* expected at most 0.5 m/s": lambda t: t["cf1"].go_to(
+        (0, 1, 1), duration=1.0
+    ),
+    "go_to: duration is 'long'; expected a finite number": lambda t: t["cf1"].go_to(
+        (0, 1, 1), duration="long"
+    ),
+    r"begins at \(0.00, 0.00, 0.00\), 1.00 m from where": lambda t: t["cf1"].follow(figure8()),
+    "cf1: trajectory: the speed is 0.83": lambda t: t["cf1"].follow(figure8(), relative=True),
+    "cf1: trajectory has no pieces": lambda t: t["cf1"].follow([]),
+    "formation: there are 1 places; expected 2": lambda t: t.formation([(0, 0, 1)]),
+    "wait is -1; expected a finite number >= 0": lambda t: t.wait(-1),
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_bad_commands_are_named_and_move_nobody(flying, text):
+    before = [flying.position(name) for name in flying.names]
+    with pytest.raises(MissionError, match=text):
+        BAD[text](flying)
+    assert [flying.position(name) for name in flying.names] == before
+
+
+def test_commands_on_the_ground_are_refused(team):
+    with pytest.raises(MissionError, match="cf1: go_to: it is on the ground; expected takeoff"):
+        team["cf1"].go_to((0, 0, 1))
+    with pytest.raises(MissionError, match="cf1: takeoff .* z is 3 m; expected 0 to 2 m"):
+        team.takeoff(3.0)
+    with pytest.raises(MissionError, match="height is nan"):
+        team.takeoff(math.nan)
+
+
+@pytest.mark.parametrize(
+    ("make", "text"),
+    [
+        (lambda: Bounds((1, 1, 1), (0, 0, 0)), "bounds are"),
+        (lambda: Limits(speed=-1.0), "limits: speed is -1.0; expected a finite number > 0"),
+        (lambda: Limits(tilt=math.nan), "limits: tilt is nan"),
+    ],
+)
+def test_bad_rules_are_named(make, text):
+    with pytest.raises(MissionError, match=text):
+        make()
+
+
+def test_trajectories_are_moved_and_stretched():
+    pieces = stretched(moved(figure8(), (1.0, 0.0, 2.0)), 3.0)
+    assert duration(pieces) == pytest.approx(30.0)
+    slow, quick = pieces[3].evaluate(1.5), figure8()[3].evaluate(0.5)
+    np.testing.assert_allclose(slow.position, np.add(quick.position, (1.0, 0.0, 2.0)))
+    np.testing.assert_allclose(slow.velocity, np.divide(quick.velocity, 3.0))

@@ -34,7 +34,7 @@ LAYERS = [
         "crazyflie_spawner",
         "mocap_optitrack",
     },
-    {"crazyflie_driver", "crazyflie_teleop", "crazyflie_tools", "crazyflie_virtual"},
+    {"crazyflie_batch", "crazyflie_driver", "crazyflie_teleop", "crazyflie_tools", "crazyflie_virtual"},
     {"crazyflie_demo", "crazyflie_examples"},
     {"uav_trajectory"},
     {"crazyflie", "crazyflie_dev"},

@@ -58,6 +58,7 @@ class Flights:
     x : ndarray, shape (n, x_dim)
         States of the model at the end.
     has_crashed : ndarray of bool, shape (n,)
+        Or its state has overflowed.
     largest_error, rms_error : ndarray, shape (n,)
         Distance from the goal after they had time to settle, at the ticks, m.
     largest_tilt : ndarray, shape (n,)
@@ -141,10 +142,13 @@ def _flights(batch, memory, records):
         return joined.swapaxes(-2, -1)[..., : batch.n, :]
 
     largest, squares, upright, speed = vehicles(memory, "metrics").T
+    x = vehicles(memory, "x")
+    # What has overflowed is neither larger nor smaller than anything.
+    has_crashed = (vehicles(memory, "has_crashed")[:, 0] > 0.0) | ~np.isfinite(x).all(axis=1)
     counted = np.maximum(batch.ticks - batch.parameters["settled"][0], 1.0)
     return Flights(
-        x=vehicles(memory, "x"),
-        has_crashed=vehicles(memory, "has_crashed")[:, 0] > 0.0,
+        x=x,
+        has_crashed=has_crashed,
         largest_error=largest,
         rms_error=np.sqrt(squares / counted),
         largest_tilt=np.arccos(np.clip(upright, -1.0, 1.0)),
@@ -152,5 +156,3 @@ def _flights(batch, memory, records):
         states=vehicles(records, "x"),
         controls=vehicles(records, "u"),
     )
-
-

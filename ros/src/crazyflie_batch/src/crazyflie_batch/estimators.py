@@ -83,12 +83,14 @@ class FiniteDifferences(Estimator):
 
     @classmethod
     @override
-    def start(cls, position, parameters):
+    def start(cls, position: Vector[Any], parameters: Sequence[Any]) -> Vector[Any]:
         return position
 
     @classmethod
     @override
-    def update(cls, memory, dt, position, parameters):
+    def update(
+        cls, memory: Vector[Any], dt: Any, position: Vector[Any], parameters: Sequence[Any]
+    ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
         return position, position, [(a - b) / dt for a, b in zip(position, memory, strict=True)]
 
 
@@ -124,12 +126,14 @@ class Kalman(Estimator):
 
     @classmethod
     @override
-    def start(cls, position, parameters):
+    def start(cls, position: Vector[Any], parameters: Sequence[Any]) -> Vector[Any]:
         return _begin(position, [0.0] * 3, parameters[0])
 
     @classmethod
     @override
-    def update(cls, memory, dt, position, parameters):
+    def update(
+        cls, memory: Vector[Any], dt: Any, position: Vector[Any], parameters: Sequence[Any]
+    ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
         noise, walk = parameters
         speeds = [(a - b) / dt for a, b in zip(position, memory[:3], strict=True)]
         anew = _begin(position, speeds, noise)

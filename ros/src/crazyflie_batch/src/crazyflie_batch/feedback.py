@@ -13,7 +13,11 @@ from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 X_DIM, U_DIM = 7, 4
 """Of states, which are x, y, z, x_dot, y_dot, z_dot, yaw, and controls."""
 
-LIMITS = {ROLL: (-MAX_TILT, MAX_TILT), PITCH: (-MAX_TILT, MAX_TILT), THRUST: (MIN_THRUST, MAX_THRUST)}
+LIMITS = {
+    ROLL: (-MAX_TILT, MAX_TILT),
+    PITCH: (-MAX_TILT, MAX_TILT),
+    THRUST: (MIN_THRUST, MAX_THRUST),
+}
 
 _INTEGRATED = (PITCH, ROLL, THRUST)
 """The controls that the integrals of x, y and z act on."""

@@ -16,6 +16,7 @@ from typing import Any
 from crazyflie_batch import feedback
 from crazyflie_batch.elementwise import turn, yaw_from_quaternion
 from crazyflie_batch.estimators import Estimator
+from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector, functions, where
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
@@ -23,6 +24,9 @@ from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 ERRORS_DIM = 7
 """Random numbers of a tick: errors of position (3) and attitude (3), of standard deviation 1; what
 decides whether the pose is lost, in [0, 1)."""
+
+SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
+"""Steps of the model from one sample of the inner loops to the next."""
 
 POSE_DIM = 5
 """Of a pose on its way: position (3), yaw, and 1 for one that is not lost."""
@@ -51,7 +55,7 @@ class Plan:
         A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
     estimator : type of Estimator
     steps : int
-        Of the model in a tick; even, since inner loops take two.
+        Of the model in a tick, a multiple of `SAMPLE_STEPS`.
     """
 
     make_model: Callable[..., Dynamics]
@@ -128,7 +132,9 @@ def effective_control(memory: Components) -> Vector[Any]:
     return [where(is_off, 0.0, part) for part in [*level, thrust]]
 
 
-def measure(plan: Plan, memory: Components, parameters: Components, errors: Vector[Any]):
+def measure(
+    plan: Plan, memory: Components, parameters: Components, errors: Vector[Any]
+) -> Vector[Any]:
     """Return the pose that motion capture sends off, `POSE_DIM` components.
 
     See `crazyflie_simulator.motion_capture.MotionCapture`.
@@ -191,7 +197,7 @@ def answer(
 
 
 def step(plan: Plan, memory: Components, parameters: Components, count: int) -> Components:
-    """Return the memory one `STEP` later; of the steps' count, it matters whether it is even."""
+    """Return the memory one `STEP` later; ``count`` is that of the steps since a sample."""
     model = plan.model(parameters)
     x = model.step(count, memory["x"], effective_control(memory))
     (age,), (is_commanded,) = memory["age"], memory["is_commanded"]

@@ -128,10 +128,10 @@ class _Writer:
             self._store(memory, dims, state)
             offset = builder.sdiv(builder.mul(tick, row), self._integer(self._lanes))
             self._store(builder.gep(record, [offset]), dims, state)
-            with self._loop(self._integer(plan.steps // 2)):
+            with self._loop(self._integer(plan.steps // flight.SAMPLE_STEPS)):
                 values = self._load(parameters, plan.parameter_dims())
                 state = self._load(memory, dims)
-                for count in range(2):
+                for count in range(flight.SAMPLE_STEPS):
                     state = flight.step(plan, state, values, count)
                 self._store(memory, dims, state)
         builder.ret_void()
@@ -158,7 +158,7 @@ class _Writer:
                 pose[part] = builder.insert_element(pose[part], number, index)
         return [self._emitter.symbol(value) for value in pose]
 
-    def _load(self, pointer, dims: Mapping[str, int]) -> Components:
+    def _load(self, pointer: ir.Value, dims: Mapping[str, int]) -> Components:
         components: Components = {}
         index = 0
         for name, dim in dims.items():
@@ -196,7 +196,7 @@ class _Writer:
         return self._builder.mul(integer, self._integer(factor))
 
     @staticmethod
-    def _integer(value):
+    def _integer(value: Any) -> Any:
         return ir.Constant(_INTEGER, value)
 
     @contextmanager

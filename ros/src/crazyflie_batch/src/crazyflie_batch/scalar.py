@@ -1,4 +1,4 @@
-"""One flight of a batch by the classes that the nodes have: the reference, and for a closer look."""
+"""One flight of a batch by the classes that the nodes have: the reference, or a closer look."""
 
 from typing import Any
 
@@ -39,13 +39,14 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
         own["integrator_k"],
         own["integrator_limit"],
     )
-    random: Any = _Replay(batch.errors(index), has_position_noise=own["noise"][0] > 0.0)
+    (position_noise, attitude_noise), (dropout,) = own["noise"], own["dropout"]
+    random: Any = _Replay(batch.errors(index), has_position_noise=position_noise > 0.0)
     motion_capture = MotionCapture(
-        *own["noise"], own["delay"][0] * period, own["dropout"][0], seed=random
+        position_noise, attitude_noise, own["delay"][0] * period, dropout, random
     )
     goal = np.array(own["goal"])
     states, controls = [vehicle.state], []
-    control = np.zeros(feedback.U_DIM)
+    control: NDArray[np.float64] = np.zeros(feedback.U_DIM)
     for tick in range(batch.ticks):
         moment = tick * period
         random.begin(tick)

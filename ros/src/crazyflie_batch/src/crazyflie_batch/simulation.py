@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from crazyflie_batch import feedback
 from crazyflie_batch.batch import Batch, Flights, fly
 from crazyflie_batch.estimators import Estimator, FiniteDifferences
-from crazyflie_batch.flight import Plan
+from crazyflie_batch.flight import SAMPLE_STEPS, Plan
+from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Coupled7D, Dynamics, NearHover
 from crazyflie_model.limits import CRASH_TILT
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
@@ -29,8 +30,8 @@ class Model:
     ----------
     make : callable
         ``make(**parameters)`` returns the `Dynamics` of one vehicle. It is also given symbols
-        (see `symbols`), so it calculates by `crazyflie_model.elementwise`. One that is a function of
-        a module is compiled once.
+        (see `symbols`), so it calculates by `crazyflie_model.elementwise`. What it makes is
+        compiled once for each function, so this should not be a lambda.
     parameters : mapping
         Each a float, or an array of shape (n,).
     max_tilt : float
@@ -209,8 +210,8 @@ def prepare(
     if n <= 0:
         raise ValueError(f"n is {n}; expected at least one vehicle")
     steps = round(period / STEP)
-    if steps <= 0 or steps % 2 or abs(steps * STEP - period) > 1e-9:
-        raise ValueError(f"period is {period}; expected a whole number of 0.002 s")
+    if steps <= 0 or steps % SAMPLE_STEPS or abs(steps * STEP - period) > 1e-9:
+        raise ValueError(f"period is {period}; expected a whole number of {inner_loops.PERIOD} s")
     ticks = round(duration / period)
     if ticks < 1:
         raise ValueError(f"duration is {duration}; expected at least one period, {period} s")

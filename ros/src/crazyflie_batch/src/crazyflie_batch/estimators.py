@@ -34,8 +34,8 @@ class Estimator(ABC):
 
     @property
     @abstractmethod
-    def parameters(self) -> list[ArrayLike]:
-        """Each a float, or an array of shape (n,)."""
+    def parameters(self) -> dict[str, ArrayLike]:
+        """By name, each a float, or an array of shape (n,)."""
 
     @classmethod
     @abstractmethod
@@ -73,8 +73,8 @@ class FiniteDifferences(Estimator):
 
     @property
     @override
-    def parameters(self) -> list[ArrayLike]:
-        return []
+    def parameters(self) -> dict[str, ArrayLike]:
+        return {}
 
     @classmethod
     @override
@@ -116,8 +116,8 @@ class Kalman(Estimator):
 
     @property
     @override
-    def parameters(self) -> list[ArrayLike]:
-        return [self.noise, self.acceleration_walk]
+    def parameters(self) -> dict[str, ArrayLike]:
+        return {"noise": self.noise, "acceleration_walk": self.acceleration_walk}
 
     @classmethod
     @override

@@ -4,8 +4,9 @@ import dataclasses
 import json
 import os
 from collections.abc import Callable
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import Executor
 from pathlib import Path
+from queue import Empty, Queue
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ from crazyflie_batch.settings import Settings
 
 PIECE = 256
 """Flights in a piece: some tenths of a second on one processor."""
+
+PATIENCE = 600.0
+"""How long to wait for the next piece, s: some workers of a cluster may be slow, or gone."""
 
 OUTCOMES = ("largest_error", "rms_error", "largest_tilt", "largest_speed", "has_crashed")
 """Columns of results; see `crazyflie_batch.Flights`."""
@@ -89,17 +93,28 @@ def run(
         Flies the pieces.
     report : callable
         ``report(count)`` is told of flights that have been flown.
+
+    Raises
+    ------
+    TimeoutError
+        No piece has been flown for `PATIENCE`.
     """
     values = settings.values()
-    futures = {}
+    futures: dict[Any, int] = {}
+    done: Queue[Any] = Queue()
     for first in results.missing():
         own = {name: part[first : first + PIECE] for name, part in values.items()}
-        futures[executor.submit(fly_piece, settings, first, own)] = first
+        future = executor.submit(fly_piece, settings, first, own)
+        futures[future] = first
+        future.add_done_callback(done.put)
     try:
-        for future in as_completed(futures):
+        for _ in range(len(futures)):
+            future = done.get(timeout=PATIENCE)
             outcomes = future.result()
             results.keep(futures[future], outcomes)
             report(len(outcomes))
+    except Empty:
+        raise TimeoutError(f"no flight has ended for {PATIENCE:g} s") from None
     finally:
         for future in futures:
             future.cancel()

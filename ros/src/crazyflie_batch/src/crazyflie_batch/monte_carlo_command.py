@@ -26,7 +26,7 @@ limits, which is the worst, and what it depends on.
 
 
 class SchedulerError(Exception):
-    """There is no scheduler, or it has no workers."""
+    """There is no scheduler, it has no workers, or these cannot fly."""
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -118,4 +118,12 @@ def _executor(address: str | None) -> Iterator[Executor]:
                 f"the scheduler at {address} has no workers; expected at least one, started in a "
                 f"sourced workspace: dask-worker {address}"
             ) from None
-        yield client.get_executor()
+        try:
+            yield client.get_executor()
+        except OSError:
+            raise
+        except Exception as error:
+            raise SchedulerError(
+                f"the workers of {address} have failed: {error!r}; expected workers in shells with "
+                "this version of the workspace sourced"
+            ) from error

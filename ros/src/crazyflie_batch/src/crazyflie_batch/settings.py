@@ -66,7 +66,7 @@ class RunParameters(Parameters):
     flights: int = parameter(Integer(1, 10**7), "how many")
     seed: int = parameter(Integer(0, 2**32 - 1), "of everything random", 0)
     model: str = parameter(Text(MODELS), "see crazyflie_simulator", "quadrotor")
-    duration: float = parameter(Number("s", above=0.0, maximum=3600.0), "of a flight", 20.0)
+    duration: float = parameter(Number("s", above=0.0, maximum=600.0), "of a flight", 20.0)
     period: float = parameter(
         Number("s", above=0.0, maximum=1.0),
         "of motion capture, estimator and controller; a whole number of 0.002 s",

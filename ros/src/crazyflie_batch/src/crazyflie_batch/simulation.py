@@ -216,17 +216,22 @@ def prepare(
     if ticks < 1:
         raise ValueError(f"duration is {duration}; expected at least one period, {period} s")
     plan = Plan(model.make, tuple(model.parameters), model.max_tilt, type(estimator), steps)
-    noise = measurement.position_noise, measurement.attitude_noise
+    noise = {
+        "position_noise": measurement.position_noise,
+        "attitude_noise": measurement.attitude_noise,
+    }
+    # What would arrive after the end need not be on its way for longer.
+    delay = np.minimum(delay_ticks(measurement.latency, plan.period), ticks)
     parameters = {
-        "model": _together("model", [*model.parameters.values()], n),
-        "estimator": _together("estimator", estimator.parameters, n),
+        "model": _together(model.parameters, n),
+        "estimator": _together(estimator.parameters, n),
         "K": _columns("K", controller.K, (feedback.U_DIM, feedback.X_DIM), n),
         "u_ref": _columns("u_ref", controller.u_ref, (feedback.U_DIM,), n),
         "integrator_k": _columns("integrator_k", controller.integrator_k, (3,), n),
         "integrator_limit": _columns("integrator_limit", controller.integrator_limit, (3,), n),
         "goal": _columns("goal", goal, (feedback.X_DIM,), n),
-        "noise": _together("noise", noise, n),
-        "delay": _columns("latency", delay_ticks(measurement.latency, plan.period), (), n),
+        "noise": _together(noise, n),
+        "delay": _columns("latency", delay, (), n),
         "dropout": _columns("dropout", measurement.dropout, (), n),
         "settled": _columns("settle_time", math.ceil(settle_time / period - 1e-6), (), n),
     }
@@ -246,9 +251,10 @@ def _initial_states(model, positions):
     return np.array([np.broadcast_to(part, positions.shape[1:]) for part in x])
 
 
-def _together(name, values, n):
-    """Return numbers or arrays of shape (n,) as one of shape (len(values), n)."""
-    return np.concatenate([np.empty((0, n)), *(_columns(name, value, (), n) for value in values)])
+def _together(values, n):
+    """Return numbers or arrays of shape (n,), by name, as one of shape (len(values), n)."""
+    columns = [_columns(name, value, (), n) for name, value in values.items()]
+    return np.concatenate([np.empty((0, n)), *columns])
 
 
 def _columns(name, values, shape, n):

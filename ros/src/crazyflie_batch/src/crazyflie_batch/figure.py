@@ -5,7 +5,13 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import PercentFormatter
+from matplotlib.ticker import (
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    PercentFormatter,
+    StrMethodFormatter,
+)
 
 from crazyflie_batch.report import Findings
 
@@ -36,6 +42,13 @@ def _errors(found):
     return np.clip(error, 1e-4, 1e3)
 
 
+def _label(axis):
+    """Write numbers along a logarithmic axis, also where it does not reach the next power of 10."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
 def _draw_errors(axes, found):
     error, limit = _errors(found), found.settings.run.largest_error
     edges = np.geomspace(error.min() / 1.05, error.max() * 1.05, 50)
@@ -43,6 +56,7 @@ def _draw_errors(axes, found):
     axes.hist([good, bad], edges, stacked=True, color=[_GOOD, _BAD], label=["within limits", "not"])
     axes.axvline(limit, color=_LINE, linestyle="--", label=f"limit {limit:g} m")
     axes.set_xscale("log")
+    _label(axes.xaxis)
     axes.set_xlabel("largest error after settling, m")
     axes.set_ylabel("flights")
     axes.set_title(f"{len(error)} flights, {found.is_within.mean():.1%} within limits")
@@ -65,6 +79,8 @@ def _draw_parameter(axes, found, sweep, is_first):
         axes.scatter(x[chosen], y[chosen], s=4, color=colour, alpha=0.4, linewidths=0)
     axes.axhline(found.settings.run.largest_error, color=_LINE, linestyle="--", linewidth=0.8)
     axes.set_yscale("log")
+    _label(axes.yaxis)
+    axes.xaxis.set_major_locator(MaxNLocator(5))
     axes.set_xlabel(f"{sweep.name}, {sweep.unit}" if sweep.unit else sweep.name)
     if is_first:
         axes.set_ylabel("largest error, m")

@@ -75,7 +75,8 @@ def program(plan: Plan) -> Program:
 
 def _machine() -> tuple[int, Any, bool]:
     """Return lanes and target of this processor, and whether there are functions of vectors."""
-    binding.initialize()
+    # Debian 13's initializes itself.
+    getattr(binding, "initialize", lambda: None)()
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     features = binding.get_host_cpu_features()

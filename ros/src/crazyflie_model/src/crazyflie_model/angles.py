@@ -47,23 +47,26 @@ def wrap_to_pi(angle: Many) -> Many:
     return wrapped if wrapped.ndim else float(wrapped)
 
 
-def quaternion_from_rpy(roll: float, pitch: float, yaw: float) -> Quaternion:
+def quaternion_from_rpy(
+    roll: Number, pitch: Number, yaw: Number
+) -> tuple[Number, Number, Number, Number]:
     """Return the quaternion of ``Rx(roll) Ry(pitch) Rz(yaw)``.
 
     Parameters
     ----------
-    roll, pitch, yaw : float
+    roll, pitch, yaw : float or ndarray
         rad.
 
     Returns
     -------
-    tuple of float
+    tuple of float or ndarray
         (x, y, z, w), of norm 1: the product of the three half-angle
         quaternions in that order.
     """
-    sr, cr = math.sin(roll / 2.0), math.cos(roll / 2.0)
-    sp, cp = math.sin(pitch / 2.0), math.cos(pitch / 2.0)
-    sy, cy = math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+    f = functions(roll)
+    sr, cr = f.sin(roll / 2.0), f.cos(roll / 2.0)
+    sp, cp = f.sin(pitch / 2.0), f.cos(pitch / 2.0)
+    sy, cy = f.sin(yaw / 2.0), f.cos(yaw / 2.0)
     return (
         sr * cp * cy + cr * sp * sy,
         cr * sp * cy - sr * cp * sy,

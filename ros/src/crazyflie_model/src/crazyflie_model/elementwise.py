@@ -72,9 +72,9 @@ def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many
 
 def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many:
     """Return ``value`` where a condition, bool or array of bool, holds, else ``other``."""
-    if isinstance(condition, np.ndarray):
-        return np.where(condition, value, other)
-    return value if condition else other
+    if isinstance(condition, (bool, np.bool_)):
+        return value if condition else other
+    return np.where(condition, value, other)
 
 
 @overload
@@ -87,6 +87,6 @@ def clip(value: Many, low: float, high: float) -> Many: ...
 
 def clip(value: Many, low: float, high: float) -> Many:
     """Return ``value`` limited to [low, high]."""
-    if isinstance(value, np.ndarray):
-        return np.clip(value, low, high)
-    return low if value < low else high if value > high else value
+    if isinstance(value, float):
+        return low if value < low else high if value > high else value
+    return np.clip(value, low, high)

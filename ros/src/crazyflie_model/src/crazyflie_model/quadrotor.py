@@ -77,7 +77,8 @@ class QuadrotorParameters:
     @cached_property
     def hover_speed(self) -> float:
         """Speed of all four rotors at which they carry the vehicle, rad/s."""
-        return math.sqrt(self.mass * GRAVITY / (4.0 * self.thrust_constant))
+        squared = self.mass * GRAVITY / (4.0 * self.thrust_constant)
+        return functions(squared).sqrt(squared)
 
     @cached_property
     def _speed_squared_per_pwm(self):

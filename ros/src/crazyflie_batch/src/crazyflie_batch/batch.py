@@ -1,0 +1,158 @@
+"""Flights as arrays, and the processor's threads that fly them."""
+
+import math
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crazyflie_batch import flight
+from crazyflie_batch.flight import Plan
+from crazyflie_batch.program import program
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Flights of n vehicles before they are flown.
+
+    Attributes
+    ----------
+    plan : Plan
+    parameters : mapping
+        By the names of `Plan.parameter_dims`, arrays of shape (dim, n).
+    x : ndarray, shape (x_dim, n)
+        States of the model at the beginning.
+    ticks : int
+    seed : int
+    first : int
+        Number of the first vehicle.
+    """
+
+    plan: Plan
+    parameters: Mapping[str, NDArray[np.float64]] = field(repr=False)
+    x: NDArray[np.float64] = field(repr=False)
+    ticks: int
+    seed: int
+    first: int
+
+    @property
+    def n(self) -> int:
+        """Number of vehicles."""
+        return self.x.shape[1]
+
+    def errors(self, index: int) -> NDArray[np.float64]:
+        """Return the random numbers of a vehicle's flight, shape (ticks, ERRORS_DIM)."""
+        random = np.random.default_rng((self.seed, self.first + index))
+        normal = random.standard_normal((self.ticks, flight.ERRORS_DIM - 1))
+        return np.column_stack([normal, random.random(self.ticks)])
+
+
+@dataclass(frozen=True)
+class Flights:
+    """What has become of n vehicles.
+
+    Attributes
+    ----------
+    x : ndarray, shape (n, x_dim)
+        States of the model at the end.
+    has_crashed : ndarray of bool, shape (n,)
+        Or its state has overflowed.
+    largest_error, rms_error : ndarray, shape (n,)
+        Distance from the goal after they had time to settle, at the ticks, m.
+    largest_tilt : ndarray, shape (n,)
+        From upright, rad, of the whole flight, at the ticks.
+    largest_speed : ndarray, shape (n,)
+        m/s, of the whole flight, at the ticks.
+    states : ndarray, shape (ticks, n, x_dim)
+        States of the model at every tick; of no tick, if they were not to be recorded.
+    controls : ndarray, shape (ticks, n, 4)
+        The control that was in force from every tick on.
+    """
+
+    x: NDArray[np.float64]
+    has_crashed: NDArray[np.bool_]
+    largest_error: NDArray[np.float64]
+    rms_error: NDArray[np.float64]
+    largest_tilt: NDArray[np.float64]
+    largest_speed: NDArray[np.float64]
+    states: NDArray[np.float64]
+    controls: NDArray[np.float64]
+
+
+def fly(batch: Batch, record: bool, threads: int) -> Flights:
+    """Fly them; ``record`` says whether all ticks are to be kept."""
+    plan, lanes = batch.plan, program(batch.plan).lanes
+    start = plan.initial_memory(list(batch.x))
+    memory = _grouped([part for name in plan.memory_dims() for part in start[name]], batch.n, lanes)
+    values = [batch.parameters[name] for name in plan.parameter_dims()]
+    parameters = _grouped(np.concatenate(values), batch.n, lanes)
+    rows = batch.ticks if record else 0
+    records = np.empty((len(memory), rows, *memory.shape[1:]))
+    slots = int(batch.parameters["delay"].max()) + 1
+    no_errors = np.zeros((batch.ticks, flight.ERRORS_DIM, lanes))
+    no_errors[:, -1] = 1.0
+    is_random = batch.parameters["noise"].any() or batch.parameters["dropout"].any()
+
+    def fly_group(group):
+        errors = _errors(batch, group, lanes) if is_random else no_errors
+        rows = records[group] if record else np.empty((1, *memory.shape[1:]))
+        program(plan).fly(memory[group], parameters[group], errors, rows, slots)
+
+    groups = range(len(memory))
+    if threads == 1 or len(groups) == 1:
+        for group in groups:
+            fly_group(group)
+    else:
+        with ThreadPoolExecutor(threads) as executor:
+            for _ in executor.map(fly_group, groups):
+                pass
+    return _flights(batch, memory, records)
+
+
+def _errors(batch, group, lanes):
+    errors = np.empty((batch.ticks, flight.ERRORS_DIM, lanes))
+    for lane in range(lanes):
+        errors[:, :, lane] = batch.errors(min(group * lanes + lane, batch.n - 1))
+    return errors
+
+
+def _grouped(rows, n, lanes):
+    """Return rows of shape (n,), or numbers, as one array of shape (groups, rows, lanes).
+
+    The last group is filled up with the last vehicle.
+    """
+    index = np.minimum(np.arange(math.ceil(n / lanes) * lanes), n - 1)
+    full = np.array([np.broadcast_to(row, (n,))[index] for row in rows])
+    return np.ascontiguousarray(full.reshape(len(full), -1, lanes).swapaxes(0, 1))
+
+
+def _flights(batch, memory, records):
+    at = {}
+    count = 0
+    for name, dim in batch.plan.memory_dims().items():
+        at[name] = slice(count, count + dim)
+        count += dim
+
+    def vehicles(array, name):
+        """Return (groups, ..., rows, lanes) as (..., n, dim)."""
+        part = np.moveaxis(array[..., at[name], :], 0, -2)
+        joined = part.reshape(*part.shape[:-2], part.shape[-2] * part.shape[-1])
+        return joined.swapaxes(-2, -1)[..., : batch.n, :]
+
+    largest, squares, upright, speed = vehicles(memory, "metrics").T
+    x = vehicles(memory, "x")
+    # What has overflowed is neither larger nor smaller than anything.
+    has_crashed = (vehicles(memory, "has_crashed")[:, 0] > 0.0) | ~np.isfinite(x).all(axis=1)
+    counted = np.maximum(batch.ticks - batch.parameters["settled"][0], 1.0)
+    return Flights(
+        x=x,
+        has_crashed=has_crashed,
+        largest_error=largest,
+        rms_error=np.sqrt(squares / counted),
+        largest_tilt=np.arccos(np.clip(upright, -1.0, 1.0)),
+        largest_speed=speed,
+        states=vehicles(records, "x"),
+        controls=vehicles(records, "u"),
+    )

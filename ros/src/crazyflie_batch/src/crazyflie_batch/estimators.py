@@ -1,0 +1,181 @@
+"""The filters of `crazyflie_state_estimator`, by components: for floats or a batch.
+
+What a filter remembers is a list of components, as states are; nothing is changed in place.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from numpy.typing import ArrayLike
+from typing_extensions import override
+
+from crazyflie_model.elementwise import Vector, where
+from crazyflie_state_estimator import kalman
+from crazyflie_state_estimator.rate_filter import FiniteDifference, RateFilter
+
+
+class Estimator(ABC):
+    """A filter that finds position and velocity from positions.
+
+    An object holds the parameters, by which vehicles may differ; the class, how it calculates.
+
+    Attributes
+    ----------
+    memory_dim : int
+        How many numbers it remembers.
+    parameter_dim : int
+        How many `parameters` there are.
+    """
+
+    memory_dim: int
+    parameter_dim: int
+
+    @property
+    @abstractmethod
+    def parameters(self) -> dict[str, ArrayLike]:
+        """By name, each a float, or an array of shape (n,)."""
+
+    @classmethod
+    @abstractmethod
+    def scalar(cls, parameters: Sequence[float]) -> RateFilter:
+        """Return the filter that a node has, for one vehicle's `parameters`."""
+
+    @classmethod
+    @abstractmethod
+    def start(cls, position: Vector[Any], parameters: Sequence[Any]) -> Vector[Any]:
+        """Return the memory after the first position, 3 components in m."""
+
+    @classmethod
+    @abstractmethod
+    def update(
+        cls, memory: Vector[Any], dt: Any, position: Vector[Any], parameters: Sequence[Any]
+    ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
+        """Return memory, position (m) and velocity (m/s) after the next position.
+
+        Parameters
+        ----------
+        memory : list
+        dt : float or ndarray
+            Since the last position, s, positive.
+        position : list, 3 components
+            m.
+        parameters : sequence
+        """
+
+
+class FiniteDifferences(Estimator):
+    """See `crazyflie_state_estimator.rate_filter.FiniteDifference`."""
+
+    memory_dim = 3
+    parameter_dim = 0
+
+    @property
+    @override
+    def parameters(self) -> dict[str, ArrayLike]:
+        return {}
+
+    @classmethod
+    @override
+    def scalar(cls, parameters: Sequence[float]) -> RateFilter:
+        return FiniteDifference()
+
+    @classmethod
+    @override
+    def start(cls, position: Vector[Any], parameters: Sequence[Any]) -> Vector[Any]:
+        return position
+
+    @classmethod
+    @override
+    def update(
+        cls, memory: Vector[Any], dt: Any, position: Vector[Any], parameters: Sequence[Any]
+    ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
+        return position, position, [(a - b) / dt for a, b in zip(position, memory, strict=True)]
+
+
+@dataclass(frozen=True)
+class Kalman(Estimator):
+    """See `crazyflie_state_estimator.kalman.ConstantAccelerationFilter`; without the control.
+
+    Memory: position (3), velocity (3), acceleration (3), and the covariance that the axes share,
+    upper half by rows (6).
+
+    Attributes
+    ----------
+    noise : float or ndarray, shape (n,)
+        Standard deviation of the poses' coordinates, m.
+    acceleration_walk : float or ndarray, shape (n,)
+        m/s^2/sqrt(s).
+    """
+
+    noise: ArrayLike = kalman.POSITION_NOISE
+    acceleration_walk: ArrayLike = kalman.ACCELERATION_WALK
+    memory_dim = 15
+    parameter_dim = 2
+
+    @property
+    @override
+    def parameters(self) -> dict[str, ArrayLike]:
+        return {"noise": self.noise, "acceleration_walk": self.acceleration_walk}
+
+    @classmethod
+    @override
+    def scalar(cls, parameters: Sequence[float]) -> RateFilter:
+        return kalman.ConstantAccelerationFilter(*parameters)
+
+    @classmethod
+    @override
+    def start(cls, position: Vector[Any], parameters: Sequence[Any]) -> Vector[Any]:
+        return _begin(position, [0.0] * 3, parameters[0])
+
+    @classmethod
+    @override
+    def update(
+        cls, memory: Vector[Any], dt: Any, position: Vector[Any], parameters: Sequence[Any]
+    ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
+        noise, walk = parameters
+        speeds = [(a - b) / dt for a, b in zip(position, memory[:3], strict=True)]
+        anew = _begin(position, speeds, noise)
+        state, covariance = _predict(memory[:9], memory[9:], dt, walk * walk)
+        state, covariance = _correct(state, covariance, position, noise * noise)
+        is_late = dt > kalman.MEMORY
+        memory = [where(is_late, a, b) for a, b in zip(anew, state + covariance, strict=True)]
+        return memory, memory[:3], memory[3:6]
+
+
+def _begin(position, velocity, noise):
+    """Return the memory of a filter that knows next to nothing about rate and acceleration."""
+    rate, acceleration = kalman.FIRST_RATE_VARIANCE, kalman.FIRST_ACCELERATION_VARIANCE
+    return [*position, *velocity, 0.0, 0.0, 0.0, noise * noise, 0.0, 0.0, rate, 0.0, acceleration]
+
+
+def _predict(state, covariance, dt, walk):
+    """Return state and covariance ``dt`` later; F P F' + Q written out."""
+    dt2, dt3 = dt**2, dt**3
+    half = dt2 / 2.0
+    p, v, a = state[:3], state[3:6], state[6:9]
+    p = [p[axis] + dt * v[axis] + half * a[axis] for axis in range(3)]
+    v = [v[axis] + dt * a[axis] for axis in range(3)]
+    pp, pv, pa, vv, va, aa = covariance
+    # F P, as far as it is needed.
+    fp_p, fp_v, fp_a = pp + dt * pv + half * pa, pv + dt * vv + half * va, pa + dt * va + half * aa
+    fv_v, fv_a = vv + dt * va, va + dt * aa
+    return [*p, *v, *a], [
+        fp_p + dt * fp_v + half * fp_a + walk * (dt3 * dt2 / 20.0),
+        fp_v + dt * fp_a + walk * (dt2 * dt2 / 8.0),
+        fp_a + walk * (dt3 / 6.0),
+        fv_v + dt * fv_a + walk * (dt3 / 3.0),
+        fv_a + walk * half,
+        aa + walk * dt,
+    ]
+
+
+def _correct(state, covariance, position, noise_variance):
+    pp, pv, pa, vv, va, aa = covariance
+    gains = [part / (pp + noise_variance) for part in (pp, pv, pa)]
+    innovation = [position[axis] - state[axis] for axis in range(3)]
+    state = [state[i] + gains[i // 3] * innovation[i % 3] for i in range(9)]
+    g, h, k = gains
+    covariance = [pp - g * pp, pv - g * pv, pa - g * pa, vv - h * pv, va - h * pa, aa - k * pa]
+    return state, covariance

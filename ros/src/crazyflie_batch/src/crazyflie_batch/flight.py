@@ -1,0 +1,243 @@
+"""One vehicle's flight, tick by tick, by components: for floats or a batch.
+
+A tick is what happens once in a control period, as in a graph of nodes without delays of its own:
+motion capture measures the pose, a pose arrives, the estimator and the controller answer it, and
+the vehicle flies on with what it was told last.
+
+What is remembered, and what differs between vehicles, are dictionaries of names to lists of
+components; `memory_dims` and `parameter_dims` tell which.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from crazyflie_batch import feedback
+from crazyflie_batch.elementwise import turn, yaw_from_quaternion
+from crazyflie_batch.estimators import Estimator
+from crazyflie_model import inner_loops
+from crazyflie_model.dynamics import STEP, Dynamics
+from crazyflie_model.elementwise import Vector, functions, where
+from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
+
+ERRORS_DIM = 7
+"""Random numbers of a tick: errors of position (3) and attitude (3), of standard deviation 1; what
+decides whether the pose is lost, in [0, 1)."""
+
+SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
+"""Steps of the model from one sample of the inner loops to the next."""
+
+POSE_DIM = 5
+"""Of a pose on its way: position (3), yaw, and 1 for one that is not lost."""
+
+METRICS = ("largest_error", "squared_errors", "least_upright", "largest_speed")
+"""What is remembered of a flight: largest distance from the goal, m, and sum of the squared
+distances at the ticks after it has settled; of all ticks, the least cosine of the tilt and the
+largest speed, m/s."""
+
+_LEVEL_STEPS, _OFF_STEPS = round(LEVEL_AGE / STEP), round(OFF_AGE / STEP)
+
+Components = dict[str, Vector[Any]]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What all flights of a batch have in common.
+
+    Attributes
+    ----------
+    make_model : callable
+        ``make_model(**parameters)`` returns the `Dynamics` of one vehicle.
+    model_parameters : tuple of str
+        Names of its parameters.
+    max_tilt : float
+        A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
+    estimator : type of Estimator
+    steps : int
+        Of the model in a tick, a multiple of `SAMPLE_STEPS`.
+    """
+
+    make_model: Callable[..., Dynamics]
+    model_parameters: tuple[str, ...]
+    max_tilt: float
+    estimator: type[Estimator]
+    steps: int
+
+    @property
+    def period(self) -> float:
+        """Of a tick, s."""
+        return self.steps * STEP
+
+    def memory_dims(self) -> dict[str, int]:
+        """Return what a flight remembers, and how many numbers that are."""
+        return {
+            "x": self.make_model(**dict.fromkeys(self.model_parameters, 0.0)).x_dim,
+            "u": feedback.U_DIM,
+            "age": 1,
+            "is_commanded": 1,
+            "has_crashed": 1,
+            "estimator": self.estimator.memory_dim,
+            "stamp": 1,
+            "integral": 3,
+            "control_stamp": 1,
+            "metrics": len(METRICS),
+        }
+
+    def parameter_dims(self) -> dict[str, int]:
+        """Return what differs between vehicles, and how many numbers that are."""
+        return {
+            "model": len(self.model_parameters),
+            "estimator": self.estimator.parameter_dim,
+            "K": feedback.X_DIM * feedback.U_DIM,
+            "u_ref": feedback.U_DIM,
+            "integrator_k": 3,
+            "integrator_limit": 3,
+            "goal": feedback.X_DIM,
+            "noise": 2,
+            "delay": 1,
+            "dropout": 1,
+            "settled": 1,
+        }
+
+    def model(self, parameters: Components) -> Dynamics:
+        """Return the model of one vehicle."""
+        return self.make_model(**dict(zip(self.model_parameters, parameters["model"], strict=True)))
+
+    def initial_memory(self, x: Vector[Any]) -> Components:
+        """Return what is remembered of a flight that begins at a state of the model."""
+        return {
+            "x": x,
+            "u": [0.0] * feedback.U_DIM,
+            "age": [0.0],
+            "is_commanded": [0.0],
+            "has_crashed": [0.0],
+            "estimator": [0.0] * self.estimator.memory_dim,
+            "stamp": [-1.0],
+            "integral": [0.0] * 3,
+            "control_stamp": [-1.0],
+            "metrics": [0.0, 0.0, 1.0, 0.0],
+        }
+
+
+def effective_control(memory: Components) -> Vector[Any]:
+    """Return what the vehicle flies: the last control while it is new, then what the watchdog does.
+
+    See `crazyflie_simulator.vehicle.SimulatedVehicle`.
+    """
+    (age,), (has_crashed,) = memory["age"], memory["has_crashed"]
+    *attitude, thrust = memory["u"]
+    level = [where(age < _LEVEL_STEPS, part, 0.0) for part in attitude]
+    is_off = (age >= _OFF_STEPS) | (has_crashed > 0.0)
+    return [where(is_off, 0.0, part) for part in [*level, thrust]]
+
+
+def measure(
+    plan: Plan, memory: Components, parameters: Components, errors: Vector[Any]
+) -> Vector[Any]:
+    """Return the pose that motion capture sends off, `POSE_DIM` components.
+
+    See `crazyflie_simulator.motion_capture.MotionCapture`.
+    """
+    position, attitude = plan.model(parameters).pose(memory["x"], effective_control(memory))
+    position_noise, attitude_noise = parameters["noise"]
+    (dropout,) = parameters["dropout"]
+    measured = [a + position_noise * b for a, b in zip(position, errors[:3], strict=True)]
+    turned = turn(attitude, [attitude_noise * part for part in errors[3:6]])
+    is_lost = errors[6] < dropout
+    return [*measured, yaw_from_quaternion(turned), where(is_lost, 0.0, 1.0)]
+
+
+def answer(
+    plan: Plan, memory: Components, parameters: Components, pose: Vector[Any], tick: Any
+) -> Components:
+    """Return the memory after estimator and controller have answered a pose, if it has arrived.
+
+    Parameters
+    ----------
+    pose : list, `POSE_DIM` components
+    tick : float or ndarray
+        At which it was measured.
+    """
+    *position, yaw, has_arrived = pose
+    (stamp,), (control_stamp,) = memory["stamp"], memory["control_stamp"]
+    has_arrived = has_arrived > 0.0
+    is_second = has_arrived & (stamp >= 0.0)
+
+    # In whole nanoseconds, as stamps are.
+    dt = (tick - stamp) * round(plan.period * 1e9) * 1e-9
+    begun = plan.estimator.start(position, parameters["estimator"])
+    filtered, position, velocity = plan.estimator.update(
+        memory["estimator"], dt, position, parameters["estimator"]
+    )
+    state = [*position, *velocity, yaw]
+
+    k = parameters["integrator_k"]
+    dt = where(control_stamp >= 0.0, tick * plan.period - control_stamp * plan.period, 0.0)
+    error = feedback.heading_error(state, parameters["goal"])
+    linear = feedback.linear_control(parameters["K"], parameters["u_ref"], error)
+    integral = feedback.integrate(
+        memory["integral"], error, dt, linear, k, parameters["integrator_limit"]
+    )
+    u = feedback.limited_control(linear, integral, k)
+    first = _choose(has_arrived, {"estimator": begun, "stamp": [tick]}, memory)
+    return _choose(
+        is_second,
+        {
+            "estimator": filtered,
+            "stamp": [tick],
+            "integral": integral,
+            "u": u,
+            "control_stamp": [tick],
+            "age": [0.0],
+            "is_commanded": [1.0],
+        },
+        first,
+    )
+
+
+def step(plan: Plan, memory: Components, parameters: Components, count: int) -> Components:
+    """Return the memory one `STEP` later; ``count`` is that of the steps since a sample."""
+    model = plan.model(parameters)
+    x = model.step(count, memory["x"], effective_control(memory))
+    (age,), (is_commanded,) = memory["age"], memory["is_commanded"]
+    flown = {"x": x, "age": [age + 1.0]}
+    memory = _choose(is_commanded > 0.0, flown, memory)
+    if math.isinf(plan.max_tilt):
+        return memory
+    is_tilted = _upright(model, memory) < math.cos(plan.max_tilt)
+    return _choose(is_tilted, {"has_crashed": [1.0]}, memory)
+
+
+def judge(plan: Plan, memory: Components, parameters: Components, tick: Any) -> Components:
+    """Return the memory with the metrics as they are after this tick; see `METRICS`."""
+    largest, squares, upright, fastest = memory["metrics"]
+    (settled,) = parameters["settled"]
+    x, goal = memory["x"], parameters["goal"]
+    root = functions(x[0]).sqrt
+    squared = sum((x[axis] - goal[axis]) ** 2 for axis in range(3))
+    counts = tick >= settled
+    error, speed = root(squared), root(sum(part**2 for part in x[3:6]))
+    present = _upright(plan.model(parameters), memory)
+    metrics = [
+        where(counts & (error > largest), error, largest),
+        squares + where(counts, squared, 0.0),
+        where(present < upright, present, upright),
+        where(speed > fastest, speed, fastest),
+    ]
+    return {**memory, "metrics": metrics}
+
+
+def _upright(model, memory):
+    """Return the cosine of the tilt."""
+    _, (x, y, _, _) = model.pose(memory["x"], effective_control(memory))
+    return 1.0 - 2.0 * (x * x + y * y)
+
+
+def _choose(condition, values, others):
+    """Return ``others``, with ``values`` in their place where a condition holds."""
+    chosen = {
+        name: [where(condition, a, b) for a, b in zip(part, others[name], strict=True)]
+        for name, part in values.items()
+    }
+    return {**others, **chosen}

@@ -1,0 +1,196 @@
+"""Flights with parameters drawn at random, piece by piece: what is flown is kept."""
+
+import dataclasses
+import json
+import os
+from collections.abc import Callable
+from concurrent.futures import Executor
+from pathlib import Path
+from queue import Empty, Queue
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crazyflie_batch import simulation
+from crazyflie_batch.estimators import Estimator, FiniteDifferences, Kalman
+from crazyflie_batch.settings import Settings
+
+PIECE = 256
+"""Flights in a piece: some tenths of a second on one processor."""
+
+PATIENCE = 600.0
+"""How long to wait for the next piece, s: some workers of a cluster may be slow, or gone."""
+
+OUTCOMES = ("largest_error", "rms_error", "largest_tilt", "largest_speed", "has_crashed")
+"""Columns of results; see `crazyflie_batch.Flights`."""
+
+
+class OtherSettingsError(Exception):
+    """The folder has flights of other settings."""
+
+
+class Results:
+    """The folder where flights are kept, from which an interrupted run goes on.
+
+    Parameters
+    ----------
+    folder : Path
+        Is made.
+    settings : Settings
+
+    Raises
+    ------
+    OtherSettingsError
+    OSError
+    """
+
+    def __init__(self, folder: Path, settings: Settings):
+        self.folder = folder
+        self._pieces = folder / "pieces"
+        self._flights = settings.run.flights
+        self._pieces.mkdir(parents=True, exist_ok=True)
+        present = json.dumps(dataclasses.asdict(settings), indent=1, sort_keys=True)
+        noted = folder / "settings.json"
+        if noted.exists() and noted.read_text(encoding="utf-8") != present:
+            raise OtherSettingsError(
+                f"{folder} has flights of other settings; expected another --out, or --restart"
+            )
+        noted.write_text(present, encoding="utf-8")
+
+    def missing(self) -> list[int]:
+        """Return the numbers of the first flights of the pieces that have not been flown."""
+        return [first for first in range(0, self._flights, PIECE) if not self._path(first).exists()]
+
+    def flown(self) -> int:
+        """Return how many flights have been flown."""
+        return self._flights - sum(min(PIECE, self._flights - first) for first in self.missing())
+
+    def keep(self, first: int, outcomes: NDArray[np.float64]) -> None:
+        """Keep the outcomes of a piece, shape (flights, len(OUTCOMES))."""
+        unfinished = self._pieces / "unfinished.npy"
+        np.save(unfinished, outcomes)
+        os.replace(unfinished, self._path(first))
+
+    def outcomes(self) -> NDArray[np.float64]:
+        """Return what is kept of all flights, shape (flights, len(OUTCOMES))."""
+        return np.concatenate([np.load(self._path(i)) for i in range(0, self._flights, PIECE)])
+
+    def _path(self, first):
+        return self._pieces / f"{first:08d}.npy"
+
+
+def run(
+    settings: Settings, results: Results, executor: Executor, report: Callable[[int], object]
+) -> None:
+    """Fly what is missing.
+
+    Parameters
+    ----------
+    settings : Settings
+    results : Results
+    executor : Executor
+        Flies the pieces.
+    report : callable
+        ``report(count)`` is told of flights that have been flown.
+
+    Raises
+    ------
+    TimeoutError
+        No piece has been flown for `PATIENCE`.
+    """
+    values = settings.values()
+    futures: dict[Any, int] = {}
+    done: Queue[Any] = Queue()
+    for first in results.missing():
+        own = {name: part[first : first + PIECE] for name, part in values.items()}
+        future = executor.submit(fly_piece, settings, first, own)
+        futures[future] = first
+        future.add_done_callback(done.put)
+    try:
+        for _ in range(len(futures)):
+            future = done.get(timeout=PATIENCE)
+            outcomes = future.result()
+            results.keep(futures[future], outcomes)
+            report(len(outcomes))
+    except Empty:
+        raise TimeoutError(f"no flight has ended for {PATIENCE:g} s") from None
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def fly_piece(
+    settings: Settings, first: int, values: dict[str, NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Return the outcomes of some flights, shape (flights, len(OUTCOMES)).
+
+    Parameters
+    ----------
+    settings : Settings
+    first : int
+        Number of the first one.
+    values : dict
+        What is swept, arrays of these flights; see `Settings.values`.
+    """
+    flights = simulate(settings, first, values)
+    return np.column_stack([getattr(flights, name) for name in OUTCOMES]).astype(float)
+
+
+def simulate(
+    settings: Settings,
+    first: int,
+    values: dict[str, NDArray[np.float64]],
+    record: bool = False,
+) -> simulation.Flights:
+    """Return some flights; see `fly_piece`."""
+    run, n = settings.run, len(next(iter(values.values())))
+    # Numbers of all of them, and arrays.
+    swept: dict[str, Any] = dict(values)
+    vehicle = dataclasses.replace(settings.vehicle, **swept)
+    return simulation.simulate(
+        _model(settings, vehicle, n),
+        _controller(settings, vehicle, n),
+        _estimator(settings),
+        (run.start_x, run.start_y, run.start_z),
+        n,
+        goal=(run.goal_x, run.goal_y, run.goal_z, 0.0, 0.0, 0.0, run.goal_yaw),
+        duration=run.duration,
+        period=run.period,
+        settle_time=run.settle_time,
+        measurement=simulation.Measurement(
+            vehicle.position_noise, vehicle.attitude_noise, vehicle.delay, vehicle.dropout
+        ),
+        seed=run.seed,
+        first=first,
+        record=record,
+        threads=1,
+    )
+
+
+def _model(settings, vehicle, n):
+    if settings.run.model == "near_hover":
+        return simulation.near_hover()
+    if settings.run.model == "coupled_7d":
+        return simulation.coupled_7d()
+    wind = [np.broadcast_to(part, n) for part in (vehicle.wind_x, vehicle.wind_y, vehicle.wind_z)]
+    return simulation.quadrotor(vehicle.mass_error, vehicle.thrust_error, np.stack(wind, axis=-1))
+
+
+def _controller(settings, vehicle, n):
+    run = settings.run
+    factors = [vehicle.position_gain] * 2 + [vehicle.height_gain]
+    factors += [vehicle.velocity_gain] * 2 + [vehicle.climb_gain, vehicle.yaw_gain]
+    columns = np.stack([np.broadcast_to(factor, n) for factor in factors], axis=-1)
+    integrator = np.broadcast_to(vehicle.integrator_gain, n)[:, np.newaxis]
+    return simulation.Controller(
+        np.array(settings.K) * columns[:, np.newaxis, :],
+        integrator_k=integrator * (run.integrator_k_x, run.integrator_k_y, run.integrator_k_z),
+        integrator_limit=(run.integrator_x, run.integrator_y, run.integrator_z),
+    )
+
+
+def _estimator(settings: Settings) -> Estimator:
+    if settings.run.estimator == "kalman":
+        return Kalman(settings.run.filter_noise, settings.run.filter_walk)
+    return FiniteDifferences()

@@ -1,0 +1,148 @@
+"""What a Monte-Carlo run has found out: shares, worst case, sensitivities."""
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import rankdata
+
+from crazyflie_batch.monte_carlo import OUTCOMES
+from crazyflie_batch.settings import Settings
+
+FIFTHS = 5
+"""Into so many parts the flights are divided by a parameter."""
+
+_CONFIDENCE = 1.96
+"""95 %, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Flights, and what they are judged by.
+
+    Attributes
+    ----------
+    settings : Settings
+    values : dict
+        What was swept; see `Settings.values`.
+    outcomes : dict
+        By the names of `crazyflie_batch.Flights`, arrays of all flights.
+    is_within : ndarray of bool, shape (flights,)
+        Whether they stayed within limits.
+    """
+
+    settings: Settings
+    values: dict[str, NDArray[np.float64]]
+    outcomes: dict[str, NDArray[np.float64]]
+    is_within: NDArray[np.bool_]
+
+    @property
+    def worst(self) -> int:
+        """Number of the worst flight: of those that have crashed, if any has."""
+        crashed = self.outcomes["has_crashed"]
+        return int(np.lexsort((_finite(self.outcomes["largest_error"]), crashed))[-1])
+
+    def sensitivities(self) -> dict[str, float]:
+        """Return the rank correlation of each parameter with the largest error, in [-1, 1].
+
+        Spearman's; a crash ranks behind all others. What makes matters worse in both directions
+        has one of about 0: see `shares`.
+        """
+        error = _finite(self.outcomes["largest_error"])
+        crashed = self.outcomes["has_crashed"] > 0.0
+        ranks = rankdata(np.where(crashed, error.max() + 1.0, error))
+        return {name: _correlation(rankdata(part), ranks) for name, part in self.values.items()}
+
+    def shares(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return the mean of a parameter, and the share within limits, of each fifth of it."""
+        order = np.argsort(self.values[name], kind="stable")
+        parts = [part for part in np.array_split(order, FIFTHS) if len(part)]
+        means = [self.values[name][part].mean() for part in parts]
+        return np.array(means), np.array([self.is_within[part].mean() for part in parts])
+
+
+def findings(settings: Settings, outcomes: NDArray[np.float64]) -> Findings:
+    """Return what outcomes, shape (flights, len(OUTCOMES)), mean."""
+    columns = dict(zip(OUTCOMES, outcomes.T, strict=True))
+    is_within = (
+        (columns["has_crashed"] == 0.0)
+        & (columns["largest_error"] <= settings.run.largest_error)
+        & (columns["largest_tilt"] <= settings.run.largest_tilt)
+    )
+    return Findings(settings, settings.values(), columns, is_within)
+
+
+def table(found: Findings) -> str:
+    """Return the findings as text."""
+    run, flights = found.settings.run, len(found.is_within)
+    low, high = share_interval(int(found.is_within.sum()), flights)
+    confidence = f"{low:.1%} to {high:.1%} with 95 % confidence"
+    limits = f"error at most {run.largest_error:g} m after {run.settle_time:g} s"
+    lines = [
+        f"{flights} flights of {run.duration:g} s, model {run.model}, seed {run.seed}",
+        "",
+        f"within limits   {found.is_within.mean():.1%}   ({confidence})",
+        f"                {limits}, tilt at most {run.largest_tilt:g} rad, no crash",
+        f"crashed         {found.outcomes['has_crashed'].mean():.1%}",
+        "",
+        f"{'':22}{'median':>10}{'95 %':>10}{'worst':>10}",
+    ]
+    for label, name in (
+        ("largest error, m", "largest_error"),
+        ("rms error, m", "rms_error"),
+        ("largest tilt, rad", "largest_tilt"),
+        ("largest speed, m/s", "largest_speed"),
+    ):
+        part = _finite(found.outcomes[name])
+        lines.append(
+            f"{label:22}{np.median(part):10.3g}{np.quantile(part, 0.95):10.3g}{part.max():10.3g}"
+        )
+    lines += ["", f"worst flight    number {found.worst}"]
+    for sweep in found.settings.sweeps:
+        value = found.values[sweep.name][found.worst]
+        lines.append(f"                {sweep.name} {value:.4g} {sweep.unit}".rstrip())
+    lines += [
+        "",
+        "sensitivity of the largest error (rank correlation, -1 to 1), and the share within limits",
+        "in each fifth of the flights, from the lowest values of the parameter to the highest",
+    ]
+    sensitivities = found.sensitivities()
+    for name in sorted(sensitivities, key=lambda each: -abs(sensitivities[each])):
+        shares = "".join(f"{share:8.0%}" for share in found.shares(name)[1])
+        lines.append(f"{name:22}{sensitivities[name]:10.2f}  {shares}")
+    return "\n".join(lines)
+
+
+def write_csv(found: Findings, path: Path) -> None:
+    """Write a row for each flight."""
+    columns = {**found.values, **found.outcomes, "is_within": found.is_within.astype(float)}
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["flight", *columns])
+        rows = zip(*(part.tolist() for part in columns.values()), strict=True)
+        writer.writerows(
+            [number, *(f"{value:.9g}" for value in row)] for number, row in enumerate(rows)
+        )
+
+
+def share_interval(count: int, total: int) -> tuple[float, float]:
+    """Return the 95 % confidence interval of a share (E. B. Wilson, 1927)."""
+    share, z2 = count / total, _CONFIDENCE**2
+    middle = (share + z2 / (2 * total)) / (1 + z2 / total)
+    half = _CONFIDENCE * math.sqrt(share * (1 - share) / total + z2 / (4 * total**2))
+    half /= 1 + z2 / total
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def _correlation(a, b):
+    """Return the correlation; 0 where one is constant."""
+    a, b = a - a.mean(), b - b.mean()
+    size = math.sqrt((a @ a) * (b @ b))
+    return float(a @ b) / size if size > 0.0 else 0.0
+
+
+def _finite(values):
+    return np.nan_to_num(values, nan=np.finfo(float).max)

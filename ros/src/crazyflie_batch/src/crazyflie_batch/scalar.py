@@ -1,0 +1,88 @@
+"""One flight of a batch by the classes that the nodes have: the reference, or a closer look."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crazyflie_batch import feedback
+from crazyflie_batch.batch import Batch
+from crazyflie_lqr.linear_feedback import IntegralStateFeedback
+from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_simulator.motion_capture import MotionCapture
+from crazyflie_simulator.vehicle import SimulatedVehicle
+from crazyflie_state_estimator.motion import MotionEstimator
+from crazyflie_state_estimator.rate_filter import FiniteDifference
+
+_YAW = 6
+
+
+def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Fly one vehicle of a batch, which takes about a thousand times as long.
+
+    Returns
+    -------
+    states : ndarray, shape (ticks + 1, x_dim)
+        Of the model at every tick, and at the end.
+    controls : ndarray, shape (ticks, 4)
+        The control that was in force from every tick on; zeros before the first.
+    """
+    plan, period = batch.plan, batch.plan.period
+    own = {name: values[:, index].tolist() for name, values in batch.parameters.items()}
+    vehicle = SimulatedVehicle(plan.model(own), batch.x[:3, index], 0.0, plan.max_tilt)
+    filter_ = plan.estimator.scalar(own["estimator"])
+    estimator = MotionEstimator(filter_, FiniteDifference())
+    controller = IntegralStateFeedback(
+        np.reshape(own["K"], (feedback.U_DIM, feedback.X_DIM)),
+        np.array(own["u_ref"]),
+        _YAW,
+        own["integrator_k"],
+        own["integrator_limit"],
+    )
+    (position_noise, attitude_noise), (dropout,) = own["noise"], own["dropout"]
+    random: Any = _Replay(batch.errors(index), has_position_noise=position_noise > 0.0)
+    motion_capture = MotionCapture(
+        position_noise, attitude_noise, own["delay"][0] * period, dropout, random
+    )
+    goal = np.array(own["goal"])
+    states, controls = [vehicle.state], []
+    control: NDArray[np.float64] = np.zeros(feedback.U_DIM)
+    for tick in range(batch.ticks):
+        moment = tick * period
+        random.begin(tick)
+        vehicle.advance_to(moment)
+        motion_capture.measure(moment, *vehicle.pose)
+        for stamp, position, quaternion in motion_capture.arrivals(moment):
+            attitude = rpy_from_quaternion(*quaternion)
+            motion = estimator.update(round(stamp * 1e9), position, attitude)
+            if motion is not None:
+                x = np.array([*motion.position, *motion.velocity, motion.attitude[2]])
+                control = controller.control(x, goal, stamp)
+                vehicle.command(control)
+        controls.append(control)
+        vehicle.advance_to(moment + period)
+        states.append(vehicle.state)
+    return np.array(states), np.array(controls)
+
+
+class _Replay(np.random.Generator):
+    """Has `MotionCapture` draw the random numbers that the batch has drawn."""
+
+    def __init__(self, errors: NDArray[np.float64], has_position_noise: bool):
+        super().__init__(np.random.PCG64())
+        self._errors = errors
+        self._has_position_noise = has_position_noise
+
+    def begin(self, tick: int) -> None:
+        """Go on with the numbers of a tick."""
+        self._tick = tick
+        errors = self._errors[tick]
+        self._next = [errors[:3], errors[3:6]] if self._has_position_noise else [errors[3:6]]
+
+    def random(self) -> Any:  # type: ignore[override]
+        """Return what decides whether the pose is lost."""
+        return self._errors[self._tick, 6]
+
+    def normal(self, mean: float, deviation: float, size: int) -> Any:  # type: ignore[override]
+        """Return errors of the position, then those of the attitude."""
+        return deviation * self._next.pop(0)

@@ -1,0 +1,260 @@
+"""What a Monte-Carlo run is told: a YAML file, checked before anything flies."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rospkg import ResourceNotFound, RosPack
+from scipy.special import ndtri
+
+from crazyflie_lqr.gain_file import GainFileError, load_matrix
+from crazyflie_model import inner_loops
+from crazyflie_model.limits import CRASH_TILT
+from crazyflie_state_estimator import kalman
+from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils.parameter_types import DURATION, METRES, TEXT, Integer, Number, Text
+from crazyflie_utils.parameter_types import FINITE as ANY
+from crazyflie_utils.parameters import Declaration
+from crazyflie_utils.yaml_file import Entry, load
+
+MODELS = ("near_hover", "coupled_7d", "quadrotor")
+ESTIMATORS = ("finite_difference", "kalman")
+
+_FRACTION = Number(minimum=-0.5, maximum=0.5)
+_NOT_NEGATIVE = Number(minimum=0.0)
+_SPEED = Number("m/s")
+
+
+class FlightParameters(Parameters):
+    """What may differ between flights, and what it is where it does not: keys of ``vehicle``."""
+
+    mass_error: float = parameter(_FRACTION, "how much heavier than nominal the vehicle is", 0.0)
+    thrust_error: float = parameter(_FRACTION, "how much more than nominal its rotors lift", 0.0)
+    wind_x: float = parameter(_SPEED, "constant wind, fixed frame", 0.0)
+    wind_y: float = parameter(_SPEED, "constant wind, fixed frame", 0.0)
+    wind_z: float = parameter(_SPEED, "constant wind, fixed frame", 0.0)
+    position_noise: float = parameter(
+        Number("m", minimum=0.0), "standard deviation of the poses' positions, each axis", 0.0
+    )
+    attitude_noise: float = parameter(
+        Number("rad", minimum=0.0), "standard deviation of the poses' attitudes, each axis", 0.0
+    )
+    delay: float = parameter(
+        Number("s", minimum=0.0, maximum=1.0),
+        "from a pose to its arrival, rounded up to whole periods",
+        0.0,
+    )
+    dropout: float = parameter(
+        Number(minimum=0.0, maximum=1.0), "probability that a pose is lost", 0.0
+    )
+    position_gain: float = parameter(_NOT_NEGATIVE, "factor of the gains of x and y", 1.0)
+    velocity_gain: float = parameter(_NOT_NEGATIVE, "factor of the gains of x_dot and y_dot", 1.0)
+    height_gain: float = parameter(_NOT_NEGATIVE, "factor of the gains of z", 1.0)
+    climb_gain: float = parameter(_NOT_NEGATIVE, "factor of the gains of z_dot", 1.0)
+    yaw_gain: float = parameter(_NOT_NEGATIVE, "factor of the gains of the yaw", 1.0)
+    integrator_gain: float = parameter(_NOT_NEGATIVE, "factor of the integrators' gains", 1.0)
+
+
+_DEFAULTS = FlightParameters.from_mapping({})
+
+
+class RunParameters(Parameters):
+    """What all flights have in common: the other keys."""
+
+    flights: int = parameter(Integer(1, 10**7), "how many")
+    seed: int = parameter(Integer(0, 2**32 - 1), "of everything random", 0)
+    model: str = parameter(Text(MODELS), "see crazyflie_simulator", "quadrotor")
+    duration: float = parameter(Number("s", above=0.0, maximum=600.0), "of a flight", 20.0)
+    period: float = parameter(
+        Number("s", above=0.0, maximum=1.0),
+        "of motion capture, estimator and controller; a whole number of 0.002 s",
+        0.01,
+    )
+    settle_time: float = parameter(DURATION, "errors count from then on", 10.0)
+    estimator: str = parameter(
+        Text(ESTIMATORS), "how velocities are found; see crazyflie_state_estimator", ESTIMATORS[0]
+    )
+    filter_noise: float = parameter(
+        Number("m", above=0.0), "that the Kalman filter expects", kalman.POSITION_NOISE
+    )
+    filter_walk: float = parameter(
+        Number("m/s^2/sqrt(s)", above=0.0),
+        "acceleration walk that the Kalman filter expects",
+        kalman.ACCELERATION_WALK,
+    )
+    K_file: str = parameter(
+        TEXT, "gain file, 4 rows of 7 numbers: beside this file, or in crazyflie_lqr/config"
+    )
+    integrator_k_x: float = parameter(ANY, "see crazyflie_lqr", 0.0, "integrator/k/x")
+    integrator_k_y: float = parameter(ANY, "see crazyflie_lqr", 0.0, "integrator/k/y")
+    integrator_k_z: float = parameter(ANY, "see crazyflie_lqr", 0.0, "integrator/k/z")
+    integrator_x: float = parameter(_NOT_NEGATIVE, "m s", 0.0, "integrator/thresh/x")
+    integrator_y: float = parameter(_NOT_NEGATIVE, "m s", 0.0, "integrator/thresh/y")
+    integrator_z: float = parameter(_NOT_NEGATIVE, "m s", 0.0, "integrator/thresh/z")
+    start_x: float = parameter(METRES, "where flights begin, at rest", 0.0, "start/x")
+    start_y: float = parameter(METRES, "where flights begin, at rest", 0.0, "start/y")
+    start_z: float = parameter(METRES, "where flights begin; the ground is 0", 1.0, "start/z")
+    goal_x: float = parameter(METRES, "where they go", 0.0, "goal/x")
+    goal_y: float = parameter(METRES, "where they go", 0.0, "goal/y")
+    goal_z: float = parameter(METRES, "where they go", 1.0, "goal/z")
+    goal_yaw: float = parameter(Number("rad"), "where they head", 0.0, "goal/yaw")
+    largest_error: float = parameter(
+        Number("m", above=0.0), "distance from the goal", 0.1, "limits/error"
+    )
+    largest_tilt: float = parameter(
+        Number("rad", above=0.0),
+        "from upright, also before it has settled",
+        CRASH_TILT,
+        "limits/tilt",
+    )
+
+    def complaints(self) -> list[str]:
+        """See `Parameters.complaints`."""
+        found = []
+        if self.settle_time >= self.duration:
+            found.append(
+                f"settle_time is {self.settle_time:g}; expected less than the duration, "
+                f"{self.duration:g}"
+            )
+        samples = self.period / inner_loops.PERIOD
+        if abs(samples - round(samples)) > 1e-6:
+            found.append(
+                f"period is {self.period:g}; expected a whole number of {inner_loops.PERIOD:g} s"
+            )
+        return found
+
+
+UNIFORM, NORMAL, VALUES = "uniform", "normal", "values"
+_EXPECTED = (
+    f"one of {UNIFORM}: [lowest, highest], {NORMAL}: [mean, standard deviation] and "
+    f"{VALUES}: [one, another, ...]"
+)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """How a parameter is spread over the flights.
+
+    Attributes
+    ----------
+    name : str
+        Of a `FlightParameters`.
+    unit : str
+    kind : str
+        `UNIFORM`, `NORMAL` or `VALUES`.
+    numbers : tuple of float
+        See the file.
+    """
+
+    name: str
+    unit: str
+    kind: str
+    numbers: tuple[float, ...]
+    low: float
+    high: float
+
+    def quantiles(self, shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values below which these shares, in [0, 1), of the flights are."""
+        if self.kind == VALUES:
+            index = (shares * len(self.numbers)).astype(int)
+            return np.sort(self.numbers)[index]
+        first, second = self.numbers
+        if self.kind == UNIFORM:
+            return first + (second - first) * shares
+        return np.clip(first + second * ndtri(shares), self.low, self.high)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A Monte-Carlo run.
+
+    Attributes
+    ----------
+    name : str
+    run : RunParameters
+    vehicle : FlightParameters
+    sweeps : tuple of Sweep
+    K : tuple of tuple of float
+        Gains, 4 rows of 7.
+    """
+
+    name: str
+    run: RunParameters
+    vehicle: FlightParameters
+    sweeps: tuple[Sweep, ...]
+    K: tuple[tuple[float, ...], ...]
+
+    def values(self) -> dict[str, NDArray[np.float64]]:
+        """Return what the flights have, by name of a `FlightParameters`, arrays of all flights."""
+        shares = np.random.default_rng(self.run.seed).random((len(self.sweeps), self.run.flights))
+        return {
+            sweep.name: sweep.quantiles(part)
+            for sweep, part in zip(self.sweeps, shares, strict=True)
+        }
+
+
+def read_settings(path: str | Path) -> Settings:
+    """Return the settings in a file.
+
+    Raises
+    ------
+    ParameterError
+        About everything that is wrong, with file and line.
+    """
+    file = load(path)
+    run = file.read(RunParameters, besides=("vehicle", "sweep"))
+    vehicle = file["vehicle"].read(FlightParameters) if "vehicle" in file else _DEFAULTS
+    sweeps = tuple(_sweep(entry, key) for key, entry in file["sweep"].entries().items())
+    if not sweeps:
+        raise file["sweep"].error("is empty; expected at least one parameter")
+    model_only = {"mass_error", "thrust_error", "wind_x", "wind_y", "wind_z"}
+    for sweep in sweeps:
+        if run.model != "quadrotor" and sweep.name in model_only:
+            raise file["sweep"][sweep.name].error(f"makes no difference to the model {run.model}")
+    try:
+        K = load_matrix(str(_gain_file(file.file, run.K_file)), 4, 7)
+    except GainFileError as error:
+        raise file["K_file"].error(f"is {run.K_file}: {error}") from None
+    return Settings(file.file.stem, run, vehicle, sweeps, tuple(map(tuple, K.tolist())))
+
+
+def _gain_file(settings: Path, name: str) -> Path:
+    beside = settings.parent / name
+    if beside.exists():
+        return beside
+    try:
+        shipped = Path(RosPack().get_path("crazyflie_lqr"), "config", name)
+    except ResourceNotFound:
+        return beside
+    return shipped if shipped.exists() else beside
+
+
+def _sweep(entry: Entry, name: str) -> Sweep:
+    declarations = {each.name: each for each in FlightParameters.declarations()}
+    if name not in declarations:
+        raise entry.error(f"is no parameter; expected one of {', '.join(declarations)}")
+    declaration = declarations[name]
+    kinds = entry.entries()
+    if len(kinds) != 1 or next(iter(kinds)) not in (UNIFORM, NORMAL, VALUES):
+        raise entry.error(f"has {', '.join(kinds) or 'nothing'}; expected {_EXPECTED}")
+    ((kind, content),) = kinds.items()
+    elements = content.elements()
+    if kind != VALUES and len(elements) != 2 or not elements:
+        raise content.error(f"has {len(elements)} entries; expected {_EXPECTED}")
+    numbers = [_number(element, declaration) for element in elements]
+    if kind == UNIFORM and numbers[0] >= numbers[1]:
+        raise content.error(f"is {numbers}; expected the lower number first")
+    number: Any = declaration.type
+    return Sweep(name, number.unit, kind, tuple(numbers), number.minimum, number.maximum)
+
+
+def _number(entry: Entry, declaration: Declaration) -> float:
+    try:
+        return declaration.type(entry.value)
+    except ValueError:
+        raise entry.error(f"is {entry.value!r}; expected {declaration.type}") from None
+
+
+__all__ = ["FlightParameters", "ParameterError", "RunParameters", "Settings", "read_settings"]

@@ -1,0 +1,267 @@
+"""Flights of many vehicles at once: `simulate`, and what it is told."""
+
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from crazyflie_batch import feedback
+from crazyflie_batch.batch import Batch, Flights, fly
+from crazyflie_batch.estimators import Estimator, FiniteDifferences
+from crazyflie_batch.flight import SAMPLE_STEPS, Plan
+from crazyflie_model import inner_loops
+from crazyflie_model.dynamics import STEP, Coupled7D, Dynamics, NearHover
+from crazyflie_model.limits import CRASH_TILT
+from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
+from crazyflie_model.units import GRAVITY
+
+HOVER = (0.0, 0.0, 0.0, GRAVITY)
+"""Control at the reference."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """Vehicles of one model, whose parameters may differ.
+
+    Attributes
+    ----------
+    make : callable
+        ``make(**parameters)`` returns the `Dynamics` of one vehicle. It is also given symbols
+        (see `symbols`), so it calculates by `crazyflie_model.elementwise`. What it makes is
+        compiled once for each function, so this should not be a lambda.
+    parameters : mapping
+        Each a float, or an array of shape (n,).
+    max_tilt : float
+        See `crazyflie_simulator.vehicle.SimulatedVehicle`.
+    """
+
+    make: Callable[..., Dynamics]
+    parameters: Mapping[str, ArrayLike] = field(default_factory=dict)
+    max_tilt: float = math.inf
+
+
+def near_hover() -> Model:
+    """Return `crazyflie_model.dynamics.NearHover`."""
+    return Model(NearHover)
+
+
+def coupled_7d() -> Model:
+    """Return `crazyflie_model.dynamics.Coupled7D`."""
+    return Model(Coupled7D)
+
+
+def quadrotor(
+    mass_error: ArrayLike = 0.0, thrust_error: ArrayLike = 0.0, wind: ArrayLike = (0.0, 0.0, 0.0)
+) -> Model:
+    """Return `crazyflie_model.stabilized_quadrotor.StabilizedQuadrotor`.
+
+    Parameters
+    ----------
+    mass_error, thrust_error : float or array_like, shape (n,)
+    wind : array_like, shape (3,) or (n, 3)
+        Velocity of the air, m/s, constant.
+    """
+    wind_x, wind_y, wind_z = np.moveaxis(np.asarray(wind, dtype=float), -1, 0)
+    parameters = {
+        "mass_error": mass_error,
+        "thrust_error": thrust_error,
+        "wind_x": wind_x,
+        "wind_y": wind_y,
+        "wind_z": wind_z,
+    }
+    return Model(_make_quadrotor, parameters, CRASH_TILT)
+
+
+def _make_quadrotor(mass_error, thrust_error, wind_x, wind_y, wind_z):
+    return StabilizedQuadrotor(
+        mass_error=mass_error,
+        thrust_error=thrust_error,
+        wind=lambda t: (wind_x, wind_y, wind_z),
+    )
+
+
+@dataclass(frozen=True)
+class Controller:
+    """`crazyflie_lqr.linear_feedback.IntegralStateFeedback` for every vehicle, in flight.
+
+    Each array may have one more axis in front, of length n.
+
+    Attributes
+    ----------
+    K : array_like, shape (4, 7)
+    u_ref : array_like, shape (4,)
+    integrator_k, integrator_limit : array_like, shape (3,)
+    """
+
+    K: ArrayLike
+    u_ref: ArrayLike = HOVER
+    integrator_k: ArrayLike = (0.0, 0.0, 0.0)
+    integrator_limit: ArrayLike = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """`crazyflie_simulator.motion_capture.MotionCapture` for every vehicle.
+
+    Attributes
+    ----------
+    position_noise, attitude_noise, latency, dropout : float or array_like, shape (n,)
+        In m, rad, s, and a probability.
+    """
+
+    position_noise: ArrayLike = 0.0
+    attitude_noise: ArrayLike = 0.0
+    latency: ArrayLike = 0.0
+    dropout: ArrayLike = 0.0
+
+
+def simulate(
+    model: Model,
+    controller: Controller,
+    estimator: Estimator | None = None,
+    x0: ArrayLike = (0.0, 0.0, 1.0),
+    n: int = 1,
+    *,
+    goal: ArrayLike = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
+    duration: float = 10.0,
+    period: float = 0.01,
+    settle_time: float = 0.0,
+    measurement: Measurement | None = None,
+    seed: int = 0,
+    first: int = 0,
+    record: bool = False,
+    threads: int | None = None,
+) -> Flights:
+    """Fly n vehicles in closed loop, each on its own.
+
+    Every vehicle flies as the workspace's classes have it fly one by one, to within rounding.
+    What it does depends on its number and the seed, not on how many there are.
+
+    Parameters
+    ----------
+    model : Model
+    controller : Controller
+    estimator : Estimator, optional
+        By default differences of positions.
+    x0 : array_like, shape (3,) or (n, 3)
+        Where they begin, at rest, m; on the ground or in the air.
+    n : int
+        > 0
+    goal : array_like, shape (7,) or (n, 7)
+        Reference: x, y, z, x_dot, y_dot, z_dot, yaw in m, m/s and rad.
+    duration : float
+        s, in whole periods.
+    period : float
+        Of motion capture, estimator and controller, s; a whole number of 2 ms.
+    settle_time : float
+        Errors count from then on, s.
+    measurement : Measurement, optional
+        By default without errors.
+    seed : int
+        Of the errors of measurement.
+    first : int
+        Number of the first vehicle; for who flies them piece by piece.
+    record : bool
+        Whether to return the states of every tick.
+    threads : int, optional
+        By default one for every processor.
+
+    Raises
+    ------
+    ValueError
+        Something is out of its range, or an array has not one entry for every vehicle.
+    """
+    batch = prepare(
+        model,
+        controller,
+        estimator or FiniteDifferences(),
+        x0,
+        n,
+        goal=goal,
+        duration=duration,
+        period=period,
+        settle_time=settle_time,
+        measurement=measurement or Measurement(),
+        seed=seed,
+        first=first,
+    )
+    return fly(batch, record, threads or len(os.sched_getaffinity(0)))
+
+
+def prepare(
+    model: Model,
+    controller: Controller,
+    estimator: Estimator,
+    x0: ArrayLike,
+    n: int,
+    *,
+    goal: ArrayLike,
+    duration: float,
+    period: float,
+    settle_time: float,
+    measurement: Measurement,
+    seed: int,
+    first: int,
+) -> Batch:
+    """Return the flights of `simulate` before they are flown."""
+    if n <= 0:
+        raise ValueError(f"n is {n}; expected at least one vehicle")
+    steps = round(period / STEP)
+    if steps <= 0 or steps % SAMPLE_STEPS or abs(steps * STEP - period) > 1e-9:
+        raise ValueError(f"period is {period}; expected a whole number of {inner_loops.PERIOD} s")
+    ticks = round(duration / period)
+    if ticks < 1:
+        raise ValueError(f"duration is {duration}; expected at least one period, {period} s")
+    plan = Plan(model.make, tuple(model.parameters), model.max_tilt, type(estimator), steps)
+    noise = {
+        "position_noise": measurement.position_noise,
+        "attitude_noise": measurement.attitude_noise,
+    }
+    # What would arrive after the end need not be on its way for longer.
+    delay = np.minimum(delay_ticks(measurement.latency, plan.period), ticks)
+    parameters = {
+        "model": _together(model.parameters, n),
+        "estimator": _together(estimator.parameters, n),
+        "K": _columns("K", controller.K, (feedback.U_DIM, feedback.X_DIM), n),
+        "u_ref": _columns("u_ref", controller.u_ref, (feedback.U_DIM,), n),
+        "integrator_k": _columns("integrator_k", controller.integrator_k, (3,), n),
+        "integrator_limit": _columns("integrator_limit", controller.integrator_limit, (3,), n),
+        "goal": _columns("goal", goal, (feedback.X_DIM,), n),
+        "noise": _together(noise, n),
+        "delay": _columns("latency", delay, (), n),
+        "dropout": _columns("dropout", measurement.dropout, (), n),
+        "settled": _columns("settle_time", math.ceil(settle_time / period - 1e-6), (), n),
+    }
+    positions = _columns("x0", x0, (3,), n)
+    return Batch(plan, parameters, _initial_states(model, positions), ticks, seed, first)
+
+
+def delay_ticks(latency: ArrayLike, period: float) -> NDArray[np.float64]:
+    """Return after how many ticks a pose arrives that is ``latency`` (s) on its way."""
+    return np.ceil((np.asarray(latency, dtype=float) - 1e-9) / period).clip(0.0)
+
+
+def _initial_states(model, positions):
+    """Return the states at rest, shape (x_dim, n)."""
+    parameters = {name: np.asarray(value, float) for name, value in model.parameters.items()}
+    x = model.make(**parameters).initial_state(list(positions))
+    return np.array([np.broadcast_to(part, positions.shape[1:]) for part in x])
+
+
+def _together(values, n):
+    """Return numbers or arrays of shape (n,), by name, as one of shape (len(values), n)."""
+    columns = [_columns(name, value, (), n) for name, value in values.items()]
+    return np.concatenate([np.empty((0, n)), *columns])
+
+
+def _columns(name, values, shape, n):
+    """Return an array of shape (..., *shape) as one of shape (size, n)."""
+    array = np.asarray(values, dtype=float)
+    if array.shape not in (shape, (n, *shape)):
+        raise ValueError(f"{name} has the shape {array.shape}; expected {shape} or {(n, *shape)}")
+    if not np.isfinite(array).all():
+        raise ValueError(f"{name} is not finite")
+    return np.broadcast_to(array, (n, *shape)).reshape(n, -1).T

@@ -1,0 +1,215 @@
+"""Numbers that stand for those of a running program: formulas become machine code.
+
+The formulas of `crazyflie_model` take floats, arrays or whatever else calculates like these
+(see `crazyflie_model.elementwise`). Given a `Symbol`, a formula leaves the instructions that
+would calculate its result, in an LLVM function that is being built; nothing is calculated yet.
+A symbol stands for one number of each of several vehicles, its lanes, which the processor
+calculates at once.
+
+A formula must not ask for a value: what depends on one is said with ``where`` and ``clip``.
+"""
+
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+
+DOUBLE = ir.DoubleType()
+
+_VECTOR_LETTERS = {8: "e", 4: "d", 2: "b"}
+"""By the number of lanes: how the C library calls its functions of vectors (x86-64 vector function
+ABI), with AVX-512, AVX2 and SSE."""
+
+_FUNCTIONS = {
+    np.sin: "sin",
+    np.cos: "cos",
+    np.tan: "tan",
+    np.arcsin: "asin",
+    np.arctan2: "atan2",
+    np.hypot: "hypot",
+}
+"""Of the C library."""
+
+_INTRINSICS = {np.sqrt: "llvm.sqrt", np.floor: "llvm.floor", np.absolute: "llvm.fabs"}
+"""Of LLVM: one instruction of most processors."""
+
+_OPERATORS: dict[Any, Callable[[Any, Any], Any]] = {
+    np.add: operator.add,
+    np.subtract: operator.sub,
+    np.multiply: operator.mul,
+    np.divide: operator.truediv,
+}
+"""Arrive as functions where numpy's own numbers are on the left."""
+
+
+class Emitter:
+    """Writes instructions for vectors of numbers into an LLVM function.
+
+    Parameters
+    ----------
+    builder : llvmlite.ir.IRBuilder
+    lanes : int
+        Numbers to a vector.
+    vector_functions : bool
+        Whether the C library has its functions for such vectors.
+    """
+
+    def __init__(self, builder: ir.IRBuilder, lanes: int, vector_functions: bool):
+        self.builder = builder
+        self.lanes = lanes
+        self.type = ir.VectorType(DOUBLE, lanes)
+        self._vector_functions = vector_functions
+
+    def value(self, number: Any) -> ir.Value:
+        """Return the vector that a symbol or a float stands for."""
+        if isinstance(number, Symbol):
+            return number.value
+        return ir.Constant(self.type, [float(number)] * self.lanes)
+
+    def symbol(self, value: ir.Value) -> "Symbol":
+        """Return the symbol of a vector."""
+        return Symbol(self, value)
+
+    def call(self, function: Any, arguments: Sequence[Any]) -> "Symbol":
+        """Return a function, one of numpy's, of symbols or floats."""
+        values = [self.value(argument) for argument in arguments]
+        if function in _OPERATORS:
+            left, right = map(self.value, arguments)
+            return _OPERATORS[function](self.symbol(left), self.symbol(right))
+        if function in _INTRINSICS:
+            name = f"{_INTRINSICS[function]}.v{self.lanes}f64"
+            return self.symbol(self.builder.call(self._declare(name, self.type, 1), values))
+        if function not in _FUNCTIONS:
+            raise TypeError(f"a batch does not know {function}")
+        name = _FUNCTIONS[function]
+        if self._vector_functions:
+            parameters = "v" * len(values)
+            name = f"_ZGV{_VECTOR_LETTERS[self.lanes]}N{self.lanes}{parameters}_{name}"
+            callee = self._declare(name, self.type, len(values))
+            return self.symbol(self.builder.call(callee, values))
+        return self.symbol(self._lane_by_lane(self._declare(name, DOUBLE, len(values)), values))
+
+    def _lane_by_lane(self, function, values):
+        result = ir.Constant(self.type, ir.Undefined)
+        for lane in range(self.lanes):
+            index = ir.Constant(ir.IntType(32), lane)
+            numbers = [self.builder.extract_element(value, index) for value in values]
+            number = self.builder.call(function, numbers)
+            result = self.builder.insert_element(result, number, index)
+        return result
+
+    def _declare(self, name, type_, count):
+        module = self.builder.module
+        if name in module.globals:
+            return module.globals[name]
+        return ir.Function(module, ir.FunctionType(type_, [type_] * count), name)
+
+
+class Condition:
+    """Something that holds for some of the lanes."""
+
+    def __init__(self, emitter: Emitter, value: ir.Value):
+        self.value = value
+        self._emitter = emitter
+
+    def __and__(self, other: "Condition") -> "Condition":
+        return Condition(self._emitter, self._emitter.builder.and_(self.value, other.value))
+
+    def __or__(self, other: "Condition") -> "Condition":
+        return Condition(self._emitter, self._emitter.builder.or_(self.value, other.value))
+
+    def __invert__(self) -> "Condition":
+        return Condition(self._emitter, self._emitter.builder.not_(self.value))
+
+    def __bool__(self) -> bool:
+        raise TypeError("a formula of a batch must not branch; it chooses with where() or clip()")
+
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        """Take part in ``numpy.where``."""
+        if function is not np.where:
+            return NotImplemented
+        _, value, other = args
+        values = [self._emitter.value(number) for number in (value, other)]
+        return self._emitter.symbol(self._emitter.builder.select(self.value, *values))
+
+
+class Symbol:
+    """A number that the program will know; see the module."""
+
+    def __init__(self, emitter: Emitter, value: ir.Value):
+        self.value = value
+        self._emitter = emitter
+
+    def _binary(self, instruction: str, left: Any, right: Any) -> "Symbol":
+        emit = getattr(self._emitter.builder, instruction)
+        return Symbol(self._emitter, emit(self._emitter.value(left), self._emitter.value(right)))
+
+    def __add__(self, other: Any) -> "Symbol":
+        return self._binary("fadd", self, other)
+
+    def __radd__(self, other: Any) -> "Symbol":
+        return self._binary("fadd", other, self)
+
+    def __sub__(self, other: Any) -> "Symbol":
+        return self._binary("fsub", self, other)
+
+    def __rsub__(self, other: Any) -> "Symbol":
+        return self._binary("fsub", other, self)
+
+    def __mul__(self, other: Any) -> "Symbol":
+        return self._binary("fmul", self, other)
+
+    def __rmul__(self, other: Any) -> "Symbol":
+        return self._binary("fmul", other, self)
+
+    def __truediv__(self, other: Any) -> "Symbol":
+        return self._binary("fdiv", self, other)
+
+    def __rtruediv__(self, other: Any) -> "Symbol":
+        return self._binary("fdiv", other, self)
+
+    def __neg__(self) -> "Symbol":
+        return self._binary("fsub", -0.0, self)
+
+    def __pow__(self, exponent: int) -> "Symbol":
+        power = self
+        for _ in range(exponent - 1):
+            power = power * self
+        return power
+
+    def _compare(self, sign: str, other: Any) -> Condition:
+        values = self.value, self._emitter.value(other)
+        return Condition(self._emitter, self._emitter.builder.fcmp_ordered(sign, *values))
+
+    def __lt__(self, other: Any) -> Condition:
+        return self._compare("<", other)
+
+    def __le__(self, other: Any) -> Condition:
+        return self._compare("<=", other)
+
+    def __gt__(self, other: Any) -> Condition:
+        return self._compare(">", other)
+
+    def __ge__(self, other: Any) -> Condition:
+        return self._compare(">=", other)
+
+    def __eq__(self, other: object) -> Condition:  # type: ignore[override]
+        return self._compare("==", other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __array_ufunc__(self, function: Any, method: str, *args: Any, **kwargs: Any) -> Any:
+        """Take part in ``numpy.sin`` and its like."""
+        if method != "__call__" or kwargs:
+            return NotImplemented
+        return self._emitter.call(function, args)
+
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        """Take part in ``numpy.clip``."""
+        if function is not np.clip:
+            return NotImplemented
+        value, low, high = args
+        raised = np.where(value < low, low, value)
+        return np.where(raised > high, high, raised)

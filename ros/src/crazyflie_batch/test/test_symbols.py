@@ -1,0 +1,77 @@
+"""Symbols calculate as floats do, whatever the processor has."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from llvmlite import binding
+
+from crazyflie_batch import Controller, Measurement, program, quadrotor, simulate
+from crazyflie_batch.elementwise import turn, wrap_to_pi, yaw_from_quaternion
+from crazyflie_batch.symbols import Condition, Emitter
+from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
+
+FEATURES = {8: {"avx512f": True}, 4: {"avx2": True}, 2: {}}
+
+
+def fly():
+    """Return the states at the end of flights with errors of everything, compiled anew."""
+    program.program.cache_clear()
+    flights = simulate(
+        quadrotor(np.linspace(-0.1, 0.1, 5)),
+        Controller(np.tile([0.0, 0.1, 0.0, 0.0, 0.3, 0.0, -0.2], (4, 1))),
+        n=5,
+        duration=1.0,
+        measurement=Measurement(1e-3, 1e-2, [0.0, 0.01, 0.02, 0.03, 2.0], 0.1),
+    )
+    return flights.x
+
+
+@pytest.fixture(scope="module")
+def expected():
+    """Return what they are with all that this processor has."""
+    return fly()
+
+
+@pytest.mark.parametrize(("lanes", "has_vector_functions"), [(4, True), (2, False)])
+def test_all_processors_fly_the_same(monkeypatch, expected, lanes, has_vector_functions):
+    present = binding.get_host_cpu_features()
+    wanted = dict.fromkeys(("avx512f", "avx2"), False) | FEATURES[lanes]
+    if any(value and not present.get(name) for name, value in wanted.items()):
+        pytest.skip(f"this processor has no {lanes} lanes")
+    features = SimpleNamespace(get=wanted.get, flatten=present.flatten)
+    monkeypatch.setattr(binding, "get_host_cpu_features", lambda: features)
+    if not has_vector_functions:
+        monkeypatch.setattr(program, "_load", lambda library: library != "libmvec.so.1")
+    try:
+        assert fly() == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    finally:
+        program.program.cache_clear()
+
+
+def test_what_is_not_known_is_refused():
+    emitter = SimpleNamespace(builder=None)
+    with pytest.raises(TypeError, match="must not branch"):
+        bool(Condition(emitter, None))
+    with pytest.raises(TypeError, match="does not know"):
+        Emitter(None, 2, vector_functions=False).call(np.cbrt, [1.0])
+
+
+@pytest.mark.parametrize("angle", [-10.0, -math.pi, -1.0, 0.0, 3.0, math.pi, 4.0, 100.0])
+def test_angles_are_wrapped(angle):
+    wrapped = wrap_to_pi(angle)
+    assert -math.pi <= wrapped <= math.pi
+    assert math.cos(wrapped - angle) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("roll", [-0.4, 0.0, 0.7])
+@pytest.mark.parametrize("pitch", [-math.pi / 2, -0.3, 0.0, 0.5, math.pi / 2])
+@pytest.mark.parametrize("yaw", [-3.0, 0.0, 1.2])
+def test_yaw_is_that_of_the_nodes(roll, pitch, yaw):
+    quaternion = quaternion_from_rpy(roll, pitch, yaw)
+    assert yaw_from_quaternion(quaternion) == pytest.approx(rpy_from_quaternion(*quaternion)[2])
+
+
+def test_a_turn_of_nothing_is_none():
+    assert turn([0.0, 0.0, 0.6, 0.8], [0.0, 0.0, 0.0]) == [0.0, 0.0, 0.6, 0.8]

@@ -15,6 +15,7 @@ from crazyflie_utils.parameter_types import ParameterType
 from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_parameter
 from crazyflie_utils.runtime import flights
 from crazyflie_utils.runtime.faults import Faults
+from crazyflie_utils.runtime.poses import StampedPose
 from crazyflie_utils.runtime.services import pass_on, serve
 from crazyflie_utils.runtime.throttle import Throttle
 from crazyflie_utils.runtime.timers import Timer
@@ -348,6 +349,16 @@ class NodeHandle:
         """
         self._process.transforms.listen()
         return self._process.transforms.lookup
+
+    def broadcast_poses(self) -> Callable[[list[StampedPose]], None]:
+        """Announce to tf and return ``broadcast(list of StampedPose)``, which is the quicker way."""
+        self._process.transforms.advertise()
+        return self._process.transforms.broadcast_poses
+
+    def listen_to_poses(self) -> Callable[[str, str], StampedPose]:
+        """As `listen_to_transforms`, for ``lookup(target, source)`` that returns a pose."""
+        self._process.transforms.listen()
+        return self._process.transforms.lookup_pose
 
     def rejected_transforms(self) -> dict[str, int]:
         """Return how many transforms were not taken into tf in this process, reason to number."""

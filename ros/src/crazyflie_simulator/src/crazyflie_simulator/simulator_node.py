@@ -4,7 +4,6 @@ import math
 import zlib
 from typing import Any
 
-from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
@@ -12,7 +11,7 @@ from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import SimulatedVehicle
-from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, StampedPose, parameter
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
     DURATION,
@@ -150,7 +149,7 @@ class SimulatorNode(Node):
         position = (parameters.init_x, parameters.init_y, parameters.init_z)
         self._start = handle.time()
         self._vehicle = SimulatedVehicle(self._dynamics, position, self._start, self.max_tilt)
-        self._broadcast = handle.broadcast_transforms()
+        self._broadcast = handle.broadcast_poses()
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
         handle.advertise_service("~reset", Empty, self._on_reset)
@@ -209,18 +208,15 @@ class SimulatorNode(Node):
             return
         self._measured_at = now
         self._motion_capture.measure(now, *self._vehicle.pose)
-        transforms = [self._transform(*pose) for pose in self._motion_capture.arrivals(now)]
-        if transforms:
-            self._broadcast(transforms)
-
-    def _transform(self, time, position, quaternion):
-        transform = TransformStamped()
-        transform.header.stamp = self._handle.stamp(time)
-        transform.header.frame_id = self._parameters.fixed_frame
-        transform.child_frame_id = self._parameters.robot_frame
-        transform.transform.translation = Vector3(*position)
-        transform.transform.rotation = Quaternion(*quaternion)
-        return transform
+        parameters, nanoseconds = self._parameters, self._handle.nanoseconds
+        poses = [
+            StampedPose(
+                parameters.fixed_frame, parameters.robot_frame, nanoseconds(time), position, rotation
+            )
+            for time, position, rotation in self._motion_capture.arrivals(now)
+        ]
+        if poses:
+            self._broadcast(poses)
 
 
 class NearHoverSimulatorNode(SimulatorNode):

@@ -171,7 +171,7 @@ class StateEstimatorNode(Node):
         self._publisher = handle.publisher(parameters.state_topic, self.state_type)
         self._tilted = handle.publisher(f"{parameters.state_topic}_tilted", Bool, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._lookup = handle.listen_to_transforms()
+        self._lookup = handle.listen_to_poses()
         if parameters.filter_type == KALMAN and parameters.control_topic is not None:
             handle.subscribe(
                 parameters.control_topic, ControlStamped, self._on_control, finite="control"
@@ -191,45 +191,38 @@ class StateEstimatorNode(Node):
             self._gate.reset()
             self._last_success = now
         try:
-            transform = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
+            pose = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
         except TransformError as error:
             self._report_no_state(now, str(error))
             return
-        motion = self._update(transform, now)
+        motion = self._update(pose, now)
         if motion is None:
-            stamp = transform.header.stamp.to_sec()
-            self._report_no_state(
-                now,
-                f"the latest is that of {stamp:.3f} s; {self._rejections()} poses were rejected",
-            )
+            self._report_no_state(now, "", pose)
             return
         self._last_success = now
         message = self.state_type()
         message.state = from_vector(type(message.state), self.state(motion))
-        message.header.stamp = transform.header.stamp
+        message.header.stamp = pose.time
         message.header.frame_id = self._parameters.fixed_frame
         self._publisher.publish(message)
 
-    def _update(self, transform, now):
-        stamp = transform.header.stamp.to_nsec()
-        if stamp == self._stamp:
+    def _update(self, pose, now):
+        if pose.stamp == self._stamp:
             return None
-        self._stamp = stamp
-        translation, rotation = transform.transform.translation, transform.transform.rotation
-        position = (translation.x, translation.y, translation.z)
-        self._tell_tilt(rotation)
-        verdict = self._gate.judge(stamp * 1e-9, position)
+        self._stamp = pose.stamp
+        self._tell_tilt(pose.rotation)
+        verdict = self._gate.judge(pose.stamp * 1e-9, pose.position)
         if verdict is Verdict.BAD:
             return None
         if verdict is Verdict.MOVED:
             self._estimator.reset()
-        attitude = rpy_from_quaternion(rotation.x, rotation.y, rotation.z, rotation.w)
+        attitude = rpy_from_quaternion(*pose.rotation)
         return self._estimator.update(
-            stamp, position, attitude, self._control.acceleration(float(attitude[2]), now)
+            pose.stamp, pose.position, attitude, self._control.acceleration(attitude[2], now)
         )
 
     def _tell_tilt(self, rotation):
-        is_tilted = self._tilt.update(rotation.x, rotation.y)
+        is_tilted = self._tilt.update(*rotation[:2])
         if is_tilted == self._is_tilted:
             return
         self._is_tilted = is_tilted
@@ -254,11 +247,14 @@ class StateEstimatorNode(Node):
         header = Header(stamp=self._handle.stamp())
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
-    def _report_no_state(self, now, reason):
+    def _report_no_state(self, now, reason, pose=None):
         # Shorter silences are ordinary: at the start, and when time_step is
         # shorter than the period of the transforms.
         if now - self._last_success < HOLD_LIMIT:
             return
+        if pose is not None:
+            seconds = pose.stamp * 1e-9
+            reason = f"the latest is that of {seconds:.3f} s; {self._rejections()} poses were rejected"
         self._handle.warn(
             f"no state: no new transform {self._parameters.fixed_frame} -> "
             f"{self._parameters.robot_frame} for {now - self._last_success:.1f} s ({reason})",

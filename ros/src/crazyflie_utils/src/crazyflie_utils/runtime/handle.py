@@ -294,6 +294,10 @@ class NodeHandle:
         """Return the ROS time of a moment of `time`, by default now."""
         return self._process.clock.stamp(moment)
 
+    def nanoseconds(self, moment: float | None = None) -> int:
+        """Return the same as `stamp` in whole ns, for a `StampedPose`."""
+        return self._process.clock.nanoseconds(moment)
+
     def timer(self, period: float, callback: Callable[[], None], steady: bool = False) -> Timer:
         """Have ``callback()`` called every ``period`` seconds of `time`.
 

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Iterable, Iterator
 from typing import BinaryIO, NamedTuple
 
+import genpy
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
@@ -57,10 +58,15 @@ class StampedPose(NamedTuple):
             (q.x, q.y, q.z, q.w),
         )
 
+    @property
+    def time(self) -> genpy.Time:
+        """The stamp as a message has it."""
+        return ros_time(self.stamp)
+
     def message(self) -> TransformStamped:
         """Return the pose as a message."""
         return TransformStamped(
-            Header(0, ros_time(self.stamp), self.parent),
+            Header(0, self.time, self.parent),
             self.child,
             Transform(Vector3(*self.position), Quaternion(*self.rotation)),
         )

@@ -23,7 +23,7 @@ from crazyflie_utils.parameter_types import (
     Number,
 )
 from crazyflie_utils.parameters import group
-from crazyflie_utils.vectors import to_vector
+from crazyflie_utils.vectors import to_tuple
 
 MAX_CATCH_UP = 1.0
 """The most that is integrated at once, s, when the clock jumps or the machine was busy; what is
@@ -168,7 +168,7 @@ class SimulatorNode(Node):
         # the control takes effect now and not at the last tick.
         if not self._parameters.publishes_clock:
             self._advance_to(self._handle.time())
-        self._vehicle.command(to_vector(message.control))
+        self._vehicle.command(to_tuple(message.control))
 
     def _on_reset(self, _):
         self._vehicle.recover()

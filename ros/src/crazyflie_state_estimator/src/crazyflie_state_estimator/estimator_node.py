@@ -1,8 +1,6 @@
 """ROS interface of the state estimators."""
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from numpy.typing import NDArray
 from std_msgs.msg import Bool, Header
 from typing_extensions import override
 
@@ -22,7 +20,7 @@ from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameter_types import FRAME, TIME_STEP, TOPIC, Integer, Number, Text
-from crazyflie_utils.vectors import from_vector, to_vector
+from crazyflie_utils.vectors import from_vector, to_tuple
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
 
@@ -134,8 +132,8 @@ class StateEstimatorNode(Node):
         self._stamp: int | None = None
         self._is_tilted: bool | None = None
 
-    def state(self, motion: Motion) -> NDArray[np.float64]:
-        """Return the state vector, in the order of the message's fields."""
+    def state(self, motion: Motion) -> list[float]:
+        """Return the state, in the order of the message's fields."""
         raise NotImplementedError
 
     @override
@@ -181,7 +179,7 @@ class StateEstimatorNode(Node):
         handle.timer(REPORT_PERIOD, self._report)
 
     def _on_control(self, message):
-        self._control.command(to_vector(message.control), self._handle.time())
+        self._control.command(to_tuple(message.control), self._handle.time())
 
     def _on_timer(self):
         now = self._handle.time()
@@ -276,8 +274,8 @@ class PositionVelocityStateEstimatorNode(StateEstimatorNode):
     parameters_type = PositionVelocityStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> NDArray[np.float64]:
-        return np.concatenate([motion.position, motion.velocity])
+    def state(self, motion: Motion) -> list[float]:
+        return [*motion.position, *motion.velocity]
 
 
 class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
@@ -286,8 +284,8 @@ class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
     state_type = PositionVelocityYawStateStamped
 
     @override
-    def state(self, motion: Motion) -> NDArray[np.float64]:
-        return np.concatenate([motion.position, motion.velocity, motion.attitude[2:]])
+    def state(self, motion: Motion) -> list[float]:
+        return [*motion.position, *motion.velocity, motion.attitude[2]]
 
 
 class FullStateEstimatorParameters(StateEstimatorParameters):
@@ -303,5 +301,5 @@ class FullStateEstimatorNode(StateEstimatorNode):
     parameters_type = FullStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> NDArray[np.float64]:
-        return np.concatenate(motion)
+    def state(self, motion: Motion) -> list[float]:
+        return [number for part in motion for number in part]

@@ -29,6 +29,9 @@ MAX_CATCH_UP = 1.0
 """The most that is integrated at once, s, when the clock jumps or the machine was busy; what is
 beyond it is skipped, so that the process goes on living."""
 
+MAX_LATENESS = 0.1
+"""Poses that the machine was too busy for are made up for if it was so no longer than this, s."""
+
 
 class MotionCaptureParameters(Parameters):
     """Errors of the motion capture system."""
@@ -167,7 +170,10 @@ class SimulatorNode(Node):
         # Without a clock of its own, the vehicle has to catch up first, so that
         # the control takes effect now and not at the last tick.
         if not self._parameters.publishes_clock:
-            self._advance_to(self._handle.time())
+            now = self._handle.time()
+            if not self._handle.uses_sim_time:
+                self._make_up(now)
+            self._advance_to(now)
         self._vehicle.command(to_tuple(message.control))
 
     def _on_reset(self, _):
@@ -175,8 +181,26 @@ class SimulatorNode(Node):
         return EmptyResponse()
 
     def _on_timer(self):
-        self._advance_to(self._handle.time())
-        self._broadcast_pose()
+        now = self._handle.time()
+        if self._handle.uses_sim_time:
+            self._advance_to(now)
+            self._broadcast_pose()
+        else:
+            self._make_up(now)
+
+    def _make_up(self, now):
+        """Broadcast the poses of all time steps until now, s, that have not been.
+
+        The machine may have been busy. Who counts on so many poses a second gets them, with the
+        stamps that they are of.
+        """
+        step = self._parameters.time_step
+        due = math.floor((now - self._start) / step + 1e-6)
+        missed = min(due - self._ticks, math.ceil(MAX_LATENESS / step))
+        for tick in range(due - missed + 1, due + 1):
+            self._advance_to(self._start + tick * step)
+            self._broadcast_pose()
+        self._ticks = due
 
     def _advance_to(self, now):
         skipped = now - self._vehicle.time - max(MAX_CATCH_UP, self._parameters.time_step)

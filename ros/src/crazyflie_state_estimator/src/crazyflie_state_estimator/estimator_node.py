@@ -19,13 +19,16 @@ from crazyflie_state_estimator.pose_gate import PoseGate, TiltMonitor, Verdict
 from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
-from crazyflie_utils.parameter_types import FRAME, TIME_STEP, TOPIC, Integer, Number, Text
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer, Number, Text
 from crazyflie_utils.vectors import from_vector, to_tuple
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
 
 REPORT_PERIOD = 1.0
 """Of the diagnostics, s; REP 107 wants one report a second."""
+
+SILENCE_PERIOD = 0.1
+"""How often an estimator that acts on arrival looks whether anything has arrived, s."""
 
 
 class StateEstimatorParameters(Parameters):
@@ -36,6 +39,13 @@ class StateEstimatorParameters(Parameters):
     fixed_frame: str = parameter(FRAME, "frame the state is in", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
     state_topic: str = parameter(TOPIC, "where states go", name="topics/state")
+    acts_on_arrival: bool = parameter(
+        BOOLEAN,
+        "answer a new pose as soon as it comes, at most one every `time_step`, and do not wait for "
+        "the next time step",
+        False,
+        "act_on_arrival",
+    )
     filter_type: str = parameter(
         Text((FINITE_DIFFERENCE, KALMAN)), "how rates are found", FINITE_DIFFERENCE, "filter/type"
     )
@@ -175,13 +185,22 @@ class StateEstimatorNode(Node):
                 parameters.control_topic, ControlStamped, self._on_control, finite="control"
             )
         self._last_success = handle.time()
-        handle.timer(parameters.time_step, self._on_timer)
+        if parameters.acts_on_arrival:
+            handle.on_pose(parameters.robot_frame, parameters.time_step, self._estimate)
+            handle.timer(max(parameters.time_step, SILENCE_PERIOD), self._watch)
+        else:
+            handle.timer(parameters.time_step, self._estimate)
         handle.timer(REPORT_PERIOD, self._report)
 
     def _on_control(self, message):
         self._control.command(to_tuple(message.control), self._handle.time())
 
-    def _on_timer(self):
+    def _watch(self):
+        # Where nothing arrives somebody has to say so.
+        if self._handle.time() - self._last_success >= HOLD_LIMIT:
+            self._estimate()
+
+    def _estimate(self):
         now = self._handle.time()
         if now < self._last_success:
             # The simulation was reset, and what is known belongs to the past one.

@@ -364,6 +364,15 @@ class NodeHandle:
         self._process.transforms.listen()
         return self._process.transforms.lookup_pose
 
+    def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
+        """Have ``callback()`` called as soon as tf knows a new pose of a frame.
+
+        Of poses that come oftener than every ``period`` (s, by their stamps) only so many are
+        told of.
+        """
+        guarded, submit = self.guard(callback), self._process.executor.submit
+        self._process.transforms.on_pose(frame, period, lambda: submit(guarded))
+
     def rejected_transforms(self) -> dict[str, int]:
         """Return how many transforms were not taken into tf in this process, reason to number."""
         return dict(self._process.transforms.rejected)

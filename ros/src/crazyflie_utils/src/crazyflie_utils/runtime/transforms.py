@@ -75,6 +75,31 @@ class _Frame:
         self.steps_back = 0
 
 
+class _Listener:
+    """Somebody who is told of new poses of a frame, so often and no oftener.
+
+    Parameters
+    ----------
+    period : float
+        s, by the poses' stamps.
+    tell : callable
+    """
+
+    def __init__(self, period: float, tell: Callable[[], None]):
+        self.tell = tell
+        self._period = round(period * 1e9)
+        self._due = 0
+
+    def is_due(self, stamp: int) -> bool:
+        """Tell whether a pose, by its stamp in ns, is one of those to be told of."""
+        early = self._due - stamp
+        # Rounding makes none late by one pose; much earlier ones are of a clock that was set back.
+        if self._period // 100 < early <= 2 * self._period:
+            return False
+        self._due = stamp + self._period if early > 0 else max(self._due + self._period, stamp)
+        return True
+
+
 class Transforms:
     """What tf knows, and the way to tell it more.
 
@@ -112,6 +137,8 @@ class Transforms:
         self._publisher: Any = None
         self._own: TFMessage | None = None
         self._listens = False
+        self._listeners: dict[str, list[_Listener]] = {}
+        self._arrived: list[_Listener] = []
         # Each broadcaster outside has a thread of its own.
         self._lock = threading.RLock()
         self._frames: dict[str, _Frame] = {}
@@ -142,6 +169,7 @@ class Transforms:
             with self._lock:
                 for pose in poses:
                     self._take(pose, now)
+            self._tell_of_arrivals()
         if self._publisher.has_subscribers(beside=int(self._listens)):
             self._own = self._codec.encode(poses)
             self._publisher.publish(self._own)
@@ -152,6 +180,13 @@ class Transforms:
             self._listens = True
             self._topics.subscribe("/tf", TFMessage, self._on_transforms, RawTransforms)
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
+
+    def on_pose(self, frame: str, period: float, tell: Callable[[], None]) -> None:
+        """Have ``tell()`` called when a pose of a frame is new; of poses within ``period`` (s), once."""
+        self.listen()
+        with self._lock:
+            self._listeners.setdefault(frame, []).append(_Listener(period, tell))
+            self._follow(frame)
 
     def clear(self) -> None:
         """Forget everything that moves: time has been reset."""
@@ -248,6 +283,15 @@ class Transforms:
             else:
                 for transform in message.transforms:
                     self._take(StampedPose.of(transform), now)
+        self._tell_of_arrivals()
+
+    def _tell_of_arrivals(self):
+        # Not under the lock, since what is done now may look poses up.
+        if self._arrived:
+            with self._lock:
+                arrived, self._arrived = self._arrived, []
+            for listener in arrived:
+                listener.tell()
 
     def _on_static(self, message):
         with self._lock:
@@ -293,6 +337,9 @@ class Transforms:
                 self._notice(pose)
             frame.latest = pose
             frame.steps_back = 0
+            for listener in self._listeners.get(pose.child, ()):
+                if listener.is_due(pose.stamp):
+                    self._arrived.append(listener)
         if self._tf2 is None:
             frame.recent.append(pose)
         else:

@@ -32,6 +32,9 @@ beyond it is skipped, so that the process goes on living."""
 MAX_LATENESS = 0.1
 """Poses that the machine was too busy for are made up for if it was so no longer than this, s."""
 
+IDLE_PERIOD = 0.1
+"""How often a simulator whose poses nobody hears looks whether that has changed, s."""
+
 
 class MotionCaptureParameters(Parameters):
     """Errors of the motion capture system."""
@@ -106,6 +109,7 @@ class SimulatorNode(Node):
 
     def __init__(self) -> None:
         self._ticks = 0
+        self._is_idle = False
         self._measured_at: float | None = None
         self._crash_is_known = False
 
@@ -152,7 +156,7 @@ class SimulatorNode(Node):
         position = (parameters.init_x, parameters.init_y, parameters.init_z)
         self._start = handle.time()
         self._vehicle = SimulatedVehicle(self._dynamics, position, self._start, self.max_tilt)
-        self._broadcast = handle.broadcast_poses()
+        self._broadcast = handle.broadcast_poses(self._catch_up)
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
         handle.advertise_service("~reset", Empty, self._on_reset)
@@ -164,16 +168,14 @@ class SimulatorNode(Node):
             period = parameters.time_step / factor if factor > 0.0 else 0.0
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
-            handle.timer(parameters.time_step, self._on_timer)
+            self._timer = handle.timer(parameters.time_step, self._on_timer)
 
     def _on_control(self, message):
-        # Without a clock of its own, the vehicle has to catch up first, so that
-        # the control takes effect now and not at the last tick.
+        self._catch_up()
+        # Without a clock of its own, the vehicle has to catch up all the way, so that the
+        # control takes effect now and not at the last tick.
         if not self._parameters.publishes_clock:
-            now = self._handle.time()
-            if not self._handle.uses_sim_time:
-                self._make_up(now)
-            self._advance_to(now)
+            self._advance_to(self._handle.time())
         self._vehicle.command(to_tuple(message.control))
 
     def _on_reset(self, _):
@@ -181,12 +183,20 @@ class SimulatorNode(Node):
         return EmptyResponse()
 
     def _on_timer(self):
-        now = self._handle.time()
         if self._handle.uses_sim_time:
-            self._advance_to(now)
+            self._advance_to(self._handle.time())
             self._broadcast_pose()
         else:
-            self._make_up(now)
+            self._catch_up()
+            self._set_pace()
+
+    def _catch_up(self):
+        """Be where the clock is, with all poses that somebody hears."""
+        if self._parameters.publishes_clock:
+            self._advance_to(self._tick_time(self._ticks))
+            self._broadcast_pose()
+        elif not self._handle.uses_sim_time:
+            self._make_up(self._handle.time())
 
     def _make_up(self, now):
         """Broadcast the poses of all time steps until now, s, that have not been.
@@ -197,10 +207,30 @@ class SimulatorNode(Node):
         step = self._parameters.time_step
         due = math.floor((now - self._start) / step + 1e-6)
         missed = min(due - self._ticks, math.ceil(MAX_LATENESS / step))
+        if missed > 0 and (self._is_idle or self._is_unheard()):
+            missed = 1
         for tick in range(due - missed + 1, due + 1):
-            self._advance_to(self._start + tick * step)
+            self._advance_to(self._tick_time(tick))
             self._broadcast_pose()
         self._ticks = due
+
+    def _set_pace(self):
+        is_idle = self._is_unheard()
+        if is_idle != self._is_idle:
+            self._is_idle = is_idle
+            self._timer.stop()
+            step = self._parameters.time_step
+            self._timer = self._handle.timer(
+                max(IDLE_PERIOD, step) if is_idle else step, self._on_timer
+            )
+
+    def _is_unheard(self):
+        """Tell whether it is early enough to broadcast a pose when it is looked up."""
+        # Errors are those of a sequence of poses.
+        return self._motion_capture.is_perfect and not self._handle.poses_are_heard()
+
+    def _tick_time(self, tick):
+        return self._start + tick * self._parameters.time_step
 
     def _advance_to(self, now):
         skipped = now - self._vehicle.time - max(MAX_CATCH_UP, self._parameters.time_step)
@@ -220,11 +250,21 @@ class SimulatorNode(Node):
         self._crash_is_known = self._vehicle.has_crashed
 
     def _on_clock_timer(self):
-        self._ticks += 1
-        now = self._start + self._ticks * self._parameters.time_step
-        self._advance_to(now)
-        self._broadcast_pose()
-        self._set_clock(now)
+        if self._is_unheard():
+            self._ticks += self._ticks_until_anything_happens()
+        else:
+            self._ticks += 1
+            self._catch_up()
+        self._set_clock(self._tick_time(self._ticks))
+
+    def _ticks_until_anything_happens(self):
+        parameters = self._parameters
+        if parameters.real_time_factor > 0.0:
+            return 1
+        wait = self._handle.next_event() - self._tick_time(self._ticks)
+        # Somebody who begins to listen does not miss much.
+        wait = min(max(wait, 0.0), IDLE_PERIOD)
+        return max(math.ceil((wait - 1e-6) / parameters.time_step), 1)
 
     def _broadcast_pose(self):
         now = self._vehicle.time

@@ -139,6 +139,7 @@ class Transforms:
         self._listens = False
         self._listeners: dict[str, list[_Listener]] = {}
         self._arrived: list[_Listener] = []
+        self._sources: list[Callable[[], None]] = []
         # Each broadcaster outside has a thread of its own.
         self._lock = threading.RLock()
         self._frames: dict[str, _Frame] = {}
@@ -157,6 +158,15 @@ class Transforms:
         """Announce that this process will broadcast."""
         if self._publisher is None:
             self._publisher = self._topics.publisher("/tf", TFMessage, latch=False)
+
+    def on_lookup(self, refresh: Callable[[], None]) -> None:
+        """Have ``refresh()`` called before poses are looked up."""
+        self._sources.append(refresh)
+
+    def is_heard(self) -> bool:
+        """Tell whether poses that are broadcast go anywhere but into look-ups of this process."""
+        beside = int(self._listens)
+        return bool(self._listeners) or self._publisher.has_subscribers(beside)
 
     def broadcast(self, transforms: list[TransformStamped]) -> None:
         """Publish a list of geometry_msgs/TransformStamped on /tf."""
@@ -214,6 +224,8 @@ class Transforms:
 
     def lookup_pose(self, target: str, source: str) -> StampedPose:
         """Return the same as `lookup`, as a pose, which is quicker."""
+        for refresh in self._sources:
+            refresh()
         if target not in self._followed or source not in self._followed:
             with self._lock:
                 self._follow(target)

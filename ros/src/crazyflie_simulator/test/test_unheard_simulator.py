@@ -65,9 +65,7 @@ def test_with_its_own_clock_what_is_looked_up_is_the_same_to_the_bit(node_class)
 @pytest.mark.parametrize("error", ["position_noise", "latency"])
 def test_errors_are_those_of_all_poses(error):
     heard, _ = fly(NearHoverSimulatorNode, tf=True, clock=False, **{f"mocap/{error}": 0.01})
-    process = clocked(
-        **{"time_step": 0.001, "clock/real_time_factor": 0, f"mocap/{error}": 0.01}
-    )
+    process = clocked(**{"time_step": 0.001, "clock/real_time_factor": 0, f"mocap/{error}": 0.01})
     looker = Looker()
     assert process.launch(looker, "/looker")
     hears(process, tf=False, clock=False)

@@ -203,9 +203,7 @@ class IntegralStateFeedback(LinearFeedback):
         u = self._linear(error)
         if not self._is_resting:
             self._integrate(error[:3], dt, u)
-        for index, k, integral in zip(
-            _INTEGRATED, self._integrator_k, self._integral, strict=True
-        ):
+        for index, k, integral in zip(_INTEGRATED, self._integrator_k, self._integral, strict=True):
             u[index] += k * integral
         u[THRUST] += climb_thrust
         u = [min(max(a, b), c) for a, b, c in zip(u, _LEAST, _MOST, strict=True)]

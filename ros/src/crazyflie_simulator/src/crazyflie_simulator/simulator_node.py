@@ -275,7 +275,11 @@ class SimulatorNode(Node):
         parameters, nanoseconds = self._parameters, self._handle.nanoseconds
         poses = [
             StampedPose(
-                parameters.fixed_frame, parameters.robot_frame, nanoseconds(time), position, rotation
+                parameters.fixed_frame,
+                parameters.robot_frame,
+                nanoseconds(time),
+                position,
+                rotation,
             )
             for time, position, rotation in self._motion_capture.arrivals(now)
         ]

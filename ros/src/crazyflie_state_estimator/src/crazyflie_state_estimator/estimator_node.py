@@ -271,7 +271,9 @@ class StateEstimatorNode(Node):
             return
         if pose is not None:
             seconds = pose.stamp * 1e-9
-            reason = f"the latest is that of {seconds:.3f} s; {self._rejections()} poses were rejected"
+            reason = (
+                f"the latest is that of {seconds:.3f} s; {self._rejections()} poses were rejected"
+            )
         self._handle.warn(
             f"no state: no new transform {self._parameters.fixed_frame} -> "
             f"{self._parameters.robot_frame} for {now - self._last_success:.1f} s ({reason})",

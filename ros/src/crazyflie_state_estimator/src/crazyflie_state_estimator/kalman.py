@@ -109,7 +109,7 @@ class ConstantAccelerationFilter(RateFilter):
         self._known = known
 
     def _predict(self, dt):
-        # x = F x and P = F P F' + Q, written out, with F = [[1, dt, dt^2 / 2], [0, 1, dt], [0, 0, 1]].
+        # x = F x, P = F P F' + Q, written out; F = [[1, dt, dt^2 / 2], [0, 1, dt], [0, 0, 1]].
         half, third, walk = dt * dt / 2.0, dt * dt * dt, self._walk_density
         axes = list(zip(self._value, self._rate, self._acceleration, strict=True))
         self._value = [x + dt * v + half * a for x, v, a in axes]

@@ -9,7 +9,7 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import genpy
 
@@ -26,11 +26,12 @@ def to_tuple(message: genpy.Message) -> tuple[float, ...]:
     message : genpy.Message
         All fields float64, such as crazyflie_msgs/Control.
     """
-    return _getter(type(message))(message)
+    message_type: Any = type(message)
+    return _getter(message_type)(message)
 
 
 @functools.cache
-def _getter(message_type: type[genpy.Message]) -> Callable[[genpy.Message], tuple[float, ...]]:
+def _getter(message_type: Any) -> Callable[[genpy.Message], tuple[float, ...]]:
     return attrgetter(*message_type.__slots__)
 
 
@@ -82,7 +83,7 @@ def from_vector(
             f"got a vector of {len(vector)}"
         )
     # Its own __init__ looks at each field several times.
-    message = message_type.__new__(message_type)
+    message = object.__new__(message_type)
     for field, value in zip(fields, vector, strict=True):
         setattr(message, field, float(value))
     return message
@@ -90,10 +91,10 @@ def from_vector(
 
 def is_finite(message: genpy.Message) -> bool:
     """Tell whether every number of a message, of nested ones and of lists, is finite."""
-    if _is_flat(type(message)):
-        # A sum is finite only of finite numbers; one that overflows says nothing.
-        if math.isfinite(sum(_getter(type(message))(message))):
-            return True
+    message_type: Any = type(message)
+    # A sum is finite only of finite numbers; one that overflows says nothing.
+    if _is_flat(message_type) and math.isfinite(sum(to_tuple(message), 0.0)):
+        return True
     return all(_is_finite(getattr(message, field)) for field in message.__slots__)
 
 

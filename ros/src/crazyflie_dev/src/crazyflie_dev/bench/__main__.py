@@ -75,8 +75,11 @@ def main() -> int:
     rows = [row for row in ROWS if row.name.startswith(chosen)]
     results = measure(rows)
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    machine = {"processor": platform.machine(), "cores": os.cpu_count()}
-    machine["load before"] = os.getloadavg()[2]
+    machine = {
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
+        "load of the last minutes": os.getloadavg()[2],
+    }
     text = json.dumps({"machine": machine, "rows": results}, indent=2)
     options.out.write_text(text + "\n")
     print(f"data: {options.out}")

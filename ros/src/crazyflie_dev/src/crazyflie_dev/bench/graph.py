@@ -8,6 +8,7 @@ import time
 import xmlrpc.client
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import rosgraph
 
@@ -49,8 +50,8 @@ def call(service: str) -> None:
 def process_of(node: str) -> int:
     """Return the process of a node, by the node's own answer."""
     uri = rosgraph.Master(_CALLER).lookupNode(node)
-    _, _, pid = xmlrpc.client.ServerProxy(uri).getPid(_CALLER)
-    return int(pid)
+    slave: Any = xmlrpc.client.ServerProxy(uri)
+    return int(slave.getPid(_CALLER)[2])
 
 
 def cpu_time(processes: Iterable[int]) -> float:

@@ -5,7 +5,7 @@ message than its stamp, so that its own work is not measured. Nobody but the pub
 
     python3 -m crazyflie_dev.bench.listener SECONDS NODE TOPIC TYPE [NODE TOPIC TYPE]...
 
-prints a list of [topic, arrival in ns, stamp in ns], as JSON; times are those of the machine's clock.
+prints a list of [topic, arrival in ns, stamp in ns], as JSON; times are the machine's.
 """
 
 import json
@@ -15,6 +15,7 @@ import struct
 import sys
 import time
 import xmlrpc.client
+from typing import Any
 
 import rosgraph
 import roslib.message
@@ -44,7 +45,7 @@ class Connection:
         self.topic = topic
         self._stamp_at = _STAMP_AT.get(message_type, 4)
         uri = rosgraph.Master("/bench_listener").lookupNode(node)
-        slave = xmlrpc.client.ServerProxy(uri)
+        slave: Any = xmlrpc.client.ServerProxy(uri)
         _, text, answer = slave.requestTopic("/bench_listener", topic, [["TCPROS"]])
         if not answer:
             raise ConnectionError(f"{node} does not publish {topic}: {text}")
@@ -105,5 +106,5 @@ def listen(seconds: float, connections: list[Connection]) -> list[tuple[str, int
 
 if __name__ == "__main__":
     wanted = iter(sys.argv[2:])
-    found = listen(float(sys.argv[1]), [Connection(*each) for each in zip(wanted, wanted, wanted)])
+    found = listen(float(sys.argv[1]), [Connection(*each) for each in zip(wanted, wanted, wanted, strict=True)])
     json.dump(found, sys.stdout)

@@ -6,8 +6,8 @@ import tempfile
 import time
 from pathlib import Path
 
-import rospkg
 import rosgraph
+import rospkg
 
 from crazyflie_dev.bench import graph
 from crazyflie_dev.bench.row import NotMeasuredError, Row

@@ -73,7 +73,7 @@ class StampedPose(NamedTuple):
 
 
 class RawTransforms(TFMessage):
-    """A tf2_msgs/TFMessage as it is on the wire, which is decoded when it is asked for its transforms.
+    """A tf2_msgs/TFMessage as it is on the wire, decoded when it is asked for its transforms.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class PoseCodec:
 
     def encode(self, poses: Iterable[StampedPose]) -> RawTransforms:
         """Return a message with poses."""
-        parts = []
+        parts: list[bytes] = []
         for parent, child, stamp, position, rotation in poses:
             known = self._written.get((parent, child))
             if known is None:

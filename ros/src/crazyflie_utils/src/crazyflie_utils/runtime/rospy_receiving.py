@@ -4,6 +4,7 @@ import functools
 import socket
 import struct
 import time
+from typing import Any
 
 import genpy
 import rospy
@@ -26,6 +27,7 @@ _BURST = 200.0
 
 _REST = 0.005
 """In a flood, one message is taken and then none for this long, s."""
+
 
 class _Flow:
     """Tells whether a connection is flooded."""
@@ -145,7 +147,7 @@ class _Inbox:
     report : callable
     """
 
-    def __init__(self, connection, read: bytes, report: Report):
+    def __init__(self, connection: Any, read: bytes, report: Report):
         self.flow = _Flow()
         self.sock = connection.socket
         self._connection = connection

@@ -81,7 +81,7 @@ class _PatientConnection:
         # A message waits for no other one; whether the subscriber asks for that or not.
         connection.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def __getattr__(self, name):
+    def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self._connection, name)

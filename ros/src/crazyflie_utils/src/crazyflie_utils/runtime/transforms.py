@@ -192,7 +192,7 @@ class Transforms:
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
     def on_pose(self, frame: str, period: float, tell: Callable[[], None]) -> None:
-        """Have ``tell()`` called when a pose of a frame is new; of poses within ``period`` (s), once."""
+        """Have ``tell()`` called when a pose of a frame is new; once in ``period`` (s)."""
         self.listen()
         with self._lock:
             self._listeners.setdefault(frame, []).append(_Listener(period, tell))

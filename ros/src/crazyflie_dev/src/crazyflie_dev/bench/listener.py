@@ -106,5 +106,6 @@ def listen(seconds: float, connections: list[Connection]) -> list[tuple[str, int
 
 if __name__ == "__main__":
     wanted = iter(sys.argv[2:])
-    found = listen(float(sys.argv[1]), [Connection(*each) for each in zip(wanted, wanted, wanted, strict=True)])
+    connections = [Connection(*each) for each in zip(wanted, wanted, wanted, strict=True)]
+    found = listen(float(sys.argv[1]), connections)
     json.dump(found, sys.stdout)

@@ -16,7 +16,7 @@ from crazyflie_simulator.simulator_node import (
     NearHoverSimulatorCoupled7DNode,
     NearHoverSimulatorNode,
 )
-from crazyflie_utils import ServiceError
+from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -298,3 +298,20 @@ def test_a_quadrotor_that_tips_over_falls_until_it_is_reset():
         command(process, 12.0)
         process.advance(0.01)
     assert heights(process)[-1] > 0.3
+
+
+@pytest.mark.parametrize("has_control", [False, True])
+def test_poses_that_the_machine_was_too_busy_for_are_made_up_for(monkeypatch, has_control):
+    # As in real time, where ticks may be late.
+    monkeypatch.setattr(NodeHandle, "uses_sim_time", property(lambda handle: False))
+    process = launch(time_step=0.001)
+    for late in (0.001, 0.0045, 0.0055, 0.006, 0.011):
+        process.clock.set(100.0 + late)
+        if has_control:
+            command(process, thrust=9.81)
+    stamps = [transform.header.stamp.to_sec() for transform in transforms(process)]
+    assert stamps == pytest.approx([100.0 + 0.001 * k for k in range(1, 12)])
+    # But not for all of a night.
+    process.clock.set(200.0)
+    assert len(transforms(process)) == 111
+    assert transforms(process)[-1].header.stamp.to_sec() == pytest.approx(200.0)

@@ -446,3 +446,47 @@ def test_bad_changes_are_refused(name, value):
     process = launch(**{"filter/type": "kalman"})
     with pytest.raises(ServiceError, match=name):
         reconfigure(process, **{name: value})
+
+
+# Acting on arrival.
+
+
+def stamps(process):
+    """Return the stamps of the states, s since the beginning."""
+    return [state.header.stamp.to_sec() - 100.0 for state in process.published("/state")]
+
+
+@pytest.mark.parametrize("rate", [1000, 300, 100])
+def test_on_arrival_a_state_comes_with_its_pose_so_often_as_before(rate):
+    process = launch(act_on_arrival=True)
+    for k in range(1, rate + 1):
+        process.advance(100.0 + k / rate - process.clock.time())
+        before = len(process.published("/state"))
+        process.publish("/tf", TFMessage([transform(process, *moving(k / rate))]))
+        for state in process.published("/state")[before:]:
+            assert state.header.stamp == process.clock.stamp()
+    assert len(stamps(process)) == pytest.approx(99, abs=1)
+    assert max(np.diff(stamps(process))) < 0.01 + 1.0 / rate
+
+
+def test_on_arrival_slow_poses_are_all_answered():
+    process = launch(act_on_arrival=True)
+    for k in range(50):
+        process.advance(0.033 if k % 3 else 0.021)
+        process.publish("/tf", TFMessage([transform(process, *moving(0.02 * k))]))
+    assert len(stamps(process)) == 49
+
+
+def test_on_arrival_time_that_is_set_back_is_followed():
+    process = launch(act_on_arrival=True)
+    fly(process, moving, 0.5)
+    process.clock.set(50.0)
+    fly(process, moving, 0.5)
+    assert stamps(process)[-1] == pytest.approx(-49.51)
+
+
+def test_on_arrival_silence_is_told_of():
+    process = launch(act_on_arrival=True)
+    fly(process, moving, 0.5)
+    process.advance(1.0)
+    assert any("no state" in text for text in process.logged("warn"))

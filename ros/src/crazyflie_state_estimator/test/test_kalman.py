@@ -108,7 +108,7 @@ def test_rate_noise_is_what_the_covariance_promises():
     subject = ConstantAccelerationFilter(NOISE, WALK)
     _, rates = run(subject, signal + NOISE * rng.normal(size=signal.shape))
     error = np.sqrt(np.mean((rates - rate[1:])[200:] ** 2))
-    assert error == pytest.approx(math.sqrt(subject.covariance[1, 1]), rel=0.1)
+    assert error == pytest.approx(math.sqrt(subject.covariance[1][1]), rel=0.1)
 
 
 def test_a_known_acceleration_is_taken_over_at_once():

@@ -10,7 +10,7 @@ import pytest
 import rosgraph
 import rospy
 from rosgraph.network import write_ros_handshake_header
-from std_msgs.msg import Float64MultiArray, Int64, String
+from std_msgs.msg import Float64MultiArray, Int64, Int64MultiArray, String
 from std_srvs.srv import Trigger, TriggerResponse
 from tf2_msgs.msg import TFMessage
 
@@ -215,18 +215,40 @@ def test_a_subscriber_of_another_type_is_refused_and_named_once(handle, warnings
 
 
 def test_a_frozen_subscriber_neither_blocks_nor_fills_the_memory(handle):
-    publisher = handle.publisher("/frozen", String)
+    publisher = handle.publisher("/frozen", Int64MultiArray)
     with socket.create_connection(address(handle)) as stranger:
-        write_ros_handshake_header(stranger, header("/frozen"))
+        stranger.settimeout(LIMIT)
+        fields = header("/frozen", type=Int64MultiArray._type, md5sum=Int64MultiArray._md5sum)
+        write_ros_handshake_header(stranger, fields)
         wait_until(publisher.has_subscribers, "the subscriber")
         done = threading.Event()
 
         def publish():
-            for _ in range(1000):
-                publisher.publish(String("x" * 100_000))
+            for number in range(1000):
+                publisher.publish(Int64MultiArray(data=[number] * 10_000))
             done.set()
 
         threading.Thread(target=publish, daemon=True).start()
         assert done.wait(LIMIT)
         (connection,) = publisher._external._publisher.impl.connections
-        assert len(connection._queue) <= 100
+        assert len(connection._waiting) <= 100
+        # When it awakes it gets whole messages: those of before, and the last hundred.
+        stream = stranger.makefile("rb")
+        read_frame(stream)
+        numbers = []
+        while not numbers or numbers[-1] < 999:
+            message = Int64MultiArray().deserialize(read_frame(stream))
+            assert len(message.data) == 10_000 and len(set(message.data)) == 1
+            numbers.append(message.data[0])
+        assert numbers[-100:] == list(range(900, 1000))
+        assert numbers == sorted(set(numbers))
+        # Then it is one like any other.
+        wait_until(lambda: not connection._rest, "the rest")
+        publisher.publish(Int64MultiArray(data=[1000]))
+        assert Int64MultiArray().deserialize(read_frame(stream)).data == (1000,)
+
+
+def read_frame(stream):
+    """Return the next message, or the header of the connection, without its length."""
+    (size,) = struct.unpack("<I", stream.read(4))
+    return stream.read(size)

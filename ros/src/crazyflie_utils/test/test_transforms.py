@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_utils.runtime import transforms
-from crazyflie_utils.runtime.transforms import RawTransforms, TransformError
+from crazyflie_utils.runtime.poses import PoseCodec, RawTransforms, StampedPose
+from crazyflie_utils.runtime.transforms import TransformError
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -169,6 +169,33 @@ def test_broadcasts_leave_the_process_and_are_known_in_it(process):
     assert lookup("world", "cf2").transform.translation.x == 2.0
 
 
+def test_poses_leave_the_process_as_messages_and_are_known_in_it(process):
+    broadcast = process.handle("/simulator").broadcast_poses()
+    heard = []
+    process.topics.subscribe("/tf", TFMessage, heard.append)
+    lookup = process.handle("/estimator").listen_to_poses()
+    batch = [
+        StampedPose("world", f"cf{n}", 99_123_456_789 + n, (n, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+        for n in range(3)
+    ]
+    broadcast(batch)
+    assert [lookup("world", f"cf{n}") for n in range(3)] == batch
+    for message in (*process.published("/tf"), *heard):
+        assert [StampedPose.of(each) for each in message.transforms] == batch
+        assert message.transforms == [pose.message() for pose in batch]
+    assert len(heard) == len(process.published("/tf")) == 1
+
+
+def test_of_poses_that_nobody_else_hears_no_message_is_made(process, monkeypatch):
+    broadcast = process.handle("/simulator").broadcast_poses()
+    lookup = process.handle("/estimator").listen_to_poses()
+    monkeypatch.setattr(process.transport.publishers["/tf"], "has_subscribers", lambda: False)
+    pose = StampedPose("world", "crazyflie", 99_000_000_000, (1.0, 2.0, 3.0), (0.0, 0.0, 0.0, 1.0))
+    broadcast([pose])
+    assert lookup("world", "crazyflie") == pose
+    assert process.published("/tf") == []
+
+
 def test_nodes_share_one_buffer_and_one_broadcaster(process):
     lookups = [process.handle(name).listen_to_transforms() for name in ("/a", "/b")]
     broadcasts = [process.handle(name).broadcast_transforms() for name in ("/a", "/b")]
@@ -266,14 +293,14 @@ def hear_raw(process, *transforms):
 def decoded(monkeypatch):
     """Return the child frames that are decoded, in order."""
     frames = []
-    decode = transforms.Transforms._decode
+    decode = PoseCodec.decode
 
     def note(self, *arguments):
-        transform = decode(self, *arguments)
-        frames.append(transform.child_frame_id)
-        return transform
+        pose = decode(self, *arguments)
+        frames.append(pose.child)
+        return pose
 
-    monkeypatch.setattr(transforms.Transforms, "_decode", note)
+    monkeypatch.setattr(PoseCodec, "decode", note)
     return frames
 
 
@@ -364,16 +391,19 @@ def test_a_message_that_says_it_is_longer_than_it_is(process, lookup, cut, count
 def test_frames_without_end_are_not_kept(process, lookup):
     hear_raw(process, transform("world", "crazyflie", 100.0))
     x_of(lookup)
+    # Not its parent, so that tf2 begins.
+    lookup("crazyflie", "world")
     kept = process.transforms
     for count in range(3000):
         hear_raw(process, transform("world", f"junk{count}", 100.0))
         hear_raw(process, transform(f"junk{count}", "crazyflie", 100.0 + 1e-4 * count))
         hear(process, transform("world", f"static{count}", 0.0), topic="/tf_static")
     hear_raw(process, transform("world", "n" * 10_000, 100.0))
-    for memory in (kept._unread, kept._names, kept._followed, kept._parents, kept._decoded_names):
+    codec = kept._codec
+    for memory in (kept._unread, kept._names, kept._followed, kept._frames, codec._read):
         assert len(memory) <= 1001
     assert max(map(len, kept._unread.values())) < 1024
-    assert kept._buffer.all_frames_as_yaml().count("parent:") <= 1000
+    assert kept._tf2.all_frames_as_yaml().count("parent:") <= 1000
     hear_raw(process, transform("world", "crazyflie", 100.4, x=2.0))
     assert x_of(lookup) == 2.0
 

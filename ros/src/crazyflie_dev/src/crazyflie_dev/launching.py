@@ -47,9 +47,7 @@ def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen[Any]
     LaunchError
         There is no master, because roslaunch refused its arguments for instance.
     """
-    port = free_port(socket.SOCK_STREAM)
-    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
-    os.environ["ROS_IP"] = "127.0.0.1"
+    port = _set_master()
     command = ["roslaunch", "-p", port, *arguments]
     with (
         log.open("w") as output,
@@ -59,10 +57,36 @@ def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen[Any]
         yield process
 
 
+@contextlib.contextmanager
+def master(log: Path) -> Iterator[None]:
+    """Run a master, and nothing else, for the time of a with block.
+
+    Parameters
+    ----------
+    log : Path
+        Receives what it prints.
+    """
+    command = ["rosmaster", "--core", "-p", _set_master()]
+    with (
+        log.open("w") as output,
+        running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
+    ):
+        _wait_for_master(process, log)
+        yield
+
+
+def _set_master():
+    """Let this process, and what it starts, have a master on a free port; return the port."""
+    port = free_port(socket.SOCK_STREAM)
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    os.environ["ROS_IP"] = "127.0.0.1"
+    return port
+
+
 def _wait_for_master(process, log):
     deadline = time.monotonic() + _START_LIMIT
     while not rosgraph.is_master_online():
         if process.poll() is not None or time.monotonic() > deadline:
             reasons = complaints(log) or log.read_text(errors="replace").splitlines()[-3:]
             raise LaunchError("\n".join(["roslaunch has not started anything:", *reasons]))
-        time.sleep(0.1)
+        time.sleep(0.02)

@@ -6,63 +6,70 @@ yaw_dot, thrust) in rad, rad/s and m/s^2 (mass-normalised): positive roll
 accelerates to the right of the heading, positive pitch along it.
 """
 
-import math
-from typing import Self
+from __future__ import annotations
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+import math
+from collections.abc import Sequence
+from operator import mul
+from typing import TYPE_CHECKING, Self
+
 from typing_extensions import override
 
 from crazyflie_lqr.climb import Climb
-from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
+from crazyflie_model.angles import wrap_to_pi
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
-_LEAST = np.array([-MAX_TILT, -MAX_TILT, -np.inf, MIN_THRUST])
-_MOST = np.array([MAX_TILT, MAX_TILT, np.inf, MAX_THRUST])
+_LEAST = (-MAX_TILT, -MAX_TILT, -math.inf, MIN_THRUST)
+_MOST = (MAX_TILT, MAX_TILT, math.inf, MAX_THRUST)
 
 _LEAST_DAMPING = 0.7
 """A height loop with this damping ratio overshoots a step by 5 %."""
 
-_INTEGRATED = [PITCH, ROLL, THRUST]
+_INTEGRATED = (PITCH, ROLL, THRUST)
 """The controls that the integrals of x, y and z act on."""
 
 MAX_GAP = 0.5
 """Longest time between two states over which `IntegralStateFeedback` integrates, s."""
 
 
-def heading_error(
-    x: NDArray[np.float64], x_ref: NDArray[np.float64], yaw_index: int
-) -> NDArray[np.float64]:
+Components = Sequence[float]
+"""A state or a control; of so few numbers, plain floats are several times quicker than arrays."""
+
+
+def heading_error(x: Components, x_ref: Components, yaw_index: int) -> list[float]:
     """Return the error of a state in the heading frame.
 
     Parameters
     ----------
-    x, x_ref : ndarray, shape (x_dim,)
+    x, x_ref : sequence, x_dim components
         State and reference.
     yaw_index : int
         Where the yaw is in the state.
 
     Returns
     -------
-    ndarray, shape (x_dim,)
+    list of float, x_dim components
         ``x - x_ref``, with the horizontal position and velocity turned by
         ``-yaw`` into the heading frame (x forward, y left), and the yaw error
         wrapped to [-pi, pi].
     """
-    e = x - x_ref
-    yaw = x[yaw_index]
-    e[0], e[1] = rotate_by_yaw(e[0], e[1], -yaw)
-    e[3], e[4] = rotate_by_yaw(e[3], e[4], -yaw)
+    e = [float(a - b) for a, b in zip(x, x_ref, strict=True)]
+    c, s = math.cos(x[yaw_index]), math.sin(x[yaw_index])
+    e[0], e[1] = c * e[0] + s * e[1], c * e[1] - s * e[0]
+    e[3], e[4] = c * e[3] + s * e[4], c * e[4] - s * e[3]
     e[yaw_index] = wrap_to_pi(e[yaw_index])
     return e
 
 
-def at_rest(x: NDArray[np.float64], yaw_index: int) -> NDArray[np.float64]:
-    """Return the reference, shape (x_dim,), that stays at the place and heading of a state."""
-    x_ref = np.zeros_like(x)
-    x_ref[:3] = x[:3]
+def at_rest(x: Components, yaw_index: int) -> list[float]:
+    """Return the reference, x_dim components, that stays at the place and heading of a state."""
+    x_ref = [*x[:3], *[0.0] * (len(x) - 3)]
     x_ref[yaw_index] = x[yaw_index]
     return x_ref
 
@@ -84,24 +91,30 @@ class LinearFeedback:
         self.K = K
         self.u_ref = u_ref
         self.yaw_index = yaw_index
+        self._u_ref = [float(each) for each in u_ref]
+        self._rows = [[float(each) for each in row] for row in K]
 
-    def control(
-        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
-    ) -> NDArray[np.float64]:
+    def control(self, x: Components, x_ref: Components, time: float) -> list[float]:
         """Return the control for a state.
 
         Parameters
         ----------
-        x, x_ref : ndarray, shape (x_dim,)
+        x, x_ref : sequence, x_dim components
             State and reference.
         time : float
             When the vehicle was in this state, s: the state's stamp.
 
         Returns
         -------
-        ndarray, shape (u_dim,)
+        list of float, u_dim components
         """
-        return self.u_ref + self.K @ heading_error(x, x_ref, self.yaw_index)
+        return self._linear(heading_error(x, x_ref, self.yaw_index))
+
+    def _linear(self, error):
+        return [
+            reference + sum(map(mul, row, error))
+            for reference, row in zip(self._u_ref, self._rows, strict=True)
+        ]
 
     def take_over(self, previous: Self) -> None:
         """Continue in flight where a controller with other parameters ends."""
@@ -135,10 +148,10 @@ class IntegralStateFeedback(LinearFeedback):
     ----------
     K, u_ref, yaw_index
         See `LinearFeedback`.
-    integrator_k : array_like, shape (3,), optional
+    integrator_k : sequence, 3 components, optional
         Gains of x, y, z in rad/(m s), rad/(m s), 1/s^3, with the signs of the
         position gains in K.
-    integrator_limit : array_like, shape (3,), optional
+    integrator_limit : sequence, 3 components, optional
         The integral of each axis stays within +- this, m s.
     """
 
@@ -147,25 +160,23 @@ class IntegralStateFeedback(LinearFeedback):
         K: NDArray[np.float64],
         u_ref: NDArray[np.float64],
         yaw_index: int,
-        integrator_k: ArrayLike = (0.0, 0.0, 0.0),
-        integrator_limit: ArrayLike = (0.0, 0.0, 0.0),
+        integrator_k: Components = (0.0, 0.0, 0.0),
+        integrator_limit: Components = (0.0, 0.0, 0.0),
     ):
         super().__init__(K, u_ref, yaw_index)
-        self._integrator_k = np.asarray(integrator_k, dtype=float)
-        self._integrator_K = np.zeros((len(u_ref), 3))
-        self._integrator_K[_INTEGRATED, [0, 1, 2]] = self._integrator_k
-        self._integrator_limit = np.asarray(integrator_limit, dtype=float)
-        self._integral = np.zeros(3)
+        self._integrator_k = [float(each) for each in integrator_k]
+        self._integrator_limit = [float(each) for each in integrator_limit]
+        self._integral = [0.0, 0.0, 0.0]
         self._time: float | None = None
         self._is_resting = False
         self._climb: Climb | None = None
-        self._thrust = float(u_ref[THRUST])
+        self._thrust = self._u_ref[THRUST]
 
     @override
     def rest(self) -> None:
         self._is_resting = True
         self._climb = None
-        self._integral = np.zeros(3)
+        self._integral = [0.0, 0.0, 0.0]
 
     @override
     def fly(self) -> None:
@@ -175,14 +186,12 @@ class IntegralStateFeedback(LinearFeedback):
     def take_off(self) -> None:
         self.rest()
         self.fly()
-        limit = float(abs(self._integrator_k[2]) * self._integrator_limit[2])
+        limit = abs(self._integrator_k[2]) * self._integrator_limit[2]
         self._climb = Climb(limit) if limit > 0.0 or self._height_overshoots() else None
-        self._thrust = float(self.u_ref[THRUST])
+        self._thrust = self._u_ref[THRUST]
 
     @override
-    def control(
-        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
-    ) -> NDArray[np.float64]:
+    def control(self, x: Components, x_ref: Components, time: float) -> list[float]:
         """Return the control for a state; see `LinearFeedback.control`.
 
         A state that is not younger than the last one, or comes more than
@@ -190,22 +199,25 @@ class IntegralStateFeedback(LinearFeedback):
         """
         dt = self._time_since_last(time)
         x_ref, climb_thrust = self._follow_climb(x, x_ref, dt)
-        e = heading_error(x, x_ref, self.yaw_index)
-        linear = self.u_ref + self.K @ e
+        error = heading_error(x, x_ref, self.yaw_index)
+        u = self._linear(error)
         if not self._is_resting:
-            self._integrate(e[:3], dt, linear)
-        u = linear + self._integrator_K @ self._integral
+            self._integrate(error[:3], dt, u)
+        for index, k, integral in zip(_INTEGRATED, self._integrator_k, self._integral, strict=True):
+            u[index] += k * integral
         u[THRUST] += climb_thrust
-        u = np.minimum(np.maximum(u, _LEAST), _MOST)
-        self._thrust = float(u[THRUST])
+        u = [min(max(a, b), c) for a, b, c in zip(u, _LEAST, _MOST, strict=True)]
+        self._thrust = u[THRUST]
         return u
 
     @override
     def take_over(self, previous: Self) -> None:
         """Take over the integral such that ``k I`` does not jump, as far as the limits allow."""
-        scale = np.ones(3)
-        np.divide(previous._integrator_k, self._integrator_k, scale, where=self._integrator_k != 0)
-        self._integral = self._within_limits(previous._integral * scale)
+        for axis, (before, now) in enumerate(
+            zip(previous._integrator_k, self._integrator_k, strict=True)
+        ):
+            scale = before / now if now != 0.0 else 1.0
+            self._integral[axis] = self._within_limit(axis, previous._integral[axis] * scale)
         self._time = previous._time
         self._is_resting = previous._is_resting
         self._climb = previous._climb
@@ -213,7 +225,7 @@ class IntegralStateFeedback(LinearFeedback):
 
     def _height_overshoots(self):
         # The height loop is s^2 + k_d s + k_p, without regard to delays.
-        k_p, k_d = -self.K[THRUST, 2], -self.K[THRUST, 5]
+        k_p, k_d = -self._rows[THRUST][2], -self._rows[THRUST][5]
         return k_p > 0.0 and k_d < 2.0 * _LEAST_DAMPING * math.sqrt(k_p)
 
     def _time_since_last(self, time):
@@ -226,29 +238,30 @@ class IntegralStateFeedback(LinearFeedback):
         climb = self._climb
         if climb is None:
             return x_ref, 0.0
-        climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self.u_ref[THRUST])
+        climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self._u_ref[THRUST])
         if climb.disturbance != 0.0:
             self._integral[2] = -climb.disturbance / self._integrator_k[2]
         if climb.has_arrived:
             self._climb = None
             return x_ref, 0.0
-        x_ref = x_ref.copy()
+        x_ref = list(x_ref)
         x_ref[2], x_ref[5] = climb.z, climb.z_dot
         return x_ref, climb.z_ddot
 
     def _integrate(self, error, dt, linear):
         # An error that overflowed must not stay in the integral.
-        if dt == 0.0 or not np.isfinite(error).all():
+        if dt == 0.0 or not all(map(math.isfinite, error)):
             return
-        integral = self._within_limits(self._integral + error * dt)
-        u = linear + self._integrator_K @ integral
-        growth = self._integrator_K @ (integral - self._integral)
-        at_limit = ((u > _MOST) & (growth > 0.0)) | ((u < _LEAST) & (growth < 0.0))
-        grows = ~at_limit[_INTEGRATED]
-        if self._climb is not None:
-            grows[2] = False
-        self._integral[grows] = integral[grows]
+        for axis, (index, k) in enumerate(zip(_INTEGRATED, self._integrator_k, strict=True)):
+            if axis == 2 and self._climb is not None:
+                continue
+            integral = self._within_limit(axis, self._integral[axis] + error[axis] * dt)
+            u = linear[index] + k * integral
+            growth = k * (integral - self._integral[axis])
+            at_limit = (u > _MOST[index] and growth > 0.0) or (u < _LEAST[index] and growth < 0.0)
+            if not at_limit:
+                self._integral[axis] = integral
 
-    def _within_limits(self, integral):
-        limit = self._integrator_limit
-        return np.minimum(np.maximum(integral, -limit), limit)
+    def _within_limit(self, axis, integral):
+        limit = self._integrator_limit[axis]
+        return min(max(integral, -limit), limit)

@@ -1,5 +1,6 @@
 """ROS interface of every controller that turns a state and a reference into a control."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameter_types import TOPIC, Integer, Number
-from crazyflie_utils.vectors import from_vector, to_vector
+from crazyflie_utils.vectors import from_vector, to_tuple, to_vector
 
 _SAME_CLOCK = 60.0
 """A stamp that is older than this, s, is of another clock and says nothing about an age."""
@@ -149,7 +150,7 @@ class LinearFeedbackNode(Node):
         self._reference.max_jump = parameters.max_jump
 
     def _on_reference(self, message):
-        x_ref = self.complete_reference(to_vector(message.state))
+        x_ref = self._completed(message)
         now = self._handle.stamp().to_sec()
         if not self._reference.update(x_ref, message.header.stamp.to_sec(), now):
             self._handle.warn(
@@ -162,11 +163,14 @@ class LinearFeedbackNode(Node):
             self._is_flown = True
             self._controller.take_off()
 
+    def _completed(self, message):
+        return [float(each) for each in self.complete_reference(to_vector(message.state))]
+
     def _on_invalid_reference(self):
         self._reference.invalidate(self._handle.time())
 
     def _on_descent(self, message):
-        x_ref = self.complete_reference(to_vector(message.state))
+        x_ref = self._completed(message)
         self._reference.descend(x_ref, self._handle.time())
 
     def _on_flight_state(self, message):
@@ -185,14 +189,14 @@ class LinearFeedbackNode(Node):
     def _on_state(self, message):
         if self._is_old(message.header.stamp):
             return
-        x = to_vector(message.state)
+        x = to_tuple(message.state)
         x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None:
             return
         if self._flight_state is None:
             self._guess_flight(x, x_ref)
         u = self._controller.control(x, x_ref, message.header.stamp.to_sec())
-        if not np.isfinite(u).all():
+        if not all(map(math.isfinite, u)):
             self._handle.warn(
                 f"the control {u} is not finite and is not sent", throttle=1.0, key="not finite"
             )

@@ -3,10 +3,7 @@
 import math
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
-from crazyflie_lqr.linear_feedback import at_rest
+from crazyflie_lqr.linear_feedback import Components, at_rest
 from crazyflie_utils.last_valid import LastValid
 
 DESCENT_LIMIT = 0.3
@@ -44,22 +41,22 @@ class GuardedReference:
         self.max_jump = max_jump
         self._yaw_index = yaw_index
         self._report = report
-        self._last_valid: LastValid[NDArray[np.float64]] = LastValid()
-        self._hold_point: NDArray[np.float64] | None = None
-        self._near: NDArray[np.float64] | None = None
-        self._far: NDArray[np.float64] | None = None
+        self._last_valid: LastValid[Components] = LastValid()
+        self._hold_point: Components | None = None
+        self._near: Components | None = None
+        self._far: Components | None = None
         self._is_new = False
         self._has_arrived = False
         self._stamp = 0.0
-        self._descent: NDArray[np.float64] | None = None
+        self._descent: Components | None = None
         self._descent_time = 0.0
 
-    def update(self, x_ref: NDArray[np.float64], stamp: float = 0.0, now: float = 0.0) -> bool:
+    def update(self, x_ref: Components, stamp: float = 0.0, now: float = 0.0) -> bool:
         """Take a valid reference.
 
         Parameters
         ----------
-        x_ref : ndarray, shape (x_dim,)
+        x_ref : sequence, x_dim components
         stamp : float
             When it was made, s; 0 if that is not known.
         now : float
@@ -87,24 +84,24 @@ class GuardedReference:
         """Take note that an invalid reference came at ``time`` (s)."""
         self._last_valid.invalidate(time)
 
-    def descend(self, x_ref: NDArray[np.float64], time: float) -> None:
-        """Take the reference of a descent, shape (x_dim,), at ``time`` (s)."""
+    def descend(self, x_ref: Components, time: float) -> None:
+        """Take the reference of a descent, x_dim components, at ``time`` (s)."""
         self._descent = x_ref
         self._descent_time = time
 
-    def value(self, time: float, x: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def value(self, time: float, x: Components) -> Components | None:
         """Return what to follow.
 
         Parameters
         ----------
         time : float
             Now, s.
-        x : ndarray, shape (x_dim,)
+        x : sequence, x_dim components
             State of the vehicle.
 
         Returns
         -------
-        ndarray, shape (x_dim,), or None
+        sequence, x_dim components, or None
             None before the first valid reference.
         """
         if self._descent is not None and 0.0 <= time - self._descent_time < DESCENT_LIMIT:
@@ -136,7 +133,9 @@ class GuardedReference:
             self._far = x_ref
             self._near = at_rest(x_ref, self._yaw_index)
             # Each factor is at most 1, so that a far one does not overflow.
-            direction = x_ref[:3] / distance - x[:3] / distance
-            self._near[:3] = x[:3] + direction * self.max_jump
+            self._near[:3] = [
+                here + (there / distance - here / distance) * self.max_jump
+                for here, there in zip(x[:3], x_ref[:3], strict=True)
+            ]
         self._last_valid.update(self._near)
         return self._near

@@ -43,6 +43,8 @@ def wrap_to_pi(angle: Many) -> Many:
     float or ndarray
         Same shape, rad.
     """
+    if type(angle) is float:
+        return (angle + math.pi) % (2.0 * math.pi) - math.pi
     wrapped = np.remainder(np.asarray(angle) + math.pi, 2.0 * math.pi) - math.pi
     return wrapped if wrapped.ndim else float(wrapped)
 

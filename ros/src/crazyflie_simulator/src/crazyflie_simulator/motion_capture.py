@@ -52,6 +52,12 @@ class MotionCapture:
         self._random = np.random.default_rng(seed)
         self._in_transit: deque[Pose] = deque()
 
+    @property
+    def is_perfect(self) -> bool:
+        """Whether poses arrive as they are, each at once."""
+        errors = (self.position_noise, self.attitude_noise, self.latency, self.dropout)
+        return not (any(errors) or self._in_transit)
+
     def measure(self, time: float, position: Triple, quaternion: Quaternion) -> None:
         """Measure the pose that holds at ``time`` (s).
 

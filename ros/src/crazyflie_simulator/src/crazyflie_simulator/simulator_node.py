@@ -4,7 +4,6 @@ import math
 import zlib
 from typing import Any
 
-from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
@@ -12,7 +11,7 @@ from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import SimulatedVehicle
-from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, StampedPose, parameter
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
     DURATION,
@@ -24,11 +23,17 @@ from crazyflie_utils.parameter_types import (
     Number,
 )
 from crazyflie_utils.parameters import group
-from crazyflie_utils.vectors import to_vector
+from crazyflie_utils.vectors import to_tuple
 
 MAX_CATCH_UP = 1.0
 """The most that is integrated at once, s, when the clock jumps or the machine was busy; what is
 beyond it is skipped, so that the process goes on living."""
+
+MAX_LATENESS = 0.1
+"""Poses that the machine was too busy for are made up for if it was so no longer than this, s."""
+
+IDLE_PERIOD = 0.1
+"""How often a simulator whose poses nobody hears looks whether that has changed, s."""
 
 
 class MotionCaptureParameters(Parameters):
@@ -104,6 +109,7 @@ class SimulatorNode(Node):
 
     def __init__(self) -> None:
         self._ticks = 0
+        self._is_idle = False
         self._measured_at: float | None = None
         self._crash_is_known = False
 
@@ -150,7 +156,7 @@ class SimulatorNode(Node):
         position = (parameters.init_x, parameters.init_y, parameters.init_z)
         self._start = handle.time()
         self._vehicle = SimulatedVehicle(self._dynamics, position, self._start, self.max_tilt)
-        self._broadcast = handle.broadcast_transforms()
+        self._broadcast = handle.broadcast_poses(self._catch_up)
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
         handle.advertise_service("~reset", Empty, self._on_reset)
@@ -162,22 +168,69 @@ class SimulatorNode(Node):
             period = parameters.time_step / factor if factor > 0.0 else 0.0
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
-            handle.timer(parameters.time_step, self._on_timer)
+            self._timer = handle.timer(parameters.time_step, self._on_timer)
 
     def _on_control(self, message):
-        # Without a clock of its own, the vehicle has to catch up first, so that
-        # the control takes effect now and not at the last tick.
+        self._catch_up()
+        # Without a clock of its own, the vehicle has to catch up all the way, so that the
+        # control takes effect now and not at the last tick.
         if not self._parameters.publishes_clock:
             self._advance_to(self._handle.time())
-        self._vehicle.command(to_vector(message.control))
+        self._vehicle.command(to_tuple(message.control))
 
     def _on_reset(self, _):
         self._vehicle.recover()
         return EmptyResponse()
 
     def _on_timer(self):
-        self._advance_to(self._handle.time())
-        self._broadcast_pose()
+        if self._handle.uses_sim_time:
+            self._advance_to(self._handle.time())
+            self._broadcast_pose()
+        else:
+            self._catch_up()
+            self._set_pace()
+
+    def _catch_up(self):
+        """Be where the clock is, with all poses that somebody hears."""
+        if self._parameters.publishes_clock:
+            self._advance_to(self._tick_time(self._ticks))
+            self._broadcast_pose()
+        elif not self._handle.uses_sim_time:
+            self._make_up(self._handle.time())
+
+    def _make_up(self, now):
+        """Broadcast the poses of all time steps until now, s, that have not been.
+
+        The machine may have been busy. Who counts on so many poses a second gets them, with the
+        stamps that they are of.
+        """
+        step = self._parameters.time_step
+        due = math.floor((now - self._start) / step + 1e-6)
+        missed = min(due - self._ticks, math.ceil(MAX_LATENESS / step))
+        if missed > 0 and (self._is_idle or self._is_unheard()):
+            missed = 1
+        for tick in range(due - missed + 1, due + 1):
+            self._advance_to(self._tick_time(tick))
+            self._broadcast_pose()
+        self._ticks = due
+
+    def _set_pace(self):
+        is_idle = self._is_unheard()
+        if is_idle != self._is_idle:
+            self._is_idle = is_idle
+            self._timer.stop()
+            step = self._parameters.time_step
+            self._timer = self._handle.timer(
+                max(IDLE_PERIOD, step) if is_idle else step, self._on_timer
+            )
+
+    def _is_unheard(self):
+        """Tell whether it is early enough to broadcast a pose when it is looked up."""
+        # Errors are those of a sequence of poses.
+        return self._motion_capture.is_perfect and not self._handle.poses_are_heard()
+
+    def _tick_time(self, tick):
+        return self._start + tick * self._parameters.time_step
 
     def _advance_to(self, now):
         skipped = now - self._vehicle.time - max(MAX_CATCH_UP, self._parameters.time_step)
@@ -197,11 +250,21 @@ class SimulatorNode(Node):
         self._crash_is_known = self._vehicle.has_crashed
 
     def _on_clock_timer(self):
-        self._ticks += 1
-        now = self._start + self._ticks * self._parameters.time_step
-        self._advance_to(now)
-        self._broadcast_pose()
-        self._set_clock(now)
+        if self._is_unheard():
+            self._ticks += self._ticks_until_anything_happens()
+        else:
+            self._ticks += 1
+            self._catch_up()
+        self._set_clock(self._tick_time(self._ticks))
+
+    def _ticks_until_anything_happens(self):
+        parameters = self._parameters
+        if parameters.real_time_factor > 0.0:
+            return 1
+        wait = self._handle.next_event() - self._tick_time(self._ticks)
+        # Somebody who begins to listen does not miss much.
+        wait = min(max(wait, 0.0), IDLE_PERIOD)
+        return max(math.ceil((wait - 1e-6) / parameters.time_step), 1)
 
     def _broadcast_pose(self):
         now = self._vehicle.time
@@ -209,18 +272,19 @@ class SimulatorNode(Node):
             return
         self._measured_at = now
         self._motion_capture.measure(now, *self._vehicle.pose)
-        transforms = [self._transform(*pose) for pose in self._motion_capture.arrivals(now)]
-        if transforms:
-            self._broadcast(transforms)
-
-    def _transform(self, time, position, quaternion):
-        transform = TransformStamped()
-        transform.header.stamp = self._handle.stamp(time)
-        transform.header.frame_id = self._parameters.fixed_frame
-        transform.child_frame_id = self._parameters.robot_frame
-        transform.transform.translation = Vector3(*position)
-        transform.transform.rotation = Quaternion(*quaternion)
-        return transform
+        parameters, nanoseconds = self._parameters, self._handle.nanoseconds
+        poses = [
+            StampedPose(
+                parameters.fixed_frame,
+                parameters.robot_frame,
+                nanoseconds(time),
+                position,
+                rotation,
+            )
+            for time, position, rotation in self._motion_capture.arrivals(now)
+        ]
+        if poses:
+            self._broadcast(poses)
 
 
 class NearHoverSimulatorNode(SimulatorNode):

@@ -1,9 +1,10 @@
 """A vehicle simulated in fixed steps, independent of when its state is asked for."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_model.dynamics import STEP, Dynamics
@@ -28,7 +29,7 @@ class SimulatedVehicle:
     Parameters
     ----------
     dynamics : Dynamics
-    position : array_like, shape (3,)
+    position : sequence, 3 components
         Where it stands at the beginning, m, fixed frame.
     time : float
         Its time at the beginning, s.
@@ -42,7 +43,7 @@ class SimulatedVehicle:
     """
 
     def __init__(
-        self, dynamics: Dynamics, position: ArrayLike, time: float, max_tilt: float = math.inf
+        self, dynamics: Dynamics, position: Sequence[float], time: float, max_tilt: float = math.inf
     ):
         self.has_crashed = False
         self._least_upright = math.cos(max_tilt) if math.isfinite(max_tilt) else -math.inf
@@ -68,8 +69,8 @@ class SimulatedVehicle:
         """Position (x, y, z) in m and quaternion (x, y, z, w) in the fixed frame."""
         return self._dynamics.pose(self._x, self._effective_control())
 
-    def command(self, u: ArrayLike) -> None:
-        """Take a control, shape (u_dim,), from the present step on."""
+    def command(self, u: Sequence[float]) -> None:
+        """Take a control, u_dim components, from the present step on."""
         self._u = _floats(u)
         self._control_step = self._steps
 
@@ -122,5 +123,5 @@ class SimulatedVehicle:
         return _OFF
 
 
-def _floats(vector: ArrayLike) -> Vector[float]:
-    return np.asarray(vector, dtype=float).tolist()
+def _floats(vector: Sequence[float]) -> Vector[float]:
+    return [float(each) for each in vector]

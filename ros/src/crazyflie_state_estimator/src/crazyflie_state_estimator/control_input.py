@@ -1,7 +1,6 @@
 """The acceleration of a vehicle that its last control commands."""
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
 
 from crazyflie_model.dynamics import coupled_acceleration
 from crazyflie_model.limits import MAX_THRUST, MIN_THRUST
@@ -12,26 +11,26 @@ class ControlInput:
     """The last control, while it is informative about the motion."""
 
     def __init__(self) -> None:
-        self._control: NDArray[np.float64] | None = None
+        self._control: Sequence[float] | None = None
         self._time = 0.0
 
-    def command(self, control: NDArray[np.float64], time: float) -> None:
+    def command(self, control: Sequence[float], time: float) -> None:
         """Take a control given at ``time`` (s).
 
         Parameters
         ----------
-        control : ndarray, shape (4,)
+        control : sequence, 4 components
             Roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2.
         """
         self._control = control
         self._time = time
 
-    def acceleration(self, yaw: float, time: float) -> NDArray[np.float64] | None:
+    def acceleration(self, yaw: float, time: float) -> list[float] | None:
         """Return the acceleration (3,), m/s^2, at a yaw (rad) and time (s), if it is known.
 
         Returns
         -------
-        ndarray or None
+        list of float or None
             None when there is no control, when it is older than `HOLD_LIMIT`,
             and when its thrust is less than that of flight.
         """
@@ -41,4 +40,4 @@ class ControlInput:
         if thrust < MIN_THRUST:
             return None
         thrust = min(thrust, MAX_THRUST)
-        return np.array(coupled_acceleration((roll, pitch, yaw_dot, thrust), yaw))
+        return coupled_acceleration((roll, pitch, yaw_dot, thrust), yaw)

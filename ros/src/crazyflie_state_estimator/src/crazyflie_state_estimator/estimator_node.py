@@ -1,8 +1,6 @@
 """ROS interface of the state estimators."""
 
-import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from numpy.typing import NDArray
 from std_msgs.msg import Bool, Header
 from typing_extensions import override
 
@@ -21,13 +19,16 @@ from crazyflie_state_estimator.pose_gate import PoseGate, TiltMonitor, Verdict
 from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
-from crazyflie_utils.parameter_types import FRAME, TIME_STEP, TOPIC, Integer, Number, Text
-from crazyflie_utils.vectors import from_vector, to_vector
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer, Number, Text
+from crazyflie_utils.vectors import from_vector, to_tuple
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
 
 REPORT_PERIOD = 1.0
 """Of the diagnostics, s; REP 107 wants one report a second."""
+
+SILENCE_PERIOD = 0.1
+"""How often an estimator that acts on arrival looks whether anything has arrived, s."""
 
 
 class StateEstimatorParameters(Parameters):
@@ -38,6 +39,13 @@ class StateEstimatorParameters(Parameters):
     fixed_frame: str = parameter(FRAME, "frame the state is in", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
     state_topic: str = parameter(TOPIC, "where states go", name="topics/state")
+    acts_on_arrival: bool = parameter(
+        BOOLEAN,
+        "answer a new pose as soon as it comes, at most one every `time_step`, and do not wait for "
+        "the next time step",
+        False,
+        "act_on_arrival",
+    )
     filter_type: str = parameter(
         Text((FINITE_DIFFERENCE, KALMAN)), "how rates are found", FINITE_DIFFERENCE, "filter/type"
     )
@@ -134,8 +142,8 @@ class StateEstimatorNode(Node):
         self._stamp: int | None = None
         self._is_tilted: bool | None = None
 
-    def state(self, motion: Motion) -> NDArray[np.float64]:
-        """Return the state vector, in the order of the message's fields."""
+    def state(self, motion: Motion) -> list[float]:
+        """Return the state, in the order of the message's fields."""
         raise NotImplementedError
 
     @override
@@ -171,19 +179,28 @@ class StateEstimatorNode(Node):
         self._publisher = handle.publisher(parameters.state_topic, self.state_type)
         self._tilted = handle.publisher(f"{parameters.state_topic}_tilted", Bool, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._lookup = handle.listen_to_transforms()
+        self._lookup = handle.listen_to_poses()
         if parameters.filter_type == KALMAN and parameters.control_topic is not None:
             handle.subscribe(
                 parameters.control_topic, ControlStamped, self._on_control, finite="control"
             )
         self._last_success = handle.time()
-        handle.timer(parameters.time_step, self._on_timer)
+        if parameters.acts_on_arrival:
+            handle.on_pose(parameters.robot_frame, parameters.time_step, self._estimate)
+            handle.timer(max(parameters.time_step, SILENCE_PERIOD), self._watch)
+        else:
+            handle.timer(parameters.time_step, self._estimate)
         handle.timer(REPORT_PERIOD, self._report)
 
     def _on_control(self, message):
-        self._control.command(to_vector(message.control), self._handle.time())
+        self._control.command(to_tuple(message.control), self._handle.time())
 
-    def _on_timer(self):
+    def _watch(self):
+        # Where nothing arrives somebody has to say so.
+        if self._handle.time() - self._last_success >= HOLD_LIMIT:
+            self._estimate()
+
+    def _estimate(self):
         now = self._handle.time()
         if now < self._last_success:
             # The simulation was reset, and what is known belongs to the past one.
@@ -191,45 +208,38 @@ class StateEstimatorNode(Node):
             self._gate.reset()
             self._last_success = now
         try:
-            transform = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
+            pose = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
         except TransformError as error:
             self._report_no_state(now, str(error))
             return
-        motion = self._update(transform, now)
+        motion = self._update(pose, now)
         if motion is None:
-            stamp = transform.header.stamp.to_sec()
-            self._report_no_state(
-                now,
-                f"the latest is that of {stamp:.3f} s; {self._rejections()} poses were rejected",
-            )
+            self._report_no_state(now, "", pose)
             return
         self._last_success = now
         message = self.state_type()
         message.state = from_vector(type(message.state), self.state(motion))
-        message.header.stamp = transform.header.stamp
+        message.header.stamp = pose.time
         message.header.frame_id = self._parameters.fixed_frame
         self._publisher.publish(message)
 
-    def _update(self, transform, now):
-        stamp = transform.header.stamp.to_nsec()
-        if stamp == self._stamp:
+    def _update(self, pose, now):
+        if pose.stamp == self._stamp:
             return None
-        self._stamp = stamp
-        translation, rotation = transform.transform.translation, transform.transform.rotation
-        position = (translation.x, translation.y, translation.z)
-        self._tell_tilt(rotation)
-        verdict = self._gate.judge(stamp * 1e-9, position)
+        self._stamp = pose.stamp
+        self._tell_tilt(pose.rotation)
+        verdict = self._gate.judge(pose.stamp * 1e-9, pose.position)
         if verdict is Verdict.BAD:
             return None
         if verdict is Verdict.MOVED:
             self._estimator.reset()
-        attitude = rpy_from_quaternion(rotation.x, rotation.y, rotation.z, rotation.w)
+        attitude = rpy_from_quaternion(*pose.rotation)
         return self._estimator.update(
-            stamp, position, attitude, self._control.acceleration(float(attitude[2]), now)
+            pose.stamp, pose.position, attitude, self._control.acceleration(attitude[2], now)
         )
 
     def _tell_tilt(self, rotation):
-        is_tilted = self._tilt.update(rotation.x, rotation.y)
+        is_tilted = self._tilt.update(*rotation[:2])
         if is_tilted == self._is_tilted:
             return
         self._is_tilted = is_tilted
@@ -254,11 +264,16 @@ class StateEstimatorNode(Node):
         header = Header(stamp=self._handle.stamp())
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
-    def _report_no_state(self, now, reason):
+    def _report_no_state(self, now, reason, pose=None):
         # Shorter silences are ordinary: at the start, and when time_step is
         # shorter than the period of the transforms.
         if now - self._last_success < HOLD_LIMIT:
             return
+        if pose is not None:
+            seconds = pose.stamp * 1e-9
+            reason = (
+                f"the latest is that of {seconds:.3f} s; {self._rejections()} poses were rejected"
+            )
         self._handle.warn(
             f"no state: no new transform {self._parameters.fixed_frame} -> "
             f"{self._parameters.robot_frame} for {now - self._last_success:.1f} s ({reason})",
@@ -280,8 +295,8 @@ class PositionVelocityStateEstimatorNode(StateEstimatorNode):
     parameters_type = PositionVelocityStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> NDArray[np.float64]:
-        return np.concatenate([motion.position, motion.velocity])
+    def state(self, motion: Motion) -> list[float]:
+        return [*motion.position, *motion.velocity]
 
 
 class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
@@ -290,8 +305,8 @@ class PositionVelocityYawStateEstimatorNode(StateEstimatorNode):
     state_type = PositionVelocityYawStateStamped
 
     @override
-    def state(self, motion: Motion) -> NDArray[np.float64]:
-        return np.concatenate([motion.position, motion.velocity, motion.attitude[2:]])
+    def state(self, motion: Motion) -> list[float]:
+        return [*motion.position, *motion.velocity, motion.attitude[2]]
 
 
 class FullStateEstimatorParameters(StateEstimatorParameters):
@@ -307,5 +322,5 @@ class FullStateEstimatorNode(StateEstimatorNode):
     parameters_type = FullStateEstimatorParameters
 
     @override
-    def state(self, motion: Motion) -> NDArray[np.float64]:
-        return np.concatenate(motion)
+    def state(self, motion: Motion) -> list[float]:
+        return [number for part in motion for number in part]

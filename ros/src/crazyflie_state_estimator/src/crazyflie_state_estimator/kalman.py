@@ -1,10 +1,8 @@
 """Kalman filter for signals whose acceleration changes slowly."""
 
-import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import override
 
-from crazyflie_state_estimator.rate_filter import RateFilter
+from crazyflie_state_estimator.rate_filter import Components, RateFilter
 
 POSITION_NOISE, ANGLE_NOISE = 0.001, 0.005
 """Default noise of poses, m and rad: a motion capture system that is not at its best."""
@@ -58,9 +56,12 @@ class ConstantAccelerationFilter(RateFilter):
 
     def __init__(self, noise: float, acceleration_walk: float):
         self.tune(noise, acceleration_walk)
-        self._state: NDArray[np.float64] = np.zeros((3, 0))
-        self._covariance: NDArray[np.float64] = np.zeros((3, 3))
-        self._acceleration: NDArray[np.float64] | None = None
+        self._value: list[float] = []
+        self._rate: list[float] = []
+        self._acceleration: list[float] = []
+        # The upper half, by rows.
+        self._covariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        self._known: Components | None = None
 
     def tune(self, noise: float, acceleration_walk: float) -> None:
         """Change the parameters; the state and its covariance stay."""
@@ -68,56 +69,82 @@ class ConstantAccelerationFilter(RateFilter):
         self._walk_density = acceleration_walk**2
 
     @property
-    def covariance(self) -> NDArray[np.float64]:
-        """Covariance of (signal, rate, acceleration) of any one axis, shape (3, 3)."""
-        return self._covariance
+    def covariance(self) -> list[list[float]]:
+        """Covariance of (signal, rate, acceleration) of any one axis, 3 rows of 3."""
+        p00, p01, p02, p11, p12, p22 = self._covariance
+        return [[p00, p01, p02], [p01, p11, p12], [p02, p12, p22]]
 
     @override
-    def start(self, value: NDArray[np.float64]) -> None:
+    def start(self, value: Components) -> None:
         """Take the first sample; next to nothing is assumed about rate and acceleration."""
-        self._begin(value, np.zeros_like(value))
+        self._begin(value, [0.0] * len(value))
 
     @override
     def step(
-        self, dt: float, value: NDArray[np.float64], acceleration: NDArray[np.float64] | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        self, dt: float, value: Components, acceleration: Components | None = None
+    ) -> tuple[Components, Components]:
         if dt > MEMORY:
-            self._begin(value, (value - self._state[0]) / dt)
+            self._begin(value, [(a - b) / dt for a, b in zip(value, self._value, strict=True)])
         else:
             self._take_over(acceleration)
             self._predict(dt)
             self._correct(value)
-        return self._state[0], self._state[1]
+        return self._value, self._rate
 
     def _begin(self, value, rate):
-        self._state = np.array([value, rate, np.zeros_like(value)])
-        self._covariance = np.diag(
-            [self._noise_variance, FIRST_RATE_VARIANCE, FIRST_ACCELERATION_VARIANCE]
-        )
-        self._acceleration = None
+        self._value, self._rate = list(value), rate
+        self._acceleration = [0.0] * len(rate)
+        variances = (FIRST_RATE_VARIANCE, 0.0, FIRST_ACCELERATION_VARIANCE)
+        self._covariance = (self._noise_variance, 0.0, 0.0, *variances)
+        self._known = None
 
-    def _take_over(self, acceleration):
-        if acceleration is not None and self._acceleration is not None:
-            self._state[2] += acceleration - self._acceleration
-        self._acceleration = acceleration
+    def _take_over(self, known):
+        if known is not None and self._known is not None:
+            self._acceleration = [
+                acceleration + new - old
+                for acceleration, new, old in zip(
+                    self._acceleration, known, self._known, strict=True
+                )
+            ]
+        self._known = known
 
     def _predict(self, dt):
-        dt2, dt3 = dt**2, dt**3
-        transition = np.array([[1.0, dt, dt2 / 2.0], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
-        walk = self._walk_density * np.array(
-            [
-                [dt3 * dt2 / 20.0, dt2 * dt2 / 8.0, dt3 / 6.0],
-                [dt2 * dt2 / 8.0, dt3 / 3.0, dt2 / 2.0],
-                [dt3 / 6.0, dt2 / 2.0, dt],
-            ]
+        # x = F x, P = F P F' + Q, written out; F = [[1, dt, dt^2 / 2], [0, 1, dt], [0, 0, 1]].
+        half, third, walk = dt * dt / 2.0, dt * dt * dt, self._walk_density
+        axes = list(zip(self._value, self._rate, self._acceleration, strict=True))
+        self._value = [x + dt * v + half * a for x, v, a in axes]
+        self._rate = [v + dt * a for _, v, a in axes]
+        p00, p01, p02, p11, p12, p22 = self._covariance
+        fp00, fp01, fp02 = (
+            p00 + dt * p01 + half * p02,
+            p01 + dt * p11 + half * p12,
+            p02 + dt * p12 + half * p22,
         )
-        self._state = transition @ self._state
-        self._covariance = transition @ self._covariance @ transition.T + walk
+        fp11, fp12 = p11 + dt * p12, p12 + dt * p22
+        self._covariance = (
+            fp00 + dt * fp01 + half * fp02 + walk * third * dt * dt / 20.0,
+            fp01 + dt * fp02 + walk * third * dt / 8.0,
+            fp02 + walk * third / 6.0,
+            fp11 + dt * fp12 + walk * third / 3.0,
+            fp12 + walk * half,
+            p22 + walk * dt,
+        )
 
     def _correct(self, value):
-        covariance = self._covariance
-        gain = covariance[0] / (covariance[0, 0] + self._noise_variance)
-        self._state = self._state + np.outer(gain, value - self._state[0])
-        covariance = covariance - np.outer(gain, covariance[0])
-        # Rounding makes the two halves drift apart.
-        self._covariance = (covariance + covariance.T) / 2.0
+        p00, p01, p02, p11, p12, p22 = self._covariance
+        scale = 1.0 / (p00 + self._noise_variance)
+        g0, g1, g2 = p00 * scale, p01 * scale, p02 * scale
+        innovations = [z - x for z, x in zip(value, self._value, strict=True)]
+        self._value = [x + g0 * y for x, y in zip(self._value, innovations, strict=True)]
+        self._rate = [v + g1 * y for v, y in zip(self._rate, innovations, strict=True)]
+        self._acceleration = [
+            a + g2 * y for a, y in zip(self._acceleration, innovations, strict=True)
+        ]
+        self._covariance = (
+            p00 - g0 * p00,
+            p01 - g0 * p01,
+            p02 - g0 * p02,
+            p11 - g1 * p01,
+            p12 - g1 * p02,
+            p22 - g2 * p02,
+        )

@@ -1,12 +1,10 @@
 """The motion of a vehicle from its stamped poses."""
 
+import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from crazyflie_model.angles import wrap_to_pi
-from crazyflie_state_estimator.rate_filter import RateFilter
+from crazyflie_state_estimator.rate_filter import Components, RateFilter
 
 
 class Motion(NamedTuple):
@@ -14,21 +12,21 @@ class Motion(NamedTuple):
 
     Attributes
     ----------
-    position : ndarray, shape (3,)
+    position : sequence, 3 components
         x, y, z in m.
-    velocity : ndarray, shape (3,)
+    velocity : sequence, 3 components
         m/s.
-    attitude : ndarray, shape (3,)
+    attitude : sequence, 3 components
         Roll, pitch, yaw in rad, in [-pi, pi]; see `crazyflie_model.angles`.
-    attitude_rate : ndarray, shape (3,)
+    attitude_rate : sequence, 3 components
         Time derivatives of roll, pitch, yaw in rad/s (not the body's angular
         velocity).
     """
 
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    attitude: NDArray[np.float64]
-    attitude_rate: NDArray[np.float64]
+    position: Components
+    velocity: Components
+    attitude: Components
+    attitude_rate: Components
 
 
 class MotionEstimator:
@@ -53,7 +51,7 @@ class MotionEstimator:
         self._position_filter = position_filter
         self._angle_filter = angle_filter
         self._stamp: int | None = None
-        self._angles = np.zeros(3)
+        self._angles: Components = (0.0, 0.0, 0.0)
 
     def reset(self) -> None:
         """Forget everything: the next pose is the first."""
@@ -62,9 +60,9 @@ class MotionEstimator:
     def update(
         self,
         stamp: int,
-        position: ArrayLike,
-        attitude: ArrayLike,
-        acceleration: NDArray[np.float64] | None = None,
+        position: Components,
+        attitude: Components,
+        acceleration: Components | None = None,
     ) -> Motion | None:
         """Take the next pose and return the motion at its time.
 
@@ -73,11 +71,11 @@ class MotionEstimator:
         stamp : int
             Time of the pose, ns. Whole nanoseconds, because a float cannot tell
             times of the day apart by less than 0.2 us.
-        position : array_like, shape (3,)
+        position : sequence, 3 components
             m.
-        attitude : array_like, shape (3,)
+        attitude : sequence, 3 components
             Roll, pitch, yaw in rad.
-        acceleration : ndarray, shape (3,), optional
+        acceleration : sequence, 3 components, optional
             Commanded since the last pose, if it is known, m/s^2.
 
         Returns
@@ -85,31 +83,35 @@ class MotionEstimator:
         Motion or None
             None when the pose is the first or ignored.
         """
-        position = np.asarray(position, dtype=float)
-        attitude = np.asarray(attitude, dtype=float)
-        if not (np.isfinite(position).all() and np.isfinite(attitude).all()):
+        if not (_is_finite(position) and _is_finite(attitude)):
             return None
         if self._stamp is None or stamp < self._stamp:
             self._start(stamp, position, attitude)
             return None
         if stamp == self._stamp:
             return None
-        with np.errstate(over="ignore", invalid="ignore"):
-            motion = self._step((stamp - self._stamp) * 1e-9, position, attitude, acceleration)
+        motion = self._step((stamp - self._stamp) * 1e-9, position, attitude, acceleration)
         self._stamp = stamp
-        if not all(np.isfinite(part).all() for part in motion):
+        if not all(map(_is_finite, motion)):
             self.reset()
             return None
         return motion
 
     def _step(self, dt, position, attitude, acceleration):
-        self._angles = self._angles + wrap_to_pi(attitude - self._angles)
+        self._angles = [
+            angle + wrap_to_pi(new - angle)
+            for angle, new in zip(self._angles, attitude, strict=True)
+        ]
         position, velocity = self._position_filter.step(dt, position, acceleration)
         _, attitude_rate = self._angle_filter.step(dt, self._angles)
-        return Motion(position, velocity, np.asarray(wrap_to_pi(attitude)), attitude_rate)
+        return Motion(position, velocity, [wrap_to_pi(each) for each in attitude], attitude_rate)
 
     def _start(self, stamp, position, attitude):
         self._stamp = stamp
         self._angles = attitude
         self._position_filter.start(position)
         self._angle_filter.start(attitude)
+
+
+def _is_finite(numbers):
+    return all(map(math.isfinite, numbers))

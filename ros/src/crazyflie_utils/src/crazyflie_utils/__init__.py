@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from crazyflie_utils.node import Node
     from crazyflie_utils.parameters import ParameterError, Parameters, parameter
     from crazyflie_utils.runtime.handle import NodeHandle
+    from crazyflie_utils.runtime.poses import StampedPose
     from crazyflie_utils.runtime.runner import run, run_composed, run_nodes
     from crazyflie_utils.runtime.transforms import TransformError
     from crazyflie_utils.runtime.transport import ServiceError
@@ -21,6 +22,7 @@ _HOME = {
     "ParameterError": "crazyflie_utils.parameters",
     "Parameters": "crazyflie_utils.parameters",
     "ServiceError": "crazyflie_utils.runtime.transport",
+    "StampedPose": "crazyflie_utils.runtime.poses",
     "TransformError": "crazyflie_utils.runtime.transforms",
     "parameter": "crazyflie_utils.parameters",
     "run": "crazyflie_utils.runtime.runner",
@@ -34,6 +36,7 @@ __all__ = [
     "ParameterError",
     "Parameters",
     "ServiceError",
+    "StampedPose",
     "TransformError",
     "parameter",
     "run",

@@ -5,15 +5,37 @@ their fields is the order of the vectors in every algorithm. So one pair of
 functions serves all of them, and a new message needs none.
 """
 
+import functools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from operator import attrgetter
+from typing import TYPE_CHECKING, Any
 
 import genpy
-import numpy as np
-from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
-def to_vector(message: genpy.Message) -> NDArray[np.float64]:
+def to_tuple(message: genpy.Message) -> tuple[float, ...]:
+    """Return the fields of a flat message, which has more than one, as they are.
+
+    Parameters
+    ----------
+    message : genpy.Message
+        All fields float64, such as crazyflie_msgs/Control.
+    """
+    message_type: Any = type(message)
+    return _getter(message_type)(message)
+
+
+@functools.cache
+def _getter(message_type: Any) -> Callable[[genpy.Message], tuple[float, ...]]:
+    return attrgetter(*message_type.__slots__)
+
+
+def to_vector(message: genpy.Message) -> "NDArray[np.float64]":
     """Return the fields of a flat message as a vector.
 
     Parameters
@@ -31,11 +53,14 @@ def to_vector(message: genpy.Message) -> NDArray[np.float64]:
     TypeError
         A field is not a number but, say, a header.
     """
+    # Here, since many processes do without.
+    import numpy as np
+
     return np.array([getattr(message, field) for field in message.__slots__], dtype=float)
 
 
 def from_vector(
-    message_type: type[genpy.Message], vector: Sequence[float] | NDArray[np.float64]
+    message_type: type[genpy.Message], vector: "Sequence[float] | NDArray[np.float64]"
 ) -> genpy.Message:
     """Return a flat message with the entries of a vector.
 
@@ -57,19 +82,35 @@ def from_vector(
             f"{message_type._type} has {len(fields)} fields {tuple(fields)}, "
             f"got a vector of {len(vector)}"
         )
-    return message_type(*map(float, vector))
+    # Its own __init__ looks at each field several times.
+    message = object.__new__(message_type)
+    for field, value in zip(fields, vector, strict=True):
+        setattr(message, field, float(value))
+    return message
 
 
 def is_finite(message: genpy.Message) -> bool:
     """Tell whether every number of a message, of nested ones and of lists, is finite."""
+    message_type: Any = type(message)
+    # A sum is finite only of finite numbers; one that overflows says nothing.
+    if _is_flat(message_type) and math.isfinite(sum(to_tuple(message), 0.0)):
+        return True
     return all(_is_finite(getattr(message, field)) for field in message.__slots__)
 
 
+@functools.cache
+def _is_flat(message_type):
+    types = message_type._slot_types
+    return len(types) > 1 and all(each == "float64" for each in types)
+
+
 def _is_finite(value):
-    if isinstance(value, (float, np.floating)):
+    # numpy's float64 is a float.
+    if isinstance(value, float):
         return math.isfinite(value)
     if hasattr(value, "__slots__"):
         return is_finite(value)
-    if isinstance(value, (list, tuple, np.ndarray)):
+    if isinstance(value, (list, tuple)):
         return all(map(_is_finite, value))
-    return True
+    # Arrays and single precision of numpy.
+    return _is_finite(value.tolist()) if hasattr(value, "tolist") else True

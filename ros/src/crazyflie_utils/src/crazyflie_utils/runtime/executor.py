@@ -63,6 +63,11 @@ class Executor:
         self._started = True
         self._drain()
 
+    @property
+    def is_running_here(self) -> bool:
+        """Whether it is this thread that runs work at present."""
+        return self._runner == threading.get_ident()
+
     def submit(self, work: Callable[[], None]) -> None:
         """Run ``work`` after all that was submitted before it.
 

@@ -1,5 +1,6 @@
 """The only door between a node and ROS: roscpp's NodeHandle for Python."""
 
+import math
 import time
 from collections.abc import Callable, Hashable
 from concurrent.futures import Future
@@ -15,6 +16,7 @@ from crazyflie_utils.parameter_types import ParameterType
 from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_parameter
 from crazyflie_utils.runtime import flights
 from crazyflie_utils.runtime.faults import Faults
+from crazyflie_utils.runtime.poses import StampedPose
 from crazyflie_utils.runtime.services import pass_on, serve
 from crazyflie_utils.runtime.throttle import Throttle
 from crazyflie_utils.runtime.timers import Timer
@@ -51,6 +53,7 @@ class NodeHandle:
         self._throttle = Throttle()
         self._undo: list[Callable[[], None]] = []
         self._is_closed = False
+        self._clock: Publisher | None = None
 
     def child(self) -> "NodeHandle":
         """Return another handle of the node, for what may be closed before the node ends.
@@ -293,6 +296,10 @@ class NodeHandle:
         """Return the ROS time of a moment of `time`, by default now."""
         return self._process.clock.stamp(moment)
 
+    def nanoseconds(self, moment: float | None = None) -> int:
+        """Return the same as `stamp` in whole ns, for a `StampedPose`."""
+        return self._process.clock.nanoseconds(moment)
+
     def timer(self, period: float, callback: Callable[[], None], steady: bool = False) -> Timer:
         """Have ``callback()`` called every ``period`` seconds of `time`.
 
@@ -317,6 +324,7 @@ class NodeHandle:
         that are due run.
         """
         publisher = self._process.topics.publisher("/clock", Clock, latch=False)
+        self._clock = publisher
 
         def set_clock(moment: float) -> None:
             stamp = self.stamp(moment)
@@ -324,6 +332,16 @@ class NodeHandle:
             publisher.publish(Clock(stamp))
 
         return set_clock
+
+    def next_event(self) -> float:
+        """Return the next moment, s, at which simulated time has to stop.
+
+        That is when a timer of this process is due; or at once, where others listen to the clock.
+        """
+        # One listener is this process.
+        if self._clock is None or self._clock.has_subscribers(beside=1):
+            return -math.inf
+        return self._process.next_simulated_deadline()
 
     def announce_flights(self) -> Callable[[bool], None]:
         """Return ``tell(in_flight)``, which tells every process of flights that this node ends.
@@ -348,6 +366,39 @@ class NodeHandle:
         """
         self._process.transforms.listen()
         return self._process.transforms.lookup
+
+    def broadcast_poses(
+        self, refresh: Callable[[], None] | None = None
+    ) -> Callable[[list[StampedPose]], None]:
+        """Announce to tf and return ``broadcast(list of StampedPose)``, which is the quicker way.
+
+        ``refresh()`` is called before a callback of this process looks poses up: as long as
+        `poses_are_heard` is false, it is early enough to broadcast then.
+        """
+        transforms, executor = self._process.transforms, self._process.executor
+        transforms.advertise()
+        if refresh is not None:
+            guarded = self.guard(refresh)
+            transforms.on_lookup(lambda: guarded() if executor.is_running_here else None)
+        return transforms.broadcast_poses
+
+    def poses_are_heard(self) -> bool:
+        """Tell whether anybody hears of each pose that is broadcast when it is."""
+        return self._process.transforms.is_heard()
+
+    def listen_to_poses(self) -> Callable[[str, str], StampedPose]:
+        """As `listen_to_transforms`, for ``lookup(target, source)`` that returns a pose."""
+        self._process.transforms.listen()
+        return self._process.transforms.lookup_pose
+
+    def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
+        """Have ``callback()`` called as soon as tf knows a new pose of a frame.
+
+        Of poses that come oftener than every ``period`` (s, by their stamps) only so many are
+        told of.
+        """
+        guarded, submit = self.guard(callback), self._process.executor.submit
+        self._process.transforms.on_pose(frame, period, lambda: submit(guarded))
 
     def rejected_transforms(self) -> dict[str, int]:
         """Return how many transforms were not taken into tf in this process, reason to number."""

@@ -36,7 +36,7 @@ class Process:
         self.transforms = Transforms(
             self.topics,
             self._warn_about_transform,
-            lambda: self.clock.stamp().to_sec(),
+            self.clock.nanoseconds,
             SIMULATED_AHEAD if use_sim_time else AHEAD,
         )
         self._log = NodeHandle(self, "/tf")

@@ -14,7 +14,7 @@ import genpy
 import rosgraph
 import rospy
 
-from crazyflie_utils.runtime import rospy_internals
+from crazyflie_utils.runtime import rospy_internals, rospy_receiving, rospy_sending
 from crazyflie_utils.runtime.throttle import Throttle
 from crazyflie_utils.runtime.transport import (
     ExternalPublisher,
@@ -24,9 +24,8 @@ from crazyflie_utils.runtime.transport import (
 )
 
 _QUEUE_SIZE = 100
-"""Messages kept for each slow listener. With a queue rospy sends from a thread of
-its own, so that a listener that is frozen cannot stop a vehicle; a simulation that
-runs as fast as it can fills a short one faster than that thread gets its turn."""
+"""Messages kept for a listener that does not keep up: a simulation that runs as fast as it
+can fills a short queue faster than the listener gets its turn."""
 
 
 _STALL_LIMIT = 5.0
@@ -44,10 +43,11 @@ class _RosPublisher(ExternalPublisher):
         self._publisher = publisher
 
     def has_subscribers(self) -> bool:
-        return self._publisher.get_num_connections() > 0
+        implementation = self._publisher.impl
+        return implementation is not None and bool(implementation.connections)
 
     def publish(self, message: genpy.Message) -> None:
-        self._publisher.publish(message)
+        rospy_sending.publish(self._publisher, message)
 
     def close(self) -> None:
         self._publisher.unregister()
@@ -78,13 +78,14 @@ class RosTransport(Transport):
         self._complaints = Throttle()
         rospy_internals.bear_hostile_newcomers(self._refuse)
         rospy_internals.never_connect_to_oneself()
+        rospy_sending.never_wait_for_subscribers()
         rospy_internals.never_fail_to_log()
         self._remappings = rospy_internals.take_over_remappings()
         self._calls: dict[str, threading.Semaphore] = {}
 
     def receive(self, limits_rate: bool) -> None:
-        """Get ready for what publishers may send; see `rospy_internals`."""
-        rospy_internals.bear_hostile_publishers(self._refuse, limits_rate)
+        """Get ready for what publishers may send; see `rospy_receiving`."""
+        rospy_receiving.bear_hostile_publishers(self._refuse, limits_rate)
 
     def _refuse(self, text, key):
         # Once, since a peer that is wrong stays so; and of the first 64 only.

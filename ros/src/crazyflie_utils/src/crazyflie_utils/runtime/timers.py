@@ -1,11 +1,11 @@
 """Timers, by whatever clock, whose callbacks run on an `Executor`."""
 
+import contextlib
 import heapq
 import itertools
 import math
 import threading
 from collections.abc import Callable
-from functools import partial
 
 from crazyflie_utils.runtime.clock import SteadyClock
 from crazyflie_utils.runtime.executor import Executor
@@ -41,6 +41,11 @@ class Timer:
             self.deadline = now
             return
         # Multiples of the period do not add up rounding errors as sums do.
+        deadline = self._start + (self._count + 1) * self._period
+        if now + _TOLERANCE < deadline:
+            self._count += 1
+            self.deadline = deadline
+            return
         passed = math.floor((now - self._start + _TOLERANCE) / self._period)
         self._count = max(self._count, passed) + 1
         self.deadline = self._start + self._count * self._period
@@ -65,7 +70,7 @@ class TimerQueue:
         self._lock = threading.Lock()
         self._heap: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
-        self._stopped = False
+        self._is_stopped = False
 
     def add(self, period: float, work: Callable[[], None], now: float) -> Timer:
         """Add a timer whose first deadline is one period from ``now`` (s).
@@ -79,6 +84,7 @@ class TimerQueue:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
         timer = Timer(period, work, now)
         with self._lock:
+            timer.stopped = self._is_stopped
             self._push(timer)
         return timer
 
@@ -94,7 +100,7 @@ class TimerQueue:
         keeps its phase.
         """
         for timer in self._take_due(now):
-            self._executor.submit(partial(self._fire, timer))
+            self._executor.submit(timer.fire)
 
     def rebase(self, now: float) -> None:
         """Make every timer due one period from ``now`` (s): time has been reset."""
@@ -107,13 +113,16 @@ class TimerQueue:
 
     def stop(self) -> None:
         """Let no timer fire again, not even those that are due already."""
-        self._stopped = True
+        with self._lock:
+            self._is_stopped = True
+            for _, _, timer in self._heap:
+                timer.stop()
 
     def _push(self, timer):
         heapq.heappush(self._heap, (timer.deadline, next(self._order), timer))
 
     def _take_due(self, now):
-        due = []
+        due: list[Timer] = []
         with self._lock:
             while self._heap and self._heap[0][0] <= now + _TOLERANCE:
                 timer = heapq.heappop(self._heap)[2]
@@ -123,10 +132,6 @@ class TimerQueue:
                 timer.skip_to(now)
                 self._push(timer)
         return due
-
-    def _fire(self, timer):
-        if not self._stopped:
-            timer.fire()
 
 
 class SteadyTimers:
@@ -143,7 +148,10 @@ class SteadyTimers:
     def __init__(self, queue: TimerQueue, clock: SteadyClock):
         self._queue = queue
         self._clock = clock
-        self._wake = threading.Condition()
+        # Released when there is anything new. Waiting for a bare lock costs half of what it
+        # costs to wait for a condition.
+        self._news = threading.Lock()
+        self._news.acquire()
         self._stopped = False
         self._thread = threading.Thread(target=self._run, name="timers", daemon=True)
 
@@ -154,21 +162,23 @@ class SteadyTimers:
     def add(self, period: float, work: Callable[[], None]) -> Timer:
         """Add a timer; its first deadline is one period from now."""
         timer = self._queue.add(period, work, self._clock.time())
-        with self._wake:
-            self._wake.notify()
+        self._tell()
         return timer
 
     def stop(self) -> None:
         """Let no timer fire again, and end the thread."""
         self._queue.stop()
-        with self._wake:
-            self._stopped = True
-            self._wake.notify()
+        self._stopped = True
+        self._tell()
+
+    def _tell(self):
+        # Another may have told already.
+        with contextlib.suppress(RuntimeError):
+            self._news.release()
 
     def _run(self) -> None:
         while not self._stopped:
-            with self._wake:
-                wait = self._queue.next_deadline() - self._clock.time()
-                if wait > 0.0 and not self._stopped:
-                    self._wake.wait(min(wait, 1.0))
+            wait = self._queue.next_deadline() - self._clock.time()
+            if wait > 0.0:
+                self._news.acquire(timeout=min(wait, 1.0))
             self._queue.run_due(self._clock.time())

@@ -52,9 +52,15 @@ class Publisher:
         """Name of the topic, absolute."""
         return self._topic.name
 
-    def has_subscribers(self) -> bool:
-        """Tell whether anyone, here or outside, is connected and receives."""
-        return bool(self._topic.receivers) or self._external.has_subscribers()
+    def has_subscribers(self, beside: int = 0) -> bool:
+        """Tell whether anyone, here or outside, is connected and receives.
+
+        Parameters
+        ----------
+        beside : int
+            So many receivers in this process do not count.
+        """
+        return len(self._topic.receivers) > beside or self._external.has_subscribers()
 
     def publish(self, message: genpy.Message) -> None:
         """Send a message; it must not be changed afterwards.

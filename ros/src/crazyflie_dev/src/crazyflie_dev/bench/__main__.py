@@ -1,0 +1,90 @@
+"""Measures the running graph, and prints each figure beside its goal."""
+
+import argparse
+import json
+import os
+import platform
+import sys
+from pathlib import Path
+
+from crazyflie_dev.bench import hover, simulated, start
+from crazyflie_dev.bench.row import NotMeasuredError, Row, plugged
+
+PLUGGED = [
+    Row(
+        "vehicles",
+        "vehicles in real time (100 Hz, p99 of the period < 12 ms), one core",
+        "",
+        plugged("crazyflie_fleet.bench:vehicles_in_real_time"),
+        least=100.0,
+    ),
+    Row(
+        "batch_many",
+        "batch simulation, n = 10 000: steps of 13 states",
+        "1/s",
+        plugged("crazyflie_simulator.bench:steps_of_many"),
+        least=10e6,
+    ),
+    Row(
+        "batch_one",
+        "batch simulation, n = 1: steps of 13 states",
+        "1/s",
+        plugged("crazyflie_simulator.bench:steps_of_one"),
+        least=500e3,
+    ),
+]
+"""What other packages measure; see README.md."""
+
+ROWS = [*hover.ROWS, *simulated.ROWS, *start.ROWS, *PLUGGED]
+
+
+def measure(rows: list[Row]) -> list[dict[str, object]]:
+    """Measure, print each figure when it is there, and return what is written to the file."""
+    width = max(len(row.text) for row in rows)
+    results: list[dict[str, object]] = []
+    for row in rows:
+        result: dict[str, object] = {"name": row.name, "figure": row.text, "unit": row.unit}
+        result["goal"] = row.goal
+        try:
+            value = row.measure()
+        except NotMeasuredError as reason:
+            result["reason"] = str(reason)
+            print(f"{row.text:{width}} {'-':>10} {row.unit:12} {reason}", flush=True)
+        else:
+            result |= {"value": value, "reached": row.is_reached(value)}
+            mark = "" if row.is_reached(value) else "  not reached"
+            print(
+                f"{row.text:{width}} {value:10.4g} {row.unit:12} goal {row.goal}{mark}", flush=True
+            )
+        results.append(result)
+    return results
+
+
+def main() -> int:
+    """Measure what the command line names."""
+    parser = argparse.ArgumentParser(
+        prog="run bench", description=__doc__, epilog=f"rows: {', '.join(r.name for r in ROWS)}"
+    )
+    parser.add_argument("--out", type=Path, default=Path("out/bench.json"), help="JSON file")
+    parser.add_argument("row", nargs="*", help="beginnings of rows' names, such as cpu; all")
+    options = parser.parse_args()
+    unknown = [each for each in options.row if not any(r.name.startswith(each) for r in ROWS)]
+    if unknown:
+        parser.error(f"no row's name begins with {unknown[0]!r}")
+    chosen = tuple(options.row) or ("",)
+    rows = [row for row in ROWS if row.name.startswith(chosen)]
+    results = measure(rows)
+    options.out.parent.mkdir(parents=True, exist_ok=True)
+    machine = {
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
+        "load of the last minutes": os.getloadavg()[2],
+    }
+    text = json.dumps({"machine": machine, "rows": results}, indent=2)
+    options.out.write_text(text + "\n")
+    print(f"data: {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

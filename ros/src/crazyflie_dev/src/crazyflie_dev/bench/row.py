@@ -1,0 +1,70 @@
+"""One figure that is measured, beside what it is to reach."""
+
+import importlib
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+
+class NotMeasuredError(Exception):
+    """A figure cannot be had here; the text says why."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A figure.
+
+    Attributes
+    ----------
+    name : str
+        A word for the command line.
+    text : str
+        What it is.
+    unit : str
+    measure : callable
+        Returns the figure, a float. Raises `NotMeasuredError`.
+    least, most : float
+        The goal: where the figure is to be.
+    """
+
+    name: str
+    text: str
+    unit: str
+    measure: Callable[[], float]
+    least: float = -math.inf
+    most: float = math.inf
+
+    @property
+    def goal(self) -> str:
+        """The goal in words."""
+        if math.isinf(self.least) and math.isinf(self.most):
+            return "-"
+        if math.isinf(self.least):
+            return f"<= {self.most:g}"
+        if math.isinf(self.most):
+            return f">= {self.least:g}"
+        return f"{self.least:g} ... {self.most:g}"
+
+    def is_reached(self, value: float) -> bool:
+        """Tell whether a value is within the goal."""
+        return self.least <= value <= self.most
+
+
+def plugged(path: str) -> Callable[[], float]:
+    """Return a measurement that another package makes.
+
+    Parameters
+    ----------
+    path : str
+        "package.module:function"; the function takes no arguments and returns the figure.
+    """
+
+    def measure():
+        module, _, function = path.partition(":")
+        try:
+            found = getattr(importlib.import_module(module), function)
+        except (ImportError, AttributeError) as error:
+            raise NotMeasuredError(f"there is no {path}: {error}") from None
+        return float(found())
+
+    return measure

@@ -1,5 +1,6 @@
 """Somebody who does what a page of the manual says."""
 
+import re
 import subprocess
 import time
 from pathlib import Path
@@ -11,6 +12,22 @@ from workspaces import BUILD_LIMIT, clean_environment
 
 START_LIMIT = 60.0
 """The longest that anything may take to appear, s."""
+
+_PRINTS = "it prints "
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
+
+
+def as_read(output: str) -> str:
+    """Return what a terminal shows as a page has it: no colours, no blanks at ends of lines."""
+    lines = _COLOURS.sub("", output).replace("\r", "").split("\n")
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def is_printed(excerpt: str, output: str) -> bool:
+    """Tell whether lines stand together in an output; "..." stands for anything."""
+    parts = [re.escape(part.rstrip(" ")) for part in excerpt.split("...")]
+    pattern = f"^{'.*?'.join(parts)}$"
+    return re.search(pattern, as_read(output), re.MULTILINE | re.DOTALL) is not None
 
 
 class Reader:
@@ -29,6 +46,7 @@ class Reader:
         self._opening: str | None = None
         self._terminals: list[Terminal] = []
         self._applied: list[str] = []
+        self._printed = ""
 
     def follow(self, page: Page) -> None:
         """Do all that the page says, and end what goes on then."""
@@ -37,6 +55,8 @@ class Reader:
                 self._type(part.commands, part.comment.partition("until ")[2])
             elif isinstance(part, Block) and part.comment == "apply":
                 self._apply(part.text)
+            elif isinstance(part, Block) and part.comment == "prints":
+                assert is_printed(part.text, self._printed), f"{part.text}\n\n{self._printed}"
             elif part == "end":
                 self.end()
             elif isinstance(part, str) and part.startswith("every shell: "):
@@ -73,10 +93,16 @@ class Reader:
 
     def _type(self, commands, awaited):
         terminal = next((t for t in self._terminals if not t.is_busy), None) or self._open()
+        self._printed = ""
         for command in commands[:-1] if awaited else commands:
-            terminal.run(command, BUILD_LIMIT)
-        if awaited:
-            terminal.start(commands[-1])
+            self._printed += terminal.run(command, BUILD_LIMIT)
+        if not awaited:
+            return
+        terminal.start(commands[-1])
+        if awaited.startswith(_PRINTS):
+            self._wait_for_text(awaited.removeprefix(_PRINTS), terminal)
+            terminal.interrupt()
+        else:
             self._wait_for(awaited, terminal)
 
     def _open(self):
@@ -91,6 +117,15 @@ class Reader:
             assert terminal.is_busy, f"it has ended\n{terminal.output}"
             assert time.monotonic() < end, f"there is no {name}\n{terminal.output}"
             terminal.read(0.2)
+
+    def _wait_for_text(self, text, terminal):
+        end = time.monotonic() + START_LIMIT
+        # Above is what was typed.
+        while text not in terminal.output.partition("\n")[2]:
+            assert terminal.is_busy, f"it has ended\n{terminal.output}"
+            assert time.monotonic() < end, f"it does not print {text!r}\n{terminal.output}"
+            terminal.read(0.2)
+        self._printed = terminal.output
 
     def _has(self, name):
         master = rosgraph.Master("/reader", self._environment["ROS_MASTER_URI"])

@@ -60,7 +60,7 @@ def test_commands_of_the_installation(workspace):
         assert (workspace / "ros" / space / "setup.bash").is_file()
 
 
-@pytest.mark.parametrize("path", PAGES_WITH_COMMANDS, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", PAGES_WITH_COMMANDS, ids=lambda path: str(path.relative_to(TOP)))
 def test_commands_of_a_page(path, followed):
     followed[path].result()
 

@@ -17,17 +17,22 @@ _PRINTS = "it prints "
 _COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 
 
-def as_read(output: str) -> str:
-    """Return what a terminal shows as a page has it: no colours, no blanks at ends of lines."""
-    lines = _COLOURS.sub("", output).replace("\r", "").split("\n")
-    return "\n".join(line.rstrip() for line in lines)
+def lines_of(text: str) -> list[str]:
+    """Return the lines of a text as one sees them: no colours, no empty lines."""
+    lines = [line.rstrip() for line in _COLOURS.sub("", text).replace("\r", "").split("\n")]
+    return [line for line in lines if line]
 
 
 def is_printed(excerpt: str, output: str) -> bool:
-    """Tell whether lines stand together in an output; "..." stands for anything."""
-    parts = [re.escape(part.rstrip(" ")) for part in excerpt.split("...")]
-    pattern = f"^{'.*?'.join(parts)}$"
-    return re.search(pattern, as_read(output), re.MULTILINE | re.DOTALL) is not None
+    """Tell whether lines stand together in an output.
+
+    A line "..." stands for any lines, "..." in a line for any part of it.
+    """
+    pattern = "^"
+    for line in lines_of(excerpt):
+        part = ".*".join(map(re.escape, line.split("...")))
+        pattern += "(?:.*\n)*?" if line == "..." else f"{part}\n"
+    return re.search(pattern, "\n".join([*lines_of(output), ""]), re.MULTILINE) is not None
 
 
 class Reader:
@@ -95,7 +100,7 @@ class Reader:
         terminal = next((t for t in self._terminals if not t.is_busy), None) or self._open()
         self._printed = ""
         for command in commands[:-1] if awaited else commands:
-            self._printed += terminal.run(command, BUILD_LIMIT)
+            self._printed += _below_the_command(terminal.run(command, BUILD_LIMIT))
         if not awaited:
             return
         terminal.start(commands[-1])
@@ -120,12 +125,11 @@ class Reader:
 
     def _wait_for_text(self, text, terminal):
         end = time.monotonic() + START_LIMIT
-        # Above is what was typed.
-        while text not in terminal.output.partition("\n")[2]:
+        while text not in _below_the_command(terminal.output):
             assert terminal.is_busy, f"it has ended\n{terminal.output}"
             assert time.monotonic() < end, f"it does not print {text!r}\n{terminal.output}"
             terminal.read(0.2)
-        self._printed = terminal.output
+        self._printed = _below_the_command(terminal.output)
 
     def _has(self, name):
         master = rosgraph.Master("/reader", self._environment["ROS_MASTER_URI"])
@@ -133,3 +137,7 @@ class Reader:
             return False
         published, _, services = master.getSystemState()
         return name in {name for name, _ in published + services}
+
+
+def _below_the_command(output):
+    return output.partition("\n")[2]

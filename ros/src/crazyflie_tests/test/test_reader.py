@@ -12,7 +12,7 @@ OUTPUT = "first\r\n\x1b[1msecond: 3.25 \x1b[0m\r\n  third\r\n\r\nfourth\r\n"
 
 @pytest.mark.parametrize(
     "excerpt",
-    ["first", "second: 3.25\n  third", "second: ...\n  third", "first\n...\nfourth", "second: ..."],
+    ["first", "second: 3.25\n  third", "sec...25\n  third", "first\n...\n\nfourth", "...\nfirst"],
 )
 def test_what_is_printed(excerpt):
     assert is_printed(excerpt, OUTPUT)

@@ -58,8 +58,10 @@ def draw_figure_eight(path: Path, log: Path) -> None:
         operator = operate()
         operator.takeoff()
         operator.hover(21.5)
+        operator.land()
         record = operator.finish()
-    flying = record.state.times >= record.events["flying"]
+    times = record.state.times
+    flying = (times >= record.events["flying"]) & (times <= record.events["land"])
     x, y = record.state.column("x")[flying], record.state.column("y")[flying]
     figure = Figure(figsize=(5, 4), layout="constrained")
     axes = figure.subplots()
@@ -80,9 +82,10 @@ def step(gains: Path, log: Path) -> FlightRecord:
     ):
         operator = operate()
         operator.takeoff()
-        operator.hover(1.0)
+        operator.hover(4.0)
         operator.refer_to((0.5, 0.0, 1.0))
         operator.hover(5.0)
+        operator.land()
         return operator.finish()
 
 
@@ -95,8 +98,12 @@ def draw_steps(path: Path, log: Path) -> None:
         if os.fork() == 0:
             folder = COURSE / "solutions" if name == "K_calm.txt" else gains_folder()
             record = step(folder / name, log)
-            start = record.reference.last_time
-            after, sent = record.state.times >= start, record.final_control.times >= start
+            end = record.events["land"]
+            start = record.reference.times[record.reference.column("x") == 0.5][0]
+            after, sent = (
+                (times >= start) & (times <= end)
+                for times in (record.state.times, record.final_control.times)
+            )
             np.savez(
                 data,
                 t=record.state.times[after] - start,
@@ -128,8 +135,9 @@ def draw_scene(path: Path, log: Path, arguments: list[str], config: Path, fly: C
     with virtual_display(*SCREEN) as display:
         os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
         with roslaunch([*arguments, f"config:={config}", "rviz:=true", *QUICK], log):
-            fly()
+            operator = fly()
             scene = crop_to_scene(screenshot(display), background_of(config))
+            operator.land()
     image = Image.fromarray(scene)
     image.thumbnail((900, 700))
     image.quantize(COLOURS).save(path, optimize=True)
@@ -144,6 +152,7 @@ def draw_sweep(path: Path, log: Path) -> None:
         operator = operate()
         operator.hover(35.0)
         time.sleep(3.0)
+        return operator
 
     arguments = ["crazyflie_mission", "sweep.launch"]
     draw_scene(path, log, arguments, package / "launch" / "sweep.rviz", fly)
@@ -158,6 +167,7 @@ def draw_pole(path: Path, log: Path) -> None:
             operator = operate()
             operator.hover(25.0)
             time.sleep(5.0)
+            return operator
 
     arguments = ["crazyflie_teleop", "circle.launch"]
     draw_scene(path, log, arguments, COURSE / "launch" / "pole.rviz", fly)

@@ -32,10 +32,11 @@ LAYERS = [
         "crazyflie_mission",
         "crazyflie_package_generator",
         "crazyflie_spawner",
+        "crazyflie_world",
         "mocap_optitrack",
     },
     {"crazyflie_driver", "crazyflie_teleop", "crazyflie_tools", "crazyflie_virtual"},
-    {"crazyflie_demo", "crazyflie_examples"},
+    {"crazyflie_demo", "crazyflie_examples", "crazyflie_ranging"},
     {"uav_trajectory"},
     {"crazyflie", "crazyflie_dev"},
 ]

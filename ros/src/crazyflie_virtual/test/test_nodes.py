@@ -6,6 +6,8 @@ import struct
 import pytest
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
 
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
@@ -47,6 +49,35 @@ def test_vehicle_answers(launch):
     assert asked(address, b"\xdd\x00") == b"\xdd\x00" + struct.pack("<i", 11)
     assert node._server.observe().position == (2.0, 0.0, 0.0)
     assert f"udp://127.0.0.1:{address[1]}" in process.logged("info")[0]
+
+
+def test_what_moves_is_where_tf_says(launch, tmp_path):
+    file = tmp_path / "room.yaml"
+    file.write_text(
+        "floor: {size: [4, 4]}\n"
+        "objects:\n"
+        "  - type: ball\n"
+        "    name: ball\n"
+        "    radius: 0.1\n"
+        "    path: {type: circle, centre: [0, 0, 1], radius: 1, period: 9}\n"
+    )
+    node = VirtualCrazyflieNode()
+    process = launch(node, {**QUIET, "world": str(file)})
+    process.advance(0.1)
+    assert node._server.vehicle.physics.world["ball"].centre == (1.0, 0.0, 1.0)
+    transform = TransformStamped(child_frame_id="ball")
+    transform.header.frame_id = "world"
+    transform.header.stamp = process.handle("/other").stamp()
+    transform.transform.translation.x = 3.0
+    transform.transform.rotation.w = 1.0
+    process.publish("/tf", TFMessage([transform]))
+    process.advance(0.1)
+    assert node._server.vehicle.physics.world["ball"].centre == (3.0, 0.0, 0.0)
+
+
+def test_a_bad_world_ends_it(launch):
+    process = launch(VirtualCrazyflieNode(), {**QUIET, "world": "/nowhere/room.yaml"})
+    assert "/nowhere/room.yaml: cannot be read" in process.logged("error")[0]
 
 
 @pytest.mark.parametrize(

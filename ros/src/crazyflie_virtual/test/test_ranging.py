@@ -5,6 +5,7 @@ import math
 import pytest
 from virtual_bench import Bench
 
+from crazyflie_utils import ParameterError
 from crazyflie_virtual.body.physics import Physics
 from crazyflie_virtual.body.ranging import NOTHING, RangingSensors
 from crazyflie_virtual.tables.log_table import log_variables
@@ -14,6 +15,8 @@ SIDES = ("front", "back", "left", "right", "up")
 
 class At:
     """A body at a height, m, with an attitude."""
+
+    world = None
 
     def __init__(self, height, quaternion=(0.0, 0.0, 0.0, 1.0)):
         self.position = (0.0, 0.0, height)
@@ -46,3 +49,28 @@ def test_reach():
 def test_without_decks():
     without = RangingSensors(Physics(), False, False)
     assert [getattr(without, side) for side in (*SIDES, "zrange")] == [0] * 6
+
+
+WORLD = """\
+floor: {size: [4, 4]}
+objects:
+  - {type: box, name: box, centre: [1.5, 0, 1], size: [1, 1, 1]}
+"""
+
+
+def test_what_is_in_a_world(tmp_path):
+    file = tmp_path / "room.yaml"
+    file.write_text(WORLD)
+    bench = Bench(multiranger=True, world=str(file))
+    bench.take_off(1.0)
+    ranging = bench.firmware.ranging
+    assert ranging.front == pytest.approx(1000, abs=30)
+    assert ranging.zrange == pytest.approx(1000, abs=30)
+    assert (ranging.back, ranging.left, ranging.right, ranging.up) == (NOTHING,) * 4
+
+
+def test_a_bad_world_is_named(tmp_path):
+    file = tmp_path / "room.yaml"
+    file.write_text(WORLD.replace("type: box", "type: cone"))
+    with pytest.raises(ParameterError, match=r"room\.yaml:3: .*'cone'"):
+        Bench(multiranger=True, world=str(file))

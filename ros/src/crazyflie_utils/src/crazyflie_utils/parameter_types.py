@@ -220,6 +220,47 @@ class Frame(ParameterType):
         return "the name of a tf frame, such as world"
 
 
+@dataclass(frozen=True)
+class ListOf(ParameterType):
+    """A list whose entries are all of one type; as a value, a tuple.
+
+    Attributes
+    ----------
+    entry : ParameterType
+    length : int or None
+        Number of entries; None for any.
+    """
+
+    entry: ParameterType
+    length: int | None = None
+
+    @property
+    def label(self) -> str:  # type: ignore[override]
+        """As the entry's."""
+        return f"list of {self.entry.label}"
+
+    @property
+    def unit(self) -> str:  # type: ignore[override]
+        """As the entry's."""
+        return self.entry.unit
+
+    @property
+    def range(self) -> str:  # type: ignore[override]
+        """As the entry's."""
+        return self.entry.range
+
+    def __call__(self, value: Any) -> tuple[Any, ...]:
+        """Return the entries."""
+        if not isinstance(value, (list, tuple)) or self.length not in (None, len(value)):
+            raise ValueError
+        return tuple(map(self.entry, value))
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        count = "a list" if self.length is None else f"a list of {self.length}"
+        return f"{count}, each entry {self.entry}"
+
+
 FINITE = Number()
 POSITIVE = Number(above=0.0)
 DURATION = Number(unit="s", minimum=0.0)
@@ -230,3 +271,4 @@ TEXT = Text()
 TOPIC = GraphName()
 SERVICE = GraphName()
 FRAME = Frame()
+POSITION = ListOf(METRES, 3)

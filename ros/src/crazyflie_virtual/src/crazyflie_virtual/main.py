@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from crazyflie_utils.command_line import parse_arguments
-from crazyflie_utils.parameters import Parameters
+from crazyflie_utils.parameters import ParameterError, Parameters
 
 _DESCRIPTION = (
     "A Crazyflie in software that speaks CRTP over UDP: connect with any cflib program to "
@@ -67,6 +67,8 @@ def _run(
         server = server_type(settings, lambda text: print(text, file=sys.stderr, flush=True))
     except OSError as error:
         sys.exit(f"{program}: cannot listen: {error}")
+    except ParameterError as error:
+        sys.exit(f"{program}: {error}")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     print(server.description, flush=True)
     try:

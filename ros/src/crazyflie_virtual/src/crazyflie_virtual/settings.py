@@ -36,7 +36,12 @@ class VehicleSettings(Parameters):
         DECK,
     )
     multiranger: bool = parameter(
-        BOOLEAN, "carry a Multi-ranger deck, which sees the ground and nothing else", False
+        BOOLEAN, "carry a Multi-ranger deck, which sees the ground and what is in `world`", False
+    )
+    world: str = parameter(
+        Text(may_be_empty=True),
+        "a world file of crazyflie_world: what ranging sensors see; empty for the ground alone",
+        "",
     )
     auto_arm: bool = parameter(
         BOOLEAN,

@@ -10,6 +10,7 @@ from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
 from crazyflie_virtual.link import crtp
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings
+from crazyflie_world import world_file
 
 _RADIO_CHANNEL = 3
 """Of the link port: packets that the radio chip answers itself, also while the
@@ -35,6 +36,11 @@ class VirtualVehicle:
     ----------
     settings : VehicleSettings
 
+    Raises
+    ------
+    ParameterError
+        The world file is missing or wrong.
+
     Attributes
     ----------
     physics : Physics
@@ -54,6 +60,8 @@ class VirtualVehicle:
             settings.mass_error,
             settings.thrust_error,
         )
+        if settings.world:
+            self.physics.world = world_file.load(settings.world)
         self.battery = Battery(settings.battery)
         self._storage = Storage(settings)
         self._steps = 0

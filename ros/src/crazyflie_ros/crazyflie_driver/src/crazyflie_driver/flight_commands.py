@@ -172,10 +172,10 @@ class FlightCommands:
         end = time.monotonic() + _REARMING
         while True:
             state = self._crazyflie.supervisor.read()
-            rearms = state is not None and SupervisorState.AUTO_ARMED in state
-            if not rearms or state & (SupervisorState.CAN_FLY | NOT_FLYABLE):
+            if state is None or time.monotonic() > end:
                 return state
-            if time.monotonic() > end:
+            rearms = SupervisorState.AUTO_ARMED in state
+            if not rearms or state & (SupervisorState.CAN_FLY | NOT_FLYABLE):
                 return state
             time.sleep(_REARMING / 10)
 

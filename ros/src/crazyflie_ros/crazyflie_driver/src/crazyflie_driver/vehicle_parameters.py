@@ -1,7 +1,6 @@
 """How a vehicle is connected, as parameters of crazyflie_add and as fields of AddCrazyflie."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Self
 
 import rosgraph.names
@@ -11,43 +10,18 @@ from crazyflie_driver.msg import LogBlock
 from crazyflie_driver.srv import AddCrazyflieRequest
 from crazyflie_py.log import LONGEST_PERIOD_MS, SHORTEST_PERIOD_MS
 from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, TEXT, Integer, Number, ParameterType
+from crazyflie_utils.parameter_types import (
+    BOOLEAN,
+    TEXT,
+    Integer,
+    ListOf,
+    Number,
+    ParameterType,
+)
 from crazyflie_utils.parameters import REQUIRED, Declaration, read_parameter
 
 STATUS_TOPIC = "status"
 """Topic that says what state a vehicle is in."""
-
-
-@dataclass(frozen=True)
-class ListOf(ParameterType):
-    """A list whose entries are all of one type; as a value, a tuple."""
-
-    entry: ParameterType
-
-    @property
-    @override
-    def label(self) -> str:  # type: ignore[override]
-        return f"list of {self.entry.label}"
-
-    @property
-    @override
-    def unit(self) -> str:  # type: ignore[override]
-        return self.entry.unit
-
-    @property
-    @override
-    def range(self) -> str:  # type: ignore[override]
-        return self.entry.range
-
-    @override
-    def __call__(self, value: object) -> tuple[Any, ...]:
-        if not isinstance(value, (list, tuple)):
-            raise ValueError
-        return tuple(map(self.entry, value))
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return f"a list, each entry {self.entry}"
 
 
 class EachLogBlock(ListOf):

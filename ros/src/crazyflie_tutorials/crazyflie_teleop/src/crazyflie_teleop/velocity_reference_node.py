@@ -87,6 +87,8 @@ class VelocityReferenceNode(Node):
     from there. So takeoff, landing and cmd_vel need one publisher to the controller only.
     """
 
+    needed_in_flight = True
+
     def __init__(self) -> None:
         self._flight_state = ""
         self._time = 0.0

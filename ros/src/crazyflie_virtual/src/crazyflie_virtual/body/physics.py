@@ -7,6 +7,7 @@ from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body.battery import FULL_VOLTAGE
+from crazyflie_world.world import World
 
 STEP = PERIOD
 """Step of the integration, s: that of the firmware's attitude controller."""
@@ -37,6 +38,8 @@ class Physics:
         What an accelerometer feels, m/s^2, body frame.
     impact_speed : float
         Downward speed of the last contact with the ground, m/s.
+    world : World or None
+        What is around it; None for the ground alone, which is also all that it comes to rest on.
     is_overturned : bool
         Came down on its back: lies there until `put_upright`.
     """
@@ -55,6 +58,7 @@ class Physics:
         self._x = x
         self.specific_force: Triple = (0.0, 0.0, GRAVITY)
         self.impact_speed = 0.0
+        self.world: World | None = None
         self.is_overturned = False
 
     @property

@@ -1,4 +1,6 @@
-"""Ranging sensors: each sees the ground along an axis of the body, and nothing else."""
+"""Ranging sensors: each sees what is along an axis of the body."""
+
+import math
 
 from crazyflie_model.angles import Triple, rotate
 from crazyflie_virtual.body.physics import Physics
@@ -58,14 +60,19 @@ class RangingSensors:
     @property
     def zrange(self) -> int:
         """Against the body's z."""
-        return self._to_ground(_DOWN) if self.has_flow_deck else 0
+        return self._measure(_DOWN) if self.has_flow_deck else 0
 
     def _side(self, direction: Triple) -> int:
-        return self._to_ground(direction) if self.has_multiranger else 0
+        return self._measure(direction) if self.has_multiranger else 0
 
-    def _to_ground(self, direction: Triple) -> int:
-        height = self._physics.position[2]
-        fall = -rotate(self._physics.quaternion, direction)[2]
-        if fall * _REACH <= height:
-            return NOTHING
-        return round(1000.0 * height / fall)
+    def _measure(self, axis: Triple) -> int:
+        direction = rotate(self._physics.quaternion, axis)
+        distance = self._distance(direction)
+        return round(1000.0 * distance) if distance < _REACH else NOTHING
+
+    def _distance(self, direction: Triple) -> float:
+        physics = self._physics
+        if physics.world is not None:
+            return float(physics.world.cast(physics.position, direction)[0])
+        height, fall = physics.position[2], -direction[2]
+        return height / fall if fall > 0.0 else math.inf

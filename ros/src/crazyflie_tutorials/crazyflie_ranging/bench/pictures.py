@@ -1,0 +1,206 @@
+"""Pictures of two flights: behind a box, and by hand towards a wall.
+
+    python3 ros/src/crazyflie_tutorials/crazyflie_ranging/bench/pictures.py docs/images
+
+flies both in a process without ROS, and draws follow_object.png and obstacle_stop.png.
+"""
+
+import argparse
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import rospkg
+from geometry_msgs.msg import Twist, Vector3
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon, Wedge
+from std_srvs.srv import EmptyRequest
+
+from crazyflie_dev import launch_files
+from crazyflie_ranging.range_sensors import DIRECTIONS
+from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.testing import FakeProcess
+from crazyflie_world import world_file
+from crazyflie_world.shapes import Box
+from crazyflie_world.world import World
+
+SIDES = ("front", "back", "left", "right")
+STEP = 0.05
+"""Between two moments, s."""
+
+SPREAD = 0.47
+"""Of the sensors' cones, rad."""
+
+VEHICLE, OBJECT, CONE, GREY = "#0b62b0", "#e07b00", "#7fb2e5", "#7a7a7a"
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What was seen at a moment.
+
+    Attributes
+    ----------
+    time : float
+        s since the takeoff.
+    x, y : float
+        Where the vehicle was, m.
+    ranges : dict
+        What each sensor said, m.
+    command : float
+        Velocity ahead that it was given, m/s.
+    world : World
+    """
+
+    time: float
+    x: float
+    y: float
+    ranges: dict[str, float]
+    command: float
+    world: World
+
+
+class Flight:
+    """A launch file of this package in flight, in a process without ROS."""
+
+    def __init__(self, file: str, **arguments: str):
+        path = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "launch" / file
+        common = {"composed": "true", "rviz": "false", "simulator_dt": "0.01"}
+        _, parameters = launch_files.expand(path, **common, **arguments)
+        self.process = FakeProcess(parameters, start=0.0)
+        for name, node in NodeClasses()(launch_files.composed_nodes(parameters)).items():
+            assert self.process.launch(node(), f"/{name}"), self.process.logged("error")
+        self._world = world_file.load(str(parameters["/world/world"]))
+        self.process.advance(1.0)
+        answer = self.process.call("/takeoff", EmptyRequest())
+        while not answer.done():
+            self.process.advance(0.1)
+        self._begin = self.process.clock.time()
+        self._lookup = self.process.handle("/pictures").listen_to_transforms()
+
+    def watch(self) -> Moment:
+        """Let `STEP` seconds pass; return what is seen then."""
+        self.process.advance(STEP)
+        x, y, _ = self._place("crazyflie")
+        commands = self.process.published("/cmd_vel")
+        return Moment(
+            self.process.clock.time() - self._begin,
+            x,
+            y,
+            {side: self.process.published(f"/range/{side}")[-1].range for side in SIDES},
+            commands[-1].linear.x if commands else 0.0,
+            self._world.placed({each.name: self._place(each.name) for each in self._world.moving}),
+        )
+
+    def _place(self, frame):
+        place = self._lookup("world", frame).transform.translation
+        return place.x, place.y, place.z
+
+
+def draw_room(axes: Axes, moment: Moment) -> None:
+    """Draw what a moment looks like from above."""
+    for each in moment.world.objects:
+        colour = OBJECT if each.path is not None else "#c9c5bb"
+        if isinstance(each, Box):
+            axes.add_patch(Polygon(corners(each), fc=colour, ec=GREY, lw=0.6))
+        else:
+            axes.add_patch(Circle(each.centre[:2], each.size[0] / 2.0, fc=colour, ec=GREY, lw=0.6))
+    for side, reading in moment.ranges.items():
+        if math.isfinite(reading):
+            middle = math.degrees(DIRECTIONS[side][2])
+            half = math.degrees(SPREAD / 2.0)
+            cone = Wedge(
+                (moment.x, moment.y), reading, middle - half, middle + half, fc=CONE, alpha=0.5
+            )
+            axes.add_patch(cone)
+    axes.add_patch(Circle((moment.x, moment.y), 0.07, fc=VEHICLE))
+    width, depth = moment.world.floor.size
+    axes.set_xlim(-width / 2.0 - 0.15, width / 2.0 + 0.15)
+    axes.set_ylim(-depth / 2.0 - 0.15, depth / 2.0 + 0.15)
+    axes.set_aspect("equal")
+    axes.set_xlabel("x, m")
+    axes.set_ylabel("y, m")
+    axes.set_title(f"{moment.time:.0f} s after the takeoff, from above", loc="left", fontsize=10)
+
+
+def corners(box: Box) -> list[tuple[float, float]]:
+    """Return the corners of a box as seen from above, m."""
+    c, s = math.cos(box.yaw), math.sin(box.yaw)
+    halves = [(box.size[0] / 2.0 * a, box.size[1] / 2.0 * b) for a, b in _SIGNS]
+    return [(box.centre[0] + c * x - s * y, box.centre[1] + s * x + c * y) for x, y in halves]
+
+
+_SIGNS = ((-1, -1), (1, -1), (1, 1), (-1, 1))
+
+
+def panes() -> tuple[Figure, Axes, Axes, Axes]:
+    """Return a figure with a room at the left and two diagrams at the right."""
+    figure = Figure(figsize=(11.0, 4.6), layout="constrained")
+    grid = figure.add_gridspec(2, 2, width_ratios=(5, 6))
+    room = figure.add_subplot(grid[:, 0])
+    top = figure.add_subplot(grid[0, 1])
+    bottom = figure.add_subplot(grid[1, 1], sharex=top)
+    for axes in (top, bottom):
+        axes.grid(color="#e6e6e6")
+        axes.spines[["top", "right"]].set_visible(False)
+    bottom.set_xlabel("time since the takeoff, s")
+    return figure, room, top, bottom
+
+
+def follow_object(path: Path) -> None:
+    """Fly behind the box for one round of its path, and draw it."""
+    flight = Flight("follow_object.launch", takeoff="false")
+    moments = [flight.watch() for _ in range(round(34.0 / STEP))]
+    figure, room, top, bottom = panes()
+    draw_room(room, moments[round(9.0 / STEP)])
+    time = [each.time for each in moments]
+    fronts = [each.world["box"].centre[0] - each.world["box"].size[0] / 2.0 for each in moments]
+    top.plot(time, fronts, color=OBJECT, label="front of the box")
+    top.plot(time, [each.x for each in moments], color=VEHICLE, label="vehicle")
+    top.set_ylabel("x, m")
+    top.legend(loc="upper right", fontsize=8)
+    bottom.plot(time, [each.ranges["front"] for each in moments], color=VEHICLE)
+    for distance, text in ((0.6, "follows beyond"), (0.3, "backs off below")):
+        bottom.axhline(distance, color=GREY, ls="--", lw=0.8)
+        bottom.text(0.0, distance + 0.01, text, fontsize=8, color=GREY)
+    bottom.set_ylim(0.0, 0.9)
+    bottom.set_ylabel("sensor in front, m")
+    figure.savefig(path, dpi=110)
+
+
+def obstacle_stop(path: Path) -> None:
+    """Ask for 0.5 m/s ahead all the time, and draw where the vehicle stops."""
+    flight = Flight("teleop_with_obstacle_stop.launch", joy="false")
+    moments = []
+    for _ in range(round(8.0 / STEP)):
+        flight.process.publish("/cmd_vel/wanted", Twist(linear=Vector3(x=0.5)))
+        moments.append(flight.watch())
+    figure, room, top, bottom = panes()
+    draw_room(room, moments[-1])
+    time = [each.time for each in moments]
+    top.axhline(0.5, color=GREY, ls="--", lw=1.0, label="asked for")
+    top.plot(time, [each.command for each in moments], color=VEHICLE, label="passed on")
+    top.set_ylabel("velocity ahead, m/s")
+    top.set_ylim(-0.02, 0.6)
+    top.legend(loc="upper right", fontsize=8)
+    bottom.plot(time, [each.ranges["front"] for each in moments], color=VEHICLE)
+    bottom.axhline(0.5, color=GREY, ls="--", lw=0.8)
+    bottom.text(
+        time[-1], 0.45, "distance that is kept", fontsize=8, color=GREY, ha="right", va="top"
+    )
+    bottom.set_ylim(0.0, None)
+    bottom.set_ylabel("sensor in front, m")
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    """Fly and draw."""
+    parser = argparse.ArgumentParser(description="Draw flights with range sensors.")
+    parser.add_argument("folder", type=Path, help="where the pictures go, such as docs/images")
+    folder = parser.parse_args().folder
+    follow_object(folder / "follow_object.png")
+    obstacle_stop(folder / "obstacle_stop.png")
+
+
+if __name__ == "__main__":
+    main()

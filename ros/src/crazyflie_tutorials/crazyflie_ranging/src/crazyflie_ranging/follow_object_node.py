@@ -1,0 +1,108 @@
+"""ROS interface of following an object: ranges in, cmd_vel out."""
+
+from collections.abc import Iterator
+
+from geometry_msgs.msg import Twist, Vector3
+from typing_extensions import override
+
+from crazyflie_ranging.follower import FollowDistances, Follower
+from crazyflie_ranging.latest_ranges import LatestRanges
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
+
+_DISTANCE = Number("m", above=0.0)
+
+
+class FollowObjectParameters(Parameters):
+    """Parameters of `FollowObjectNode`."""
+
+    front_topic: str = parameter(TOPIC, "the sensor in front", "range/front", "topics/front")
+    left_topic: str = parameter(TOPIC, "the one at the left", "range/left", "topics/left")
+    right_topic: str = parameter(TOPIC, "the one at the right", "range/right", "topics/right")
+    cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
+    scale_linear: float = parameter(
+        Number("m/s", minimum=0.0), "speed ahead and back", 0.3, live=True
+    )
+    scale_angular: float = parameter(
+        Number("rad/s", minimum=0.0),
+        "yaw rate to what is at one side and not in front; 0: no turning",
+        0.0,
+        live=True,
+    )
+    back_off: float = parameter(
+        _DISTANCE, "backs off from what is nearer", 0.3, "distances/back_off", live=True
+    )
+    follow: float = parameter(
+        _DISTANCE, "follows what is farther away", 0.6, "distances/follow", live=True
+    )
+    lost: float = parameter(
+        _DISTANCE, "but not what is beyond this", 2.0, "distances/lost", live=True
+    )
+    silence: float = parameter(
+        TIME_STEP, "so long after the last reading of the sensor in front it stands still", 0.15
+    )
+    time_step: float = parameter(TIME_STEP, "between two velocities", 0.02)
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        if not self.back_off <= self.follow <= self.lost:
+            yield (
+                f"distances/back_off, follow and lost are {self.back_off:g}, {self.follow:g} and "
+                f"{self.lost:g}; expected each >= the one before (m)"
+            )
+        if self.time_step >= self.silence:
+            yield f"time_step is {self.time_step:g}; expected < silence, {self.silence:g} (s)"
+
+    def follower(self) -> Follower:
+        """Return the algorithm with these parameters."""
+        return Follower(
+            FollowDistances(self.back_off, self.follow, self.lost),
+            self.scale_linear,
+            self.scale_angular,
+        )
+
+
+class FollowObjectNode(Node):
+    """Keep a distance to the object in front; stand still when the sensor is silent."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(FollowObjectParameters, self._reconfigure)
+        self._follower = self._parameters.follower()
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = handle.publisher(parameters.cmd_vel_topic, Twist)
+        self._ranges = LatestRanges(
+            handle,
+            {
+                "front": parameters.front_topic,
+                "left": parameters.left_topic,
+                "right": parameters.right_topic,
+            },
+        )
+        handle.timer(parameters.time_step, self._on_timer)
+
+    @override
+    def make_safe(self) -> None:
+        """Stop the vehicle."""
+        self._publisher.publish(Twist())
+
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
+        self._follower = parameters.follower()
+
+    def _on_timer(self):
+        # A velocity holds until the next one.
+        age = self._parameters.silence - self._parameters.time_step
+        front, left, right = (
+            self._ranges.reading(name, age) for name in ("front", "left", "right")
+        )
+        if front is None:
+            topic = self._handle.resolve(self._parameters.front_topic)
+            self._handle.warn(f"standing still: nothing comes on {topic}", throttle=5.0)
+            self._publisher.publish(Twist())
+            return
+        speed, yaw_dot = self._follower.velocity(front, left, right)
+        self._publisher.publish(Twist(linear=Vector3(x=speed), angular=Vector3(z=yaw_dot)))

@@ -1,0 +1,65 @@
+"""Velocities that lead to no obstacle."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from crazyflie_teleop.velocity_reference import Velocity
+
+AXES: dict[str, tuple[str, int]] = {
+    "front": ("x", 1),
+    "back": ("x", -1),
+    "left": ("y", 1),
+    "right": ("y", -1),
+    "up": ("z", 1),
+    "down": ("z", -1),
+}
+"""Direction -> component of a velocity, and its sign there."""
+
+
+@dataclass(frozen=True)
+class ObstacleStop:
+    """Limits velocities to what comes to rest at a distance from every obstacle.
+
+    Attributes
+    ----------
+    distance : float
+        Nearer to an obstacle, nothing leads towards it, m.
+    deceleration : float
+        With which the vehicle brakes, m/s^2.
+    reaction : float
+        How long it flies on before, s.
+    """
+
+    distance: float
+    deceleration: float
+    reaction: float
+
+    def speed(self, clearance: float) -> float:
+        """Return the largest speed (m/s) towards an obstacle that is ``clearance`` (m) away.
+
+        The one with which reaction and braking together take v t + v^2 / (2 a).
+        """
+        if math.isinf(clearance) and clearance > 0.0:
+            return math.inf
+        gap = max(clearance - self.distance, 0.0)
+        delay = self.deceleration * self.reaction
+        return math.sqrt(delay**2 + 2.0 * self.deceleration * gap) - delay
+
+    def limit(self, velocity: Velocity, clearances: Mapping[str, float | None]) -> Velocity:
+        """Return a velocity (heading frame) as far as it leads to no obstacle.
+
+        Parameters
+        ----------
+        velocity : Velocity
+        clearances : mapping
+            Of the directions that are guarded, m; None where the sensor is silent: nothing
+            leads there.
+        """
+        for direction, clearance in clearances.items():
+            axis, sign = AXES[direction]
+            most = 0.0 if clearance is None else self.speed(clearance)
+            # + 0.0: not -0.0, for those who read it.
+            limited = sign * min(sign * getattr(velocity, axis), most) + 0.0
+            velocity = replace(velocity, **{axis: limited})
+        return velocity

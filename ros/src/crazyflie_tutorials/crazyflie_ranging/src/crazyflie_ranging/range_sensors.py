@@ -1,0 +1,185 @@
+"""Range sensors on a vehicle: what they are, and the file that describes them."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from typing_extensions import override
+
+from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
+from crazyflie_utils import ParameterError, Parameters, parameter, yaml_file
+from crazyflie_utils.parameter_types import (
+    FRAME,
+    POSITION,
+    TOPIC,
+    Integer,
+    Number,
+    ParameterType,
+    Text,
+)
+
+LASER, ULTRASONIC = "laser", "ultrasonic"
+"""Types of sensors."""
+
+DIRECTIONS: dict[str, Triple] = {
+    "front": (0.0, 0.0, 0.0),
+    "back": (0.0, 0.0, math.pi),
+    "left": (0.0, 0.0, math.pi / 2.0),
+    "right": (0.0, 0.0, -math.pi / 2.0),
+    "up": (0.0, -math.pi / 2.0, 0.0),
+    "down": (0.0, math.pi / 2.0, 0.0),
+}
+"""Where sensors look: roll, pitch, yaw that turn the body's x axis there, rad."""
+
+
+@dataclass(frozen=True)
+class RangeSensor:
+    """A sensor that measures the distance to what is nearest in a cone.
+
+    Attributes
+    ----------
+    type : str
+        `LASER` or `ULTRASONIC`.
+    name : str
+        Its topic.
+    frame_id : str
+        Its tf frame, whose x axis is the axis of the cone.
+    direction : str
+        One of `DIRECTIONS`.
+    position : tuple of float
+        Where it is on the vehicle, in the body's frame (forward, left, up), m.
+    min_range, max_range : float
+        Between which it measures, m.
+    spread_angle : float
+        Of the cone, from edge to edge, rad.
+    desired_frequency : float
+        Hz.
+    noise : float
+        Standard deviation of a simulated measurement, m.
+    rays : int
+        With how many a simulated one looks.
+    variable : str
+        Log variable of the firmware, which has it in mm.
+    """
+
+    type: str
+    name: str
+    frame_id: str
+    direction: str
+    position: Triple
+    min_range: float
+    max_range: float
+    spread_angle: float
+    desired_frequency: float
+    noise: float
+    rays: int
+    variable: str
+
+    @property
+    def attitude(self) -> Quaternion:
+        """Of its frame in the body's."""
+        return quaternion_from_rpy(*DIRECTIONS[self.direction])
+
+    def reading(self, distance: float) -> float:
+        """Return what it says about a distance (m): infinity beyond its range.
+
+        What is nearer than its range is negative infinity, as in REP 117.
+        """
+        if distance > self.max_range:
+            return math.inf
+        return distance if distance >= self.min_range else -math.inf
+
+
+class RangeSensorParameters(Parameters):
+    """An entry of a sensor file."""
+
+    type: str = parameter(Text((LASER, ULTRASONIC)), "how it measures")
+    name: str = parameter(TOPIC, "its topic")
+    frame_id: str = parameter(FRAME, "its tf frame; the x axis is the axis of the cone")
+    direction: str = parameter(Text(tuple(DIRECTIONS)), "where it looks")
+    position: Triple = parameter(POSITION, "where it is, in the body's frame", (0.0, 0.0, 0.0))
+    min_range: float = parameter(Number("m", minimum=0.0), "nothing nearer is measured")
+    max_range: float = parameter(Number("m", above=0.0), "nor anything farther away")
+    spread_angle: float = parameter(
+        Number("rad", minimum=0.0, maximum=math.pi), "of its cone, from edge to edge"
+    )
+    desired_frequency: float = parameter(
+        Number("Hz", above=0.0, maximum=100.0), "how often it measures"
+    )
+    noise: float = parameter(Number("m", minimum=0.0), "standard deviation, if simulated", 0.0)
+    rays: int = parameter(Integer(1, 1000), "in its cone, if simulated", 13)
+    variable: str | None = parameter(
+        Text(), "log variable of the firmware, mm; without it range.NAME", None
+    )
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        if self.min_range >= self.max_range:
+            yield (f"min_range is {self.min_range:g}; expected < max_range, {self.max_range:g} (m)")
+
+    def sensor(self) -> RangeSensor:
+        """Return what is declared."""
+        return RangeSensor(
+            self.type,
+            self.name,
+            self.frame_id,
+            self.direction,
+            self.position,
+            self.min_range,
+            self.max_range,
+            self.spread_angle,
+            self.desired_frequency,
+            self.noise,
+            self.rays,
+            self.variable or f"range.{self.name}",
+        )
+
+
+class SensorFile(ParameterType):
+    """The path of a sensor file; as a value, the sensors in it."""
+
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> tuple[RangeSensor, ...]:
+        if not isinstance(value, str) or not value:
+            raise ValueError
+        return load(value)
+
+    @override
+    def __str__(self) -> str:
+        return "the path of a sensor file"
+
+
+def load(path: str | Path) -> tuple[RangeSensor, ...]:
+    """Return the sensors in a file, which has a list ``sensors``.
+
+    Raises
+    ------
+    ParameterError
+        About everything that is wrong in it: file, line and what was expected.
+    """
+    file = yaml_file.load(path)
+    sensors, complaints = [], []
+    lines: dict[str, dict[str, int]] = {"name": {}, "frame_id": {}}
+    for key, entry in file.entries().items():
+        if key != "sensors":
+            complaints += entry.error("is not known; expected sensors").complaints
+    for entry in file["sensors"].elements():
+        try:
+            sensors.append(entry.read(RangeSensorParameters).sensor())
+            for key, taken in lines.items():
+                value = entry[key]
+                if value.value in taken:
+                    text = f"is {value.value!r}, which is there in line {taken[value.value]}"
+                    raise value.error(text)
+                taken[value.value] = value.line
+        except ParameterError as error:
+            complaints += error.complaints
+    if not sensors and not complaints:
+        complaints += file["sensors"].error("is empty; expected a sensor or more").complaints
+    if complaints:
+        raise ParameterError(*complaints)
+    return tuple(sensors)

@@ -1,0 +1,54 @@
+"""What the launch files start, and that all of it can be initialized."""
+
+from pathlib import Path
+
+import pytest
+import rospkg
+
+from crazyflie_dev import launch_files
+from crazyflie_ranging.deck_ranger_node import DeckRangerNode
+from crazyflie_ranging.follow_object_node import FollowObjectNode
+from crazyflie_ranging.obstacle_stop_node import ObstacleStopNode
+from crazyflie_ranging.simulated_ranger_node import SimulatedRangerNode
+from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.testing import FakeProcess
+
+LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "launch"
+
+COMMON = {"obstacle_stop": ObstacleStopNode}
+FOLLOW = {**COMMON, "follow_object": FollowObjectNode}
+
+
+@pytest.mark.parametrize(
+    ("file", "flight", "composed", "classes"),
+    [
+        ("follow_object", "sw", "true", {**FOLLOW, "simulated_ranger": SimulatedRangerNode}),
+        ("follow_object", "virtual_hw", "false", {**FOLLOW, "deck_ranger": DeckRangerNode}),
+        (
+            "teleop_with_obstacle_stop",
+            "sw",
+            "false",
+            {**COMMON, "simulated_ranger": SimulatedRangerNode},
+        ),
+    ],
+)
+def test_launch_files(file, flight, composed, classes):
+    nodes, parameters = launch_files.expand(
+        LAUNCH / f"{file}.launch", flight=f"{flight}_hover.launch", composed=composed, rviz="false"
+    )
+    process = FakeProcess(parameters)
+    for name, node in classes.items():
+        assert (f"/{name}" in nodes) == (composed == "false")
+        assert process.launch(node(), f"/{name}"), process.logged("error")
+    if composed == "true":
+        assert classes.items() <= NodeClasses()(launch_files.composed_nodes(parameters)).items()
+    steers = {"follow_object": "follow_object", "teleop_with_obstacle_stop": "joy_velocity"}[file]
+    wanted = parameters["/obstacle_stop/topics/cmd_vel_in"]
+    assert parameters[f"/{steers}/topics/cmd_vel"] == wanted
+    obeyed = parameters["/velocity_reference/topics/cmd_vel"]
+    assert obeyed == parameters["/obstacle_stop/topics/cmd_vel_out"] != wanted
+    if flight == "virtual_hw":
+        assert parameters["/virtual_crazyflie/multiranger"] is True
+        assert parameters["/virtual_crazyflie/world"] == parameters["/world/world"]
+        assert parameters["/crazyflie/crazyflie_add/genericLogTopics"] == ["ranges"]
+        assert parameters["/deck_ranger/topics/log"] == "/crazyflie/ranges"

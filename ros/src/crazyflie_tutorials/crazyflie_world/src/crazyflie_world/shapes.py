@@ -1,0 +1,223 @@
+"""Solid shapes in a room, and where rays enter them.
+
+All of them are convex, so that a ray is within a shape from one distance to another;
+those of a box, a cylinder and a ball are the common part of simpler ones, such as the
+space between two parallel planes (Kay and Kajiya, Ray Tracing Complex Scenes, 1986).
+"""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from crazyflie_world.paths import Path, Position
+
+Colour = tuple[float, float, float]
+"""Red, green, blue, each from 0 to 1."""
+
+Vectors = NDArray[np.float64]
+"""Shape (..., 3)."""
+
+Interval = tuple[NDArray[np.float64], NDArray[np.float64]]
+"""Distances at which rays enter and leave, shape (...,); the first is larger where they miss."""
+
+WALL_COLOUR = (0.85, 0.85, 0.8)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shape:
+    """What all solid shapes have.
+
+    Attributes
+    ----------
+    name : str
+        No two objects of a world have the same; for those that move it is that of their tf frame.
+    centre : tuple of float
+        x, y, z in the world's frame, m.
+    colour : tuple of float
+    path : Path or None
+        Where the centre moves, if it does.
+    """
+
+    name: str
+    centre: Position
+    colour: Colour = (0.5, 0.5, 0.5)
+    path: Path | None = None
+
+    @property
+    def size(self) -> Position:
+        """Extent along the object's own x, y and z, m."""
+        raise NotImplementedError
+
+    def interval(self, origins: Vectors, directions: Vectors) -> Interval:
+        """Return how far along rays the shape begins and ends.
+
+        Parameters
+        ----------
+        origins : ndarray, shape (..., 3)
+            In the world's frame, m.
+        directions : ndarray, shape (..., 3)
+            None of them 0.
+
+        Returns
+        -------
+        tuple of ndarray, shape (...,)
+            In lengths of the directions; both are negative for what is behind the origin.
+        """
+        raise NotImplementedError
+
+    def moved_to(self, centre: Position) -> Self:
+        """Return the same shape at another place."""
+        return replace(self, centre=centre)
+
+    def at(self, time: float) -> Self:
+        """Return the shape as it is ``time`` seconds after paths begin."""
+        return self if self.path is None else self.moved_to(self.path.position(time))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Box(Shape):
+    """A box that stands upright.
+
+    Attributes
+    ----------
+    extent : tuple of float
+        Along its own x, y and z, m.
+    yaw : float
+        How far it is turned about the vertical, rad.
+    """
+
+    extent: Position
+    yaw: float = 0.0
+
+    @property
+    def size(self) -> Position:
+        """``extent``."""
+        return self.extent
+
+    def interval(self, origins: Vectors, directions: Vectors) -> Interval:
+        """See `Shape.interval`."""
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        to_own = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        return _between(
+            (origins - self.centre) @ to_own, directions @ to_own, np.array(self.extent) / 2.0
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cylinder(Shape):
+    """A cylinder that stands upright; lengths in m."""
+
+    radius: float
+    height: float
+
+    @property
+    def size(self) -> Position:
+        """Diameter, diameter, height."""
+        return (2.0 * self.radius, 2.0 * self.radius, self.height)
+
+    def interval(self, origins: Vectors, directions: Vectors) -> Interval:
+        """See `Shape.interval`."""
+        own = origins - self.centre
+        return _common(
+            _within(own[..., :2], directions[..., :2], self.radius),
+            _between(own[..., 2:], directions[..., 2:], np.array([self.height / 2.0])),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ball(Shape):
+    """A ball; its radius in m."""
+
+    radius: float
+
+    @property
+    def size(self) -> Position:
+        """Three times the diameter."""
+        return (2.0 * self.radius,) * 3
+
+    def interval(self, origins: Vectors, directions: Vectors) -> Interval:
+        """See `Shape.interval`."""
+        return _within(origins - self.centre, directions, self.radius)
+
+
+def wall(
+    name: str,
+    start: tuple[float, float],
+    end: tuple[float, float],
+    height: float,
+    thickness: float,
+    colour: Colour = WALL_COLOUR,
+) -> Box:
+    """Return a wall that stands on the floor between two points, x and y in m; lengths in m."""
+    (x0, y0), (x1, y1) = start, end
+    return Box(
+        name=name,
+        centre=((x0 + x1) / 2.0, (y0 + y1) / 2.0, height / 2.0),
+        extent=(math.dist(start, end), thickness, height),
+        yaw=math.atan2(y1 - y0, x1 - x0),
+        colour=colour,
+    )
+
+
+def cast(
+    shapes: tuple[Shape, ...], origins: ArrayLike, directions: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+    """Return what rays meet first, and how far away it is.
+
+    Parameters
+    ----------
+    shapes : tuple of Shape
+    origins, directions : array_like, shape (..., 3)
+        Of the rays, in the world's frame; one origin may serve all. Directions have the
+        length 1, or else distances are in their lengths.
+
+    Returns
+    -------
+    distances : ndarray, shape (...,)
+        m; infinite where nothing is met, 0 within a shape.
+    indices : ndarray of int, shape (...,)
+        Into ``shapes``; -1 where nothing is met.
+    """
+    origins, directions = np.broadcast_arrays(
+        np.asarray(origins, dtype=float), np.asarray(directions, dtype=float)
+    )
+    distances = np.full(directions.shape[:-1], np.inf)
+    indices = np.full(distances.shape, -1)
+    for index, shape in enumerate(shapes):
+        enter, leave = shape.interval(origins, directions)
+        entrance = np.where((enter <= leave) & (leave >= 0.0), np.maximum(enter, 0.0), np.inf)
+        indices = np.where(entrance < distances, index, indices)
+        distances = np.minimum(distances, entrance)
+    return distances, indices
+
+
+def _between(origins, directions, half):
+    # For each axis, the space between two planes; a ray along them is within for ever, or never.
+    with np.errstate(all="ignore"):
+        one, other = (-half - origins) / directions, (half - origins) / directions
+    along = directions == 0.0
+    outside = along & (np.abs(origins) > half)
+    enter = np.where(along, -np.inf, np.minimum(one, other))
+    leave = np.where(along, np.inf, np.maximum(one, other))
+    return np.where(outside, np.inf, enter).max(axis=-1), leave.min(axis=-1)
+
+
+def _within(origins, directions, radius):
+    # |o + t d|^2 = r^2, in the plane for a cylinder and in space for a ball.
+    a = (directions**2).sum(axis=-1)
+    b = (origins * directions).sum(axis=-1)
+    c = (origins**2).sum(axis=-1) - radius**2
+    along = a == 0.0
+    with np.errstate(all="ignore"):
+        root = np.sqrt(b**2 - a * c)
+        enter, leave = (-b - root) / a, (-b + root) / a
+    missed = np.where(along, c > 0.0, np.isnan(root))
+    enter = np.where(along, -np.inf, enter)
+    return np.where(missed, np.inf, enter), np.where(missed | along, np.inf, leave)
+
+
+def _common(one, other):
+    return np.maximum(one[0], other[0]), np.minimum(one[1], other[1])

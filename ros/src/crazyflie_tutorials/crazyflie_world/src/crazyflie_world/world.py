@@ -1,0 +1,98 @@
+"""What stands and moves in a room."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from crazyflie_world.paths import Position
+from crazyflie_world.shapes import Box, Colour, Shape, cast
+
+FLOOR = "floor"
+"""Name of the floor among the solids."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The floor: the plane z = 0, with its middle in the origin.
+
+    Attributes
+    ----------
+    size : tuple of float
+        Along x and y, m.
+    texture : str
+        What a camera sees of it; one of `TEXTURES`.
+    colour : tuple of float
+    """
+
+    size: tuple[float, float]
+    texture: str = "plain"
+    colour: Colour = (0.6, 0.6, 0.6)
+
+    def solid(self) -> Box:
+        """Return it as a box without thickness."""
+        return Box(name=FLOOR, centre=(0.0, 0.0, 0.0), extent=(*self.size, 0.0), colour=self.colour)
+
+
+TEXTURES = ("plain", "checkers", "speckles")
+"""Of floors."""
+
+
+@dataclass(frozen=True)
+class World:
+    """A floor and objects, at one moment.
+
+    Attributes
+    ----------
+    frame : str
+        The tf frame of all positions.
+    floor : Floor
+    objects : tuple of Shape
+        Walls are boxes.
+    """
+
+    frame: str
+    floor: Floor
+    objects: tuple[Shape, ...] = ()
+
+    @property
+    def solids(self) -> tuple[Shape, ...]:
+        """The objects, then the floor."""
+        return (*self.objects, self.floor.solid())
+
+    @property
+    def moving(self) -> tuple[Shape, ...]:
+        """The objects that have a path."""
+        return tuple(each for each in self.objects if each.path is not None)
+
+    def __getitem__(self, name: str) -> Shape:
+        """Return the object with this name; KeyError if there is none."""
+        for each in self.objects:
+            if each.name == name:
+                return each
+        raise KeyError(name)
+
+    def at(self, time: float) -> Self:
+        """Return the world as it is ``time`` seconds after paths begin."""
+        return replace(self, objects=tuple(each.at(time) for each in self.objects))
+
+    def placed(self, centres: Mapping[str, Position]) -> Self:
+        """Return the world with some objects elsewhere, name -> centre (m)."""
+        return replace(
+            self,
+            objects=tuple(
+                each.moved_to(centres[each.name]) if each.name in centres else each
+                for each in self.objects
+            ),
+        )
+
+    def cast(
+        self, origins: ArrayLike, directions: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
+        """Return how far away the first of the `solids` is along rays, and which it is.
+
+        See `shapes.cast`.
+        """
+        return cast(self.solids, origins, directions)

@@ -1,0 +1,157 @@
+"""Settings in YAML files: what is read, and how messages name file and line."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crazyflie_utils import yaml_file
+from crazyflie_utils.parameter_types import BOOLEAN, POSITION, POSITIVE, TEXT
+from crazyflie_utils.parameters import ParameterError, Parameters, group, parameter
+
+
+class NoiseParameters(Parameters):
+    """A group."""
+
+    deviation: float = parameter(POSITIVE, "standard deviation", default=0.01)
+
+
+class BoxParameters(Parameters):
+    """A box."""
+
+    center: tuple[float, float, float] = parameter(POSITION, "middle")
+    size: float = parameter(POSITIVE, "edge", default=1.0)
+    is_solid: bool = parameter(BOOLEAN, "whether it is", default=True, name="solid")
+    colour: str | None = parameter(TEXT, "of its sides", default=None)
+    noise: NoiseParameters = group(NoiseParameters, "noise")
+
+    def complaints(self):
+        """See `Parameters.complaints`."""
+        if self.center[2] < self.size / 2:
+            yield f"a box of {self.size:g} m at height {self.center[2]:g} is in the ground"
+
+
+TEXT_OF_LAB = """\
+boxes:
+  table:
+    center: [1, 2, 0.5]
+    solid: false
+  chair:
+    center: [0.5, 2, 3.0]
+    noise:
+      deviation: 0.5
+list: [1, two]
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load(text):
+        path = tmp_path / "lab.yaml"
+        path.write_text(text)
+        return yaml_file.load(path)
+
+    return load
+
+
+def complaints_of(load, text, read=lambda lab: lab["boxes"]["table"].read(BoxParameters)):
+    with pytest.raises(ParameterError) as caught:
+        read(load(text))
+    return [text.partition("lab.yaml")[2] for text in caught.value.complaints]
+
+
+def test_reads_entries(load):
+    lab = load(TEXT_OF_LAB)
+    boxes = lab["boxes"].entries()
+    table = boxes["table"].read(BoxParameters)
+    assert table == BoxParameters(
+        center=(1.0, 2.0, 0.5),
+        size=1.0,
+        is_solid=False,
+        colour=None,
+        noise=NoiseParameters(deviation=0.01),
+    )
+    assert boxes["chair"].read(BoxParameters).noise.deviation == 0.5
+    assert [entry.line for entry in boxes.values()] == [3, 6]
+    assert [entry.value for entry in lab["list"].elements()] == [1, "two"]
+    assert "boxes" in lab
+    assert "tables" not in lab
+
+
+def test_each_wrong_value_is_named_with_its_line(load):
+    text = """\
+boxes:
+  table:
+    size: -1
+    noise:
+      deviation: much
+      bias: 0
+    wheels: 4
+"""
+    assert complaints_of(load, text) == [
+        ":6: boxes/table/noise/bias is not known; expected one of center, colour, noise/deviation, "
+        "size, solid",
+        ":7: boxes/table/wheels is not known; expected one of center, colour, noise/deviation, "
+        "size, solid",
+        ":3) is not set; expected a list of 3, each entry a finite number (m)",
+        ":3) is -1; expected a finite number > 0",
+        ":5) is 'much'; expected a finite number > 0",
+    ]
+
+
+def test_keys_that_somebody_else_reads(load):
+    table = load("center: [0, 0, 1]\nwheels: 4\n")
+    assert table.read(BoxParameters, besides=("wheels",)).center == (0.0, 0.0, 1.0)
+
+
+def test_what_does_not_fit_together_is_named_with_its_line(load):
+    text = "boxes:\n  table:\n    center: [0, 0, 0]\n"
+    assert complaints_of(load, text) == [
+        ":3: boxes/table: a box of 1 m at height 0 is in the ground"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("boxes: 3\n", ":1: boxes is 3; expected a mapping"),
+        ("# nothing\n", ": is empty; expected a mapping"),
+        ("[1, 2]\n", ":1: the file is [1, 2]; expected a mapping"),
+        ("a: 1\nboxes: {}\n", ":2: boxes has no table; it has nothing"),
+        ("a: 1\n", ":1: the file has no boxes; it has a"),
+        ("boxes:\n  table: {}\n  table: {}\n", ":3: boxes/table is there twice, first in line 2"),
+        ("boxes:\n  3: {}\n", ":2: boxes has the key 3; expected a string"),
+        ("boxes: {\n", ":2: is no YAML: expected the node content, but found '<stream end>'"),
+        ("boxes: !!python/name:os.system\n", ":1: boxes cannot be read"),
+    ],
+)
+def test_files_that_hold_something_else(load, text, complaint):
+    assert complaints_of(load, text)[0].startswith(complaint)
+
+
+def test_a_list_is_expected(load):
+    assert complaints_of(load, "list: 3\n", lambda lab: lab["list"].elements()) == [
+        ":1: list is 3; expected a list"
+    ]
+
+
+def test_a_file_that_cannot_be_read(tmp_path):
+    with pytest.raises(ParameterError, match=r"none\.yaml: cannot be read: No such file"):
+        yaml_file.load(tmp_path / "none.yaml")
+    (tmp_path / "latin.yaml").write_bytes(b"name: Stra\xdfe\n")
+    with pytest.raises(ParameterError, match=r"latin\.yaml: is no text in UTF-8"):
+        yaml_file.load(tmp_path / "latin.yaml")
+
+
+def test_a_file_without_an_end_to_its_nesting(load):
+    assert complaints_of(load, "[" * 100_000) == [": is nested too deep"]
+
+
+@given(st.text())
+def test_any_text_is_read_or_refused(tmp_path_factory, text):
+    path = tmp_path_factory.mktemp("any") / "lab.yaml"
+    path.write_text(text, encoding="utf-8", errors="surrogatepass")
+    try:
+        for entry in yaml_file.load(path).entries().values():
+            entry.read(BoxParameters)
+    except ParameterError as error:
+        assert str(path) in str(error)

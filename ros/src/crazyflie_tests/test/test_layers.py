@@ -36,7 +36,7 @@ LAYERS = [
         "mocap_optitrack",
     },
     {"crazyflie_driver", "crazyflie_teleop", "crazyflie_tools", "crazyflie_virtual"},
-    {"crazyflie_demo", "crazyflie_examples", "crazyflie_ranging"},
+    {"crazyflie_demo", "crazyflie_examples", "crazyflie_ranging", "crazyflie_vision"},
     {"uav_trajectory"},
     {"crazyflie", "crazyflie_dev"},
 ]

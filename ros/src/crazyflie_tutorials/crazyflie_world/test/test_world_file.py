@@ -89,6 +89,7 @@ def test_the_lab():
         ("centre: [1, 0, 0.5], ", "", 3, "a centre and a path, or none"),
         ("name: other", "name: other\n    centre: [0, 0, 1]", 10, "a centre and a path, or none"),
         ("size: [4, 3]", "size: [4, 0]", 1, "floor/size"),
+        ("yaw: 0.5", "picture: none.png", 3, "objects[0]/picture is 'none.png'; expected a file"),
         ("floor: {size: [4, 3]}", "floor: {size: [4, 3], texture: lawn}", 1, "one of plain"),
         ("floor:", "ceiling:", 1, "ceiling is not known"),
         ("floor: {size: [4, 3]}", "frame: world", 1, "floor/size"),
@@ -101,6 +102,12 @@ def test_bad_files(write, old, new, line, expected):
         world_file.load(file)
     assert f"{file}:{line}: " in str(error.value) or f"({file}:{line})" in str(error.value)
     assert expected in str(error.value)
+
+
+def test_a_picture_lies_beside_the_file(write, tmp_path):
+    (tmp_path / "face.png").touch()
+    world = world_file.load(write(GOOD.replace("yaw: 0.5", "picture: face.png")))
+    assert world["crate"].picture == str(tmp_path / "face.png")
 
 
 def test_everything_wrong_is_said_at_once(write):

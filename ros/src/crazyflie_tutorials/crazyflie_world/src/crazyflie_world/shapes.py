@@ -87,10 +87,14 @@ class Box(Shape):
         Along its own x, y and z, m.
     yaw : float
         How far it is turned about the vertical, rad.
+    picture : str
+        File of what is to be seen on its front, the side that looks along its own x; empty for
+        nothing.
     """
 
     extent: Position
     yaw: float = 0.0
+    picture: str = ""
 
     @property
     def size(self) -> Position:

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import Any
@@ -15,6 +16,7 @@ from crazyflie_utils.parameter_types import (
     FRAME,
     METRES,
     POSITION,
+    TEXT,
     TIME_STEP,
     ListOf,
     Number,
@@ -114,10 +116,13 @@ class BoxParameters(_ObjectParameters):
 
     size: tuple[float, float, float] = parameter(ListOf(_LENGTH, 3), "along its x, y and z")
     yaw: float = parameter(_ANGLE, "turned about the vertical", 0.0)
+    picture: str = parameter(
+        TEXT, "file of a picture on its front, which looks along its own x", ""
+    )
 
     @override
     def shape(self, path: Path | None) -> Box:
-        return Box(extent=self.size, yaw=self.yaw, **self._common(path))
+        return Box(extent=self.size, yaw=self.yaw, picture=self.picture, **self._common(path))
 
 
 class CylinderParameters(_ObjectParameters):
@@ -245,7 +250,19 @@ def _object(entry: Entry) -> Shape:
     parameters = entry.read(OBJECTS[kind], besides=("type", "path"))
     if (parameters.centre is None) == (path is None):
         raise entry.error("has a centre and a path, or none of them; expected one of them")
-    return parameters.shape(path)
+    return _with_picture(parameters.shape(path), entry)
+
+
+def _with_picture(shape: Shape, entry: Entry) -> Shape:
+    # Its name is relative to the file in which it stands.
+    if not isinstance(shape, Box) or not shape.picture:
+        return shape
+    picture = entry.file.parent / shape.picture
+    if not picture.is_file():
+        raise entry["picture"].error(
+            f"is {shape.picture!r}; expected a file, and {picture} is none"
+        )
+    return replace(shape, picture=str(picture))
 
 
 def _path(entry: Entry) -> Path:

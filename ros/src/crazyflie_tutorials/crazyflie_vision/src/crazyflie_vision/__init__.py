@@ -1,0 +1,1 @@
+"""Seeing: a simulated camera and a webcam, image filters, trackers, and following."""

@@ -1,0 +1,121 @@
+"""A camera without distortion: its numbers, and how directions become pixels.
+
+Pixels are counted from the middle of the one at the upper left, x to the right and y down. The
+optical frame of a camera looks along z, with x to the right and y down (REP 103).
+"""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from crazyflie_utils import Parameters, parameter, yaml_file
+from crazyflie_utils.parameter_types import DURATION, METRES, Integer, Number
+from crazyflie_utils.parameters import group
+
+OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Takes the optical frame of a camera that looks ahead to forward, left, up."""
+
+
+class MountParameters(Parameters):
+    """Where a camera sits on a vehicle."""
+
+    x: float = parameter(METRES, "ahead of the vehicle's middle", 0.03)
+    y: float = parameter(METRES, "to the left of it", 0.0)
+    z: float = parameter(METRES, "above it", 0.01)
+    pitch: float = parameter(
+        Number("deg", minimum=-90.0, maximum=90.0), "how far it looks down", 0.0
+    )
+    yaw: float = parameter(
+        Number("deg", minimum=-180.0, maximum=180.0), "how far it looks to the left", 0.0
+    )
+
+
+class CameraParameters(Parameters):
+    """What a camera's YAML file holds."""
+
+    width: int = parameter(Integer(16, 4096), "columns of the image", 320)
+    height: int = parameter(Integer(16, 4096), "rows of the image", 240)
+    fov: float = parameter(
+        Number("deg", minimum=10.0, maximum=150.0), "between the left and the right edge", 75.0
+    )
+    rate: float = parameter(Number("Hz", above=0.0, maximum=200.0), "images a second", 30.0)
+    noise: float = parameter(
+        Number(minimum=0.0, maximum=100.0),
+        "standard deviation of each of a pixel's values, which are from 0 to 255",
+        2.0,
+    )
+    latency: float = parameter(DURATION, "from the exposure to the message", 0.03)
+    mount: MountParameters = group(MountParameters, "mount")
+
+
+def load(path: str | Path) -> CameraParameters:
+    """Return what a camera's YAML file holds.
+
+    Raises
+    ------
+    ParameterError
+        About everything wrong with it: file, line and what was expected.
+    """
+    return yaml_file.load(path).read(CameraParameters)
+
+
+@dataclass(frozen=True)
+class Pinhole:
+    """The projection x = f X / Z + cx, y = f Y / Z + cy of the optical frame's X, Y, Z.
+
+    Attributes
+    ----------
+    width, height : int
+        Of the image, pixels.
+    focal_length : float
+        f, pixels.
+    """
+
+    width: int
+    height: int
+    focal_length: float
+
+    @classmethod
+    def with_fov(cls, width: int, height: int, fov: float) -> "Pinhole":
+        """Return the one that sees ``fov`` (deg) from the left to the right edge of its image."""
+        return cls(width, height, 0.5 * width / math.tan(math.radians(fov) / 2.0))
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Where the optical axis is in the image: cx, cy."""
+        return (self.width - 1) / 2.0, (self.height - 1) / 2.0
+
+    @property
+    def matrix(self) -> NDArray[np.float64]:
+        """K of sensor_msgs/CameraInfo, shape (3, 3)."""
+        f, (cx, cy) = self.focal_length, self.centre
+        return np.array([[f, 0.0, cx], [0.0, f, cy], [0.0, 0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Where a frame is: R and p of x' = R x + p.
+
+    Attributes
+    ----------
+    rotation : ndarray, shape (3, 3)
+    position : ndarray, shape (3,)
+        m.
+    """
+
+    rotation: NDArray[np.float64]
+    position: NDArray[np.float64]
+
+    def __matmul__(self, inner: "Pose") -> "Pose":
+        """Return the pose of a frame that has the pose ``inner`` in this one."""
+        return Pose(self.rotation @ inner.rotation, self.rotation @ inner.position + self.position)
+
+
+def optical_pose(mount: MountParameters) -> Pose:
+    """Return where the optical frame of a mounted camera is in the vehicle's frame."""
+    turned = Rotation.from_euler("ZY", [mount.yaw, mount.pitch], degrees=True).as_matrix()
+    return Pose(turned @ OPTICAL, np.array([mount.x, mount.y, mount.z]))

@@ -1,0 +1,139 @@
+"""ROS interface of following: a target in, cmd_vel out."""
+
+import math
+
+from geometry_msgs.msg import PointStamped, Twist, Vector3
+from sensor_msgs.msg import CameraInfo
+from typing_extensions import override
+
+from crazyflie_teleop.velocity_reference import Velocity
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameters import group
+from crazyflie_vision.follow import Follower
+from crazyflie_vision.target import Target
+
+_LENGTH = Number("m", above=0.0)
+_GAIN = Number("1/s", minimum=0.0)
+_SPEED = Number("m/s", minimum=0.0)
+
+
+class GainParameters(Parameters):
+    """How fast errors are to vanish."""
+
+    forward: float = parameter(
+        _GAIN, "velocity ahead over what is missing in distance", 1.5, live=True
+    )
+    up: float = parameter(_GAIN, "velocity upwards over what is missing in height", 1.5, live=True)
+    turn: float = parameter(_GAIN, "yaw rate over the angle to the target", 2.5, live=True)
+
+
+class SpeedParameters(Parameters):
+    """What is not exceeded."""
+
+    forward: float = parameter(_SPEED, "ahead, and back", 0.5, live=True)
+    up: float = parameter(_SPEED, "upwards, and down", 0.3, live=True)
+    turn: float = parameter(Number("rad/s", minimum=0.0), "to either side", 1.0, live=True)
+
+
+class FollowParameters(Parameters):
+    """Parameters of `FollowNode`."""
+
+    distance: float = parameter(_LENGTH, "to be kept to the target", 1.0, live=True)
+    radius: float = parameter(_LENGTH, "of the target; half the width of a face", 0.12, live=True)
+    gains: GainParameters = group(GainParameters, "gains")
+    limits: SpeedParameters = group(SpeedParameters, "limits")
+    silence: float = parameter(
+        TIME_STEP, "after so long without a target the vehicle stops", 0.12, live=True
+    )
+    time_step: float = parameter(TIME_STEP, "between two velocities", 0.02)
+    target_topic: str = parameter(
+        TOPIC, "what is seen: x, y and, as z, radius in pixels", "target", name="topics/target"
+    )
+    info_topic: str = parameter(
+        TOPIC, "what the camera is", "camera/camera_info", name="topics/info"
+    )
+    cmd_vel_topic: str = parameter(
+        TOPIC, "velocities in the heading frame", "cmd_vel", name="topics/cmd_vel"
+    )
+
+    def follower(self) -> Follower:
+        """Return the controller."""
+        return Follower(
+            self.distance,
+            self.radius,
+            self.gains.forward,
+            self.gains.up,
+            self.gains.turn,
+            self.limits.forward,
+            self.limits.up,
+            self.limits.turn,
+        )
+
+
+class FollowNode(Node):
+    """Publish the velocity that keeps a target in the middle and at a distance.
+
+    Without a target it is zero.
+    """
+
+    needed_in_flight = True
+
+    def __init__(self) -> None:
+        self._velocity = Velocity()
+        self._seen_at = -math.inf
+        self._focal_length = 0.0
+        self._centre = (0.0, 0.0)
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._reconfigure(handle.load(FollowParameters, self._reconfigure))
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._publisher = handle.publisher(parameters.cmd_vel_topic, Twist)
+        handle.subscribe(parameters.info_topic, CameraInfo, self._on_info)
+        handle.subscribe(parameters.target_topic, PointStamped, self._on_target, finite="point")
+        handle.timer(parameters.time_step, self._on_timer)
+
+    @override
+    def make_safe(self) -> None:
+        """Stop the vehicle."""
+        self._seen_at = -math.inf
+        self._publisher.publish(Twist())
+
+    def _reconfigure(self, parameters):
+        self._parameters = parameters
+        self._follower = parameters.follower()
+
+    def _on_info(self, message):
+        focal_length, _, cx, _, _, cy, *_ = message.K
+        if not all(map(math.isfinite, (focal_length, cx, cy))) or focal_length <= 0.0:
+            self._handle.warn(
+                f"ignoring a camera of focal length {focal_length:g}; expected > 0 (pixels)",
+                throttle=5.0,
+            )
+            return
+        self._focal_length, self._centre = focal_length, (cx, cy)
+
+    def _on_target(self, message):
+        point = message.point
+        if point.z <= 0.0:
+            self._handle.warn(
+                f"ignoring a target of radius {point.z:g}; expected > 0 (pixels)", throttle=5.0
+            )
+            return
+        if self._focal_length == 0.0:
+            topic = self._handle.resolve(self._parameters.info_topic)
+            self._handle.warn(f"there is a target, but nothing on {topic}", throttle=5.0)
+            return
+        target = Target(point.x, point.y, point.z)
+        self._velocity = self._follower.velocity(target, self._focal_length, self._centre)
+        self._seen_at = self._handle.time()
+
+    def _on_timer(self):
+        if self._handle.time() - self._seen_at >= self._parameters.silence:
+            self._velocity = Velocity()
+        linear = Vector3(self._velocity.x, self._velocity.y, self._velocity.z)
+        self._publisher.publish(Twist(linear, Vector3(z=self._velocity.yaw_dot)))

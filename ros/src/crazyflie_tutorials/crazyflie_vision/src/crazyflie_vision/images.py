@@ -1,0 +1,50 @@
+"""Images between messages and OpenCV."""
+
+import cv2
+import numpy as np
+from cv_bridge import CvBridge, CvBridgeError
+from numpy.typing import NDArray
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+from crazyflie_vision.camera import Pinhole
+
+COLOUR = "bgr8"
+GREY = "mono8"
+
+_BRIDGE = CvBridge()
+
+
+def to_array(message: Image) -> NDArray[np.uint8]:
+    """Return what an image shows, shape (height, width, 3): blue, green, red.
+
+    Raises
+    ------
+    ValueError
+        It has an encoding that has no such meaning, or too little data.
+    """
+    what = f"an image of {message.width} x {message.height}, {message.encoding!r}"
+    if message.width == 0 or message.height == 0:
+        raise ValueError(f"{what}: it is empty")
+    try:
+        return _BRIDGE.imgmsg_to_cv2(message, COLOUR)
+    except (CvBridgeError, TypeError, cv2.error) as error:
+        raise ValueError(f"{what}: {error}") from None
+
+
+def to_message(image: NDArray[np.uint8], header: Header) -> Image:
+    """Return a message with an image, grey if its shape is (height, width), and a header."""
+    encoding = GREY if image.ndim == 2 else COLOUR
+    return _BRIDGE.cv2_to_imgmsg(np.ascontiguousarray(image), encoding, header)
+
+
+def camera_info(camera: Pinhole, header: Header) -> CameraInfo:
+    """Return what others have to know of a camera; without distortion."""
+    k = camera.matrix
+    message = CameraInfo(header=header, width=camera.width, height=camera.height)
+    message.distortion_model = "plumb_bob"
+    message.D = [0.0] * 5
+    message.K = k.ravel().tolist()
+    message.R = np.eye(3).ravel().tolist()
+    message.P = np.hstack([k, np.zeros((3, 1))]).ravel().tolist()
+    return message

@@ -1,0 +1,212 @@
+"""What a camera sees of a world.
+
+Everything is drawn into a buffer that knows how near each pixel is (Catmull, A Subdivision
+Algorithm for Computer Display of Curved Surfaces, 1974). It holds the inverse of the depth,
+which on a plane is linear in the pixel's coordinates.
+"""
+
+import math
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+
+from crazyflie_vision.camera import Pinhole, Pose
+from crazyflie_vision.faces import (
+    AMBIENT,
+    LIGHT,
+    Face,
+    Image,
+    bgr,
+    face_of,
+    faces_of,
+)
+from crazyflie_world.shapes import Ball, Shape
+from crazyflie_world.world import World
+
+NEAR = 0.02
+"""What is nearer to the camera's plane is not seen, m."""
+
+SKY = (225.0, 215.0, 205.0)
+"""Blue, green, red of where nothing is."""
+
+_SUBPIXEL_BITS = 4
+
+
+class Renderer:
+    """Draws images of a world whose objects may move.
+
+    Parameters
+    ----------
+    camera : Pinhole
+    world : World
+        What has no path is prepared once.
+
+    Raises
+    ------
+    OSError
+        A picture of a box cannot be read.
+    """
+
+    def __init__(self, camera: Pinhole, world: World):
+        self._camera = camera
+        cx, cy = camera.centre
+        self._x = ((np.arange(camera.width) - cx) / camera.focal_length).astype(np.float32)
+        self._y = ((np.arange(camera.height) - cy) / camera.focal_length).astype(np.float32)[
+            :, None
+        ]
+        self._floor = face_of(world.floor)
+        self._still = [each for each in world.objects if each.path is None]
+        self._still_faces = [face for each in self._still for face in faces_of(each)]
+        for each in world.moving:
+            # Its pictures are kept, or complained about, now.
+            faces_of(each)
+
+    def render(self, pose: Pose, moving: Iterable[Shape] = ()) -> Image:
+        """Return what is seen.
+
+        Parameters
+        ----------
+        pose : Pose
+            Of the optical frame in the world.
+        moving : iterable of Shape
+            The objects that move, where they are now.
+
+        Returns
+        -------
+        ndarray of uint8, shape (height, width, 3)
+            Blue, green, red.
+        """
+        camera = self._camera
+        self._image = np.full((camera.height, camera.width, 3), SKY, dtype=np.uint8)
+        self._inverse_depth = np.zeros((camera.height, camera.width), dtype=np.float32)
+        moving = tuple(moving)
+        for shape in (*self._still, *moving):
+            if isinstance(shape, Ball):
+                self._draw_ball(shape, pose)
+        for face in (*self._still_faces, *(face for each in moving for face in faces_of(each))):
+            self._draw_face(face, pose)
+        self._draw_face(self._floor, pose)
+        return self._image
+
+    def _draw_face(self, face: Face, pose: Pose) -> None:
+        if face.normal @ (pose.position - face.corners[0]) < 1e-6:
+            return
+        corners = (face.corners - pose.position) @ pose.rotation
+        seen = _clipped(corners)
+        if len(seen) < 3:
+            return
+        camera = self._camera
+        pixels = camera.focal_length * seen[:, :2] / seen[:, 2:] + camera.centre
+        patch = self._patch(*pixels.min(axis=0), *pixels.max(axis=0))
+        if patch is None:
+            return
+        rows, columns = patch
+        corner = (columns.start, rows.start)
+        mask = np.zeros((rows.stop - rows.start, columns.stop - columns.start), dtype=np.uint8)
+        points = np.round((pixels - corner) * 2**_SUBPIXEL_BITS).astype(np.int32)
+        cv2.fillConvexPoly(mask, points, 1, shift=_SUBPIXEL_BITS)
+        a, b, c = (pose.rotation.T @ face.normal) / (
+            face.normal @ (face.corners[0] - pose.position)
+        )
+        inverse_depth = np.float32(a) * self._x[columns] + (
+            np.float32(b) * self._y[rows] + np.float32(c)
+        )
+        # Pixels on the rim lie a little beyond the face.
+        nearest, furthest = seen[:, 2].min(), seen[:, 2].max()
+        np.clip(inverse_depth, 1.0 / furthest, 1.0 / nearest, out=inverse_depth)
+        colours = face.shade * face.colour
+        if face.texture is not None:
+            colours = self._warped(face, corners, corner, mask.shape)
+        self._put(patch, mask.view(bool), inverse_depth, colours)
+
+    def _warped(self, face, corners, corner, shape):
+        # From texels to the plane, to the optical frame, to pixels of the patch.
+        rows, columns = face.texture.shape[:2]
+        lower_left, _, upper_right, upper_left = corners
+        plane = np.stack(
+            [
+                (upper_right - upper_left) / columns,
+                (lower_left - upper_left) / rows,
+                upper_left,
+            ],
+            axis=1,
+        )
+        matrix = self._camera.matrix.copy()
+        matrix[:2, 2] -= corner
+        warped = cv2.warpPerspective(
+            face.texture, matrix @ plane, shape[::-1], borderMode=cv2.BORDER_REPLICATE
+        )
+        return cv2.convertScaleAbs(warped, alpha=face.shade)
+
+    def _draw_ball(self, ball: Ball, pose: Pose) -> None:
+        centre = (np.array(ball.centre) - pose.position) @ pose.rotation
+        x, y, z = centre
+        camera = self._camera
+        if np.linalg.norm(centre) <= ball.radius + NEAR or z < -ball.radius:
+            return
+        columns = _silhouette(x, z, ball.radius, camera.focal_length, camera.centre[0])
+        rows = _silhouette(y, z, ball.radius, camera.focal_length, camera.centre[1])
+        patch = self._patch(columns[0], rows[0], columns[1], rows[1])
+        if patch is None:
+            return
+        # |t d - c|^2 = r^2 with d = (x, y, 1), so that t is the depth.
+        dx, dy = self._x[patch[1]], self._y[patch[0]]
+        x, y, z, radius = (np.float32(value) for value in (x, y, z, ball.radius))
+        a = dx * dx + (dy * dy + np.float32(1.0))
+        b = dx * x + (dy * y + z)
+        discriminant = b * b - a * (x * x + y * y + z * z - radius * radius)
+        depth = (b - np.sqrt(np.maximum(discriminant, 0.0))) / a
+        mask = (discriminant > 0.0) & (depth > NEAR)
+        lx, ly, lz = (LIGHT @ pose.rotation / ball.radius).astype(np.float32)
+        cosine = depth * (dx * lx + (dy * ly + lz)) - np.float32(lx * x + ly * y + lz * z)
+        light = np.float32(AMBIENT) + np.float32(1.0 - AMBIENT) * np.maximum(cosine, 0.0)
+        colours = np.minimum(light[..., None] * bgr(ball.colour).astype(np.float32), 255.0)
+        self._put(patch, mask, 1.0 / np.maximum(depth, np.float32(NEAR)), colours.astype(np.uint8))
+
+    def _patch(self, left, top, right, bottom):
+        # Rows and columns of the image within limits; None for none.
+        columns, rows = (
+            slice(math.floor(max(first, 0.0)), math.ceil(min(last + 1.0, count)))
+            for first, last, count in (
+                (left, right, self._camera.width),
+                (top, bottom, self._camera.height),
+            )
+        )
+        if columns.start >= columns.stop or rows.start >= rows.stop:
+            return None
+        return rows, columns
+
+    def _put(self, patch, mask, inverse_depth, colours):
+        held = self._inverse_depth[patch]
+        nearer = mask & (inverse_depth > held)
+        np.copyto(held, inverse_depth, where=nearer)
+        if colours.ndim == 1:
+            self._image[patch][nearer] = colours.astype(np.uint8)
+        else:
+            cv2.copyTo(colours, nearer.view(np.uint8), self._image[patch])
+
+
+def _clipped(corners):
+    # The part of a convex polygon beyond the near plane (Sutherland and Hodgman, 1974).
+    if np.all(corners[:, 2] >= NEAR):
+        return corners
+    kept = []
+    for begin, end in zip(np.roll(corners, 1, axis=0), corners, strict=False):
+        share = begin[2] - NEAR, end[2] - NEAR
+        if (share[0] >= 0.0) != (share[1] >= 0.0):
+            kept.append(begin + (end - begin) * share[0] / (share[0] - share[1]))
+        if share[1] >= 0.0:
+            kept.append(end)
+    return np.array(kept).reshape(-1, 3)
+
+
+def _silhouette(offset, depth, radius, focal_length, centre):
+    # First and last pixel of a ball along one axis of the image, from its tangents.
+    distance = math.hypot(offset, depth)
+    if distance <= radius:
+        return -math.inf, math.inf
+    middle, half = math.atan2(offset, depth), math.asin(radius / distance)
+    limit = 0.5 * math.pi - 1e-3
+    angles = (min(max(angle, -limit), limit) for angle in (middle - half, middle + half))
+    return tuple(centre + focal_length * math.tan(angle) for angle in angles)

@@ -64,8 +64,9 @@ def test_what_is_in_a_world(tmp_path):
     bench = Bench(multiranger=True, world=str(file))
     bench.take_off(1.0)
     ranging = bench.firmware.ranging
-    assert ranging.front == pytest.approx(1000, abs=30)
-    assert ranging.zrange == pytest.approx(1000, abs=30)
+    x, _, height = bench.physics.position
+    assert ranging.front == pytest.approx(1000.0 * (1.0 - x), abs=20)
+    assert ranging.zrange == pytest.approx(1000.0 * height, abs=20)
     assert (ranging.back, ranging.left, ranging.right, ranging.up) == (NOTHING,) * 4
 
 

@@ -203,7 +203,7 @@ def _between(origins, directions, half):
     with np.errstate(all="ignore"):
         one, other = (-half - origins) / directions, (half - origins) / directions
     along = directions == 0.0
-    outside = along & (np.abs(origins) > half)
+    outside = along & (np.abs(origins) >= half)
     enter = np.where(along, -np.inf, np.minimum(one, other))
     leave = np.where(along, np.inf, np.maximum(one, other))
     return np.where(outside, np.inf, enter).max(axis=-1), leave.min(axis=-1)

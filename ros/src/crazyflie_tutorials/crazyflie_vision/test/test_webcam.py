@@ -124,6 +124,7 @@ def test_the_basics_with_a_webcam_need_no_vehicle(composed):
         CONFIG.parent / "launch" / "basics.launch", webcam="0", composed=composed
     )
     assert parameters["/camera/device"] == "0"
-    assert "/simulator" not in nodes
+    assert not {"/simulator", "/visualizer"} & set(nodes)
+    assert "basics.rviz" in nodes["/rviz"].args
     assert ("/composed" in nodes) == (composed == "true")
     assert ("/camera" in nodes) == (composed == "false")

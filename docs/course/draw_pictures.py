@@ -34,7 +34,9 @@ COLOURS = 64
 
 
 def operate() -> FlightOperator:
-    """Return an operator of what was launched."""
+    """Return an operator of what was launched, as soon as it can take off."""
+    # Before, nobody has told yet whether time is simulated.
+    wait_for_service("/takeoff")
     operator = FlightOperator(runner.begin("draw_pictures"))
     operator.wait_until_ready()
     return operator
@@ -63,14 +65,13 @@ def draw_figure_eight(path: Path, log: Path) -> None:
     times = record.state.times
     flying = (times >= record.events["flying"]) & (times <= record.events["land"])
     x, y = record.state.column("x")[flying], record.state.column("y")[flying]
-    figure = Figure(figsize=(5, 4), layout="constrained")
+    figure = Figure(figsize=(5, 3), layout="constrained")
     axes = figure.subplots()
     axes.plot(y, x)
-    axes.plot(y[0], x[0], "o", label="begin, along x")
+    axes.plot(y[0], x[0], "o")
     axes.invert_xaxis()
     axes.set(xlabel="y (m)", ylabel="x (m)", aspect="equal")
     axes.grid(alpha=0.3)
-    axes.legend(loc="upper left")
     figure.savefig(path, dpi=90)
 
 
@@ -148,7 +149,6 @@ def draw_sweep(path: Path, log: Path) -> None:
     package = COURSE.parents[1] / "ros/src/crazyflie_tutorials/crazyflie_mission"
 
     def fly():
-        wait_for_service("/sweep/start")
         operator = operate()
         operator.hover(35.0)
         time.sleep(3.0)
@@ -162,9 +162,8 @@ def draw_pole(path: Path, log: Path) -> None:
     """Draw the circle around the pole."""
 
     def fly():
-        wait_for_service("/takeoff")
+        operator = operate()
         with running("rosrun", "pole", "pole_node"):
-            operator = operate()
             operator.hover(25.0)
             time.sleep(5.0)
             return operator

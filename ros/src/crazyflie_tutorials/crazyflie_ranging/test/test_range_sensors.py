@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospkg
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from crazyflie_model.angles import quaternion_from_rpy, rotate
@@ -170,3 +170,23 @@ def test_noise(write):
     readings = [ranger.measure(WORLD, (1.0, 0, 1), (0, 0, 0, 1))[0] for _ in range(500)]
     assert np.mean(readings) == pytest.approx(1.0, abs=0.005)
     assert np.std(readings) == pytest.approx(0.02, rel=0.15)
+
+
+ODD = st.sampled_from(
+    ["null", "[]", "{}", "-1", ".nan", "1e999", "x", "true", "2026-13-45", "&a", "*a", "!!set"]
+)
+
+
+@settings(
+    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.data())
+def test_any_value_anywhere_is_taken_or_refused(write, data):
+    pieces = re.split(r"([\w.]+)", GOOD)
+    place = data.draw(st.integers(0, len(pieces) // 2 - 1)) * 2 + 1
+    pieces[place] = data.draw(ODD)
+    file = write("".join(pieces))
+    try:
+        range_sensors.load(file)
+    except ParameterError as error:
+        assert str(file) in str(error)

@@ -7,7 +7,7 @@ from following import fly
 
 @pytest.fixture(scope="module")
 def flight():
-    return fly("face", begin=3.0, end=11.0)
+    return fly("face", begin=3.0, end=8.0)
 
 
 def test_the_face_stays_in_the_middle_of_the_image(flight):
@@ -22,7 +22,7 @@ def test_the_vehicle_keeps_its_distance(flight):
 
 
 def test_it_had_to_fly_for_that(flight):
-    assert np.ptp(flight.path, axis=0).max() > 0.2
+    assert np.ptp(flight.path, axis=0).max() > 0.1
 
 
 def test_lands_though_the_face_moves_on(flight):

@@ -1,9 +1,12 @@
 """World files: what is in them, and what is said about bad ones."""
 
+import re
 from pathlib import Path
 
 import pytest
 import rospkg
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from crazyflie_utils import ParameterError
 from crazyflie_world import world_file
@@ -126,3 +129,23 @@ def test_no_world_at_all(write, text):
 def test_a_missing_file():
     with pytest.raises(ParameterError, match=r"^/nowhere/room\.yaml: cannot be read"):
         world_file.load("/nowhere/room.yaml")
+
+
+ODD = st.sampled_from(
+    ["null", "[]", "{}", "-1", ".nan", "1e999", "x", "true", "2026-13-45", "&a", "*a", "!!set"]
+)
+
+
+@settings(
+    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.data())
+def test_any_value_anywhere_is_taken_or_refused(write, data):
+    pieces = re.split(r"([\w.]+)", GOOD)
+    place = data.draw(st.integers(0, len(pieces) // 2 - 1)) * 2 + 1
+    pieces[place] = data.draw(ODD)
+    file = write("".join(pieces))
+    try:
+        world_file.load(file)
+    except ParameterError as error:
+        assert str(file) in str(error)

@@ -160,9 +160,12 @@ def follow_object(path: Path) -> None:
     top.set_ylabel("x, m")
     top.legend(loc="upper right", fontsize=8)
     bottom.plot(time, [each.ranges["front"] for each in moments], color=VEHICLE)
-    for distance, text in ((0.6, "follows beyond"), (0.3, "backs off below")):
+    for distance, text, at, side in (
+        (0.6, "follows beyond", time[-1], "right"),
+        (0.3, "backs off below", 0.0, "left"),
+    ):
         bottom.axhline(distance, color=GREY, ls="--", lw=0.8)
-        bottom.text(0.0, distance + 0.01, text, fontsize=8, color=GREY)
+        bottom.text(at, distance + 0.01, text, fontsize=8, color=GREY, ha=side)
     bottom.set_ylim(0.0, 0.9)
     bottom.set_ylabel("sensor in front, m")
     figure.savefig(path, dpi=110)

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from functools import partial
 
+import genpy
 import numpy as np
 from geometry_msgs.msg import TransformStamped
 from typing_extensions import override
@@ -36,6 +37,9 @@ class SimulatedRangerParameters(Parameters):
 
 class SimulatedRangerNode(Node):
     """Measure distances to what is in a world, where /tf says that the vehicle is."""
+
+    def __init__(self) -> None:
+        self._stamps: dict[int, genpy.Time] = {}
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -75,6 +79,10 @@ class SimulatedRangerNode(Node):
         except TransformError as error:
             self._handle.warn(f"no ranges: {error}", throttle=5.0)
             return
+        # What rests on a pose is said once.
+        if self._stamps.get(numbers[0]) == robot.header.stamp:
+            return
+        self._stamps[numbers[0]] = robot.header.stamp
         rotation = robot.transform.rotation
         readings = ranger.measure(
             world.placed(centres),

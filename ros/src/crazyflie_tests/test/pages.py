@@ -6,7 +6,11 @@ from pathlib import Path
 
 from workspaces import TOP
 
-PAGES = [TOP / "README.md", *sorted((TOP / "docs").glob("*.md"))]
+PAGES = [
+    TOP / "README.md",
+    *sorted((TOP / "docs").glob("*.md")),
+    *sorted((TOP / "docs" / "course").glob("*.md")),
+]
 """The pages whose commands are run."""
 
 PACKAGE_PAGES = sorted((TOP / "ros").glob("src/**/README.md")) + [

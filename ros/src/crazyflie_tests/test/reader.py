@@ -1,5 +1,6 @@
 """Somebody who does what a page of the manual says."""
 
+import re
 import subprocess
 import time
 from pathlib import Path
@@ -11,6 +12,27 @@ from workspaces import BUILD_LIMIT, clean_environment
 
 START_LIMIT = 120.0
 """The longest that anything may take to appear, s."""
+
+_PRINTS = "it prints "
+_COLOURS = re.compile(r"\x1b\[[0-9;]*m")
+
+
+def lines_of(text: str) -> list[str]:
+    """Return the lines of a text as one sees them: no colours, no empty lines."""
+    lines = [line.rstrip() for line in _COLOURS.sub("", text).replace("\r", "").split("\n")]
+    return [line for line in lines if line]
+
+
+def is_printed(excerpt: str, output: str) -> bool:
+    """Tell whether lines stand together in an output.
+
+    A line "..." stands for any lines, "..." in a line for any part of it.
+    """
+    pattern = "^"
+    for line in lines_of(excerpt):
+        part = ".*".join(map(re.escape, line.split("...")))
+        pattern += "(?:.*\n)*?" if line == "..." else f"{part}\n"
+    return re.search(pattern, "\n".join([*lines_of(output), ""]), re.MULTILINE) is not None
 
 
 class Reader:
@@ -29,6 +51,7 @@ class Reader:
         self._opening: str | None = None
         self._terminals: list[Terminal] = []
         self._applied: list[str] = []
+        self._printed = ""
 
     def follow(self, page: Page) -> None:
         """Do all that the page says, and end what goes on then."""
@@ -37,6 +60,8 @@ class Reader:
                 self._type(part.commands, part.comment.partition("until ")[2])
             elif isinstance(part, Block) and part.comment == "apply":
                 self._apply(part.text)
+            elif isinstance(part, Block) and part.comment == "prints":
+                assert is_printed(part.text, self._printed), f"{part.text}\n\n{self._printed}"
             elif part == "end":
                 self.end()
             elif isinstance(part, str) and part.startswith("every shell: "):
@@ -73,10 +98,16 @@ class Reader:
 
     def _type(self, commands, awaited):
         terminal = next((t for t in self._terminals if not t.is_busy), None) or self._open()
+        self._printed = ""
         for command in commands[:-1] if awaited else commands:
-            terminal.run(command, BUILD_LIMIT)
-        if awaited:
-            terminal.start(commands[-1])
+            self._printed += _below_the_command(terminal.run(command, BUILD_LIMIT))
+        if not awaited:
+            return
+        terminal.start(commands[-1])
+        if awaited.startswith(_PRINTS):
+            self._wait_for_text(awaited.removeprefix(_PRINTS), terminal)
+            terminal.interrupt()
+        else:
             self._wait_for(awaited, terminal)
 
     def _open(self):
@@ -92,9 +123,21 @@ class Reader:
             assert time.monotonic() < end, f"there is no {name}\n{terminal.output}"
             terminal.read(0.2)
 
+    def _wait_for_text(self, text, terminal):
+        end = time.monotonic() + START_LIMIT
+        while text not in _below_the_command(terminal.output):
+            assert terminal.is_busy, f"it has ended\n{terminal.output}"
+            assert time.monotonic() < end, f"it does not print {text!r}\n{terminal.output}"
+            terminal.read(0.2)
+        self._printed = _below_the_command(terminal.output)
+
     def _has(self, name):
         master = rosgraph.Master("/reader", self._environment["ROS_MASTER_URI"])
         if not master.is_online():
             return False
         published, _, services = master.getSystemState()
         return name in {name for name, _ in published + services}
+
+
+def _below_the_command(output):
+    return output.partition("\n")[2]

@@ -1,6 +1,7 @@
 """The commands of the manual do what the manual says, typed as they stand into terminals."""
 
 import re
+import threading
 from concurrent.futures import ThreadPoolExecutor, wait
 
 import pytest
@@ -15,11 +16,16 @@ PAGES_WITH_COMMANDS = [
 ]
 
 
-def calls_run(page):
-    """Tell whether a page calls the script ``run``, which builds the workspace where it must."""
+def types(page, text):
+    """Tell whether a text is among what is typed when a page is followed."""
     typed = [part for part in page.parts if isinstance(part, str)]
     typed += [block.text for block in page.blocks if block.comment.startswith("run")]
-    return any("./run " in text for text in typed)
+    return any(text in part for part in typed)
+
+
+def calls_run(page):
+    """Tell whether a page calls the script ``run``, which builds the workspace where it must."""
+    return types(page, "./run ")
 
 
 def length(path):
@@ -40,15 +46,28 @@ def in_turns():
 AT_A_TIME = 2
 """So many pages are followed at a time: flights and calls mostly wait."""
 
+VIRTUAL_VEHICLE = "virtual_"
+"""What pages type that launch it. Its ports can be used by one of them at a time."""
+
 
 @pytest.fixture(scope="module")
 def followed(workspace, tmp_path_factory):
     """Return the pages, each with a future that is done when it has been followed."""
 
+    ports = threading.Lock()
+
     def follow(path):
+        page = Page(path)
+        if types(page, VIRTUAL_VEHICLE):
+            with ports:
+                read(page)
+        else:
+            read(page)
+
+    def read(page):
         reader = Reader(workspace, tmp_path_factory.mktemp("home"))
         try:
-            reader.follow(Page(path))
+            reader.follow(page)
         finally:
             reader.close()
 
@@ -66,7 +85,7 @@ def test_commands_of_the_installation(workspace):
         assert (workspace / "ros" / space / "setup.bash").is_file()
 
 
-@pytest.mark.parametrize("path", PAGES_WITH_COMMANDS, ids=lambda path: path.name)
+@pytest.mark.parametrize("path", PAGES_WITH_COMMANDS, ids=lambda path: str(path.relative_to(TOP)))
 def test_commands_of_a_page(path, followed):
     followed[path].result()
 

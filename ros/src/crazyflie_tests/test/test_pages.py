@@ -11,7 +11,7 @@ from workspaces import TOP
 COMMANDS = {"./run", "apt", "catkin_make", "git", "pip", "python3", "source", "sudo"}
 ROS_COMMAND = re.compile(r"ros(launch|run|service|topic|param|node|msg|bag|test|pack|core)")
 CODE_SPAN = re.compile(r"`([^`]+)`")
-RUN = re.compile("run$|run: until /[a-z_/]+$")
+RUN = re.compile("run$|run: until /[a-z0-9_/]+$|run: until it prints .+$")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 
 
@@ -136,11 +136,11 @@ def test_links_lead_somewhere(path):
 @named(PAGES)
 def test_comments_are_understood(path):
     page = Page(path)
-    known = f"{RUN.pattern}|end$|apply$|every shell: |from: |arguments of: "
+    known = f"{RUN.pattern}|prints$|end$|apply$|every shell: |from: |arguments of: "
     for part in page.parts:
         assert not isinstance(part, str) or re.match(known, part), part
     for comment, follower in zip(page.parts, page.parts[1:], strict=False):
-        if isinstance(comment, str) and comment.startswith(("run", "from: ")):
+        if isinstance(comment, str) and comment.startswith(("run", "prints", "from: ")):
             assert isinstance(follower, Block), f"{comment}: there is no block below"
             assert follower.comment == comment
 
@@ -181,6 +181,8 @@ def test_every_package_is_named(path):
     assert re.search(rf"^ +{path.rpartition('/')[2]}\b", tree, re.MULTILINE)
 
 
-def test_every_page_is_in_the_table_of_contents():
-    contents = LINK.findall((TOP / "docs" / "README.md").read_text())
-    assert {path.name for path in PAGES} - {"README.md"} <= set(contents)
+@pytest.mark.parametrize("folder", ["docs", "docs/course"])
+def test_every_page_is_in_the_table_of_contents(folder):
+    contents = LINK.findall((TOP / folder / "README.md").read_text())
+    pages = {path.name for path in PAGES if path.parent == TOP / folder}
+    assert pages - {"README.md"} <= set(contents)

@@ -1,4 +1,4 @@
-"""Draws the nodes and topics of the running software example.
+"""Draws the nodes and topics of the software example, or of what runs.
 
 Nodes are ovals, topics boxes; an arrow is a registration of a publisher or subscriber with the
 master.
@@ -20,6 +20,16 @@ Registrations = list[tuple[str, list[str]]]
 
 HIDDEN_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf_static")
 HIDDEN_NODES = ("/rosout",)
+EXAMPLE = {
+    "/simulator",
+    "/state_estimator",
+    "/lqr_controller",
+    "/takeoff_server",
+    "/takeoff_control_filter",
+    "/robot_base_link_publisher",
+}
+"""Nodes of the software example."""
+
 _LIMIT = 60.0
 
 _QUIET = 2.0
@@ -79,28 +89,41 @@ def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
     raise TimeoutError(f"not all of {sorted(expected)} were running after {_LIMIT:g} s")
 
 
-def main() -> int:
-    """Launch the example, draw it, end it; return the exit status."""
-    parser = argparse.ArgumentParser(prog="run graph", description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("docs/images/sw_hover_graph.svg"))
-    path = parser.parse_args().out.resolve()
-    expected = {
-        "/simulator",
-        "/state_estimator",
-        "/lqr_controller",
-        "/takeoff_server",
-        "/takeoff_control_filter",
-        "/robot_base_link_publisher",
-    }
+def example_graph() -> tuple[Registrations, Registrations]:
+    """Launch the software example, and return its publications and subscriptions.
+
+    Raises
+    ------
+    TimeoutError
+        Not all nodes are there after some time.
+    """
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "sw_hover.log"
         print("launching sw_hover", flush=True)
         with roslaunch(["crazyflie_examples", "sw_hover.launch", "rviz:=false"], log):
             try:
-                graph = dot(*running_graph(expected))
+                return running_graph(EXAMPLE)
             except TimeoutError as error:
-                print(f"{error}\n{log.read_text()}", file=sys.stderr)
-                return 1
+                raise TimeoutError(f"{error}\n{log.read_text()}") from None
+
+
+def main() -> int:
+    """Draw the example, or what runs; return the exit status."""
+    parser = argparse.ArgumentParser(prog="run graph", description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("docs/images/sw_hover_graph.svg"))
+    parser.add_argument(
+        "--running", action="store_true", help="draw what runs; nothing is launched"
+    )
+    arguments = parser.parse_args()
+    path = arguments.out.resolve()
+    if arguments.running and not rosgraph.is_master_online():
+        print(f"no ROS master at {rosgraph.get_master_uri()}: nothing runs", file=sys.stderr)
+        return 1
+    try:
+        graph = dot(*(running_graph(set()) if arguments.running else example_graph()))
+    except TimeoutError as error:
+        print(error, file=sys.stderr)
+        return 1
     subprocess.run(["dot", "-Tsvg", "-o", str(path)], input=graph, text=True, check=True)
     print(f"graph: {path}")
     return 0

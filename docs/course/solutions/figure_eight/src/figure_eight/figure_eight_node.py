@@ -1,0 +1,52 @@
+"""The node: a subscriber that says when to begin, a timer, two publishers."""
+
+from geometry_msgs.msg import Twist
+from std_msgs.msg import String, UInt32
+from typing_extensions import override
+
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameter_types import TIME_STEP, Number
+from figure_eight.figure_eight import FigureEight
+
+
+class FigureEightParameters(Parameters):
+    """Parameters of `FigureEightNode`."""
+
+    time_step: float = parameter(TIME_STEP, "between two velocities", 0.1)
+    radius: float = parameter(Number("m", above=0.0), "of the two circles", 0.5)
+    speed: float = parameter(Number("m/s", above=0.0), "along them", 0.3)
+
+
+class FigureEightNode(Node):
+    """Publish velocities while the vehicle flies, and how many circles are complete."""
+
+    def __init__(self) -> None:
+        self._beginning: float | None = None
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(FigureEightParameters)
+        self._eight = FigureEight(self._parameters.radius, self._parameters.speed)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._velocities = handle.publisher("cmd_vel", Twist)
+        self._circles = handle.publisher("~circles", UInt32, latch=True)
+        handle.subscribe("in_flight_state", String, self._on_flight_state)
+        handle.timer(self._parameters.time_step, self._on_timer)
+
+    def _on_flight_state(self, message):
+        if message.data != "flying":
+            self._beginning = None
+        elif self._beginning is None:
+            self._beginning = self._handle.time()
+
+    def _on_timer(self):
+        if self._beginning is None:
+            return
+        time = self._handle.time() - self._beginning
+        twist = Twist()
+        twist.linear.x = self._eight.speed
+        twist.angular.z = self._eight.yaw_rate(time)
+        self._velocities.publish(twist)
+        self._circles.publish(UInt32(self._eight.circles(time)))

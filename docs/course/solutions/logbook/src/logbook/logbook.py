@@ -1,0 +1,79 @@
+"""The algorithm: a book into which flights are written."""
+
+import math
+from dataclasses import dataclass
+
+from crazyflie_utils.refusal import RefusalError
+
+
+@dataclass
+class FlightEntry:
+    """One flight.
+
+    Attributes
+    ----------
+    number : int
+        The first one is 1.
+    duration : float
+        s.
+    distance : float
+        Length of the way, m.
+    max_height : float
+        m.
+    """
+
+    number: int
+    duration: float = 0.0
+    distance: float = 0.0
+    max_height: float = 0.0
+
+
+class Logbook:
+    """Writes down one flight after the other.
+
+    Attributes
+    ----------
+    flights : list of FlightEntry
+        Those that have ended.
+    """
+
+    def __init__(self) -> None:
+        self.flights: list[FlightEntry] = []
+        self._entry: FlightEntry | None = None
+        self._beginning = 0.0
+        self._last: tuple[float, float, float] | None = None
+
+    def begin(self, time: float) -> None:
+        """Begin a flight at ``time`` (s), unless one goes on."""
+        if self._entry is None:
+            self._entry = FlightEntry(len(self.flights) + 1)
+            self._beginning, self._last = time, None
+
+    def add(self, position: tuple[float, float, float]) -> None:
+        """Take the next position (x, y, z), m, of the flight that goes on."""
+        if self._entry is None:
+            return
+        if self._last is not None:
+            self._entry.distance += math.dist(self._last, position)
+        self._entry.max_height = max(self._entry.max_height, position[2])
+        self._last = position
+
+    def end(self, time: float) -> FlightEntry | None:
+        """End the flight at ``time`` (s); return it, or None if there was none."""
+        entry, self._entry = self._entry, None
+        if entry is not None:
+            entry.duration = time - self._beginning
+            self.flights.append(entry)
+        return entry
+
+    def flight(self, number: int) -> FlightEntry:
+        """Return a flight that has ended.
+
+        Raises
+        ------
+        RefusalError
+            There is none with this number.
+        """
+        if not 1 <= number <= len(self.flights):
+            raise RefusalError(f"there is no flight {number}; {len(self.flights)} have ended")
+        return self.flights[number - 1]

@@ -1,0 +1,46 @@
+"""The node: flight states and states in, flights out."""
+
+from std_msgs.msg import String
+from typing_extensions import override
+
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_utils.refusal import RefusalError
+from logbook.logbook import FlightEntry, Logbook
+from logbook.msg import Flight
+from logbook.srv import GetFlight, GetFlightResponse
+
+
+class LogbookNode(Node):
+    """Publish every flight when it has ended, and tell about former ones by service."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._book = Logbook()
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        self._publisher = handle.publisher("~flight", Flight, latch=True)
+        handle.advertise_service("~get_flight", GetFlight, self._on_get_flight)
+        handle.subscribe("in_flight_state", String, self._on_flight_state)
+        handle.subscribe("state", PositionVelocityYawStateStamped, self._on_state, finite="state")
+
+    def _on_flight_state(self, message):
+        now = self._handle.time()
+        if message.data != "on_ground":
+            self._book.begin(now)
+        elif entry := self._book.end(now):
+            self._publisher.publish(_message(entry))
+
+    def _on_state(self, message):
+        self._book.add((message.state.x, message.state.y, message.state.z))
+
+    def _on_get_flight(self, request):
+        try:
+            return GetFlightResponse(_message(self._book.flight(request.number)))
+        except RefusalError as reason:
+            raise ServiceError(str(reason)) from None
+
+
+def _message(entry: FlightEntry) -> Flight:
+    return Flight(entry.number, entry.duration, entry.distance, entry.max_height)

@@ -1,0 +1,1 @@
+"""A pole that is too near, or not."""

@@ -1,0 +1,1 @@
+"""Another velocity for the sweep mission."""

@@ -46,8 +46,14 @@ def fly(target, begin, end):
         peer.listening("/camera/camera_info", CameraInfo) as infos,
         ready_operator() as operator,
     ):
-        states.next(lambda message: message.data == "flying")
-        operator.hover(end)
+        peer.wait_until(
+            lambda: any(message.data == "flying" for message in states.drain()),
+            "the takeoff",
+            limit=90.0,
+        )
+        for _ in range(round(end)):
+            # In parts, each of which may take its time on a busy machine.
+            operator.hover(1.0)
         operator.land()
         record = operator.finish()
         seen, there, info = _table(targets.drain()), _table(poses.drain()), infos.next()

@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet import DOWNWASH, LogTopic, close_pairs
+from crazyflie_fleet.launch_text import launch_text
 from crazyflie_fleet.settings import same_vehicle
 from crazyflie_utils import ParameterError
 
@@ -223,3 +225,20 @@ def test_one_above_the_other_needs_more_distance():
     above = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5))
     assert not list(close_pairs(np.array(apart), [0.2, 0.2]))
     assert [pair[:2] for pair in close_pairs(np.array(above), [0.2, 0.2])] == [(0, 1)]
+
+
+def test_a_launch_file_for_several_computers(tmp_path):
+    path = tmp_path / "fleet.yaml"
+    path.write_text(
+        TWO + "    machine: far\nmachines:\n  far: {address: 10.0.0.2, env_loader: /env.sh}\n"
+    )
+    launch = ElementTree.fromstring(launch_text(path))
+    (machine,) = launch.findall("machine")
+    assert machine.attrib == {"name": "far", "address": "10.0.0.2", "env-loader": "/env.sh"}
+    arguments = [
+        {each.attrib["name"]: each.attrib["value"] for each in include.findall("arg")}
+        for include in launch.findall("include")
+    ]
+    assert [each["machine"] for each in arguments] == ["local", "far"]
+    assert [each["name"] for each in arguments] == ["fleet", "fleet_far"]
+    assert [each["host"] for each in arguments] == ["", "far"]

@@ -23,9 +23,11 @@ from crazyflie_utils.testing import FakeProcess
 class Flight:
     """Two vehicles, cf1 and cf2, 1 m apart along y."""
 
-    def __init__(self):
+    def __init__(self, own=2):
         self.process = FakeProcess()
-        node = ReferencesNode(fleet_file.grid(2).vehicles, "world")
+        node = ReferencesNode(
+            fleet_file.grid(2).vehicles[:own], fleet_file.grid(2).vehicles[own:], "world"
+        )
         assert self.process.launch(node, "/fleet/references")
         for name, y in (("cf1", 0.0), ("cf2", 1.0)):
             self.process.publish(f"/{name}/in_flight_state", String("flying"))
@@ -78,6 +80,16 @@ def test_who_would_come_too_close_waits_where_it_is(flight):
         "/fleet/references: cf1 and cf2 are 0.20 m apart and must not come closer than 0.30 m: "
         "whom its reference leads nearer waits"
     ]
+
+
+def test_who_is_flown_elsewhere_is_kept_apart_from():
+    flight = Flight(own=1)
+    flight.want("cf1", 0.9)
+    flight.see("cf1", 0.8)
+    flight.process.advance(0.06)
+    assert flight.followed("cf1")[-1].state.y == 0.8
+    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    assert "/cf2/go_to" not in flight.process.transport.services
 
 
 def test_it_goes_on_when_there_is_room(flight):

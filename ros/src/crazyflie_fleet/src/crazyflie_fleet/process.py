@@ -35,13 +35,14 @@ class _Plan:
         self._has_clock = False
         fleet = told.fleet()
         vehicles = tuple(fleet[name] for name in told.own_names(fleet))
+        others = tuple(each for each in fleet.vehicles if each not in vehicles)
         for model in MODELS if told.is_simulated and told.flies_together else ():
             of_model = tuple(each for each in vehicles if each.settings.model == model)
             if of_model:
                 self._add_swarm(model, of_model)
         for vehicle in vehicles:
             self._add_vehicle(vehicle)
-        self.nodes[f"{handle.name}/references"] = ReferencesNode(vehicles, told.fixed_frame)
+        self.nodes[f"{handle.name}/references"] = ReferencesNode(vehicles, others, told.fixed_frame)
         if vehicles[0] is fleet.vehicles[0]:
             self._add_services(fleet)
 

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
@@ -23,6 +22,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameter_types import TIME_STEP, TOPIC
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.runtime.topics import Publisher
 from crazyflie_utils.vectors import is_finite
 
 STATE_LIMIT = 0.5
@@ -42,10 +42,10 @@ class ReferencesParameters(Parameters):
 
 @dataclass
 class _Led:
-    """A vehicle that is led; `way_time` is how long its way has been flown, s."""
+    """A vehicle that is led or, without a publisher, only seen; times are in s."""
 
     vehicle: Vehicle
-    publisher: Any
+    publisher: Publisher | None = None
     state: PositionVelocityYawStateStamped | None = None
     state_time: float = 0.0
     flight_state: str = ""
@@ -62,16 +62,22 @@ class ReferencesNode(Node):
     ----------
     vehicles : sequence of Vehicle
         Those that are flown in this process.
+    others : sequence of Vehicle
+        Those that are flown elsewhere, from which the former keep apart.
     fixed_frame : str
     """
 
     needed_in_flight = True
 
-    def __init__(self, vehicles: tuple[Vehicle, ...], fixed_frame: str):
+    def __init__(
+        self, vehicles: tuple[Vehicle, ...], others: tuple[Vehicle, ...], fixed_frame: str
+    ):
         self._vehicles = vehicles
+        self._others = others
         self._fixed_frame = fixed_frame
-        self._separation = Separation([vehicle.buffer for vehicle in vehicles])
-        self._led: list[_Led] = []
+        self._separation = Separation([vehicle.buffer for vehicle in (*vehicles, *others)])
+        # Own ones first.
+        self._seen: list[_Led] = []
         self._told = ""
 
     @override
@@ -84,24 +90,27 @@ class ReferencesNode(Node):
         self._waiting = handle.publisher(parameters.waiting_topic, String, latch=True)
         self._publish_mocap_frames(handle)
         for vehicle in self._vehicles:
-            below = f"/{vehicle.name}/"
-            publisher = handle.publisher(below + SAFE_REFERENCE, PositionVelocityStateStamped)
-            led = _Led(vehicle, publisher)
-            self._led.append(led)
-            handle.advertise_service(below + "go_to", GoTo, partial(self._on_go_to, led))
-            handle.subscribe(
-                below + REFERENCE,
-                PositionVelocityStateStamped,
-                partial(self._on_reference, led),
-            )
-            handle.subscribe(
-                below + STATE,
-                PositionVelocityYawStateStamped,
-                partial(self._on_state, led),
-            )
-            handle.subscribe(below + FLIGHT_STATE, String, partial(self._on_flight_state, led))
+            self._lead(handle, vehicle)
+        for vehicle in self._others:
+            self._see(handle, _Led(vehicle))
         handle.timer(parameters.way_period, self._on_way_timer)
         handle.timer(parameters.watch_period, self._on_watch_timer)
+
+    def _lead(self, handle, vehicle):
+        below = f"/{vehicle.name}/"
+        led = _Led(vehicle, handle.publisher(below + SAFE_REFERENCE, PositionVelocityStateStamped))
+        handle.advertise_service(below + "go_to", GoTo, partial(self._on_go_to, led))
+        handle.subscribe(
+            below + REFERENCE, PositionVelocityStateStamped, partial(self._on_reference, led)
+        )
+        self._see(handle, led)
+
+    def _see(self, handle, led):
+        below = f"/{led.vehicle.name}/"
+        on_state = partial(self._on_state, led)
+        handle.subscribe(below + STATE, PositionVelocityYawStateStamped, on_state)
+        handle.subscribe(below + FLIGHT_STATE, String, partial(self._on_flight_state, led))
+        self._seen.append(led)
 
     def _publish_mocap_frames(self, handle):
         # What motion capture calls a vehicle is the vehicle.
@@ -167,7 +176,7 @@ class ReferencesNode(Node):
         return told if np.linalg.norm(told - place) < led.vehicle.buffer else place
 
     def _on_way_timer(self):
-        for led in self._led:
+        for led in self._seen:
             if led.way is None or led.waits:
                 continue
             led.way_time += self._parameters.way_period
@@ -191,9 +200,9 @@ class ReferencesNode(Node):
         return is_fresh and bool(np.isfinite(_position(led.state)).all())
 
     def _on_watch_timer(self):
-        n = len(self._led)
+        n = len(self._seen)
         positions, velocities, goals = (np.full((n, 3), np.nan) for _ in range(3))
-        for k, led in enumerate(self._led):
+        for k, led in enumerate(self._seen):
             if led.state is None or led.flight_state not in _WATCHED:
                 continue
             positions[k] = goals[k] = _position(led.state)
@@ -205,8 +214,8 @@ class ReferencesNode(Node):
         waiting, close = self._separation.waiting(positions, velocities, goals)
         for pair in close:
             self._warn(pair)
-        for led, waits in zip(self._led, waiting.tolist(), strict=True):
-            if waits != led.waits:
+        for led, waits in zip(self._seen, waiting.tolist(), strict=True):
+            if waits != led.waits and led.publisher is not None:
                 self._turn(led, waits)
         self._tell()
 
@@ -221,7 +230,7 @@ class ReferencesNode(Node):
             led.publisher.publish(self._reference(_position(led.wanted), velocity))
 
     def _warn(self, pair):
-        first, second = (self._led[k].vehicle.name for k in (pair.first, pair.second))
+        first, second = (self._seen[k].vehicle.name for k in (pair.first, pair.second))
         self._handle.warn(
             f"{first} and {second} are {pair.distance:.2f} m apart and must not come closer than "
             f"{pair.limit:.2f} m: whom its reference leads nearer waits",
@@ -230,7 +239,7 @@ class ReferencesNode(Node):
         )
 
     def _tell(self):
-        told = " ".join(led.vehicle.name for led in self._led if led.waits)
+        told = " ".join(led.vehicle.name for led in self._seen if led.waits)
         if told != self._told:
             self._told = told
             self._waiting.publish(String(told))

@@ -4,11 +4,13 @@
 Run it in a shell that has sourced the workspace:
 
     python3 ros/src/crazyflie_fleet/bench/swarm.py 10 50 100
+    python3 ros/src/crazyflie_fleet/bench/swarm.py 100 sim_time:=true real_time_factor:=0
 
-The vehicles take off and hover in real time, their process on one core. Periods of the final
-control of three of them come from outside;
-the processor time of the process comes from /proc. Nothing is
-asserted: the figures depend on the machine and on its other work.
+The vehicles take off and hover, their process on one core. Periods of the final control of three
+of them come from outside; the processor time comes from /proc, per second of the flight. The last
+column is the processor time of ten million additions at the same moment, s: on a machine that is
+busy with other work all processor times are longer. By simulated time that work does not
+disturb the flight itself. Nothing is asserted.
 """
 
 import argparse
@@ -27,6 +29,7 @@ from std_srvs.srv import Empty
 
 from crazyflie_dev.launching import roslaunch
 from crazyflie_msgs.msg import ControlStamped
+from crazyflie_utils.testing.peer import wait_until
 
 _START_LIMIT = 180.0
 _TICKS = os.sysconf("SC_CLK_TCK")
@@ -47,7 +50,7 @@ def main() -> int:
     parser.add_argument("--json", type=Path, help="write the figures there, too")
     options, rest = parser.parse_known_args()
     rows = []
-    print("   n  start  cpu %   p50   p99   max ms  MiB", flush=True)
+    print("   n  start  cpu %   p50   p99   max ms  MiB  additions", flush=True)
     for n in options.numbers:
         # rospy can be initialized once in a process.
         pid = os.fork()
@@ -79,38 +82,37 @@ def _measure_and_print(n, options, rest):
             print(f"{n}: {error!r}\n{log.read_text()[-2000:]}", file=sys.stderr)
             return 1
     _result_file(os.getppid()).write_text(json.dumps(row))
-    print(
-        "{n:4d} {start:6.1f} {cpu:6.1f} {p50:5.1f} {p99:5.1f} {max:8.1f} {memory:4.0f}".format(
-            **row
-        ),
-        flush=True,
-    )
+    line = "{n:4d} {start:6.1f} {cpu:6.1f} {p50:5.1f} {p99:5.1f} {max:8.1f} {memory:4.0f} "
+    line += "{additions:6.2f}"
+    print(line.format(**row), flush=True)
     return 0
 
 
 def _measure(n, options, begin):
+    # Only then is it decided whether time is simulated.
+    wait_until(lambda: "/all/takeoff" in _services(), "the fleet", _START_LIMIT)
     rospy.init_node("swarm_bench", anonymous=True, disable_signals=True)
-    rospy.wait_for_service("/all/takeoff", _START_LIMIT)
     start = time.monotonic() - begin
     pid = _pid("/fleet")
     os.sched_setaffinity(pid, {options.core})
     for thread in Path(f"/proc/{pid}/task").iterdir():
         os.sched_setaffinity(int(thread.name), {options.core})
+    rospy.sleep(3.0)
     rospy.ServiceProxy("/all/takeoff", Empty)()
     arrivals: dict[str, list[float]] = {f"/cf{k}": [] for k in {1, (n + 1) // 2, n}}
     for name, found in arrivals.items():
         rospy.Subscriber(
             f"{name}/control/final",
             ControlStamped,
-            lambda _, found=found: found.append(time.monotonic()),
+            lambda _, found=found: found.append(rospy.get_time()),
             tcp_nodelay=True,
         )
-    time.sleep(1.0)
+    rospy.sleep(1.0)
     for found in arrivals.values():
         found.clear()
-    cpu, moment = _cpu(pid), time.monotonic()
-    time.sleep(options.seconds)
-    share = 100.0 * (_cpu(pid) - cpu) / (time.monotonic() - moment)
+    cpu, moment = _cpu(pid), rospy.get_time()
+    rospy.sleep(options.seconds)
+    share = 100.0 * (_cpu(pid) - cpu) / (rospy.get_time() - moment)
     periods = 1e3 * np.concatenate([np.diff(found) for found in arrivals.values()])
     return {
         "n": n,
@@ -120,7 +122,20 @@ def _measure(n, options, begin):
         "p99": float(np.percentile(periods, 99)),
         "max": float(periods.max()),
         "memory": _memory(pid),
+        "additions": _additions(),
     }
+
+
+def _additions():
+    begin = time.process_time()
+    total = 0
+    for k in range(10_000_000):
+        total += k
+    return time.process_time() - begin
+
+
+def _services():
+    return {name for name, _ in rosgraph.Master("/swarm_bench").getSystemState()[2]}
 
 
 def _pid(node):

@@ -164,6 +164,16 @@ def test_setpoints_are_followed_until_they_stop(bench):
     assert bench.references()[-1] == pytest.approx([0.4, 0.0, 1.0, 0.0, 0.0, 0.0], abs=1e-6)
 
 
+def test_a_setpoint_ends_a_way(bench):
+    bench.go_to((1.0, 0.0, 1.0))
+    bench.fly(0.5)
+    bench.process.publish(f"{TOP}/cmd_position", Position(x=0.1, z=1.0))
+    bench.process.advance(0.3)
+    assert bench.references()[-1][0] == pytest.approx(0.1)
+    bench.node.shutdown()
+    assert bench.references()[-1] == pytest.approx([0.1, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
 def test_references_have_a_heading_for_controllers_that_follow_it():
     bench = Bench(**{"reference/yaw": True})
     bench.be("flying")

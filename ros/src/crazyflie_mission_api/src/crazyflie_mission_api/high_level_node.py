@@ -111,11 +111,14 @@ class HighLevelNode(Node):
     @override
     def make_safe(self) -> None:
         """Leave the controller a reference at rest."""
-        goal = self._follower.goal(self._handle.time())
-        if self._flight_state == _FLYING and self._is_moving and goal is not None:
+        goal = self._streamed
+        if self._is_moving:
+            goal = self._follower.goal(self._handle.time())
+        if self._flight_state == _FLYING and goal is not None:
             self._publish(at_rest(goal.position, goal.yaw))
         self._follower.forget()
         self._is_moving = False
+        self._streamed = None
 
     # What the vehicle does.
 
@@ -263,6 +266,7 @@ class HighLevelNode(Node):
         if not all(map(math.isfinite, (*goal.position, *goal.velocity, goal.yaw))):
             self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
         elif self._flight_state == _FLYING:
+            self._is_moving = False
             self._streamed = goal
             self._streamed_at = self._handle.time()
             self._publish(self._streamed)

@@ -24,8 +24,8 @@ MEMORY = 1.0
 """After a longer pause between two samples, in s, the filter starts afresh: the
 acceleration known by then is out of date."""
 
-FIRST_RATE_VARIANCE = 10.0**2
-FIRST_ACCELERATION_VARIANCE = 10.0**2
+_FIRST_RATE_VARIANCE = 10.0**2
+_FIRST_ACCELERATION_VARIANCE = 10.0**2
 
 
 class ConstantAccelerationFilter(RateFilter):
@@ -92,7 +92,7 @@ class ConstantAccelerationFilter(RateFilter):
     def _begin(self, value, rate):
         self._state = np.array([value, rate, np.zeros_like(value)])
         self._covariance = np.diag(
-            [self._noise_variance, FIRST_RATE_VARIANCE, FIRST_ACCELERATION_VARIANCE]
+            [self._noise_variance, _FIRST_RATE_VARIANCE, _FIRST_ACCELERATION_VARIANCE]
         )
         self._acceleration = None
 

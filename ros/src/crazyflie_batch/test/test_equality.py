@@ -100,13 +100,16 @@ def test_a_long_flight_stays_the_same_through_gaps_and_a_crash(estimator):
         duration=5.0,
         period=0.01,
         settle_time=0.0,
-        # So many are lost that the watchdog levels the vehicle, and stops its motors.
-        measurement=Measurement(1e-3, 1e-3, 0.02, [0.0, 0.995, 0.0]),
-        seed=4,
+        # The second vehicle gets poses at the ticks 5, 19, 288 and some later ones: between them the
+        # watchdog levels it and stops its motors, and the integrator pauses.
+        measurement=Measurement(1e-3, 1e-3, 0.02, [0.0, 0.985, 0.0]),
+        seed=374,
         first=0,
     )
     flights = fly(batch, record=True, threads=1)
     assert flights.has_crashed.tolist() == [False, False, True]
+    arrivals = np.flatnonzero(batch.errors(1)[:, 6] >= 0.985)
+    assert arrivals[:4].tolist() == [5, 19, 288, 377]
     for index in range(3):
         states, controls = fly_one(batch, index)
         assert distance(flights.states[:, index], states[:-1]) < 1e-9

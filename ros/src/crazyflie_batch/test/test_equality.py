@@ -100,7 +100,7 @@ def test_a_long_flight_stays_the_same_through_gaps_and_a_crash(estimator):
         duration=5.0,
         period=0.01,
         settle_time=0.0,
-        # The second vehicle gets poses at the ticks 5, 19, 288 and some later ones: between them the
+        # The second vehicle gets poses at the ticks 5, 19, 288 and some later: between them the
         # watchdog levels it and stops its motors, and the integrator pauses.
         measurement=Measurement(1e-3, 1e-3, 0.02, [0.0, 0.985, 0.0]),
         seed=374,

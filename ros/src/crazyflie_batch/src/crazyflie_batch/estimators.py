@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
@@ -144,10 +145,20 @@ class Kalman(Estimator):
         return memory, memory[:3], memory[3:6]
 
 
+def _first_variances():
+    """Return those of rate and acceleration in a filter that has seen one sample."""
+    filter_ = kalman.ConstantAccelerationFilter(1.0, 1.0)
+    filter_.start(np.zeros(1))
+    return np.diag(filter_.covariance)[1:].tolist()
+
+
+_RATE_VARIANCE, _ACCELERATION_VARIANCE = _first_variances()
+
+
 def _begin(position, velocity, noise):
     """Return the memory of a filter that knows next to nothing about rate and acceleration."""
-    rate, acceleration = kalman.FIRST_RATE_VARIANCE, kalman.FIRST_ACCELERATION_VARIANCE
-    return [*position, *velocity, 0.0, 0.0, 0.0, noise * noise, 0.0, 0.0, rate, 0.0, acceleration]
+    covariance = [noise * noise, 0.0, 0.0, _RATE_VARIANCE, 0.0, _ACCELERATION_VARIANCE]
+    return [*position, *velocity, 0.0, 0.0, 0.0, *covariance]
 
 
 def _predict(state, covariance, dt, walk):

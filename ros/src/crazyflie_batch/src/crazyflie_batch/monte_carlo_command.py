@@ -116,7 +116,7 @@ def _executor(address: str | None) -> Iterator[Executor]:
         except TimeoutError:
             raise SchedulerError(
                 f"the scheduler at {address} has no workers; expected at least one, started in a "
-                f"sourced workspace: dask-worker {address}"
+                f"sourced workspace: dask worker {address}"
             ) from None
         try:
             yield client.get_executor()

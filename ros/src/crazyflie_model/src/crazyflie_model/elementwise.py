@@ -3,7 +3,8 @@
 The models take a state or a control as the list of its *components*: floats
 for one vehicle, on which Python is several times quicker than numpy; arrays of
 shape (n,), or of any shape that broadcasts, for many. What differs between the
-two is in this module.
+two is in this module. Anything else that takes part in numpy's ``sin``, ``where``
+and ``clip`` (NEP 13, NEP 18) is taken as well.
 """
 
 import math

@@ -22,8 +22,8 @@ MEMORY = 1.0
 """After a longer pause between two samples, in s, the filter starts afresh: the
 acceleration known by then is out of date."""
 
-FIRST_RATE_VARIANCE = 10.0**2
-FIRST_ACCELERATION_VARIANCE = 10.0**2
+_FIRST_RATE_VARIANCE = 10.0**2
+_FIRST_ACCELERATION_VARIANCE = 10.0**2
 
 
 class ConstantAccelerationFilter(RateFilter):
@@ -94,7 +94,7 @@ class ConstantAccelerationFilter(RateFilter):
     def _begin(self, value, rate):
         self._value, self._rate = list(value), rate
         self._acceleration = [0.0] * len(rate)
-        variances = (FIRST_RATE_VARIANCE, 0.0, FIRST_ACCELERATION_VARIANCE)
+        variances = (_FIRST_RATE_VARIANCE, 0.0, FIRST_ACCELERATION_VARIANCE)
         self._covariance = (self._noise_variance, 0.0, 0.0, *variances)
         self._known = None
 

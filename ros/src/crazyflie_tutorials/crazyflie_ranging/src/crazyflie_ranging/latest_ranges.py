@@ -1,6 +1,7 @@
 """The latest reading of each of several range sensors, while it is alive."""
 
 import math
+from functools import partial
 
 from sensor_msgs.msg import Range
 
@@ -21,7 +22,7 @@ class LatestRanges:
         self._handle = handle
         self._readings: dict[str, tuple[float, float]] = {}
         for name, topic in topics.items():
-            handle.subscribe(topic, Range, lambda message, name=name: self._take(name, message))
+            handle.subscribe(topic, Range, partial(self._take, name))
 
     def _take(self, name, message):
         if not math.isnan(message.range):

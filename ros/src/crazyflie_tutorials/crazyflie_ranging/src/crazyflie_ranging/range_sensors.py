@@ -162,7 +162,8 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
         About everything that is wrong in it: file, line and what was expected.
     """
     file = yaml_file.load(path)
-    sensors, complaints = [], []
+    sensors: list[RangeSensor] = []
+    complaints: list[str] = []
     lines: dict[str, dict[str, int]] = {"name": {}, "frame_id": {}}
     for key, entry in file.entries().items():
         if key != "sensors":

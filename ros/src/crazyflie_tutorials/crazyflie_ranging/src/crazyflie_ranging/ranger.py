@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from crazyflie_model.angles import Quaternion, Triple, rotate
+from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_ranging.range_sensors import RangeSensor
 from crazyflie_world.world import World
 
@@ -51,18 +52,18 @@ class Ranger:
     def __init__(self, sensors: Sequence[RangeSensor], random: np.random.Generator):
         self._sensors = sensors
         self._random = random
-        rays, origins, self._slices = [], [], []
+        rays: list[NDArray[np.float64]] = []
+        self._slices: list[slice] = []
         begin = 0
         for each in sensors:
-            # Rotation works on the components of many vectors at once.
-            rays.append(
-                np.column_stack(rotate(each.attitude, cone(each.spread_angle, each.rays).T))
-            )
-            origins.append(np.tile(each.position, (each.rays, 1)))
+            turn = Rotation.from_quat(each.attitude)
+            rays.append(turn.apply(cone(each.spread_angle, each.rays)))
             self._slices.append(slice(begin, begin + each.rays))
             begin += each.rays
+        self._origins = np.repeat(
+            [each.position for each in sensors], [each.rays for each in sensors], axis=0
+        )
         self._rays = np.concatenate(rays)
-        self._origins = np.concatenate(origins)
 
     def measure(self, world: World, position: Triple, attitude: Quaternion) -> list[float]:
         """Return what each sensor says, m: the nearest of what is in its cone.
@@ -75,9 +76,8 @@ class Ranger:
         attitude : tuple of float
             From the body's to the world's frame, (x, y, z, w), of norm 1.
         """
-        origins = np.column_stack(rotate(attitude, self._origins.T)) + position
-        directions = np.column_stack(rotate(attitude, self._rays.T))
-        distances, _ = world.cast(origins, directions)
+        turn = Rotation.from_quat(attitude)
+        distances, _ = world.cast(position + turn.apply(self._origins), turn.apply(self._rays))
         readings = []
         for sensor, own in zip(self._sensors, self._slices, strict=True):
             noise = sensor.noise * self._random.standard_normal()

@@ -224,7 +224,8 @@ def load(path: str | FilePath) -> World:
     file = yaml_file.load(path)
     settings = file.read(WorldParameters, besides=("objects",))
     entries = file["objects"].elements() if "objects" in file else []
-    objects, complaints = [], []
+    objects: list[Shape] = []
+    complaints: list[str] = []
     lines = {FLOOR: "the floor", settings.frame: "the frame"}
     for entry in entries:
         try:

@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 from typing_extensions import override
 
 from crazyflie_utils import NodeHandle, Parameters, parameter
@@ -40,7 +41,7 @@ class FilterNode(ImageNode):
         raise NotImplementedError
 
     @override
-    def on_image(self, image, header) -> None:
+    def on_image(self, image: filters.Image, header: Header) -> None:
         if self._publisher.has_subscribers():
             self._publisher.publish(to_message(self.apply(image), header))
 

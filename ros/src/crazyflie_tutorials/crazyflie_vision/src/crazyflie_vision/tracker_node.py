@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 from geometry_msgs.msg import Point, PointStamped
 from numpy.typing import NDArray
 from sensor_msgs.msg import Image
+from std_msgs.msg import Header
 from typing_extensions import override
 
 from crazyflie_utils import NodeHandle, Parameters, parameter
@@ -52,7 +53,7 @@ class TrackerNode(ImageNode):
         raise NotImplementedError
 
     @override
-    def on_image(self, image, header) -> None:
+    def on_image(self, image: NDArray[Any], header: Header) -> None:
         target = self.find(image)
         if target is not None:
             point = Point(target.x, target.y, target.radius)

@@ -31,13 +31,15 @@ COURSE = Path(__file__).resolve().parent
 QUICK = "sim_time:=true real_time_factor:=2 composed:=true simulator_dt:=0.01".split()
 SCREEN = (1400, 900)
 COLOURS = 64
+LIMIT = 300.0
+"""The longest that a part of a flight may take, s: RViz draws without a graphics card."""
 
 
 def operate() -> FlightOperator:
     """Return an operator of what was launched, as soon as it can take off."""
     # Before, nobody has told yet whether time is simulated.
     wait_for_service("/takeoff")
-    operator = FlightOperator(runner.begin("draw_pictures"))
+    operator = FlightOperator(runner.begin("draw_pictures"), limit=LIMIT)
     operator.wait_until_ready()
     return operator
 

@@ -53,7 +53,6 @@ VIRTUAL_VEHICLE = "virtual_"
 @pytest.fixture(scope="module")
 def followed(workspace, tmp_path_factory):
     """Return the pages, each with a future that is done when it has been followed."""
-
     ports = threading.Lock()
 
     def follow(path):

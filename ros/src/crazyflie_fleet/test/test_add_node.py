@@ -1,0 +1,86 @@
+"""The node that has the driver connect a fleet."""
+
+from concurrent.futures import Future
+from pathlib import Path
+
+import rospkg
+
+from crazyflie_driver.srv import AddCrazyflieResponse, UpdateParamsResponse
+from crazyflie_fleet.add_node import FleetAddNode
+from crazyflie_utils import ServiceError
+from crazyflie_utils.testing import FakeProcess
+
+EXAMPLE = Path(rospkg.RosPack().get_path("crazyflie_fleet")) / "config" / "example.yaml"
+
+
+class Driver:
+    """A driver that knows some addresses."""
+
+    def __init__(self, process, missing=()):
+        self.missing = missing
+        self.added = {}
+        self.updated = {}
+        services = process.transport.services
+        services["/add_crazyflie"] = self.add
+        for name in ("cf1", "cf2"):
+            services[f"/{name}/update_params"] = lambda r, name=name: self.update(name, r)
+
+    def add(self, request):
+        self.added[request.tf_prefix] = request
+        answer = Future()
+        if request.tf_prefix in self.missing:
+            answer.set_exception(ServiceError("does not answer"))
+        else:
+            answer.set_result(AddCrazyflieResponse())
+        return answer
+
+    def update(self, name, request):
+        self.updated[name] = request.params
+        answer = Future()
+        answer.set_result(UpdateParamsResponse())
+        return answer
+
+
+def add(missing=(), **parameters):
+    process = FakeProcess()
+    driver = Driver(process, missing)
+    launched = process.launch(
+        FleetAddNode(), "/fleet_add", {"fleet/file": str(EXAMPLE), **parameters}
+    )
+    return process, driver, launched
+
+
+def test_vehicles_are_added_and_their_parameters_written():
+    process, driver, _ = add()
+    assert process.exit_status == 0
+    assert list(driver.added) == ["cf1", "cf2"]
+    second = driver.added["cf2"]
+    assert second.uri == "radio://0/80/2M/E7E7E7E702"
+    assert (second.enable_logging_pose, second.enable_logging_imu) == (True, False)
+    (block,) = second.log_blocks
+    # The driver's frequency is a period in ms.
+    assert (block.topic_name, block.frequency, len(block.variables)) == ("motors", 100, 4)
+    expected = ["stabilizer/estimator", "stabilizer/controller", "locSrv/extPosStdDev"]
+    assert driver.updated == {"cf1": expected, "cf2": expected}
+    assert process.transport.parameters["/cf1/locSrv/extPosStdDev"] == 0.001
+
+
+def test_who_is_not_there_is_named_and_the_others_are_added():
+    process, driver, _ = add(missing=("cf1",))
+    assert process.exit_status == 1
+    assert list(driver.updated) == ["cf2"]
+    assert process.logged("error")[-1] == "/fleet_add: not all vehicles are there: cf1"
+
+
+def test_virtual_vehicles_have_ports_for_addresses():
+    _, driver, _ = add(**{"fleet/virtual_port": 30000})
+    assert driver.added["cf2"].uri == "udp://127.0.0.1:30001"
+
+
+def test_an_address_is_needed(tmp_path):
+    file = tmp_path / "fleet.yaml"
+    file.write_text("robots: {a: {initial_position: [0, 0, 0]}}\n")
+    process, driver, launched = add(**{"fleet/file": str(file)})
+    assert not launched
+    assert "no uri of a; expected one" in process.logged("error")[0]
+    assert driver.added == {}

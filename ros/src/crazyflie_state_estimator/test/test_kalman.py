@@ -155,3 +155,33 @@ def test_covariance_stays_positive_and_estimates_finite(samples):
         assert np.isfinite(estimates).all()
         assert np.linalg.eigvalsh(subject.covariance).min() > -1e-9
         assert np.diag(subject.covariance).min() >= 0.0
+
+
+def continuous_wiener_covariance(dt, walk):
+    """Return the integral of `walk_covariance` in closed form (Bar-Shalom et al., 6.2.3)."""
+    return walk**2 * np.array(
+        [
+            [dt**5 / 20.0, dt**4 / 8.0, dt**3 / 6.0],
+            [dt**4 / 8.0, dt**3 / 3.0, dt**2 / 2.0],
+            [dt**3 / 6.0, dt**2 / 2.0, dt],
+        ]
+    )
+
+
+def test_the_plain_floats_are_the_textbook_s_matrices():
+    rng = np.random.default_rng(1)
+    subject = ConstantAccelerationFilter(NOISE, WALK)
+    subject.start([0.1, -0.2, 0.3])
+    state = np.array([[0.1, -0.2, 0.3], [0.0] * 3, [0.0] * 3])
+    covariance = np.array(subject.covariance)
+    for _ in range(200):
+        dt, sample = rng.uniform(0.005, 0.03), rng.normal(size=3)
+        f = transition(dt)
+        state = f @ state
+        covariance = f @ covariance @ f.T + continuous_wiener_covariance(dt, WALK)
+        gain = covariance[0] / (covariance[0, 0] + NOISE**2)
+        state = state + np.outer(gain, sample - state[0])
+        covariance = covariance - np.outer(gain, covariance[0])
+        value, rate = subject.step(dt, sample)
+        np.testing.assert_allclose([value, rate], state[:2], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(subject.covariance, covariance, rtol=1e-9, atol=1e-12)

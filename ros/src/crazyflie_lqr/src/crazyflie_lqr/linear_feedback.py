@@ -6,22 +6,18 @@ yaw_dot, thrust) in rad, rad/s and m/s^2 (mass-normalised): positive roll
 accelerates to the right of the heading, positive pitch along it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from operator import mul
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
+import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_lqr.climb import Climb
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
@@ -94,21 +90,24 @@ class LinearFeedback:
         self._u_ref = [float(each) for each in u_ref]
         self._rows = [[float(each) for each in row] for row in K]
 
-    def control(self, x: Components, x_ref: Components, time: float) -> list[float]:
+    def control(
+        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
+    ) -> NDArray[np.float64]:
         """Return the control for a state.
 
         Parameters
         ----------
-        x, x_ref : sequence, x_dim components
+        x, x_ref : ndarray, shape (x_dim,)
             State and reference.
         time : float
             When the vehicle was in this state, s: the state's stamp.
 
         Returns
         -------
-        list of float, u_dim components
+        ndarray, shape (u_dim,)
         """
-        return self._linear(heading_error(x, x_ref, self.yaw_index))
+        error = heading_error(_floats(x), _floats(x_ref), self.yaw_index)
+        return np.array(self._linear(error))
 
     def _linear(self, error):
         return [
@@ -191,15 +190,18 @@ class IntegralStateFeedback(LinearFeedback):
         self._thrust = self._u_ref[THRUST]
 
     @override
-    def control(self, x: Components, x_ref: Components, time: float) -> list[float]:
+    def control(
+        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
+    ) -> NDArray[np.float64]:
         """Return the control for a state; see `LinearFeedback.control`.
 
         A state that is not younger than the last one, or comes more than
         `MAX_GAP` after it, adds nothing to the integral.
         """
         dt = self._time_since_last(time)
-        x_ref, climb_thrust = self._follow_climb(x, x_ref, dt)
-        error = heading_error(x, x_ref, self.yaw_index)
+        state = _floats(x)
+        reference, climb_thrust = self._follow_climb(state, _floats(x_ref), dt)
+        error = heading_error(state, reference, self.yaw_index)
         u = self._linear(error)
         if not self._is_resting:
             self._integrate(error[:3], dt, u)
@@ -208,7 +210,7 @@ class IntegralStateFeedback(LinearFeedback):
         u[THRUST] += climb_thrust
         u = [min(max(a, b), c) for a, b, c in zip(u, _LEAST, _MOST, strict=True)]
         self._thrust = u[THRUST]
-        return u
+        return np.array(u)
 
     @override
     def take_over(self, previous: Self) -> None:
@@ -244,7 +246,6 @@ class IntegralStateFeedback(LinearFeedback):
         if climb.has_arrived:
             self._climb = None
             return x_ref, 0.0
-        x_ref = list(x_ref)
         x_ref[2], x_ref[5] = climb.z, climb.z_dot
         return x_ref, climb.z_ddot
 
@@ -265,3 +266,7 @@ class IntegralStateFeedback(LinearFeedback):
     def _within_limit(self, axis, integral):
         limit = self._integrator_limit[axis]
         return min(max(integral, -limit), limit)
+
+
+def _floats(vector):
+    return [float(each) for each in vector]

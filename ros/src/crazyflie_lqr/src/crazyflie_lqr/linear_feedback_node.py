@@ -195,7 +195,8 @@ class LinearFeedbackNode(Node):
             return
         if self._flight_state is None:
             self._guess_flight(x, x_ref)
-        u = self._controller.control(x, x_ref, message.header.stamp.to_sec())
+        stamp = message.header.stamp.to_sec()
+        u = self._controller.control(np.array(x), np.array(x_ref), stamp)
         if not all(map(math.isfinite, u)):
             self._handle.warn(
                 f"the control {u} is not finite and is not sent", throttle=1.0, key="not finite"

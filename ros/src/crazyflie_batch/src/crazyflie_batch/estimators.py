@@ -148,7 +148,7 @@ class Kalman(Estimator):
 def _first_variances():
     """Return those of rate and acceleration in a filter that has seen one sample."""
     filter_ = kalman.ConstantAccelerationFilter(1.0, 1.0)
-    filter_.start(np.zeros(1))
+    filter_.start([0.0])
     return np.diag(filter_.covariance)[1:].tolist()
 
 

@@ -29,7 +29,7 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
     """
     plan, period = batch.plan, batch.plan.period
     own = {name: values[:, index].tolist() for name, values in batch.parameters.items()}
-    vehicle = SimulatedVehicle(plan.model(own), batch.x[:3, index], 0.0, plan.max_tilt)
+    vehicle = SimulatedVehicle(plan.model(own), batch.x[:3, index].tolist(), 0.0, plan.max_tilt)
     filter_ = plan.estimator.scalar(own["estimator"])
     estimator = MotionEstimator(filter_, FiniteDifference())
     controller = IntegralStateFeedback(
@@ -58,7 +58,7 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
             if motion is not None:
                 x = np.array([*motion.position, *motion.velocity, motion.attitude[2]])
                 control = controller.control(x, goal, stamp)
-                vehicle.command(control)
+                vehicle.command(control.tolist())
         controls.append(control)
         vehicle.advance_to(moment + period)
         states.append(vehicle.state)

@@ -94,7 +94,7 @@ class ConstantAccelerationFilter(RateFilter):
     def _begin(self, value, rate):
         self._value, self._rate = list(value), rate
         self._acceleration = [0.0] * len(rate)
-        variances = (_FIRST_RATE_VARIANCE, 0.0, FIRST_ACCELERATION_VARIANCE)
+        variances = (_FIRST_RATE_VARIANCE, 0.0, _FIRST_ACCELERATION_VARIANCE)
         self._covariance = (self._noise_variance, 0.0, 0.0, *variances)
         self._known = None
 

@@ -7,7 +7,7 @@ from following import fly
 
 @pytest.fixture(scope="module")
 def flight():
-    return fly("ball", begin=4.0, end=16.0)
+    return fly("ball", begin=4.0, end=13.0)
 
 
 def test_the_ball_stays_in_the_middle_of_the_image(flight):

@@ -7,7 +7,7 @@ from following import fly
 
 @pytest.fixture(scope="module")
 def flight():
-    return fly("face", begin=3.0, end=8.0)
+    return fly("face", begin=3.0, end=7.0)
 
 
 def test_the_face_stays_in_the_middle_of_the_image(flight):

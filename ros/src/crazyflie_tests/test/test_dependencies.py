@@ -114,7 +114,10 @@ def debian_file(module):
 
 
 OWN_MODULES = {path.stem for path in files(".py")} | {
-    path.name for path in SOURCES.glob("**/src/*") if path.is_dir()
+    path.name
+    for folder in (SOURCES, TOP / "docs")
+    for path in folder.glob("**/src/*")
+    if path.is_dir()
 }
 MODULES = sorted(imports() - OWN_MODULES - own_packages())
 

@@ -46,7 +46,7 @@ ANSWER
 
 <!-- run: until it prints 42 -->
 ```sh
-while echo $((6 * 7)); do sleep 0.1; done
+echo $((6 * 7)) && sleep 1000
 ```
 """
 

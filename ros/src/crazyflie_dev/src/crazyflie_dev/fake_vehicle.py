@@ -107,13 +107,13 @@ class FakeVehicle:
         """Return the data of all packets received on a port and channel, oldest first."""
         return [data for p, c, data in list(self.received) if (p, c) == (port, channel)]
 
-    def wait_for(self, condition: Callable[[], bool], limit: float = 5.0) -> bool:
+    def wait_for(self, condition: Callable[[], bool], limit: float = 60.0) -> bool:
         """Wait until ``condition()`` holds, looking after every packet; tell whether it does."""
         with self._changed:
             return self._changed.wait_for(condition, limit)
 
     def wait_for_packets(
-        self, port: int, channel: int, count: int = 1, limit: float = 5.0
+        self, port: int, channel: int, count: int = 1, limit: float = 60.0
     ) -> list[bytes]:
         """Wait for so many packets on a port and channel, and return all of them.
 

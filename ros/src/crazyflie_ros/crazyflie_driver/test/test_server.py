@@ -200,4 +200,13 @@ def test_the_end_of_the_server_stops_all_motors(server):
     process, node = server.process, server.node
     process.shut_down({"/crazyflie_server": node})
     for vehicle in vehicles:
-        assert vehicle.packets(3, 0) == [ZERO] * 100
+        assert vehicle.wait_for_packets(3, 0, 100) == [ZERO] * 100
+
+
+def test_a_vehicle_that_does_not_tell_its_state_is_stopped_if_its_log_has_it_on_the_ground(server):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri)
+    vehicle.received.clear()
+    vehicle.deaf.add((9, 0, b"\x0c"))
+    server.remove(vehicle.uri)
+    assert vehicle.wait_for_packets(3, 0, 100) == [ZERO] * 100

@@ -4,6 +4,7 @@ import time
 from typing import TYPE_CHECKING
 
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.errors import NoReplyError
 
 if TYPE_CHECKING:
     from crazyflie_driver.vehicle import DriverVehicle
@@ -34,8 +35,12 @@ def take_leave(vehicle: "DriverVehicle", duration: float, limit: float) -> None:
         There is no link, or the vehicle does not reply.
     """
     crazyflie = vehicle.crazyflie
-    state = crazyflie.supervisor.read()
-    is_flying = state is not None and SupervisorState.FLYING in state
+    try:
+        state = crazyflie.supervisor.read()
+        is_flying = state is not None and SupervisorState.FLYING in state
+    except NoReplyError:
+        # One lost answer must not leave the motors of a vehicle on the ground running.
+        is_flying = vehicle.is_flying
     if is_flying and vehicle.setpoints.knows_position(vehicle.now()):
         end = time.monotonic() + limit
         if vehicle.setpoints.is_streaming:

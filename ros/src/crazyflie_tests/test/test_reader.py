@@ -46,7 +46,7 @@ ANSWER
 
 <!-- run: until it prints 42 -->
 ```sh
-echo $((6 * 7)) && sleep 1000
+bash -c 'echo $((6 * 7)); exec sleep 1000'
 ```
 """
 

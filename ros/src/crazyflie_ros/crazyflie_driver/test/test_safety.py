@@ -110,6 +110,31 @@ def test_a_landing_outlives_the_server(hovering):
     assert commands(vehicle) == [(7, 1), (8, 0)]
 
 
+def test_ctrl_c_while_the_link_is_silent_is_a_landing_all_the_same(server, vehicle):
+    server.call("/cf1/takeoff", TAKEOFF)
+    is_(vehicle, FLYING | HIGH_LEVEL)
+    wait_for_words(server, "flying: on high-level commands")
+    server.process.advance(0.2)
+    assert server.process.published("/flights")[-1].data == "/crazyflie_server in flight"
+    vehicle.is_frozen = True
+    wait_for_words(server, "lost")
+    vehicle.received.clear()
+    server.node.leave()
+    vehicle.is_frozen = False
+
+    def is_landed():
+        server.process.advance(0.1)
+        return any(packet[0] == 8 for packet in vehicle.packets(8, 0))
+
+    def has_told():
+        server.process.advance(0.1)
+        return server.process.published("/flights")[-1].data == "/crazyflie_server on ground"
+
+    wait_until(is_landed, "a landing")
+    is_(vehicle, READY)
+    wait_until(has_told, "the end of the flight")
+
+
 def test_a_flight_on_thrust_cannot_be_landed_by_the_vehicle(server, vehicle):
     is_(vehicle, FLYING)
     wait_for_words(server, "flying")

@@ -70,6 +70,13 @@ class FlightCommands:
         self._holds = 0
         self._feeds_watchdog = False
         self._has_landed_low = False
+        self._last_landing: Future[None] | None = None
+
+    @property
+    def are_flown(self) -> bool:
+        """Whether the vehicle flies on high-level commands."""
+        flies = self._vehicle.is_flying and not self._vehicle.is_emergency
+        return flies and self.is_high_level and not self._setpoints.is_streaming
 
     def start(self) -> None:
         """Begin to feed the watchdog, once there is a flight."""
@@ -119,6 +126,12 @@ class FlightCommands:
         return self.send(
             "land", lambda high_level: high_level.land(height, duration, group_mask), duration, True
         )
+
+    def land_at_last(self) -> None:
+        """Land; called again, it tries again what a silent link has prevented."""
+        landing = self._last_landing
+        if landing is None or (landing.done() and landing.exception() is not None):
+            self._last_landing = self.land(0.0, self._safety.landing_duration)
 
     def notify(self, remain_valid_ms: int) -> None:
         """Announce that setpoints stop: at once on the ground, in flight with the next command.
@@ -181,8 +194,7 @@ class FlightCommands:
 
     def check_battery(self) -> None:
         """Land a high-level flight whose battery is critical, once."""
-        flies = self._vehicle.is_flying and self.is_high_level and not self._setpoints.is_streaming
-        if not flies:
+        if not self.are_flown:
             self._has_landed_low = False
         elif self._battery.charge is Charge.CRITICAL and not self._has_landed_low:
             self._has_landed_low = True

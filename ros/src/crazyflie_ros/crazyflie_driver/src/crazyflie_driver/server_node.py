@@ -23,6 +23,7 @@ ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"
 """Services of the server."""
 
 _DIAGNOSTICS_PERIOD = 1.0
+_FLIGHTS_PERIOD = 0.2
 _LEAVE_LIMIT, _LANDING_LIMIT = 1.5, 0.5
 """How long, in s, the end of the server waits for its vehicles to be left, and each of these for
 the end of a landing, which it flies without a link, too."""
@@ -36,6 +37,8 @@ class CrazyflieServerNode(Node):
     def __init__(self) -> None:
         # By URI.
         self._vehicles: dict[str, DriverVehicle] = {}
+        self._in_flight = False
+        self._is_leaving = False
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -47,7 +50,14 @@ class CrazyflieServerNode(Node):
         handle.advertise_service(ADD, AddCrazyflie, self._on_add)
         handle.advertise_service(REMOVE, RemoveCrazyflie, self._on_remove)
         handle.subscribe(self._parameters.emergency_topic, Empty, self._on_emergency)
+        self._announce_flight = handle.announce_flights()
         handle.timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        handle.timer(_FLIGHTS_PERIOD, self._follow_flights)
+
+    @override
+    def leave(self) -> None:
+        self._is_leaving = True
+        self._follow_flights()
 
     def shutdown(self) -> None:
         """Have vehicles in the air land, stop the motors of all others, disconnect from all."""
@@ -55,6 +65,16 @@ class CrazyflieServerNode(Node):
             [vehicle.leave(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())],
             _LEAVE_LIMIT,
         )
+
+    def _follow_flights(self):
+        # Flights on setpoints are ended by who sends these.
+        flying = [each for each in self._vehicles.values() if each.commands.are_flown]
+        if bool(flying) != self._in_flight:
+            self._in_flight = bool(flying)
+            self._announce_flight(self._in_flight)
+        if self._is_leaving:
+            for vehicle in flying:
+                vehicle.commands.land_at_last()
 
     def _on_add(self, request):
         wanted = VehicleParameters.from_request(request)

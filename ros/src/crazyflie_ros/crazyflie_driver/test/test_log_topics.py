@@ -106,6 +106,7 @@ def test_without_logging_there_are_only_status_and_packets(server, log_block):
     assert len([data for data in vehicle.packets(5, 1) if data[0] == 6]) == 1
     assert set(server.process.transport.publishers) == {
         "/diagnostics",
+        "/flights",
         "/cf1/rssi",
         "/cf1/status",
         "/cf1/packets",

@@ -3,17 +3,17 @@
 For each vehicle it is what a simulator, an estimator and a controller are, with the same topics.
 """
 
+import math
 from functools import partial
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from numpy.typing import NDArray
-from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
-from tf2_msgs.msg import TFMessage
+from std_msgs.msg import Float64MultiArray, Header
 from typing_extensions import override
 
 from crazyflie_fleet.batch_vehicles import BatchVehicles
 from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.messages import array_message, control_message, state_message
 from crazyflie_fleet.stack import FINAL_CONTROL, LQR_CONTROL, REFERENCE, SAFE_REFERENCE, STATE
 from crazyflie_lqr.componentwise import heading_error, limited_control, linear_control
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
@@ -23,15 +23,14 @@ from crazyflie_model.angles import quaternion_from_rpy, wrap_to_pi
 from crazyflie_model.dynamics import Coupled7D, NearHover, SevenDimensional
 from crazyflie_model.elementwise import join, split
 from crazyflie_msgs.msg import (
-    Control,
     ControlStamped,
     PositionVelocityStateStamped,
-    PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
 from crazyflie_simulator.simulator_node import MAX_CATCH_UP
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, Number
+from crazyflie_utils.runtime.poses import StampedPose
 from crazyflie_utils.runtime.topics import Publisher
 from crazyflie_utils.vectors import to_tuple
 
@@ -124,6 +123,7 @@ class SwarmNode(Node):
         self._model = model
         self._ticks = 0
         self._measured: tuple[float, NDArray[np.float64]] | None = None
+        self._broadcast_time = math.nan
         self._references: list[GuardedReference] = []
         self._states: list[Publisher] = []
         self._controls: list[Publisher] = []
@@ -143,7 +143,7 @@ class SwarmNode(Node):
         self._start = handle.time()
         places = [vehicle.position for vehicle in self._vehicles]
         self._batch = BatchVehicles(MODELS[self._model](), places, self._start)
-        self._tf = handle.publisher("/tf", TFMessage)
+        self._broadcast = handle.broadcast_poses(self._broadcast_poses)
         self._all_states = handle.publisher("~" + ALL_STATES, Float64MultiArray)
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
@@ -216,32 +216,37 @@ class SwarmNode(Node):
         if self._measured is not None and time == self._measured[0]:
             return
         states = self._batch.states
-        header = Header(0, self._handle.stamp(time), self._parameters.fixed_frame)
-        if self._tf.has_subscribers():
-            self._tf.publish(TFMessage(self._transforms(header, states)))
         before, self._measured = self._measured, (time, states)
+        if self._handle.poses_are_heard():
+            self._broadcast_poses()
+        header = Header(0, self._handle.stamp(time), self._parameters.fixed_frame)
         if before is not None and time > before[0]:
             self._control(header, _estimates(*before, time, states))
 
-    def _transforms(self, header, states):
+    def _broadcast_poses(self):
+        """Tell tf of the present poses, if it does not know them."""
+        if self._measured is None or self._broadcast_time == self._measured[0]:
+            return
+        self._broadcast_time, states = self._measured
+        frame, stamp = self._parameters.fixed_frame, self._handle.nanoseconds(self._broadcast_time)
         tilts = self._batch.tilts.tolist()
-        return [
-            TransformStamped(
-                header,
-                vehicle.name,
-                Transform(Vector3(x, y, z), Quaternion(*quaternion_from_rpy(roll, pitch, yaw))),
-            )
-            for vehicle, (x, y, z, _, _, _, yaw), (roll, pitch) in zip(
-                self._vehicles, states.tolist(), tilts, strict=True
-            )
-        ]
+        self._broadcast(
+            [
+                StampedPose(
+                    frame, vehicle.name, stamp, (x, y, z), quaternion_from_rpy(roll, pitch, yaw)
+                )
+                for vehicle, (x, y, z, _, _, _, yaw), (roll, pitch) in zip(
+                    self._vehicles, states.tolist(), tilts, strict=True
+                )
+            ]
+        )
 
     def _control(self, header, estimates):
-        self._all_states.publish(_array_message(estimates))
+        self._all_states.publish(array_message(estimates))
         rows = estimates.tolist()
         for publisher, row in zip(self._states, rows, strict=True):
             if publisher.has_subscribers():
-                publisher.publish(_state_message(header, row))
+                publisher.publish(state_message(header, row))
         now = self._handle.time()
         found = [
             (number, x_ref)
@@ -257,34 +262,7 @@ class SwarmNode(Node):
         )
         header = Header(0, header.stamp, "")
         for number, row in zip(numbers, controls.tolist(), strict=True):
-            self._controls[number].publish(_control_message(header, row))
-
-
-# Made as copy and pickle make objects: the messages' own __init__ takes five times as long.
-
-
-def _state_message(header, row):
-    state = object.__new__(PositionVelocityYawState)
-    state.x, state.y, state.z, state.x_dot, state.y_dot, state.z_dot, state.yaw = row
-    message = object.__new__(PositionVelocityYawStateStamped)
-    message.header, message.state = header, state
-    return message
-
-
-def _control_message(header, row):
-    control = object.__new__(Control)
-    control.roll, control.pitch, control.yaw_dot, control.thrust = row
-    message = object.__new__(ControlStamped)
-    message.header, message.control = header, control
-    return message
-
-
-def _array_message(rows):
-    n, size = rows.shape
-    layout = MultiArrayLayout(
-        [MultiArrayDimension("vehicle", n, n * size), MultiArrayDimension("state", size, size)], 0
-    )
-    return Float64MultiArray(layout, rows.ravel())
+            self._controls[number].publish(control_message(header, row))
 
 
 def _estimates(

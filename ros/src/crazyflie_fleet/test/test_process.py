@@ -11,7 +11,8 @@ from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet.process import make_nodes
-from crazyflie_utils import ParameterError, ServiceError
+from crazyflie_utils import Node, ParameterError, ServiceError
+from crazyflie_utils.parameter_types import FRAME, Number
 from crazyflie_utils.testing import FakeProcess
 
 GAINS = Path(rospkg.RosPack().get_path("crazyflie_lqr")) / "config"
@@ -24,6 +25,17 @@ NODES = {
         "u_ref_file": str(GAINS / "u_ref_hover.txt"),
     },
 }
+
+
+class Waver(Node):
+    """Something beside what flies a vehicle."""
+
+    def load_parameters(self, handle):
+        self.frames = [handle.get_param(f"~frames/{each}", FRAME) for each in ("fixed", "robot")]
+        self.tilt = handle.get_param("~tilt", Number())
+
+    def register_callbacks(self, handle):
+        pass
 
 
 class Swarm:
@@ -134,9 +146,17 @@ def test_models_are_mixed(tmp_path):
         assert swarm.position(name) == pytest.approx((0.0, y, 1.0), abs=0.1)
 
 
+def test_more_nodes_of_every_vehicle():
+    nodes = {**NODES, "waver": {"tilt": 0.1}}
+    swarm = Swarm(nodes, fleet={"n": 2}, further={"waver": f"{__name__}:Waver"})
+    assert swarm.nodes["/cf2/waver"].frames == ["world", "cf2"]
+    assert swarm.nodes["/cf1/waver"].tilt == 0.1
+
+
 @pytest.mark.parametrize(
     ("parameters", "text"),
     [
+        ({"further": {"waver": "none:None"}}, "/fleet/further .*expected a dictionary of node"),
         ({"fleet": {"file": "/none.yaml"}}, "/none.yaml: cannot be read"),
         ({"fleet": {"n": 0}}, "/fleet/fleet/n is 0; expected an integer from 1 to 1000"),
         ({"fleet": {"machine": "x"}}, "is flown by the machine 'x'"),

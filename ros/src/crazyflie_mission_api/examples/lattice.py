@@ -9,13 +9,17 @@ import math
 import sys
 
 import crazyflie_mission_api
+from crazyflie_fleet.fleet import DOWNWASH
 from crazyflie_mission_api import Limits, Rehearsal
 from crazyflie_mission_api.formations import Array, circle, lattice
 from crazyflie_mission_api.rehearsal import Team
 from crazyflie_mission_api.roster import Rules
 
-SPACING = 0.8
-"""Of the lattice, m."""
+SPACING = 0.7
+"""Between neighbours, m."""
+
+LAYERS = DOWNWASH * SPACING
+"""From one layer of the lattice to the next, m."""
 
 LIMITS = Limits(speed=1.0, acceleration=1.5)
 
@@ -23,7 +27,8 @@ LIMITS = Limits(speed=1.0, acceleration=1.5)
 def cube(n: int) -> Array:
     """Return the first n places of a cube, from below, m."""
     side = math.ceil(n ** (1.0 / 3.0))
-    places = lattice((side, side, side), SPACING, (0.0, 0.0, 1.0 + SPACING * (side - 1) / 2.0))
+    center = (0.0, 0.0, 1.0 + LAYERS * (side - 1) / 2.0)
+    places = lattice((side, side, side), (SPACING, SPACING, LAYERS), center)
     return places[places[:, 2].argsort(kind="stable")][:n]
 
 

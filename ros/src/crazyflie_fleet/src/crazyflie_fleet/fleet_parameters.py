@@ -7,7 +7,7 @@ from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet import Fleet
-from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils import Node, ParameterError, Parameters, parameter
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
     FRAME,
@@ -17,6 +17,7 @@ from crazyflie_utils.parameter_types import (
     ParameterType,
     Text,
 )
+from crazyflie_utils.runtime.runner import NodeClasses
 
 
 class NodeParameters(ParameterType):
@@ -104,4 +105,7 @@ class FlyParameters(FleetParameters):
     )
     by_model: Mapping[str, Any] | None = parameter(
         NodeParameters(), "those of vehicles of one model, which come before them", None, "models"
+    )
+    further: Mapping[str, type[Node]] | None = parameter(
+        NodeClasses(), "more nodes of every vehicle, by their names below its own", None
     )

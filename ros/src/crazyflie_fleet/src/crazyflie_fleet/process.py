@@ -85,7 +85,11 @@ class _Plan:
         if f"{self._handle.name}/{vehicle.settings.model}" in self.nodes:
             for name in ("simulator", "state_estimator", "lqr_controller"):
                 del classes[name]
-        tree = parameters(vehicle, self._told.fixed_frame, self._common(vehicle.settings.model))
+        frames = {"fixed": self._told.fixed_frame, "robot": vehicle.name}
+        tree = parameters(vehicle, frames, self._common(vehicle.settings.model))
+        for name, node_class in (self._told.further or {}).items():
+            own = merged(tree.get(name, {}), {"frames": frames})
+            self._add(f"/{vehicle.name}/{name}", node_class(), own)
         for name, node_class in classes.items():
             self._add(f"/{vehicle.name}/{name}", node_class(), tree[name])
         self._has_clock = True

@@ -49,17 +49,17 @@ def node_classes(vehicle: Vehicle, is_simulated: bool) -> dict[str, type[Node]]:
     return {"cmd_vel_converter": CmdVelConverterNode, **HOVER_STACK}
 
 
-def parameters(vehicle: Vehicle, fixed_frame: str, common: Mapping[str, Any]) -> Tree:
+def parameters(vehicle: Vehicle, frames: Mapping[str, str], common: Mapping[str, Any]) -> Tree:
     """Return the parameters of a vehicle's nodes, node by node.
 
     Parameters
     ----------
     vehicle : Vehicle
-    fixed_frame : str
+    frames : mapping
+        Names of the tf frames, fixed and robot.
     common : mapping
         What those of all vehicles have in common, node by node.
     """
-    frames = {"fixed": fixed_frame, "robot": vehicle.name}
     hover, settings = vehicle.hover_point, vehicle.settings
     own: Tree = {
         "simulator": {

@@ -54,9 +54,19 @@ class RosVehicle:
         Where its services are: go_to, takeoff and so on to absolute names.
     is_driven : bool
         Whether the driver flies it, and not a controller.
+    frames : tuple of str, optional
+        The fixed frame and its own, if tf says where it is; with the driver this is how it is
+        unless poses come.
     """
 
-    def __init__(self, name: str, handle: NodeHandle, services: dict[str, str], is_driven: bool):
+    def __init__(
+        self,
+        name: str,
+        handle: NodeHandle,
+        services: dict[str, str],
+        is_driven: bool,
+        frames: tuple[str, str] | None = None,
+    ):
         self.name = name
         self.bounds = fence(handle, prefix(name))
         self._handle = handle
@@ -71,15 +81,17 @@ class RosVehicle:
         self._stream: Course | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
-        self._lookup = handle.listen_to_transforms() if is_driven else None
+        self._frames = ("world", name) if is_driven else frames
+        self._lookup = None if self._frames is None else handle.listen_to_poses()
         if is_driven:
             handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
             handle.subscribe(f"{top}/status", String, self._on_status)
             self._setpoints = handle.publisher(f"{top}/cmd_full_state", FullState)
             handle.timer(_STREAM_STEP, self._send_setpoint)
         else:
-            state = PositionVelocityYawStateStamped
-            handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
+            if frames is None:
+                state = PositionVelocityYawStateStamped
+                handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
             handle.subscribe(f"{top}/in_flight_state", String, self._on_flight_state)
             handle.subscribe(f"{top}/in_flight_status", String, self._on_status)
 
@@ -89,10 +101,9 @@ class RosVehicle:
         """Return where it is, m; None when nobody has said so for a second."""
         if self._lookup is not None and not self._is_fresh():
             try:
-                found = self._lookup("world", self.name).transform.translation
+                return self._lookup(*self._frames).position
             except TransformError:
                 return None
-            return (found.x, found.y, found.z)
         return self._position if self._is_fresh() else None
 
     def _is_fresh(self):

@@ -20,6 +20,7 @@ from crazyflie_mission_api.ros_clock import RosClock
 from crazyflie_mission_api.roster import Rules
 from crazyflie_mission_api.team import Team
 from crazyflie_utils import NodeHandle, ParameterError
+from crazyflie_utils.parameter_types import FRAME
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.runner import begin_script
 
@@ -188,7 +189,7 @@ def _vehicle(process, handle, name, services):
     top = prefix(name)
     commander = f"{top}/high_level"
     if f"{commander}/go_to" in services:
-        return RosVehicle(name, handle, _below(commander), is_driven=False)
+        return RosVehicle(name, handle, _below(commander), False, _frames(handle, commander))
     driver = services.get(f"{top}/upload_trajectory")
     if driver is not None and services.get(f"{top}/takeoff") == driver:
         return RosVehicle(name, handle, _below(top), is_driven=True)
@@ -199,6 +200,14 @@ def _vehicle(process, handle, name, services):
             raise MissionError(f"{commander} could not be started; its reason is in the log")
         return RosVehicle(name, handle, _below(commander), is_driven=False)
     return None
+
+
+def _frames(handle, commander):
+    # In a fleet, one message on /tf has where all are.
+    fixed, own = (
+        handle.get_param(f"{commander}/frames/{frame}", FRAME, None) for frame in ("fixed", "robot")
+    )
+    return None if fixed is None or own is None else (fixed, own)
 
 
 def topic_types(handle: NodeHandle) -> dict[str, str]:

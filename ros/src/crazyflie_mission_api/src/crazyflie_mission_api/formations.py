@@ -7,13 +7,18 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist, pdist
 
+from crazyflie_fleet.fleet import DOWNWASH
 from crazyflie_mission_api.limits import Array
+
+_SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
 
 Point = tuple[float, float, float]
 
 
 def lattice(
-    counts: tuple[int, int, int], spacing: float, center: Sequence[float] = (0.0, 0.0, 1.0)
+    counts: tuple[int, int, int],
+    spacing: float | Sequence[float],
+    center: Sequence[float] = (0.0, 0.0, 1.0),
 ) -> Array:
     """Return the places of a box of vehicles.
 
@@ -21,8 +26,8 @@ def lattice(
     ----------
     counts : tuple, 3 components
         How many along x, y and z.
-    spacing : float
-        Between neighbours, m.
+    spacing : float or sequence, 3 components
+        Between neighbours, m; along x, y and z.
     center : sequence, 3 components
         m.
 
@@ -31,7 +36,11 @@ def lattice(
     ndarray, shape (n, 3)
         m.
     """
-    axes = [spacing * (np.arange(count) - (count - 1) / 2.0) for count in counts]
+    spacings = np.broadcast_to(spacing, 3)
+    axes = [
+        step * (np.arange(count) - (count - 1) / 2.0)
+        for count, step in zip(counts, spacings, strict=True)
+    ]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3) + center
 
 
@@ -46,8 +55,8 @@ def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Poi
     """Return which vehicle flies to which goal, such that the sum of squared ways is least.
 
     Vehicles that then fly straight there in the same time, in the same rhythm, come no nearer than
-    min(start distance, goal distance) / sqrt(2): Turpin, Michael and Kumar, CAPT: Concurrent
-    Assignment and Planning of Trajectories for Multiple Robots (IJRR 2014).
+    min(start distance, goal distance) / sqrt(2), distances as in `nearest`: Turpin, Michael and
+    Kumar, CAPT: Concurrent Assignment and Planning of Trajectories for Multiple Robots (IJRR 2014).
 
     Parameters
     ----------
@@ -57,13 +66,16 @@ def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Poi
         As many as vehicles, m.
     """
     starts = np.array([*places.values()], dtype=float)
-    rows, columns = linear_sum_assignment(cdist(starts, goals, "sqeuclidean"))
+    squares = cdist(starts * _SCALE, goals * _SCALE, "sqeuclidean")
+    rows, columns = linear_sum_assignment(squares)
     names = [*places]
     return {names[row]: tuple(goals[column]) for row, column in zip(rows, columns, strict=True)}
 
 
 def nearest(names: Sequence[str], positions: Array) -> tuple[float, str, str]:
     """Return the least distance of two vehicles, m, and who they are.
+
+    A metre of height counts for `crazyflie_fleet.fleet.DOWNWASH` metres less.
 
     Parameters
     ----------
@@ -72,7 +84,7 @@ def nearest(names: Sequence[str], positions: Array) -> tuple[float, str, str]:
     positions : ndarray, shape (n, 3)
         m.
     """
-    distances = pdist(positions)
+    distances = pdist(positions * _SCALE)
     least = int(distances.argmin())
     one, two = np.triu_indices(len(names), 1)
     return float(distances[least]), names[one[least]], names[two[least]]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
 from crazyflie_model.polynomials import Goal
-from crazyflie_virtual.firmware.trajectory import (
+from crazyflie_model.trajectory import (
     Trajectory,
     smooth_piece,
     spiral_piece,

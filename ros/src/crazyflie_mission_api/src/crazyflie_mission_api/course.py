@@ -11,7 +11,7 @@ from crazyflie_mission_api.limits import Array, MissionError
 from crazyflie_mission_api.trajectories import Pieces, straight
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal
-from crazyflie_virtual.firmware.trajectory import Trajectory
+from crazyflie_model.trajectory import Trajectory
 
 _STEP = 0.05
 """Of time, s, at which distances are looked at."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal
+from crazyflie_model.trajectory import Trajectory, smooth_piece
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_virtual.firmware.trajectory import Trajectory, smooth_piece
 
 NEAR = 0.5
 """A new way begins at the present goal if the vehicle is so near to it, m; otherwise, as

@@ -1,4 +1,4 @@
-"""What the high-level commander flies: smooth and straight pieces, and trajectories of pieces."""
+"""What the firmware's high-level commander flies: smooth and straight pieces, and trajectories."""
 
 import math
 from dataclasses import dataclass

@@ -7,14 +7,14 @@ from enum import Enum
 
 from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, Goal, PolynomialPiece
-from crazyflie_virtual.firmware.compressed_trajectory import read_compressed
-from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Modes, Setpoint
-from crazyflie_virtual.firmware.trajectory import (
+from crazyflie_model.trajectory import (
     Trajectory,
     smooth_piece,
     spiral_piece,
     straight_piece,
 )
+from crazyflie_virtual.firmware.compressed_trajectory import read_compressed
+from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Modes, Setpoint
 
 MEMORY_SIZE = 4096
 """Bytes of the trajectory memory."""

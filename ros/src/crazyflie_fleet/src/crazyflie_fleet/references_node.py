@@ -207,15 +207,16 @@ class ReferencesNode(Node):
         return told if np.linalg.norm(told - place) < led.vehicle.buffer else place.copy()
 
     def _on_way_timer(self):
-        going = [led for led in self._seen if led.way is not None and not led.waits]
-        if not going:
+        ways = {led.number: led.way for led in self._seen if led.way is not None and not led.waits}
+        if not ways:
             return
+        going = [self._seen[number] for number in ways]
         for led in going:
             led.way_time += self._parameters.way_period
-        places = along([led.way for led in going], [led.way_time for led in going])
-        for led, position, velocity in zip(going, *places, strict=True):
+        places = along([*ways.values()], [led.way_time for led in going])
+        for led, way, position, velocity in zip(going, ways.values(), *places, strict=True):
             self._want(led, self._reference(position, velocity))
-            if led.way_time >= led.way.duration:
+            if led.way_time >= way.duration:
                 led.way = None
 
     def _reference(self, position, velocity):
@@ -238,10 +239,10 @@ class ReferencesNode(Node):
         told = [led for led in self._seen if led.wanted is not None and led.way is None]
         if told:
             goals[[led.number for led in told]] = [_position(led.wanted) for led in told]
-        going = [led for led in self._seen if led.way is not None]
-        if going:
-            soon = [led.way_time + LOOK_AHEAD for led in going]
-            goals[[led.number for led in going]] = along([led.way for led in going], soon)[0]
+        ways = {led.number: led.way for led in self._seen if led.way is not None}
+        if ways:
+            soon = [self._seen[number].way_time + LOOK_AHEAD for number in ways]
+            goals[[*ways]] = along([*ways.values()], soon)[0]
         waiting, close = self._separation.waiting(positions, velocities, goals)
         for pair in close:
             self._warn(pair)

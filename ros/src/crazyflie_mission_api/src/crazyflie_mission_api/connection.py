@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 import genpy
@@ -81,8 +82,8 @@ class RosVehicle:
         self._stream: Course | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
-        self._frames = ("world", name) if is_driven else frames
-        self._lookup = None if self._frames is None else handle.listen_to_poses()
+        frames = ("world", name) if is_driven else frames
+        self._lookup = None if frames is None else partial(handle.listen_to_poses(), *frames)
         if is_driven:
             handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
             handle.subscribe(f"{top}/status", String, self._on_status)
@@ -101,7 +102,7 @@ class RosVehicle:
         """Return where it is, m; None when nobody has said so for a second."""
         if self._lookup is not None and not self._is_fresh():
             try:
-                return self._lookup(*self._frames).position
+                return self._lookup().position
             except TransformError:
                 return None
         return self._position if self._is_fresh() else None

@@ -1,6 +1,7 @@
 """How many simulated vehicles one core flies in real time."""
 
 import bisect
+import contextlib
 import os
 import tempfile
 import time
@@ -73,7 +74,9 @@ def measure(n: int, arguments: Sequence[str] = (), core: int = 0) -> SwarmFigure
             start = time.monotonic() - begin
             process = graph.process_of("/fleet")
             for thread in Path(f"/proc/{process}/task").iterdir():
-                os.sched_setaffinity(int(thread.name), {core})
+                # Some are there for a moment only.
+                with contextlib.suppress(ProcessLookupError):
+                    os.sched_setaffinity(int(thread.name), {core})
             graph.call("/all/takeoff")
             time.sleep(_SETTLING)
             used = graph.cpu_time([process])

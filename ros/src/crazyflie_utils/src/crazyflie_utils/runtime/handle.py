@@ -317,29 +317,31 @@ class NodeHandle:
         """
         self._process.executor.submit(partial(self.guard(callback), *arguments))
 
-    def clock_publisher(self) -> Callable[[float], None]:
-        """Return a function that moves simulated time to a moment (s) for everybody.
+    def clock_publisher(self) -> Callable[..., None]:
+        """Return ``set_clock(*moments)``, which moves simulated time to moments (s) for everybody.
 
-        In this process time moves after the present callback; then the timers
-        that are due run.
+        Other processes are told of all of them, in one go. In this process time moves to the last
+        one, after the present callback; then the timers that are due run.
         """
         publisher = self._process.topics.publisher("/clock", Clock, latch=False)
         self._clock = publisher
 
-        def set_clock(moment: float) -> None:
-            stamp = self.stamp(moment)
+        def set_clock(*moments: float) -> None:
+            stamp = self.stamp(moments[-1])
             self._process.transport.clock_was_set(stamp)
-            publisher.publish(Clock(stamp))
+            before = [Clock(self.stamp(each)) for each in moments[:-1]]
+            publisher.publish(Clock(stamp), before)
 
         return set_clock
 
     def next_event(self) -> float:
         """Return the next moment, s, at which simulated time has to stop.
 
-        That is when a timer of this process is due; or at once, where others listen to the clock.
+        That is when a timer of this process is due; or at once, where somebody in it listens to
+        the clock.
         """
-        # One listener is this process.
-        if self._clock is None or self._clock.has_subscribers(beside=1):
+        # One listener is the process itself.
+        if self._clock is None or self._clock.is_read_here(beside=1):
             return -math.inf
         return self._process.next_simulated_deadline()
 

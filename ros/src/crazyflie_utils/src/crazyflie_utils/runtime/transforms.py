@@ -20,7 +20,7 @@ from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_utils.runtime.poses import PoseCodec, RawTransforms, StampedPose, entries
-from crazyflie_utils.runtime.topics import Topics
+from crazyflie_utils.runtime.topics import Subscriber, Topics
 
 _LATEST = genpy.Time()
 
@@ -136,7 +136,7 @@ class Transforms:
         self._codec = PoseCodec()
         self._publisher: Any = None
         self._own: TFMessage | None = None
-        self._listens = False
+        self._subscriber: Subscriber | None = None
         self._listeners: dict[str, list[_Listener]] = {}
         self._arrived: list[_Listener] = []
         self._sources: list[Callable[[], None]] = []
@@ -165,7 +165,7 @@ class Transforms:
 
     def is_heard(self) -> bool:
         """Tell whether poses that are broadcast go anywhere but into look-ups of this process."""
-        beside = int(self._listens)
+        beside = int(self._subscriber is not None)
         return bool(self._listeners) or self._publisher.has_subscribers(beside)
 
     def broadcast(self, transforms: list[TransformStamped]) -> None:
@@ -174,26 +174,30 @@ class Transforms:
 
     def broadcast_poses(self, poses: list[StampedPose]) -> None:
         """Publish poses on /tf; a message is made only if anybody else gets it."""
-        if self._listens:
+        if self._subscriber is not None:
             now = self._now()
             with self._lock:
                 for pose in poses:
                     self._take(pose, now)
             self._tell_of_arrivals()
-        if self._publisher.has_subscribers(beside=int(self._listens)):
+        if self._publisher.has_subscribers(beside=int(self._subscriber is not None)):
             self._own = self._codec.encode(poses)
             self._publisher.publish(self._own)
 
     def listen(self) -> None:
         """Begin to collect what is said on /tf and /tf_static."""
-        if not self._listens:
-            self._listens = True
-            self._topics.subscribe("/tf", TFMessage, self._on_transforms, RawTransforms)
+        if self._subscriber is None:
+            self._subscriber = self._topics.subscribe(
+                "/tf", TFMessage, self._on_transforms, RawTransforms
+            )
+            self._subscriber.read_lazily(True)
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
     def on_pose(self, frame: str, period: float, tell: Callable[[], None]) -> None:
         """Have ``tell()`` called when a pose of a frame is new; once in ``period`` (s)."""
         self.listen()
+        if self._subscriber is not None:
+            self._subscriber.read_lazily(False)
         with self._lock:
             self._listeners.setdefault(frame, []).append(_Listener(period, tell))
             self._follow(frame)
@@ -226,6 +230,8 @@ class Transforms:
         """Return the same as `lookup`, as a pose, which is quicker."""
         for refresh in self._sources:
             refresh()
+        if self._subscriber is not None:
+            self._subscriber.collect()
         if target not in self._followed or source not in self._followed:
             with self._lock:
                 self._follow(target)

@@ -2,76 +2,20 @@
 
 Usage: python3 bench/steps_per_second.py [--json FILE], in a sourced workspace.
 
-A step is 1 ms of one quadrotor: a rigid body of 13 states, four motors with their lag, inner loops
-at 500 Hz; and, at 100 Hz, motion capture, estimator and controller. "Noise" has every pose drawn
-with errors of its own; "one by one" flies by the classes that the nodes have.
+What a step is says `crazyflie_batch.bench`. "Noise" has every pose drawn with errors of its own;
+"one by one" flies by the classes that the nodes have.
 """
 
 import argparse
 import json
 import os
-import time
 from pathlib import Path
 
-import numpy as np
-from rospkg import RosPack
+from crazyflie_batch import Measurement
+from crazyflie_batch.bench import DURATIONS, MANY, ONE, one_by_one, steps_per_second
 
-from crazyflie_batch import Controller, FiniteDifferences, Measurement, quadrotor, simulate
-from crazyflie_batch.scalar import fly_one
-from crazyflie_batch.simulation import prepare
-from crazyflie_lqr.gain_file import load_matrix
-from crazyflie_model.dynamics import STEP
-
-DURATIONS = {1: 60.0, 100: 20.0, 10_000: 2.0}
-"""Of the flights, s, by number of vehicles."""
-
-GOALS = {1: 0.5e6, 10_000: 10e6}
+GOALS = {ONE: 0.5e6, MANY: 10e6}
 """Steps per second on two processors."""
-
-REPEATS = 5
-
-
-def steps_per_second(n: int, measurement: Measurement) -> tuple[float, float]:
-    """Return the best of some repeats: by the clock, and by one processor's time.
-
-    What is compiled is compiled before. On a busy machine only the latter says something.
-    """
-    controller = Controller(_gains(), integrator_k=(-0.05, 0.05, -0.5), integrator_limit=(1, 1, 6))
-    model = quadrotor(mass_error=np.linspace(-0.1, 0.1, n))
-    times, processor_times = [], []
-    for _ in range(REPEATS + 1):
-        start, processor_start = time.perf_counter(), time.process_time()
-        simulate(model, controller, n=n, duration=DURATIONS[n], measurement=measurement)
-        times.append(time.perf_counter() - start)
-        processor_times.append(time.process_time() - processor_start)
-    steps = n * DURATIONS[n] / STEP
-    return steps / min(times[1:]), steps / min(processor_times[1:])
-
-
-def one_by_one() -> float:
-    """Return the same of the nodes' classes."""
-    duration = 2.0
-    batch = prepare(
-        quadrotor(),
-        Controller(_gains()),
-        FiniteDifferences(),
-        (0.0, 0.0, 1.0),
-        1,
-        goal=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
-        duration=duration,
-        period=0.01,
-        settle_time=0.0,
-        measurement=Measurement(),
-        seed=0,
-        first=0,
-    )
-    start = time.perf_counter()
-    fly_one(batch, 0)
-    return duration / STEP / (time.perf_counter() - start)
-
-
-def _gains():
-    return load_matrix(str(Path(RosPack().get_path("crazyflie_lqr"), "config", "K_soft.txt")), 4, 7)
 
 
 def main() -> None:
@@ -82,7 +26,7 @@ def main() -> None:
     noise = Measurement(1e-4, 1e-3)
     rows = []
     for n in DURATIONS:
-        by_clock, by_processor = steps_per_second(n, Measurement())
+        by_clock, by_processor = steps_per_second(n)
         noisy, noisy_by_processor = steps_per_second(n, noise)
         rows.append(
             {

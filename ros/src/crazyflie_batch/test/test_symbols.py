@@ -8,7 +8,7 @@ import pytest
 from llvmlite import binding
 
 from crazyflie_batch import Controller, Measurement, program, quadrotor, simulate
-from crazyflie_batch.elementwise import turn, wrap_to_pi, yaw_from_quaternion
+from crazyflie_batch.elementwise import turn, yaw_from_quaternion
 from crazyflie_batch.symbols import Condition, Emitter
 from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
 
@@ -56,13 +56,6 @@ def test_what_is_not_known_is_refused():
         bool(Condition(emitter, None))
     with pytest.raises(TypeError, match="does not know"):
         Emitter(None, 2, vector_functions=False).call(np.cbrt, [1.0])
-
-
-@pytest.mark.parametrize("angle", [-10.0, -math.pi, -1.0, 0.0, 3.0, math.pi, 4.0, 100.0])
-def test_angles_are_wrapped(angle):
-    wrapped = wrap_to_pi(angle)
-    assert -math.pi <= wrapped <= math.pi
-    assert math.cos(wrapped - angle) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("roll", [-0.4, 0.0, 0.7])

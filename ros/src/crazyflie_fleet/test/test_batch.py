@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from crazyflie_fleet.batch_feedback import batch_control, is_memoryless
 from crazyflie_fleet.batch_vehicles import BatchVehicles
+from crazyflie_fleet.swarm_node import batch_control, is_memoryless
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.dynamics import Coupled7D, NearHover
 from crazyflie_simulator.vehicle import SimulatedVehicle

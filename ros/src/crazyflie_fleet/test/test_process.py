@@ -85,13 +85,23 @@ def test_together_they_fly_as_each_alone():
     assert max(row[2] for row in first) == pytest.approx(max(row[2] for row in second), abs=0.02)
 
 
-def test_one_message_on_tf_for_all():
-    swarm = Swarm(fleet={"n": 4})
+@pytest.mark.parametrize("models", [3 * ["near_hover"], ["near_hover", "quadrotor", "quadrotor"]])
+def test_one_message_on_tf_for_all(tmp_path, models):
+    file = tmp_path / "fleet.yaml"
+    file.write_text(
+        "robots:\n"
+        + "".join(
+            f"  cf{k}: {{initial_position: [0, {k}, 0], model: {model}}}\n"
+            for k, model in enumerate(models)
+        )
+    )
+    swarm = Swarm(fleet={"file": str(file)})
     count = len(swarm.process.published("/tf"))
     swarm.process.advance(0.1)
     messages = swarm.process.published("/tf")[count:]
     assert len(messages) == 5
-    assert [t.child_frame_id for t in messages[-1].transforms] == ["cf1", "cf2", "cf3", "cf4"]
+    for message in messages:
+        assert [each.child_frame_id for each in message.transforms] == ["cf0", "cf1", "cf2"]
 
 
 def test_all_cannot_go_to_one_place():

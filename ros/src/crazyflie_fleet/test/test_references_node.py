@@ -5,7 +5,7 @@ import math
 import pytest
 import rospy
 from geometry_msgs.msg import Point
-from std_msgs.msg import String
+from std_msgs.msg import Float64MultiArray, String
 
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import fleet_file
@@ -23,15 +23,16 @@ from crazyflie_utils.testing import FakeProcess
 class Flight:
     """Two vehicles, cf1 and cf2, 1 m apart along y."""
 
-    def __init__(self, own=2):
+    def __init__(self, own=2, swarms=None):
         self.process = FakeProcess()
         node = ReferencesNode(
-            fleet_file.grid(2).vehicles[:own], fleet_file.grid(2).vehicles[own:], "world"
+            fleet_file.grid(2).vehicles[:own], fleet_file.grid(2).vehicles[own:], "world", swarms
         )
         assert self.process.launch(node, "/fleet/references")
         for name, y in (("cf1", 0.0), ("cf2", 1.0)):
             self.process.publish(f"/{name}/in_flight_state", String("flying"))
-            self.see(name, y)
+            if f"/{name}/state" in self.process.transport.subscribers:
+                self.see(name, y)
 
     def see(self, name, y):
         state = PositionVelocityYawState(y=y, z=1.0)
@@ -90,6 +91,19 @@ def test_who_is_flown_elsewhere_is_kept_apart_from():
     assert flight.followed("cf1")[-1].state.y == 0.8
     assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
     assert "/cf2/go_to" not in flight.process.transport.services
+
+
+def test_states_of_many_come_in_one_message():
+    _, second = fleet_file.grid(2).vehicles
+    flight = Flight(swarms={"/swarm/states": (second,)})
+    flight.process.publish("/swarm/states", Float64MultiArray(data=[0.0, 1.5, 1.0, 0, 0, 0, 0]))
+    flight.process.publish("/swarm/states", Float64MultiArray(data=[0.0] * 8))
+    assert flight.process.logged("warn") == [
+        "/fleet/references: ignoring 8 numbers as states of 1 vehicles"
+    ]
+    flight.go_to("cf2", goal=(0.0, 0.5, 0.0), relative=True)
+    flight.process.advance(0.02)
+    assert flight.followed("cf2")[-1].state.y == pytest.approx(1.5, abs=0.001)
 
 
 def test_it_goes_on_when_there_is_room(flight):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.way import MAX_SPEED, Way
+from crazyflie_fleet.way import MAX_SPEED, Way, along
 from crazyflie_utils.refusal import RefusalError
 
 STILL = np.zeros((2, 3))
@@ -81,15 +81,17 @@ def test_a_way_is_smooth_and_not_too_fast(start, goal, share):
     start, goal = np.array(start), np.array(goal)
     duration = 15.0 / 8.0 * float(np.linalg.norm(goal - start)) / MAX_SPEED + 0.1
     way = Way(start, goal, duration)
-    assert way.at(0.0)[0] == pytest.approx(start)
-    assert way.at(2.0 * duration)[0] == pytest.approx(goal)
+    assert along([way], [0.0])[0][0] == pytest.approx(start)
+    assert along([way], [2.0 * duration])[0][0] == pytest.approx(goal)
     for time in (0.0, duration):
-        assert way.at(time)[1] == pytest.approx(np.zeros(3))
+        assert along([way], [time])[1][0] == pytest.approx(np.zeros(3))
     time = share * duration
-    position, velocity = way.at(time)
+    (position,), (velocity,) = along([way], [time])
     assert np.linalg.norm(velocity) <= MAX_SPEED
     step = 1e-6
-    assert (way.at(time + step)[0] - position) / step == pytest.approx(velocity, abs=1e-3)
+    assert (along([way], [time + step])[0][0] - position) / step == pytest.approx(
+        velocity, abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("duration", [0.0, -1.0, 0.9, float("nan")])

@@ -472,3 +472,21 @@ def test_answers_are_those_of_a_buffer_that_knows_everything(tree, rounds):
             assert answer(lookup, target, source) == answer(
                 full.lookup_transform_core, target, source, genpy.Time()
             )
+
+
+def test_what_timers_broadcast_at_once_is_one_message(process):
+    handle = process.handle("/node")
+    broadcast = handle.broadcast_poses()
+    handle.broadcast_poses()
+
+    def tell(child):
+        stamp = handle.nanoseconds()
+        broadcast([StampedPose("world", child, stamp, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0))])
+
+    handle.timer(0.1, lambda: tell("one"))
+    handle.timer(0.2, lambda: tell("two"))
+    process.advance(0.2)
+    told = [[t.child_frame_id for t in m.transforms] for m in process.published("/tf")]
+    assert [sorted(each) for each in told] == [["one"], ["one", "two"]]
+    tell("three")
+    assert len(process.published("/tf")) == 3

@@ -1,20 +1,11 @@
 """Formulas of poses that the nodes have for one vehicle only, by components."""
 
-import math
 from collections.abc import Sequence
-
-import numpy as np
 
 from crazyflie_model.elementwise import Number, Vector, functions, where
 
 _SMALLEST_COSINE = 1e-6
 """Of a pitch from which roll and yaw can still be told apart."""
-
-
-def wrap_to_pi(angle: Number) -> Number:
-    """Return the angle in [-pi, pi] that points the same way; see `crazyflie_model.angles`."""
-    turned = angle + math.pi
-    return turned - 2.0 * math.pi * np.floor(turned / (2.0 * math.pi)) - math.pi
 
 
 def yaw_from_quaternion(quaternion: Sequence[Number]) -> Number:

@@ -13,9 +13,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from crazyflie_batch import feedback
 from crazyflie_batch.elementwise import turn, yaw_from_quaternion
 from crazyflie_batch.estimators import Estimator
+from crazyflie_lqr import componentwise
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector, functions, where
@@ -73,7 +73,7 @@ class Plan:
         """Return what a flight remembers, and how many numbers that are."""
         return {
             "x": self.make_model(**dict.fromkeys(self.model_parameters, 0.0)).x_dim,
-            "u": feedback.U_DIM,
+            "u": componentwise.U_DIM,
             "age": 1,
             "is_commanded": 1,
             "has_crashed": 1,
@@ -89,11 +89,11 @@ class Plan:
         return {
             "model": len(self.model_parameters),
             "estimator": self.estimator.parameter_dim,
-            "K": feedback.X_DIM * feedback.U_DIM,
-            "u_ref": feedback.U_DIM,
+            "K": componentwise.X_DIM * componentwise.U_DIM,
+            "u_ref": componentwise.U_DIM,
             "integrator_k": 3,
             "integrator_limit": 3,
-            "goal": feedback.X_DIM,
+            "goal": componentwise.X_DIM,
             "noise": 2,
             "delay": 1,
             "dropout": 1,
@@ -108,7 +108,7 @@ class Plan:
         """Return what is remembered of a flight that begins at a state of the model."""
         return {
             "x": x,
-            "u": [0.0] * feedback.U_DIM,
+            "u": [0.0] * componentwise.U_DIM,
             "age": [0.0],
             "is_commanded": [0.0],
             "has_crashed": [0.0],
@@ -174,12 +174,12 @@ def answer(
 
     k = parameters["integrator_k"]
     dt = where(control_stamp >= 0.0, tick * plan.period - control_stamp * plan.period, 0.0)
-    error = feedback.heading_error(state, parameters["goal"])
-    linear = feedback.linear_control(parameters["K"], parameters["u_ref"], error)
-    integral = feedback.integrate(
+    error = componentwise.heading_error(state, parameters["goal"])
+    linear = componentwise.linear_control(parameters["K"], parameters["u_ref"], error)
+    integral = componentwise.integrate(
         memory["integral"], error, dt, linear, k, parameters["integrator_limit"]
     )
-    u = feedback.limited_control(linear, integral, k)
+    u = componentwise.limited_control(linear, integral, k)
     first = _choose(has_arrived, {"estimator": begun, "stamp": [tick]}, memory)
     return _choose(
         is_second,

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from crazyflie_batch import feedback
 from crazyflie_batch.batch import Batch, Flights, fly
 from crazyflie_batch.estimators import Estimator, FiniteDifferences
 from crazyflie_batch.flight import SAMPLE_STEPS, Plan
+from crazyflie_lqr import componentwise
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Coupled7D, Dynamics, NearHover
 from crazyflie_model.limits import CRASH_TILT
@@ -225,11 +225,11 @@ def prepare(
     parameters = {
         "model": _together(model.parameters, n),
         "estimator": _together(estimator.parameters, n),
-        "K": _columns("K", controller.K, (feedback.U_DIM, feedback.X_DIM), n),
-        "u_ref": _columns("u_ref", controller.u_ref, (feedback.U_DIM,), n),
+        "K": _columns("K", controller.K, (componentwise.U_DIM, componentwise.X_DIM), n),
+        "u_ref": _columns("u_ref", controller.u_ref, (componentwise.U_DIM,), n),
         "integrator_k": _columns("integrator_k", controller.integrator_k, (3,), n),
         "integrator_limit": _columns("integrator_limit", controller.integrator_limit, (3,), n),
-        "goal": _columns("goal", goal, (feedback.X_DIM,), n),
+        "goal": _columns("goal", goal, (componentwise.X_DIM,), n),
         "noise": _together(noise, n),
         "delay": _columns("latency", delay, (), n),
         "dropout": _columns("dropout", measurement.dropout, (), n),

@@ -8,7 +8,7 @@ from crazyflie_fleet.fleet_node import FleetNode
 from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_fleet.stack import Tree, merged, node_classes, parameters
-from crazyflie_fleet.swarm_node import MODELS, SwarmNode, SwarmParameters
+from crazyflie_fleet.swarm_node import ALL_STATES, MODELS, SwarmNode, SwarmParameters
 from crazyflie_takeoff.all_emergency_node import AllEmergencyNode
 from crazyflie_utils import Node, NodeHandle, ParameterError
 
@@ -33,16 +33,19 @@ class _Plan:
         self.nodes: dict[str, Node] = {}
         # Of all simulators one is the source of simulated time.
         self._has_clock = False
+        swarms: dict[str, tuple[Vehicle, ...]] = {}
         fleet = told.fleet()
         vehicles = tuple(fleet[name] for name in told.own_names(fleet))
         others = tuple(each for each in fleet.vehicles if each not in vehicles)
         for model in MODELS if told.is_simulated and told.flies_together else ():
             of_model = tuple(each for each in vehicles if each.settings.model == model)
             if of_model:
-                self._add_swarm(model, of_model)
+                swarms[self._add_swarm(model, of_model)] = of_model
         for vehicle in vehicles:
             self._add_vehicle(vehicle)
-        self.nodes[f"{handle.name}/references"] = ReferencesNode(vehicles, others, told.fixed_frame)
+        self.nodes[f"{handle.name}/references"] = ReferencesNode(
+            vehicles, others, told.fixed_frame, swarms
+        )
         if vehicles[0] is fleet.vehicles[0]:
             self._add_services(fleet)
 
@@ -56,7 +59,8 @@ class _Plan:
             tree = merged(tree, {"simulator": {"clock": {"publish": False}}})
         return tree
 
-    def _add_swarm(self, model: str, vehicles: tuple[Vehicle, ...]) -> None:
+    def _add_swarm(self, model: str, vehicles: tuple[Vehicle, ...]) -> str:
+        """Return the topic of their states."""
         name = f"{self._handle.name}/{model}"
         tree = self._common(model)
         own: Tree = {key: tree[key] for key in ("simulator", "lqr_controller") if key in tree}
@@ -74,6 +78,7 @@ class _Plan:
             name, SwarmNode(vehicles, model), {**own, "frames": {"fixed": self._told.fixed_frame}}
         )
         self._has_clock = True
+        return f"{name}/{ALL_STATES}"
 
     def _add_vehicle(self, vehicle: Vehicle) -> None:
         classes = node_classes(vehicle, self._told.is_simulated)

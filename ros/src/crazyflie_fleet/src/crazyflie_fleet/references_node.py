@@ -1,11 +1,12 @@
 """ROS interface of what leads vehicles along ways, and apart."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
-from std_msgs.msg import Header, String
+from std_msgs.msg import Float64MultiArray, Header, String
 from tf2_msgs.msg import TFMessage
 from typing_extensions import override
 
@@ -13,7 +14,7 @@ from crazyflie_driver.srv import GoTo, GoToResponse
 from crazyflie_fleet.fleet import Vehicle
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
 from crazyflie_fleet.stack import FLIGHT_STATE, REFERENCE, SAFE_REFERENCE, STATE
-from crazyflie_fleet.way import Way
+from crazyflie_fleet.way import Way, along
 from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,
@@ -23,7 +24,7 @@ from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, paramete
 from crazyflie_utils.parameter_types import TIME_STEP, TOPIC
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.runtime.topics import Publisher
-from crazyflie_utils.vectors import is_finite
+from crazyflie_utils.vectors import is_finite, to_tuple
 
 STATE_LIMIT = 0.5
 """A vehicle whose state is older than this is not led anywhere, s."""
@@ -44,10 +45,9 @@ class ReferencesParameters(Parameters):
 class _Led:
     """A vehicle that is led or, without a publisher, only seen; times are in s."""
 
+    number: int
     vehicle: Vehicle
     publisher: Publisher | None = None
-    state: PositionVelocityYawStateStamped | None = None
-    state_time: float = 0.0
     flight_state: str = ""
     wanted: PositionVelocityStateStamped | None = None
     way: Way | None = None
@@ -65,19 +65,30 @@ class ReferencesNode(Node):
     others : sequence of Vehicle
         Those that are flown elsewhere, from which the former keep apart.
     fixed_frame : str
+    swarms : mapping of str to sequence of Vehicle, optional
+        Topics that have the states of some of them in one message.
     """
 
     needed_in_flight = True
 
     def __init__(
-        self, vehicles: tuple[Vehicle, ...], others: tuple[Vehicle, ...], fixed_frame: str
+        self,
+        vehicles: tuple[Vehicle, ...],
+        others: tuple[Vehicle, ...],
+        fixed_frame: str,
+        swarms: Mapping[str, tuple[Vehicle, ...]] | None = None,
     ):
         self._vehicles = vehicles
         self._others = others
         self._fixed_frame = fixed_frame
-        self._separation = Separation([vehicle.buffer for vehicle in (*vehicles, *others)])
+        self._swarms = swarms or {}
+        everybody = (*vehicles, *others)
+        self._separation = Separation([vehicle.buffer for vehicle in everybody])
         # Own ones first.
         self._seen: list[_Led] = []
+        # Of each: x, y, z, x_dot, y_dot, z_dot, and since when it is known.
+        self._states = np.full((len(everybody), 6), np.nan)
+        self._state_times = np.full(len(everybody), -np.inf)
         self._told = ""
 
     @override
@@ -92,13 +103,15 @@ class ReferencesNode(Node):
         for vehicle in self._vehicles:
             self._lead(handle, vehicle)
         for vehicle in self._others:
-            self._see(handle, _Led(vehicle))
+            self._see(handle, _Led(len(self._seen), vehicle))
+        self._see_states(handle)
         handle.timer(parameters.way_period, self._on_way_timer)
         handle.timer(parameters.watch_period, self._on_watch_timer)
 
     def _lead(self, handle, vehicle):
         below = f"/{vehicle.name}/"
-        led = _Led(vehicle, handle.publisher(below + SAFE_REFERENCE, PositionVelocityStateStamped))
+        publisher = handle.publisher(below + SAFE_REFERENCE, PositionVelocityStateStamped)
+        led = _Led(len(self._seen), vehicle, publisher)
         handle.advertise_service(below + "go_to", GoTo, partial(self._on_go_to, led))
         handle.subscribe(
             below + REFERENCE, PositionVelocityStateStamped, partial(self._on_reference, led)
@@ -106,11 +119,18 @@ class ReferencesNode(Node):
         self._see(handle, led)
 
     def _see(self, handle, led):
-        below = f"/{led.vehicle.name}/"
-        on_state = partial(self._on_state, led)
-        handle.subscribe(below + STATE, PositionVelocityYawStateStamped, on_state)
-        handle.subscribe(below + FLIGHT_STATE, String, partial(self._on_flight_state, led))
+        topic = f"/{led.vehicle.name}/{FLIGHT_STATE}"
+        handle.subscribe(topic, String, partial(self._on_flight_state, led))
         self._seen.append(led)
+
+    def _see_states(self, handle):
+        alone = {led.vehicle.name: led.number for led in self._seen}
+        for topic, swarm in self._swarms.items():
+            numbers = np.array([alone.pop(vehicle.name) for vehicle in swarm])
+            handle.subscribe(topic, Float64MultiArray, partial(self._on_states, numbers))
+        for name, number in alone.items():
+            on_state = partial(self._on_state, number)
+            handle.subscribe(f"/{name}/{STATE}", PositionVelocityYawStateStamped, on_state)
 
     def _publish_mocap_frames(self, handle):
         # What motion capture calls a vehicle is the vehicle.
@@ -126,9 +146,20 @@ class ReferencesNode(Node):
 
     # What it hears.
 
-    def _on_state(self, led, message):
-        led.state = message
-        led.state_time = self._handle.time()
+    def _on_state(self, number, message):
+        self._states[number] = to_tuple(message.state)[:6]
+        self._state_times[number] = self._handle.time()
+
+    def _on_states(self, numbers, message):
+        if len(message.data) != 7 * len(numbers):
+            self._handle.warn(
+                f"ignoring {len(message.data)} numbers as states of {len(numbers)} vehicles",
+                throttle=1.0,
+                key="states",
+            )
+            return
+        self._states[numbers] = np.reshape(message.data, (-1, 7))[:, :6]
+        self._state_times[numbers] = self._handle.time()
 
     def _on_flight_state(self, led, message):
         led.flight_state = message.data
@@ -171,16 +202,18 @@ class ReferencesNode(Node):
 
     def _place(self, led):
         # Where it is told to be, if it is about there: otherwise every way would begin with a jerk.
-        place = _position(led.state)
+        place = self._states[led.number, :3]
         told = place if led.wanted is None else _position(led.wanted)
-        return told if np.linalg.norm(told - place) < led.vehicle.buffer else place
+        return told if np.linalg.norm(told - place) < led.vehicle.buffer else place.copy()
 
     def _on_way_timer(self):
-        for led in self._seen:
-            if led.way is None or led.waits:
-                continue
+        going = [led for led in self._seen if led.way is not None and not led.waits]
+        if not going:
+            return
+        for led in going:
             led.way_time += self._parameters.way_period
-            position, velocity = led.way.at(led.way_time)
+        places = along([led.way for led in going], [led.way_time for led in going])
+        for led, position, velocity in zip(going, *places, strict=True):
             self._want(led, self._reference(position, velocity))
             if led.way_time >= led.way.duration:
                 led.way = None
@@ -189,28 +222,26 @@ class ReferencesNode(Node):
         message = PositionVelocityStateStamped()
         message.header.stamp = self._handle.stamp()
         message.header.frame_id = self._fixed_frame
-        message.state = PositionVelocityState(*map(float, position), *map(float, velocity))
+        message.state = PositionVelocityState(*position.tolist(), *velocity.tolist())
         return message
 
     # Distances.
 
     def _knows(self, led):
-        age = self._handle.time() - led.state_time
-        is_fresh = led.state is not None and 0.0 <= age < STATE_LIMIT
-        return is_fresh and bool(np.isfinite(_position(led.state)).all())
+        age = self._handle.time() - self._state_times[led.number]
+        return 0.0 <= age < STATE_LIMIT and bool(np.isfinite(self._states[led.number, :3]).all())
 
     def _on_watch_timer(self):
-        n = len(self._seen)
-        positions, velocities, goals = (np.full((n, 3), np.nan) for _ in range(3))
-        for k, led in enumerate(self._seen):
-            if led.state is None or led.flight_state not in _WATCHED:
-                continue
-            positions[k] = goals[k] = _position(led.state)
-            velocities[k] = led.state.state.x_dot, led.state.state.y_dot, led.state.state.z_dot
-            if led.way is not None:
-                goals[k] = led.way.at(led.way_time + LOOK_AHEAD)[0]
-            elif led.wanted is not None:
-                goals[k] = _position(led.wanted)
+        positions, velocities = self._states[:, :3].copy(), self._states[:, 3:]
+        positions[[led.flight_state not in _WATCHED for led in self._seen]] = np.nan
+        goals = positions.copy()
+        told = [led for led in self._seen if led.wanted is not None and led.way is None]
+        if told:
+            goals[[led.number for led in told]] = [_position(led.wanted) for led in told]
+        going = [led for led in self._seen if led.way is not None]
+        if going:
+            soon = [led.way_time + LOOK_AHEAD for led in going]
+            goals[[led.number for led in going]] = along([led.way for led in going], soon)[0]
         waiting, close = self._separation.waiting(positions, velocities, goals)
         for pair in close:
             self._warn(pair)
@@ -222,12 +253,12 @@ class ReferencesNode(Node):
     def _turn(self, led, waits):
         led.waits = waits
         if waits:
-            led.publisher.publish(self._reference(_position(led.state), np.zeros(3)))
+            place = self._states[led.number, :3]
+            led.publisher.publish(self._reference(place, np.zeros(3)))
         elif led.wanted is not None and led.way is None:
-            state = led.wanted.state
             # Anew, since a controller does not go back to what is older than the place to wait.
-            velocity = (state.x_dot, state.y_dot, state.z_dot)
-            led.publisher.publish(self._reference(_position(led.wanted), velocity))
+            wanted = np.array(to_tuple(led.wanted.state))
+            led.publisher.publish(self._reference(wanted[:3], wanted[3:]))
 
     def _warn(self, pair):
         first, second = (self._seen[k].vehicle.name for k in (pair.first, pair.second))
@@ -246,4 +277,4 @@ class ReferencesNode(Node):
 
 
 def _position(message):
-    return np.array([message.state.x, message.state.y, message.state.z])
+    return np.array(to_tuple(message.state)[:3])

@@ -3,38 +3,77 @@
 For each vehicle it is what a simulator, an estimator and a controller are, with the same topics.
 """
 
+import math
 from functools import partial
 
 import numpy as np
-from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from numpy.typing import NDArray
-from std_msgs.msg import Header
-from tf2_msgs.msg import TFMessage
+from std_msgs.msg import Float64MultiArray, Header
 from typing_extensions import override
 
-from crazyflie_fleet.batch_feedback import YAW, batch_control, is_memoryless
 from crazyflie_fleet.batch_vehicles import BatchVehicles
 from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.messages import array_message, control_message, state_message
 from crazyflie_fleet.stack import FINAL_CONTROL, LQR_CONTROL, REFERENCE, SAFE_REFERENCE, STATE
+from crazyflie_lqr.componentwise import heading_error, limited_control, linear_control
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
+from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_lqr.reference import GuardedReference
 from crazyflie_model.angles import quaternion_from_rpy, wrap_to_pi
 from crazyflie_model.dynamics import Coupled7D, NearHover, SevenDimensional
+from crazyflie_model.elementwise import join, split
 from crazyflie_msgs.msg import (
-    Control,
     ControlStamped,
     PositionVelocityStateStamped,
-    PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
 from crazyflie_simulator.simulator_node import MAX_CATCH_UP
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, Number
+from crazyflie_utils.runtime.poses import StampedPose
 from crazyflie_utils.runtime.topics import Publisher
-from crazyflie_utils.vectors import to_vector
+from crazyflie_utils.vectors import to_tuple
+
+YAW = 6
+
+ALL_STATES = "states"
+"""Topic, below the node's name, of all its vehicles' states in one message: for each in the order
+of the file a row of x, y, z, x_dot, y_dot, z_dot and yaw."""
 
 MODELS: dict[str, type[SevenDimensional]] = {"near_hover": NearHover, "coupled_7d": Coupled7D}
 """Models of which vehicles can be flown together."""
+
+
+def batch_control(
+    K: NDArray[np.float64],
+    u_ref: NDArray[np.float64],
+    x: NDArray[np.float64],
+    x_ref: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Return the controls, shape (n, 4), of an `IntegralStateFeedback` without an integrator.
+
+    Parameters
+    ----------
+    K : ndarray, shape (4, 7)
+    u_ref : ndarray, shape (4,)
+    x, x_ref : ndarray, shape (n, 7)
+        States and references.
+    """
+    error = heading_error(split(x), split(x_ref))
+    return join(limited_control(linear_control(K.ravel().tolist(), u_ref.tolist(), error)))
+
+
+def is_memoryless(K: NDArray[np.float64], u_ref: NDArray[np.float64]) -> bool:
+    """Tell whether the controller with these gains, and no integrator, is `batch_control`.
+
+    It is not if it leads its vehicle up along a climb, instead of by a step of the reference.
+    """
+    controller = IntegralStateFeedback(K, u_ref, YAW)
+    controller.take_off()
+    low, high = np.zeros(7), np.zeros(7)
+    high[2] = 1e-3
+    alone = controller.control(low, high, 0.0)
+    return np.allclose(alone, batch_control(K, u_ref, low[None], high[None])[0], rtol=0, atol=1e-12)
 
 
 class SwarmParameters(Parameters):
@@ -84,6 +123,7 @@ class SwarmNode(Node):
         self._model = model
         self._ticks = 0
         self._measured: tuple[float, NDArray[np.float64]] | None = None
+        self._broadcast_time = math.nan
         self._references: list[GuardedReference] = []
         self._states: list[Publisher] = []
         self._controls: list[Publisher] = []
@@ -103,7 +143,8 @@ class SwarmNode(Node):
         self._start = handle.time()
         places = [vehicle.position for vehicle in self._vehicles]
         self._batch = BatchVehicles(MODELS[self._model](), places, self._start)
-        self._tf = handle.publisher("/tf", TFMessage)
+        self._broadcast = handle.broadcast_poses(self._broadcast_poses)
+        self._all_states = handle.publisher("~" + ALL_STATES, Float64MultiArray)
         if parameters.publishes_clock:
             self._set_clock = handle.clock_publisher()
         for number, vehicle in enumerate(self._vehicles):
@@ -144,16 +185,14 @@ class SwarmNode(Node):
         )
 
     def _on_control(self, number, message):
-        control = message.control
-        u = (control.roll, control.pitch, control.yaw_dot, control.thrust)
-        self._batch.command(number, u, self._handle.time())
+        self._batch.command(number, to_tuple(message.control), self._handle.time())
 
     def _on_reference(self, reference, message):
-        x_ref = np.append(to_vector(message.state), 0.0)
+        x_ref = (*to_tuple(message.state), 0.0)
         reference.update(x_ref, message.header.stamp.to_sec(), self._handle.stamp().to_sec())
 
     def _on_descent(self, reference, message):
-        reference.descend(np.append(to_vector(message.state), 0.0), self._handle.time())
+        reference.descend((*to_tuple(message.state), 0.0), self._handle.time())
 
     # What time brings.
 
@@ -177,37 +216,42 @@ class SwarmNode(Node):
         if self._measured is not None and time == self._measured[0]:
             return
         states = self._batch.states
-        header = Header(0, self._handle.stamp(time), self._parameters.fixed_frame)
-        if self._tf.has_subscribers():
-            self._tf.publish(TFMessage(self._transforms(header, states)))
         before, self._measured = self._measured, (time, states)
+        if self._handle.poses_are_heard():
+            self._broadcast_poses()
+        header = Header(0, self._handle.stamp(time), self._parameters.fixed_frame)
         if before is not None and time > before[0]:
             self._control(header, _estimates(*before, time, states))
 
-    def _transforms(self, header, states):
+    def _broadcast_poses(self):
+        """Tell tf of the present poses, if it does not know them."""
+        if self._measured is None or self._broadcast_time == self._measured[0]:
+            return
+        self._broadcast_time, states = self._measured
+        frame, stamp = self._parameters.fixed_frame, self._handle.nanoseconds(self._broadcast_time)
         tilts = self._batch.tilts.tolist()
-        return [
-            TransformStamped(
-                header,
-                vehicle.name,
-                Transform(Vector3(x, y, z), Quaternion(*quaternion_from_rpy(roll, pitch, yaw))),
-            )
-            for vehicle, (x, y, z, _, _, _, yaw), (roll, pitch) in zip(
-                self._vehicles, states.tolist(), tilts, strict=True
-            )
-        ]
+        self._broadcast(
+            [
+                StampedPose(
+                    frame, vehicle.name, stamp, (x, y, z), quaternion_from_rpy(roll, pitch, yaw)
+                )
+                for vehicle, (x, y, z, _, _, _, yaw), (roll, pitch) in zip(
+                    self._vehicles, states.tolist(), tilts, strict=True
+                )
+            ]
+        )
 
     def _control(self, header, estimates):
+        self._all_states.publish(array_message(estimates))
         rows = estimates.tolist()
         for publisher, row in zip(self._states, rows, strict=True):
             if publisher.has_subscribers():
-                state = PositionVelocityYawState(*row)
-                publisher.publish(PositionVelocityYawStateStamped(header, state))
+                publisher.publish(state_message(header, row))
         now = self._handle.time()
         found = [
             (number, x_ref)
-            for number, reference in enumerate(self._references)
-            if (x_ref := reference.value(now, estimates[number])) is not None
+            for number, (reference, row) in enumerate(zip(self._references, rows, strict=True))
+            if (x_ref := reference.value(now, row)) is not None
         ]
         if not found:
             return
@@ -218,7 +262,7 @@ class SwarmNode(Node):
         )
         header = Header(0, header.stamp, "")
         for number, row in zip(numbers, controls.tolist(), strict=True):
-            self._controls[number].publish(ControlStamped(header, Control(*row)))
+            self._controls[number].publish(control_message(header, row))
 
 
 def _estimates(

@@ -1,5 +1,6 @@
 """The way from one point of rest to another."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,9 +44,21 @@ class Way:
                 f"{needed:.2f} s (at most {MAX_SPEED:g} m/s)"
             )
 
-    def at(self, time: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return position (m) and velocity (m/s), shape (3,), some time (s) after the start."""
-        s = min(max(time / self.duration, 0.0), 1.0)
-        path = self.goal - self.start
-        position = self.start + path * (s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
-        return position, path * (30.0 * s * s * (1.0 - s) ** 2 / self.duration)
+
+def along(
+    ways: Sequence[Way], times: Sequence[float]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return positions (m) and velocities (m/s) on n ways, shape (n, 3) each.
+
+    Parameters
+    ----------
+    ways : sequence of Way
+    times : sequence of float
+        Since the start of each, s.
+    """
+    durations = np.array([way.duration for way in ways])
+    s = np.clip(np.array(times) / durations, 0.0, 1.0)[:, None]
+    start = np.array([way.start for way in ways])
+    path = np.array([way.goal for way in ways]) - start
+    position = start + path * (s**3 * (10.0 - 15.0 * s + 6.0 * s * s))
+    return position, path * (30.0 * s * s * (1.0 - s) ** 2 / durations[:, None])

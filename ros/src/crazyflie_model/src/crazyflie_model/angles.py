@@ -43,10 +43,11 @@ def wrap_to_pi(angle: Many) -> Many:
     float or ndarray
         Same shape, rad.
     """
-    if type(angle) is float:
-        return (angle + math.pi) % (2.0 * math.pi) - math.pi
-    wrapped = np.remainder(np.asarray(angle) + math.pi, 2.0 * math.pi) - math.pi
-    return wrapped if wrapped.ndim else float(wrapped)
+    turned = angle + math.pi
+    if isinstance(turned, float):
+        return turned % (2.0 * math.pi) - math.pi
+    # The remainder, by what anything else that takes part in numpy's functions knows, too.
+    return turned - 2.0 * math.pi * np.floor(turned / (2.0 * math.pi)) - math.pi
 
 
 def quaternion_from_rpy(

@@ -7,35 +7,10 @@ import platform
 import sys
 from pathlib import Path
 
-from crazyflie_dev.bench import hover, simulated, start
-from crazyflie_dev.bench.row import NotMeasuredError, Row, plugged
+from crazyflie_dev.bench import batch, hover, simulated, start, swarm
+from crazyflie_dev.bench.row import NotMeasuredError, Row
 
-PLUGGED = [
-    Row(
-        "vehicles",
-        "vehicles in real time (100 Hz, p99 of the period < 12 ms), one core",
-        "",
-        plugged("crazyflie_fleet.bench:vehicles_in_real_time"),
-        least=100.0,
-    ),
-    Row(
-        "batch_many",
-        "batch simulation, n = 10 000: steps of 13 states",
-        "1/s",
-        plugged("crazyflie_simulator.bench:steps_of_many"),
-        least=10e6,
-    ),
-    Row(
-        "batch_one",
-        "batch simulation, n = 1: steps of 13 states",
-        "1/s",
-        plugged("crazyflie_simulator.bench:steps_of_one"),
-        least=500e3,
-    ),
-]
-"""What other packages measure; see README.md."""
-
-ROWS = [*hover.ROWS, *simulated.ROWS, *start.ROWS, *PLUGGED]
+ROWS = [*hover.ROWS, *simulated.ROWS, *start.ROWS, *swarm.ROWS, *batch.ROWS]
 
 
 def measure(rows: list[Row]) -> list[dict[str, object]]:

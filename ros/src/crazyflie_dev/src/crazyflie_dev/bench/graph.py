@@ -25,9 +25,9 @@ Arrivals = list[tuple[str, int, int]]
 """Topic, arrival and stamp, in ns of the machine's clock."""
 
 
-def wait_for_service(name: str) -> None:
-    """Wait until somebody offers a service."""
-    end = time.monotonic() + _LIMIT
+def wait_for_service(name: str, limit: float = _LIMIT) -> None:
+    """Wait until somebody offers a service, at most so long (s)."""
+    end = time.monotonic() + limit
     while time.monotonic() < end:
         # There may be no master yet.
         try:
@@ -35,7 +35,7 @@ def wait_for_service(name: str) -> None:
                 return
         except (rosgraph.MasterError, OSError):
             time.sleep(0.002)
-    raise NotMeasuredError(f"nobody offers {name} after {_LIMIT:g} s")
+    raise NotMeasuredError(f"nobody offers {name} after {limit:g} s")
 
 
 def call(service: str) -> None:

@@ -1,6 +1,5 @@
 """One figure that is measured, beside what it is to reach."""
 
-import importlib
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -48,23 +47,3 @@ class Row:
     def is_reached(self, value: float) -> bool:
         """Tell whether a value is within the goal."""
         return self.least <= value <= self.most
-
-
-def plugged(path: str) -> Callable[[], float]:
-    """Return a measurement that another package makes.
-
-    Parameters
-    ----------
-    path : str
-        "package.module:function"; the function takes no arguments and returns the figure.
-    """
-
-    def measure():
-        module, _, function = path.partition(":")
-        try:
-            found = getattr(importlib.import_module(module), function)
-        except (ImportError, AttributeError) as error:
-            raise NotMeasuredError(f"there is no {path}: {error}") from None
-        return float(found())
-
-    return measure

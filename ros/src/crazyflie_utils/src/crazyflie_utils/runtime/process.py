@@ -41,8 +41,10 @@ class Process:
         )
         self._log = NodeHandle(self, "/tf")
         self._steady_clock = SteadyClock()
-        self._steady = SteadyTimers(TimerQueue(self.executor), self._steady_clock)
-        self._simulated = TimerQueue(self.executor)
+        # The poses of vehicles that are simulated in one tick are one message.
+        tf = self.transforms.gather, self.transforms.send_gathered
+        self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
+        self._simulated = TimerQueue(self.executor, *tf)
         self.exit_status: int | None = None
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)

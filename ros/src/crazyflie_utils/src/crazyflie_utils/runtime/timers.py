@@ -67,10 +67,19 @@ class TimerQueue:
     ----------
     executor : Executor
         Where their callbacks run.
+    before, after : callable, optional
+        Called before and after several that are due at once.
     """
 
-    def __init__(self, executor: Executor):
+    def __init__(
+        self,
+        executor: Executor,
+        before: Callable[[], None] | None = None,
+        after: Callable[[], None] | None = None,
+    ):
         self._executor = executor
+        self._before = before
+        self._after = after
         self._lock = threading.Lock()
         self._heap: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
@@ -115,8 +124,14 @@ class TimerQueue:
         A timer that is late by more than a period skips what it missed and
         keeps its phase.
         """
-        for timer in self._take_due(now):
+        due = self._take_due(now)
+        are_several = len(due) > 1
+        if are_several and self._before is not None:
+            self._executor.submit(self._before)
+        for timer in due:
             self._executor.submit(timer.fire)
+        if are_several and self._after is not None:
+            self._executor.submit(self._after)
 
     def rebase(self, now: float) -> None:
         """Make every timer due one period from ``now`` (s): time has been reset."""

@@ -136,6 +136,8 @@ class Transforms:
         self._codec = PoseCodec()
         self._publisher: Any = None
         self._own: TFMessage | None = None
+        self._broadcasters = 0
+        self._gathered: list[StampedPose] | None = None
         self._subscriber: Subscriber | None = None
         self._listeners: dict[str, list[_Listener]] = {}
         self._arrived: list[_Listener] = []
@@ -155,7 +157,8 @@ class Transforms:
         self._stamps: OrderedDict[float, int] = OrderedDict()
 
     def advertise(self) -> None:
-        """Announce that this process will broadcast."""
+        """Announce that one more in this process will broadcast."""
+        self._broadcasters += 1
         if self._publisher is None:
             self._publisher = self._topics.publisher("/tf", TFMessage, latch=False)
 
@@ -180,9 +183,27 @@ class Transforms:
                 for pose in poses:
                     self._take(pose, now)
             self._tell_of_arrivals()
-        if self._publisher.has_subscribers(beside=int(self._subscriber is not None)):
-            self._own = self._codec.encode(poses)
-            self._publisher.publish(self._own)
+        if not self._publisher.has_subscribers(beside=int(self._subscriber is not None)):
+            return
+        if self._gathered is None:
+            self._send(poses)
+        else:
+            self._gathered += poses
+
+    def gather(self) -> None:
+        """Keep the poses that several broadcast from now on for one message."""
+        if self._broadcasters > 1 and self._gathered is None:
+            self._gathered = []
+
+    def send_gathered(self) -> None:
+        """Publish what has been gathered; from now on each broadcast is a message again."""
+        poses, self._gathered = self._gathered, None
+        if poses:
+            self._send(poses)
+
+    def _send(self, poses):
+        self._own = self._codec.encode(poses)
+        self._publisher.publish(self._own)
 
     def listen(self) -> None:
         """Begin to collect what is said on /tf and /tf_static."""

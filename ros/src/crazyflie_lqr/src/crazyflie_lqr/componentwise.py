@@ -1,12 +1,12 @@
-"""The control law of `crazyflie_lqr.linear_feedback`, by components: for floats or a batch.
+"""The control law of `linear_feedback` by components: for floats, or for many vehicles in arrays.
 
 What a controller remembers is a list of components, as states are; nothing is changed in place.
 """
 
 from collections.abc import Sequence
 
-from crazyflie_batch.elementwise import wrap_to_pi
 from crazyflie_lqr.linear_feedback import MAX_GAP, PITCH, ROLL, THRUST
+from crazyflie_model.angles import wrap_to_pi
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 
@@ -26,7 +26,7 @@ _INTEGRATED = (PITCH, ROLL, THRUST)
 def heading_error(x: Sequence[Number], x_ref: Sequence[Number]) -> Vector[Number]:
     """Return the error of a state in the heading frame, 7 components.
 
-    See `crazyflie_lqr.linear_feedback.heading_error`.
+    See `linear_feedback.heading_error`.
     """
     px, py, pz, vx, vy, vz, turn = (a - b for a, b in zip(x, x_ref, strict=True))
     yaw = x[6]
@@ -75,7 +75,7 @@ def integrate(
     linear : sequence, 4 components
         Of `linear_control`.
     k, limit : sequence, 3 components
-        See `crazyflie_lqr.linear_feedback.IntegralStateFeedback`.
+        See `linear_feedback.IntegralStateFeedback`.
     """
     dt = where(dt <= MAX_GAP, dt, 0.0)
     after = []
@@ -92,7 +92,9 @@ def integrate(
 
 
 def limited_control(
-    linear: Sequence[Number], integral: Sequence[Number], k: Sequence[Number]
+    linear: Sequence[Number],
+    integral: Sequence[Number] = (0.0, 0.0, 0.0),
+    k: Sequence[Number] = (0.0, 0.0, 0.0),
 ) -> Vector[Number]:
     """Return the control with its integral part, within what controllers ask for."""
     u = list(linear)

@@ -1,0 +1,85 @@
+"""How many steps of vehicles in closed loop are computed in a second.
+
+A step is 1 ms of one quadrotor: a rigid body of 13 states, four motors with their lag, inner loops
+at 500 Hz; and, at 100 Hz, motion capture, estimator and controller.
+"""
+
+import time
+from pathlib import Path
+
+import numpy as np
+from rospkg import RosPack
+
+from crazyflie_batch import Controller, FiniteDifferences, Measurement, quadrotor, simulate
+from crazyflie_batch.scalar import fly_one
+from crazyflie_batch.simulation import prepare
+from crazyflie_lqr.gain_file import load_matrix
+from crazyflie_model.dynamics import STEP
+
+ONE, MANY = 1, 10_000
+"""Numbers of vehicles that have a goal."""
+
+DURATIONS = {ONE: 60.0, 100: 20.0, MANY: 2.0}
+"""Of the flights, s, by number of vehicles."""
+
+REPEATS = 5
+
+
+def steps_per_second(n: int, measurement: Measurement | None = None) -> tuple[float, float]:
+    """Return the best of some repeats: by the clock, and by one processor's time.
+
+    What is compiled is compiled before. On a busy machine only the latter says something.
+
+    Parameters
+    ----------
+    n : int
+        Of `DURATIONS`.
+    measurement : Measurement, optional
+        By default without errors.
+    """
+    controller = Controller(_gains(), integrator_k=(-0.05, 0.05, -0.5), integrator_limit=(1, 1, 6))
+    model = quadrotor(mass_error=np.linspace(-0.1, 0.1, n))
+    times, processor_times = [], []
+    for _ in range(REPEATS + 1):
+        start, processor_start = time.perf_counter(), time.process_time()
+        simulate(model, controller, n=n, duration=DURATIONS[n], measurement=measurement)
+        times.append(time.perf_counter() - start)
+        processor_times.append(time.process_time() - processor_start)
+    steps = n * DURATIONS[n] / STEP
+    return steps / min(times[1:]), steps / min(processor_times[1:])
+
+
+def steps_of_one() -> float:
+    """Return the steps of a single vehicle in a second of the clock."""
+    return steps_per_second(ONE)[0]
+
+
+def steps_of_many() -> float:
+    """Return the steps of `MANY` vehicles in a second of the clock, on all processors."""
+    return steps_per_second(MANY)[0]
+
+
+def one_by_one() -> float:
+    """Return the steps of a single vehicle that flies by the classes that the nodes have."""
+    duration = 2.0
+    batch = prepare(
+        quadrotor(),
+        Controller(_gains()),
+        FiniteDifferences(),
+        (0.0, 0.0, 1.0),
+        1,
+        goal=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
+        duration=duration,
+        period=0.01,
+        settle_time=0.0,
+        measurement=Measurement(),
+        seed=0,
+        first=0,
+    )
+    start = time.perf_counter()
+    fly_one(batch, 0)
+    return duration / STEP / (time.perf_counter() - start)
+
+
+def _gains():
+    return load_matrix(str(Path(RosPack().get_path("crazyflie_lqr"), "config", "K_soft.txt")), 4, 7)

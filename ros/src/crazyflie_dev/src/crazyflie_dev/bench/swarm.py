@@ -1,0 +1,121 @@
+"""How many simulated vehicles one core flies in real time."""
+
+import bisect
+import os
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from crazyflie_dev.bench import graph
+from crazyflie_dev.bench.row import NotMeasuredError, Row
+from crazyflie_dev.launching import roslaunch
+
+DURATION = 20.0
+"""For how long it is measured, s."""
+
+LONGEST_PERIOD = 12.0
+"""The 99th percentile of the periods of a control that is to come every 10 ms, ms."""
+
+_NUMBERS = range(10, 200, 10)
+
+_START_LIMIT = 180.0
+
+_SETTLING = 2.0
+"""From the end of the takeoff on, s."""
+
+
+@dataclass(frozen=True)
+class SwarmFigures:
+    """What a flight of some vehicles costs.
+
+    Attributes
+    ----------
+    n : int
+        Number of vehicles.
+    start : float
+        From roslaunch to the service that has them all take off, s.
+    cpu : float
+        Processor time of their process, % of the time of the flight, which may be simulated.
+    p50, p99, longest : float
+        Periods of the final control of three of them, as they arrive outside, ms.
+    memory : float
+        MiB.
+    """
+
+    n: int
+    start: float
+    cpu: float
+    p50: float
+    p99: float
+    longest: float
+    memory: float
+
+
+def measure(n: int, arguments: Sequence[str] = (), core: int = 0) -> SwarmFigures:
+    """Have vehicles take off and hover, their process on one core.
+
+    Parameters
+    ----------
+    n : int
+    arguments : sequence of str, optional
+        Others of sw_swarm.launch.
+    core : int, optional
+    """
+    launch = ["crazyflie_examples", "sw_swarm.launch", f"n:={n}", "rviz:=false", *arguments]
+    with tempfile.TemporaryDirectory() as folder:
+        begin = time.monotonic()
+        with roslaunch(launch, Path(folder) / "log"):
+            graph.wait_for_service("/all/takeoff", _START_LIMIT)
+            start = time.monotonic() - begin
+            process = graph.process_of("/fleet")
+            for thread in Path(f"/proc/{process}/task").iterdir():
+                os.sched_setaffinity(int(thread.name), {core})
+            graph.call("/all/takeoff")
+            time.sleep(_SETTLING)
+            used = graph.cpu_time([process])
+            arrivals = _listen(n)
+            used = graph.cpu_time([process]) - used
+            memory = graph.memory([process])
+    stamps = [stamp for _, _, stamp in arrivals]
+    periods = np.concatenate(
+        [
+            np.diff([arrival for topic, arrival, _ in arrivals if topic == each])
+            for each in {topic for topic, _, _ in arrivals}
+        ]
+    )
+    p50, p99, longest = (float(each) * 1e-6 for each in np.percentile(periods, (50, 99, 100)))
+    cpu = 100.0 * used / ((max(stamps) - min(stamps)) * 1e-9)
+    return SwarmFigures(n, start, cpu, p50, p99, longest, memory)
+
+
+def _listen(n):
+    control = "crazyflie_msgs/ControlStamped"
+    topics = (f"/cf{k}/control/final" for k in sorted({1, (n + 1) // 2, n}))
+    arrivals = graph.listen(DURATION, *(("/fleet", topic, control) for topic in topics))
+    if len(arrivals) < n:
+        raise NotMeasuredError("no controls came")
+    return arrivals
+
+
+def vehicles_in_real_time() -> int:
+    """Return how many vehicles fly such that their periods are not above `LONGEST_PERIOD`.
+
+    In tens, found by bisection; more vehicles are taken to be slower.
+    """
+    position = bisect.bisect_left(_NUMBERS, True, key=lambda n: measure(n).p99 >= LONGEST_PERIOD)
+    return _NUMBERS[position] - _NUMBERS.step if position < len(_NUMBERS) else _NUMBERS[-1]
+
+
+ROWS = [
+    Row(
+        "vehicles",
+        "vehicles in real time (100 Hz, p99 of the period < 12 ms), one core",
+        "",
+        vehicles_in_real_time,
+        least=100.0,
+    ),
+]

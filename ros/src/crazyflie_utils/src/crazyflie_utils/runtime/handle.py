@@ -17,7 +17,7 @@ from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_p
 from crazyflie_utils.runtime import flights
 from crazyflie_utils.runtime.faults import Faults
 from crazyflie_utils.runtime.poses import StampedPose
-from crazyflie_utils.runtime.services import pass_on, serve
+from crazyflie_utils.runtime.services import Reply, pass_on, serve
 from crazyflie_utils.runtime.throttle import Throttle
 from crazyflie_utils.runtime.timers import Timer
 from crazyflie_utils.runtime.topics import Publisher, Subscriber
@@ -269,7 +269,7 @@ class NodeHandle:
             machine's clock. What is added to it with ``add_done_callback`` runs
             like any callback; none may wait for it.
         """
-        outcome: Future[Any] = Future()
+        outcome = Reply(self)
         reply = self._process.transport.call_service(
             self.resolve(name), service_type, request, limit
         )

@@ -166,7 +166,7 @@ def test_of_a_flood_of_transforms_each_counts(handle, process):
         mine.transforms[0].child_frame_id = "crazyflie"
         hostile.send(frame(mine) + frame(crowd(80)) * 3000)
         hostile.send(frame(crowd(2)))
-        wait_until(lambda: b"body001" in process.transforms._unread, "the crowd")
+        wait_until(lambda: b"body001" in process.transforms._tree._unread, "the crowd")
     found = lookup("world", "crazyflie")
     assert found.header.stamp == genpy.Time.from_sec(mine.transforms[0].header.stamp.to_sec())
 
@@ -202,7 +202,9 @@ def test_transforms_that_nobody_looks_up_are_taken_all_the_same(handle, process)
         for _ in range(300):
             publisher.send(lazy_pose(2.0) * 100)
         publisher.send(lazy_pose(5.0))
-        wait_until(lambda: process.transforms._frames["lazy"].latest.position[0] == 5.0, "all")
+        wait_until(
+            lambda: process.transforms._tree.latest("world", "lazy").position[0] == 5.0, "all"
+        )
     # Who hangs up is noticed without a look-up, too.
     wait_until(lambda: not process.transforms._subscriber.has_publishers(), "the end")
 

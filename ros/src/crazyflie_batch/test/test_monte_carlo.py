@@ -127,6 +127,23 @@ def test_flights_of_other_settings_are_not_mixed(command, tmp_path):
     assert "error at most 0.2 m" in output
 
 
+def test_a_damaged_piece_is_flown_anew(command, tmp_path):
+    _, whole, _ = command()
+    piece = next((tmp_path / "settings" / "pieces").glob("0*.npy"))
+    piece.write_bytes(piece.read_bytes()[:20])
+    status, _, errors = command()
+    assert status == 1
+    assert f"{piece.name} was damaged, and is gone" in errors
+    assert command()[:2] == (0, whole)
+
+
+def test_a_folder_that_cannot_be_written_is_told(command, tmp_path):
+    (tmp_path / "file").touch()
+    status, _, errors = command("--out", "file/folder")
+    assert status == 1
+    assert "--out is file/folder: Not a directory; expected a folder" in errors
+
+
 def test_what_is_wrong_ends_it_with_a_word(command, tmp_path):
     (tmp_path / "settings.yaml").write_text(SETTINGS.replace("40", "-40"))
     status, _, errors = command()

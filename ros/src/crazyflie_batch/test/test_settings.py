@@ -65,6 +65,7 @@ def complaint(path):
         ("[-0.2, 0.2]", "[-0.2, heavy]", 8, ["heavy", "a finite number"]),
         ("[-0.2, 0.2]", "0.2", 8, ["0.2", "a list"]),
         ("  mass_error: {uniform: [-0.2, 0.2]}", "  {}", 8, ["sweep", "at least one"]),
+        ("attitude_noise", "mass_error", 8, ["sweep/mass_error is in line 6 under vehicle, too"]),
         ("sweep:", "model: near_hover\nsweep:", 9, ["no difference", "near_hover"]),
         ("sweep:\n  mass_error: {uniform: [-0.2, 0.2]}\n", "", 1, ["sweep"]),
     ],

@@ -30,6 +30,8 @@ with Fleet(["cf1", "cf2"], bounds=Bounds((-2, -2, 0), (2, 2, 2))) as fleet:
     fleet.wait(1e6)
 """
 
+# Plays a script as users of the module have it: its commands return at once, so that it sleeps
+# as long as they take, in simulated time here.
 OLD = """
 import rospy
 from crazyflie import Crazyflie

@@ -112,7 +112,7 @@ BAD = {
     r"cf1 and cf2 would be 0\.\d+ m apart, \d\.\d s from now": lambda t: t["cf1"].go_to(
         (0.9, 0, 1)
     ),
-    "cf1: go_to: the speed is .* m/s at .* expected at most 0.5 m/s": lambda t: t["cf1"].go_to(
+    "cf1: go_to: the speed is .* m/s at .* expected at most 0.5 m/s; a longer duration": lambda t: t["cf1"].go_to(
         (0, 1, 1), duration=1.0
     ),
     "go_to: duration is 'long'; expected a finite number": lambda t: t["cf1"].go_to(
@@ -121,7 +121,11 @@ BAD = {
     r"begins at \(0.00, 0.00, 0.00\), 1.00 m from where": lambda t: t["cf1"].follow(figure8()),
     "cf1: trajectory: the speed is 0.83": lambda t: t["cf1"].follow(figure8(), relative=True),
     "cf1: trajectory has no pieces": lambda t: t["cf1"].follow([]),
-    "formation: there are 1 places; expected 2": lambda t: t.formation([(0, 0, 1)]),
+    "cf1: trajectory is 'eight.csv'; expected a list of": lambda t: t["cf1"].follow("eight.csv"),
+    "follow: there are no trajectories": lambda t: t.follow({}),
+    "go_to: there are no goals": lambda t: t.go_to({}),
+    "there is no vehicle 0; expected one of cf1, cf2": lambda t: t[0],
+    "formation: the number of places is 1; expected 2": lambda t: t.formation([(0, 0, 1)]),
     "wait is -1; expected a finite number >= 0": lambda t: t.wait(-1),
 }
 
@@ -148,6 +152,12 @@ def test_commands_on_the_ground_are_refused(team):
     [
         (lambda: Bounds((1, 1, 1), (0, 0, 0)), "bounds are"),
         (lambda: Limits(speed=-1.0), "limits: speed is -1.0; expected a finite number > 0"),
+        (lambda: Limits(speed="fast"), "limits: speed is 'fast'; expected a finite number > 0"),
+        (lambda: Limits(min_thrust=12.0), "min_thrust is 12, and max_thrust 16; expected one below"),
+        (lambda: Bounds("room", (0, 0, 0)), "bounds are 'room' to"),
+        (lambda: Rules(separation=-1), "separation is -1; expected a finite number >= 0"),
+        (lambda: Rules(tolerance=0), "tolerance is 0; expected a finite number > 0"),
+        (lambda: Rules(patience=math.nan), "patience is nan; expected a finite number >= 0"),
         (lambda: Limits(tilt=math.nan), "limits: tilt is nan"),
     ],
 )

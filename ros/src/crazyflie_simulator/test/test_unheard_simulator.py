@@ -38,28 +38,42 @@ def hears(process, **topics):
 
 
 def fly(node_class, tf, clock, **changes):
-    """Return what is looked up in a flight of 1 s, and how often the clock has ticked."""
+    """Return what is looked up in a flight of 1 s, and the process."""
     process = clocked(node_class, **{"time_step": 0.001, "clock/real_time_factor": 0, **changes})
     looker = Looker()
     assert process.launch(looker, "/looker")
     hears(process, tf=tf, clock=clock)
-    ticks = 0
     while process.clock.time() < 0.9995:
         process.tick()
-        ticks += 1
     assert bool(process.published("/tf")) == tf
-    return looker.poses, ticks
+    assert bool(process.published("/clock")) == clock
+    return looker.poses, process
 
 
 @NODES
 def test_with_its_own_clock_what_is_looked_up_is_the_same_to_the_bit(node_class):
-    heard, ticks = fly(node_class, tf=True, clock=True)
+    heard, _ = fly(node_class, tf=True, clock=True)
     assert heard[-1][1].position[2] > 0.05
-    assert ticks == 1000
-    assert fly(node_class, tf=False, clock=True) == (heard, 1000)
-    poses, ticks = fly(node_class, tf=False, clock=False)
-    assert poses == heard
-    assert ticks < 100
+    for clock in (True, False):
+        poses, _ = fly(node_class, tf=False, clock=clock)
+        assert poses == heard
+
+
+def test_who_listens_to_the_clock_is_told_of_every_tick():
+    for tf in (True, False):
+        _, process = fly(NearHoverSimulatorNode, tf=tf, clock=True)
+        ticks = [message.clock.to_nsec() for message in process.published("/clock")]
+        assert ticks == [1_000_000 * k for k in range(1, 1001)]
+
+
+def test_where_nobody_hears_poses_time_stops_only_where_something_happens():
+    moments = []
+    process = clocked(**{"time_step": 0.001, "clock/real_time_factor": 0})
+    hears(process, tf=False, clock=True)
+    process.clock.on_change(lambda time, _: moments.append(time))
+    while process.clock.time() < 0.9995:
+        process.tick()
+    assert len(moments) < 100
 
 
 @pytest.mark.parametrize("error", ["position_noise", "latency"])

@@ -12,7 +12,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty as EmptyService
 
 from crazyflie_msgs.msg import Control, ControlStamped
-from crazyflie_utils.testing.peer import LIMIT, listening
+from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
 COMMANDED = 9.0
 SERVER, FILTER = "/takeoff_server", "/takeoff_control_filter"
@@ -57,14 +57,17 @@ def service(name):
 
 def call_when_there(name):
     """Call a service of a node that may just be starting again."""
-    for _ in range(int(LIMIT / 0.1)):
+
+    def is_answered():
         try:
-            return service(name)()
+            service(name)()
         except rospy.ServiceException as error:
             if "refused:" in str(error):
                 raise
-            rospy.sleep(0.1)
-    raise AssertionError(f"{name} did not come back")
+            return False
+        return True
+
+    wait_until(is_answered, f"{name} to come back")
 
 
 def wait_for(heard, topic, word):

@@ -63,6 +63,10 @@ class Vehicle:
         """Return whether there are log data of the last 0.3 s."""
         return len(self._log) > 0 and rospy.get_time() - self._log.last_time < 0.3
 
+    def wait_for_log_of(self, moment):
+        """Wait until log data of a moment (s), or of a later one, have come."""
+        wait_until(lambda: self._log.last_time >= moment, "the vehicle's log data", LIMIT)
+
     @property
     def height(self):
         """The latest, m."""
@@ -172,6 +176,7 @@ def lose_motion_capture_for_a_moment(flight):
     begin = flight.observer.now
     motion_capture = Client("/virtual_mocap", LIMIT)
     motion_capture.update_configuration({"fault/silent": True})
+    # How long it is silent is what is tested, not a wait for anything.
     time.sleep(0.3)
     motion_capture.update_configuration({"fault/silent": False})
     flight.observer.hover(2.0)
@@ -196,7 +201,7 @@ def lose_motion_capture(flight):
     }
     wait_until(flight.vehicle.rests, "the motors to stop", LIMIT)
     down = rospy.get_time()
-    time.sleep(1.5)
+    flight.vehicle.wait_for_log_of(down + 1.5)
     return {**seen, "highest PWM afterwards": flight.vehicle.highest_pwm_since(down)}
 
 
@@ -206,7 +211,7 @@ def stop_in_emergency(flight):
     call("/emergency")
     flight.wait_for_the_ground()
     refusal = flight.refusal()
-    time.sleep(max(0.0, called + 2.1 - rospy.get_time()))
+    flight.vehicle.wait_for_log_of(called + 2.1)
     call("/emergency_reset")
     return {"refusal": refusal, "seconds": flight.vehicle.motors_stop_after(called)}
 
@@ -215,10 +220,10 @@ def restart_the_firmware(flight):
     """Restart the vehicle while the controller streams."""
     flight.vehicle.restart()
     begin = rospy.get_time()
-    time.sleep(0.3)
-    wait_until(flight.vehicle.speaks, "the vehicle's log data", LIMIT)
+    # Earlier data may be from before the restart.
+    flight.vehicle.wait_for_log_of(begin + 0.3)
     flight.wait_for_the_ground()
-    time.sleep(2.0)
+    flight.vehicle.wait_for_log_of(rospy.get_time() + 2.0)
     highest = flight.vehicle.highest_pwm_since(begin + 0.3)
     flight.observer.land()
     return {"highest PWM": highest}
@@ -256,7 +261,7 @@ def stop_all_in_emergency(flight):
     begin = rospy.get_time()
     publisher.publish()
     flight.wait_for_the_ground()
-    time.sleep(max(0.0, begin + 2.1 - rospy.get_time()))
+    flight.vehicle.wait_for_log_of(begin + 2.1)
     # The filter's stop can be reset, the driver's not.
     call("/emergency_reset")
     status = next_message("/crazyflie/status", String)

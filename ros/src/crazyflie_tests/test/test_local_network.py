@@ -3,15 +3,13 @@
 import os
 import socket
 import subprocess
-import time
 from pathlib import Path
 
 import pytest
 from workspaces import FAST, clean_environment
 
 from crazyflie_dev.programs import free_port, running
-
-LIMIT = 60.0
+from crazyflie_utils.testing.waiting import wait_until
 
 LISTEN = "0A"
 """State of a TCP socket in /proc/net/tcp."""
@@ -76,13 +74,6 @@ def environment(home):
     return {**variables, "ROS_MASTER_URI": f"http://localhost:{port}"}
 
 
-def wait_until(condition):
-    end = time.monotonic() + LIMIT
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.2)
-
-
 def test_a_launch_is_for_this_computer_only(workspace, environment):
     port = environment["ROS_MASTER_URI"].rpartition(":")[2]
     command = (
@@ -96,9 +87,9 @@ def test_a_launch_is_for_this_computer_only(workspace, environment):
             return listening(launch.pid)
 
         expected = {"rosmaster", "composed_node", "rosout", "static_transfor"}
-        wait_until(lambda: {name for name, _ in found()} >= expected)
+        wait_until(lambda: {name for name, _ in found()} >= expected, "all programs", period=0.2)
         # Nodes have more than one socket, and open them one after another.
-        wait_until(lambda: ("static_transfor", "127.0.0.1") in found())
+        wait_until(lambda: ("static_transfor", "127.0.0.1") in found(), "sockets", period=0.2)
         open_to_all = {name for name, address in found() if not address.startswith("127.")}
     assert open_to_all <= IN_CPP
 
@@ -106,5 +97,5 @@ def test_a_launch_is_for_this_computer_only(workspace, environment):
 def test_without_the_workspace_the_master_is_open_to_all(environment):
     port = environment["ROS_MASTER_URI"].rpartition(":")[2]
     with running("/usr/bin/rosmaster", "--core", "-p", port, env=environment) as master:
-        wait_until(lambda: listening(master.pid))
+        wait_until(lambda: listening(master.pid), "a socket", period=0.2)
         assert {address for _, address in listening(master.pid)} <= {"0.0.0.0", "::"}

@@ -182,6 +182,23 @@ def test_nodes_call_services_without_waiting(process, handle):
     assert order == ["called", "served", True]
 
 
+def test_what_is_added_to_a_call_fails_like_any_callback(process, handle):
+    handle.advertise_service("go", Trigger, lambda request: TriggerResponse())
+    safe = []
+    handle.on_fault(lambda: safe.append(True))
+
+    def fail(done):
+        raise ValueError(f"success is {done.result().success}")
+
+    for service in ("go", "gone"):
+        handle.call_service(service, Trigger, None, 1.0).add_done_callback(fail)
+    assert safe == [True, True]
+    errors = process.logged("error")
+    assert ["fail failed\nTraceback" in text for text in errors] == [True, True]
+    assert "ValueError: success is False" in errors[0]
+    assert "ServiceError: there is no service /ns/gone" in errors[1]
+
+
 def test_called_service_that_refuses_or_is_missing(process, handle):
     def refuse(request):
         raise ServiceError("no")
@@ -254,7 +271,7 @@ def test_log_names_the_node(process, handle):
 
 def test_throttled_warnings(process, handle, monkeypatch):
     now = [50.0]
-    monkeypatch.setattr("crazyflie_utils.runtime.handle.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("crazyflie_utils.runtime.handle_base.time.monotonic", lambda: now[0])
     for _ in range(3):
         handle.warn("a", throttle=1.0)
         handle.warn("b", throttle=1.0)

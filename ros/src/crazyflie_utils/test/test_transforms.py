@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tf2_msgs.msg import TFMessage
 
+from crazyflie_utils import TransformError
 from crazyflie_utils.runtime.poses import PoseCodec, RawTransforms, StampedPose
-from crazyflie_utils.runtime.transforms import TransformError
 from crazyflie_utils.testing import FakeProcess
 
 
@@ -63,7 +63,7 @@ def test_stamps_come_back_to_the_nanosecond(seconds, nanoseconds):
 
 
 def test_transforms_of_many_threads(process, lookup, monkeypatch):
-    monkeypatch.setattr("crazyflie_utils.runtime.transforms._MOST_STAMPS", 3)
+    monkeypatch.setattr("crazyflie_utils.runtime.tf2_memory._MOST_STAMPS", 3)
     process.clock.set(103.0)
     failures = []
 
@@ -393,17 +393,17 @@ def test_frames_without_end_are_not_kept(process, lookup):
     x_of(lookup)
     # Not its parent, so that tf2 begins.
     lookup("crazyflie", "world")
-    kept = process.transforms
+    kept = process.transforms._tree
     for count in range(3000):
         hear_raw(process, transform("world", f"junk{count}", 100.0))
         hear_raw(process, transform(f"junk{count}", "crazyflie", 100.0 + 1e-4 * count))
         hear(process, transform("world", f"static{count}", 0.0), topic="/tf_static")
     hear_raw(process, transform("world", "n" * 10_000, 100.0))
     codec = kept._codec
-    for memory in (kept._unread, kept._names, kept._followed, kept._frames, codec._read):
+    for memory in (kept._unread, kept._names, kept.followed, kept._frames, codec._read):
         assert len(memory) <= 1001
     assert max(map(len, kept._unread.values())) < 1024
-    assert kept._tf2.all_frames_as_yaml().count("parent:") <= 1000
+    assert kept._tf2._buffer.all_frames_as_yaml().count("parent:") <= 1000
     hear_raw(process, transform("world", "crazyflie", 100.4, x=2.0))
     assert x_of(lookup) == 2.0
 
@@ -477,6 +477,7 @@ def test_answers_are_those_of_a_buffer_that_knows_everything(tree, rounds):
 def test_what_timers_broadcast_at_once_is_one_message(process):
     handle = process.handle("/node")
     broadcast = handle.broadcast_poses()
+    handle.broadcast_poses()
 
     def tell(child):
         stamp = handle.nanoseconds()

@@ -6,8 +6,9 @@ import pytest
 from cflib.crazyflie.mem import MemoryElement, Poly4D
 from cflib.crtp.udpdriver import UdpDriver
 from cflib.utils.power_switch import PowerSwitch
-from virtual_client import LIMIT, Client, wait_until
+from virtual_client import LIMIT, Client
 
+from crazyflie_utils.testing.waiting import wait_until
 from crazyflie_virtual.firmware.supervisor_states import State
 from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings

@@ -12,11 +12,11 @@ import re
 import subprocess
 import sys
 import threading
-import time
 from typing import Any, NamedTuple
 
 import pytest
 
+from crazyflie_utils.testing.waiting import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
 LIMIT = 300.0
@@ -157,8 +157,9 @@ def run_example(name: str, place: pathlib.Path) -> Run:
             code, output = done.returncode, done.stdout
         except subprocess.TimeoutExpired as error:
             code, output = None, _text(error.stdout)
-        # What was landed at the last moment comes to rest.
-        time.sleep(0.5)
+        # What was landed at the last moment comes to rest. Whether it does is for the test.
+        with contextlib.suppress(AssertionError):
+            wait_until(lambda: all(s.vehicle.physics.position[2] == 0.0 for s in servers))
         is_over.set()
         watcher.join()
         ends = [server.vehicle.physics.position for server in servers]

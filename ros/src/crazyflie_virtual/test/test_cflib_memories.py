@@ -8,8 +8,9 @@ from cflib.crazyflie.mem.deck_memory import SyncDeckMemoryManager
 from cflib.crazyflie.syncCrazyflie import SyncCrazyflie
 from cflib.localization import LighthouseConfigWriter
 from cflib.utils.multiranger import Multiranger
-from virtual_client import LIMIT, Client, wait_until
+from virtual_client import LIMIT, Client
 
+from crazyflie_utils.testing.waiting import wait_until
 from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.memories import LighthouseMemory

@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from virtual_client import wait_until
+
+from crazyflie_utils.testing.waiting import wait_until
 
 TOP = Path(__file__).resolve().parents[4]
 PROGRAM = TOP / "docs" / "examples" / "cflib_hover" / "hover.py"
@@ -38,8 +39,8 @@ def run():
 def test_a_plain_cflib_program_flies(serve, run):
     server, uri = serve()
     process = run(uri)
-    wait_until(lambda: server.observe().position[2] > 0.45, LIMIT)
-    wait_until(lambda: server.observe().position[0] > 0.45, LIMIT)
+    wait_until(lambda: server.observe().position[2] > 0.45, "the takeoff")
+    wait_until(lambda: server.observe().position[0] > 0.45, "the way to the right")
     assert server.observe().position[2] == pytest.approx(0.5, abs=0.1)
     out, err = process.communicate(timeout=LIMIT)
     assert process.returncode == 0, err
@@ -47,4 +48,4 @@ def test_a_plain_cflib_program_flies(serve, run):
     assert max(z for _, _, z in rows) == pytest.approx(0.5, abs=0.1)
     x, y, z = server.observe().position
     assert (x, y, z) == pytest.approx((0.5, 0.0, 0.0), abs=0.1)
-    wait_until(lambda: not any(server.vehicle.board.firmware.stabilizer.commands))
+    wait_until(lambda: not any(server.vehicle.board.firmware.stabilizer.commands), "the end")

@@ -1,14 +1,13 @@
 """A cflib program, every wait of which has a limit."""
 
 import threading
-import time
 
 import cflib.crtp
 from cflib.crazyflie import Crazyflie
 from cflib.crazyflie.log import LogConfig
 from cflib.crtp.crtpstack import CRTPPacket
 
-LIMIT = 60.0
+from crazyflie_utils.testing.waiting import LIMIT
 
 
 class Client:
@@ -80,11 +79,3 @@ class Client:
         self.cf.param.set_value(name, value)
         assert confirmation.wait(LIMIT), f"{name} was not set"
         self.cf.param.remove_update_callback(group, parameter, confirm)
-
-
-def wait_until(condition, limit=LIMIT):
-    """Wait until ``condition()`` holds."""
-    end = time.monotonic() + limit
-    while not condition():
-        assert time.monotonic() < end, "nothing happened"
-        time.sleep(0.005)

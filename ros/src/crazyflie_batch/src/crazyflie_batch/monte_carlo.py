@@ -74,7 +74,15 @@ class Results:
 
     def outcomes(self) -> NDArray[np.float64]:
         """Return what is kept of all flights, shape (flights, len(OUTCOMES))."""
-        return np.concatenate([np.load(self._path(i)) for i in range(0, self._flights, PIECE)])
+        return np.concatenate([self._load(i) for i in range(0, self._flights, PIECE)])
+
+    def _load(self, first):
+        path = self._path(first)
+        try:
+            return np.load(path)
+        except (ValueError, EOFError):
+            path.unlink()
+            raise OSError(f"{path} was damaged, and is gone; call again to fly it anew") from None
 
     def _path(self, first):
         return self._pieces / f"{first:08d}.npy"

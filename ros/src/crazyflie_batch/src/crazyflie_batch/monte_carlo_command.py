@@ -44,7 +44,7 @@ def main(arguments: list[str] | None = None) -> int:
         if options.restart:
             shutil.rmtree(folder / "pieces", ignore_errors=True)
             (folder / "settings.json").unlink(missing_ok=True)
-        results = Results(folder, settings)
+        results = _results(folder, settings)
         with _executor(options.scheduler) as executor:
             _fly(settings, results, executor)
         found = findings(settings, results.outcomes())
@@ -64,6 +64,15 @@ def main(arguments: list[str] | None = None) -> int:
     print(text)
     print(f"\nwrote report.txt, flights.csv and figure.png in {folder}")
     return 0
+
+
+def _results(folder, settings):
+    try:
+        return Results(folder, settings)
+    except OSError as error:
+        raise OSError(
+            f"--out is {folder}: {error.strerror}; expected a folder that can be written"
+        ) from None
 
 
 def _parser():
@@ -104,6 +113,9 @@ def _executor(address: str | None) -> Iterator[Executor]:
     from distributed import Client
 
     try:
+        # A client of something that is no address complains again when the process ends.
+        if ":" not in address:
+            raise ValueError("that is no address")
         client = Client(address, timeout=SCHEDULER_LIMIT, set_as_default=False)
     except (OSError, ValueError) as error:
         raise SchedulerError(

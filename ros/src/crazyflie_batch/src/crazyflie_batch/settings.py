@@ -211,6 +211,11 @@ def read_settings(path: str | Path) -> Settings:
         raise file["sweep"].error("is empty; expected at least one parameter")
     model_only = {"mass_error", "thrust_error", "wind_x", "wind_y", "wind_z"}
     for sweep in sweeps:
+        if "vehicle" in file and sweep.name in file["vehicle"]:
+            raise file["sweep"][sweep.name].error(
+                f"is in line {file['vehicle'][sweep.name].line} under vehicle, too; expected one "
+                "of them"
+            )
         if run.model != "quadrotor" and sweep.name in model_only:
             raise file["sweep"][sweep.name].error(f"makes no difference to the model {run.model}")
     try:

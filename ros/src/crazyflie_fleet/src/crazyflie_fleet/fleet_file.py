@@ -78,8 +78,8 @@ def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> Fleet:
         vehicles.append(Vehicle(f"cf{k + 1}", position, settings))
     for _, _, distance, limit in _close(vehicles):
         raise ParameterError(
-            f"a grid with {distance:g} m from one vehicle to the next; expected at least "
-            f"{limit:g} m, their collision buffers"
+            f"the spacing of the grid is {distance:g} m; expected at least {limit:g} m, the "
+            "collision buffers of two vehicles"
         )
     return Fleet(tuple(vehicles))
 

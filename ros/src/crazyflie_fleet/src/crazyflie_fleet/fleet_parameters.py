@@ -69,6 +69,11 @@ class FleetParameters(Parameters):
             About everything that is wrong with the file.
         """
         fleet = fleet_file.load(self.file) if self.file else fleet_file.grid(self.n, self.spacing)
+        if self.fixed_frame in fleet.names:
+            raise ParameterError(
+                f"{self.file}: a vehicle is named {self.fixed_frame}, as the fixed frame is; "
+                "expected another name"
+            )
         return fleet.at_ports(self.virtual_port) if self.virtual_port else fleet
 
     def own_names(self, fleet: Fleet) -> tuple[str, ...]:

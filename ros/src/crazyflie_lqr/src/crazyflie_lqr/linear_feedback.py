@@ -269,4 +269,4 @@ class IntegralStateFeedback(LinearFeedback):
 
 
 def _floats(vector):
-    return [float(each) for each in vector]
+    return np.asarray(vector, dtype=float).tolist()

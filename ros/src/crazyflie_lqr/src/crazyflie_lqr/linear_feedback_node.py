@@ -16,7 +16,7 @@ from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameter_types import TOPIC, Integer, Number
-from crazyflie_utils.vectors import from_vector, to_tuple, to_vector
+from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 
 _SAME_CLOCK = 60.0
 """A stamp that is older than this, s, is of another clock and says nothing about an age."""
@@ -195,19 +195,18 @@ class LinearFeedbackNode(Node):
             return
         if self._flight_state is None:
             self._guess_flight(x, x_ref)
-        stamp = message.header.stamp.to_sec()
-        u = self._controller.control(np.array(x), np.array(x_ref), stamp)
+        time = message.header.stamp.to_sec()
+        u = self._controller.control(np.array(x), np.array(x_ref), time).tolist()
         if not all(map(math.isfinite, u)):
             self._handle.warn(
                 f"the control {u} is not finite and is not sent", throttle=1.0, key="not finite"
             )
             return
-        control = ControlStamped(control=from_vector(Control, u))
-        control.header.stamp = message.header.stamp
-        self._publisher.publish(control)
+        control = from_vector(Control, u)
+        self._publisher.publish(stamped(ControlStamped, message.header.stamp, control=control))
 
     def _is_old(self, stamp):
-        age = self._handle.stamp().to_sec() - stamp.to_sec()
+        age = self._handle.nanoseconds() * 1e-9 - stamp.to_sec()
         if not self._parameters.max_age < age < _SAME_CLOCK:
             return False
         self._handle.warn(

@@ -82,6 +82,7 @@ class Fleet(Team):
         process: Process | None = None,
     ):
         chosen = names_of(names)
+        rules = Rules(limits or Limits(), bounds, separation, tolerance, patience)
         self._end: Callable[[], None] = lambda: None
         if process is None:
             process, self._end = begin_script("mission")
@@ -90,7 +91,6 @@ class Fleet(Team):
         try:
             vehicles = _connect(process, self._handle, chosen, limit)
             clock = RosClock(self._handle, lambda: process.exit_status is not None)
-            rules = Rules(limits or Limits(), bounds, separation, tolerance, patience)
             super().__init__(vehicles, clock, rules)
             process.start()
             self._await_positions(limit)

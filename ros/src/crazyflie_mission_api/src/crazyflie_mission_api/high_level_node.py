@@ -163,7 +163,7 @@ class HighLevelNode(Node):
         x, y, _ = start.position
         self._next = (Follower.go_to, (x, y, request.height), start.yaw, duration)
         call = self._call(self._parameters.takeoff, srv.TakeoffResponse)
-        call.add_done_callback(self._forget_refused)
+        call.add_done_callback(self._handle.guard(self._forget_refused))
         return call
 
     def _forget_refused(self, call):

@@ -8,18 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_model.units import GRAVITY
 
 Array = NDArray[np.float64]
 
 
 class MissionError(Exception):
     """A mission cannot be flown; the text names what, its value, and what was expected."""
-
-
-def _check_numbers(thing, **numbers):
-    for name, value in numbers.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise MissionError(f"{thing}: {name} is {value!r}; expected a finite number > 0")
 
 
 @dataclass(frozen=True)
@@ -47,7 +42,13 @@ class Limits:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        _check_numbers("limits", **vars(self))
+        for name, value in vars(self).items():
+            number(value, f"limits: {name}", above=0.0)
+        if not self.min_thrust < GRAVITY < self.max_thrust:
+            raise MissionError(
+                f"limits: min_thrust is {self.min_thrust:g}, and max_thrust {self.max_thrust:g}; "
+                f"expected one below and one above {GRAVITY:g} m/s^2, which hovers"
+            )
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,11 @@ class Bounds:
 
     def __post_init__(self) -> None:
         """Check the corners."""
-        corners = np.array([self.lower, self.upper], dtype=float)
-        if corners.shape != (2, 3) or np.isnan(corners).any() or (corners[0] >= corners[1]).any():
+        try:
+            corners = np.array([self.lower, self.upper], dtype=float)
+        except (TypeError, ValueError):
+            corners = np.empty(0)
+        if corners.shape != (2, 3) or not (corners[0] < corners[1]).all():
             raise MissionError(
                 f"bounds are {self.lower!r} to {self.upper!r} m; expected a lower and an upper "
                 "corner x, y, z"
@@ -122,8 +126,8 @@ def point(value: Sequence[float], what: str) -> Array:
     return array
 
 
-def number(value: float, what: str, minimum: float = -math.inf) -> float:
-    """Return a finite number that is ``minimum`` at least.
+def number(value: float, what: str, minimum: float = -math.inf, above: float = -math.inf) -> float:
+    """Return a finite number that is ``minimum`` at least, and more than ``above``.
 
     Raises
     ------
@@ -131,7 +135,9 @@ def number(value: float, what: str, minimum: float = -math.inf) -> float:
     """
     if isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool):
         as_float = float(value)
-        if math.isfinite(as_float) and as_float >= minimum:
+        if math.isfinite(as_float) and as_float >= minimum and as_float > above:
             return as_float
     bound = "" if minimum == -math.inf else f" >= {minimum:g}"
+    if above > -math.inf:
+        bound += f" > {above:g}"
     raise MissionError(f"{what} is {value!r}; expected a finite number{bound}")

@@ -40,6 +40,12 @@ class Rules:
     tolerance: float = 0.15
     patience: float = 15.0
 
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        number(self.separation, "separation", 0.0)
+        number(self.tolerance, "tolerance", above=0.0)
+        number(self.patience, "patience", 0.0)
+
 
 class Roster:
     """The vehicles of a team, where they were told to be, and the way to the ground.
@@ -60,7 +66,7 @@ class Roster:
 
     def __getitem__(self, names: str | tuple[str, ...]) -> Self:
         """Return a team of some."""
-        chosen = (names,) if isinstance(names, str) else names
+        chosen = names if isinstance(names, tuple) else (names,)
         self._check_names(chosen)
         some = copy.copy(self)
         some._vehicles = {name: self._vehicles[name] for name in chosen}

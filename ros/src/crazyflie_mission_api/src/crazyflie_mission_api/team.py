@@ -93,7 +93,7 @@ class Team(Roster):
             duration = max(1.0, *shortest)
         seconds = number(duration, "go_to: duration", 1e-3)
         ways = {name: trajectories.stretched(way, seconds) for name, way in ways.items()}
-        self._check(ways, "go_to")
+        self._check(ways, "go_to", "a longer duration")
 
         def command(name):
             return self._vehicles[name].go_to(places[name], yaw, seconds)
@@ -124,6 +124,8 @@ class Team(Roster):
         """
         factor = number(timescale, "follow: timescale", 1e-3)
         given = paths if isinstance(paths, Mapping) else dict.fromkeys(self._vehicles, paths)
+        if not given:
+            raise MissionError("follow: there are no trajectories; expected one at least")
         self._check_names(given)
         ways = {}
         for name, pieces in given.items():
@@ -141,7 +143,7 @@ class Team(Roster):
                     f"the vehicle is, {text(start)}; expected at most {self.rules.tolerance:g} m"
                 )
             ways[name] = way
-        self._check(ways, "trajectory")
+        self._check(ways, "trajectory", "a timescale > 1")
         chosen = self._some(ways)
         chosen._tell("upload", lambda name: self._vehicles[name].prepare(ways[name], stream))
         self._fly(ways, "follow", lambda name: self._vehicles[name].start(), wait)
@@ -161,8 +163,8 @@ class Team(Roster):
         goals = [point(place, f"formation: place {k}") for k, place in enumerate(places, start=1)]
         if len(goals) != len(self._vehicles):
             raise MissionError(
-                f"formation: there are {len(goals)} places; expected {len(self._vehicles)}, one "
-                "for each vehicle"
+                f"formation: the number of places is {len(goals)}; expected {len(self._vehicles)}, "
+                "one for each vehicle"
             )
         starts = {name: self._rest_of(name, "formation").position for name in self._vehicles}
         chosen = formations.assign(starts, np.array(goals))
@@ -179,6 +181,8 @@ class Team(Roster):
                     "a goal for each: {name: (x, y, z)}"
                 )
             goals = dict.fromkeys(self._vehicles, goals)
+        if not goals:
+            raise MissionError("go_to: there are no goals; expected one at least")
         self._check_names(goals)
         places = {name: point(goal, f"{name}: goal") for name, goal in goals.items()}
         if relative:
@@ -201,9 +205,9 @@ class Team(Roster):
     def _quickest(self, way):
         return trajectories.duration(trajectories.within_limits(way, self.rules.limits))
 
-    def _check(self, ways, what):
+    def _check(self, ways, what, slower):
         for name, way in ways.items():
-            trajectories.check(way, self.rules.limits, self.fence(name), f"{name}: {what}")
+            trajectories.check(way, self.rules.limits, self.fence(name), f"{name}: {what}", slower)
         now = self.time()
         self._check_apart({name: Course(way, now) for name, way in ways.items()})
 

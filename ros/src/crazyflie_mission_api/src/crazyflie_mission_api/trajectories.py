@@ -101,6 +101,12 @@ def check_numbers(pieces: Pieces, what: str) -> None:
     ------
     MissionError
     """
+    try:
+        valid = all(isinstance(piece, PolynomialPiece) for piece in pieces)
+    except TypeError:
+        valid = False
+    if not valid:
+        raise MissionError(f"{what} is {pieces!r}; expected a list of PolynomialPiece")
     if not pieces:
         raise MissionError(f"{what} has no pieces")
     for number, piece in enumerate(pieces, start=1):
@@ -112,8 +118,16 @@ def check_numbers(pieces: Pieces, what: str) -> None:
             )
 
 
-def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str) -> None:
+def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str, slower: str) -> None:
     """Refuse a trajectory that asks too much, or leaves the bounds.
+
+    Parameters
+    ----------
+    pieces, limits, bounds
+    what : str
+        What it is, for the text of the error.
+    slower : str
+        What would make it slower, likewise.
 
     Raises
     ------
@@ -125,7 +139,7 @@ def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str) -> None:
         side = "least" if name == "min_thrust" else "most"
         raise MissionError(
             f"{what}: the {words} is {value:.3g} {_UNITS[name]} at {time:.2f} s; expected at "
-            f"{side} {getattr(limits, name):g} {_UNITS[name]}; a timescale > 1 makes it slower"
+            f"{side} {getattr(limits, name):g} {_UNITS[name]}; {slower} makes it slower"
         )
 
 

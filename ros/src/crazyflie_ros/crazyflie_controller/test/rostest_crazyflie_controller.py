@@ -8,7 +8,7 @@ from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Twist, 
 from std_srvs.srv import Empty
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_utils.testing.peer import LIMIT, listening
+from crazyflie_utils.testing.peer import LIMIT, listening, wait_until
 
 
 class TrackedVehicle:
@@ -52,15 +52,16 @@ def call(name):
     """Call one of the controller's services as soon as it is not refused."""
     name = f"/crazyflie/controller/{name}"
     rospy.wait_for_service(name, timeout=LIMIT)
-    end = rospy.get_time() + LIMIT
-    while True:
+
+    def is_accepted():
         try:
-            return rospy.ServiceProxy(name, Empty)()
+            rospy.ServiceProxy(name, Empty)()
         except rospy.ServiceException:
             # The controller may not have a pose yet.
-            if rospy.get_time() > end:
-                raise
-            rospy.sleep(0.1)
+            return False
+        return True
+
+    wait_until(is_accepted, f"{name} to be accepted")
 
 
 def test_takes_off_goes_and_lands(vehicle, setpoints):

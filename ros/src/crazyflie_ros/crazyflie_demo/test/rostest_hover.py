@@ -1,7 +1,5 @@
 """A virtual vehicle that motion capture sees hovers at a goal that a joystick moves."""
 
-import time
-
 import pytest
 import rospy
 import tf2_ros
@@ -10,6 +8,7 @@ from flights import LIMIT, Stick, launched, node, virtual_vehicle, wait_for_serv
 
 from crazyflie_demo.gamepad import LAND, PITCH, TAKEOFF
 from crazyflie_dev.programs import free_port
+from crazyflie_utils.testing.peer import wait_until
 
 
 class Positions:
@@ -31,12 +30,12 @@ class Positions:
             for t in transforms
         ]
 
-    def wait_until(self, is_it, limit=LIMIT):
+    def wait_until(self, is_it):
         """Wait until ``is_it(*positions)``."""
-        end = time.monotonic() + limit
-        while not is_it(*self.positions()):
-            assert time.monotonic() < end, f"in the end: {self.positions()}"
-            time.sleep(0.02)
+        try:
+            wait_until(lambda: is_it(*self.positions()), "these positions")
+        except AssertionError as error:
+            raise AssertionError(f"{error}; in the end: {self.positions()}") from error
 
 
 def virtual_mocap(command_port, observer_port):

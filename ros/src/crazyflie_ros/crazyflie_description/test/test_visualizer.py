@@ -12,7 +12,12 @@ from visualization_msgs.msg import Marker
 from crazyflie_description import visualizer_node
 from crazyflie_description.flown_path import FlownPath, circle
 from crazyflie_description.visualizer_node import PERIOD, SPACING, VisualizerNode
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_msgs.msg import (
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils.testing import FakeProcess
 
 PARAMETERS = {
@@ -130,6 +135,15 @@ def test_draws_the_path(process):
         Marker.ADD,
     )
     assert [point.z for point in path.points] == [0.0, 0.1, 0.2]
+
+
+def test_draws_references_that_have_a_yaw():
+    fake = FakeProcess()
+    assert fake.launch(VisualizerNode(), "/visualizer", {**PARAMETERS, "reference/yaw": True})
+    state = PositionVelocityYawState(x=0.5, y=0.0, z=1.0, yaw=0.2)
+    fake.publish("/ref", PositionVelocityYawStateStamped(state=state))
+    fake.advance(PERIOD)
+    assert markers(fake)["reference label"].text == "reference (0.50, 0.00, 1.00) m"
 
 
 def test_says_nothing_new_in_a_hover(process):

@@ -1,7 +1,6 @@
 """The driver on the virtual vehicle, which locks itself as the firmware does; in real time."""
 
 import threading
-import time
 
 import pytest
 from genpy import Duration
@@ -12,17 +11,17 @@ from crazyflie_driver.srv import LandRequest, NotifySetpointsStopRequest, Takeof
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_py.log import LogBlock
+from crazyflie_utils.testing.waiting import LIMIT, wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 
-LIMIT = 60.0
 PERIOD = 0.02
 HEIGHT = 0.5
 LOCK_TIME = 2.5
-"""Silence after which the firmware has locked itself, s."""
+"""Silence after which the firmware has locked itself, s of the vehicle's own time."""
 
 
 class Flight:
-    """A vehicle that is added to a server, with time as it goes by, and a stream of positions."""
+    """A vehicle that is added to a server, with the vehicle's time, and a stream of positions."""
 
     def __init__(self, server, virtual, uri):
         self.server, self.uri, self.virtual = server, uri, virtual
@@ -40,14 +39,24 @@ class Flight:
         self.heights.append(values[0])
         self.state = SupervisorState(values[1])
 
+    @property
+    def time(self):
+        """How far the vehicle has come, s."""
+        return self.virtual.vehicle.time
+
+    def wait(self, duration):
+        """Let the vehicle's time go by; nobody says anything."""
+        end = self.time + duration
+        wait_until(lambda: self.time >= end, f"{duration} s of the vehicle's time", period=0.002)
+
     def run(self, duration, height=None, until=lambda: False):
         """Let time go by, streaming positions if a height is given."""
-        end = time.monotonic() + duration
-        while time.monotonic() < end and not until():
+        end = self.time + duration
+        while self.time < end and not until():
             self.server.process.advance(PERIOD)
             if height is not None:
                 self.server.process.publish("/cf1/cmd_position", Position(z=height))
-            time.sleep(PERIOD)
+            self.wait(PERIOD)
 
     def climb(self):
         self.run(LIMIT, HEIGHT, lambda: self.heights and self.heights[-1] > 0.9 * HEIGHT)
@@ -69,13 +78,13 @@ def flight(server):
 def remove(flight):
     """Remove the vehicle; return how long it took to sink."""
     removing = threading.Thread(target=flight.server.remove, args=(flight.uri,))
-    begin, count = time.monotonic(), len(flight.heights)
+    begin, count = flight.time, len(flight.heights)
     removing.start()
     sunk = None
     while removing.is_alive():
         flight.run(PERIOD)
         if sunk is None and flight.heights[count:] and flight.heights[-1] < 0.05:
-            sunk = time.monotonic() - begin
+            sunk = flight.time - begin
     return sunk
 
 
@@ -83,7 +92,7 @@ def test_a_vehicle_that_was_added_and_removed_can_fly(flight):
     flight.run(LOCK_TIME)
     assert SupervisorState.LOCKED not in flight.state
     remove(flight)
-    time.sleep(LOCK_TIME)
+    flight.wait(LOCK_TIME)
     assert SupervisorState.LOCKED not in flight.seen_by_another()
 
 
@@ -91,7 +100,7 @@ def test_a_removal_in_flight_is_a_landing_and_locks_nothing(flight):
     flight.climb()
     # A fall would take a third of a second, the landing takes three.
     assert remove(flight) > 1.5
-    time.sleep(LOCK_TIME)
+    flight.wait(LOCK_TIME)
     assert SupervisorState.LOCKED not in flight.seen_by_another()
 
 
@@ -134,10 +143,7 @@ def test_a_takeoff_waits_for_the_moment_after_a_landing_in_which_the_firmware_re
     flight.run(1.5)
     flight.server.call("/cf1/land", LandRequest(0, 0.0, Duration(1)))
     supervisor = flight.virtual.vehicle.board.firmware.supervisor
-    end = time.monotonic() + LIMIT
-    while supervisor.can_fly:
-        assert time.monotonic() < end
-        time.sleep(0.001)
+    wait_until(lambda: not supervisor.can_fly, "the firmware to refuse", period=0.001)
     flight.server.call("/cf1/takeoff", TakeoffRequest(0, HEIGHT, Duration(1)))
     flight.run(LIMIT, until=lambda: flight.virtual.observe().position[2] > 0.8 * HEIGHT)
     assert flight.virtual.observe().position[2] > 0.8 * HEIGHT

@@ -13,11 +13,11 @@ from cflib.drivers import crazyradio
 from crazyflie_dev.fake_vehicle import FakeVehicle
 from crazyflie_py.crazyflie import Crazyflie, LinkState
 from crazyflie_py.errors import NoDongleError
+from crazyflie_utils.testing.waiting import LIMIT, wait_until
 
 # The thread of cflib that ends is what these tests are about.
 pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 
-LIMIT = 60.0
 NULL = 0xF3
 
 
@@ -131,13 +131,6 @@ def connected(bus, tmp_path):
     yield both
     for each in both:
         each.link.close()
-
-
-def wait_until(condition):
-    end = time.monotonic() + LIMIT
-    while not condition():
-        assert time.monotonic() < end
-        time.sleep(0.05)
 
 
 def emergency_arrives(bus, connected):

@@ -97,6 +97,15 @@ def test_pings_without_log_data_are_a_restart():
     assert states.index(Life.RESTARTED) <= 4
 
 
+def test_a_vehicle_that_is_frozen_between_log_data_and_ping_is_silent():
+    liveness = Liveness(0.0)
+    liveness.expect_log(0.01, 0.0)
+    assert set(life(liveness, 0.0, 2.0, True, True)) == {Life.ALIVE}
+    liveness.ping_answered(b"", 2.09)
+    assert watch(liveness, 2.09, 4.0, step=0.01, bad=Life.RESTARTED) is None
+    assert liveness.state(4.0) is Life.SILENT
+
+
 def test_slow_log_blocks_get_more_time():
     liveness = Liveness(0.0)
     liveness.expect_log(1.0, 0.0)

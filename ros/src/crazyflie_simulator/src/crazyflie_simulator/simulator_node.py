@@ -250,12 +250,13 @@ class SimulatorNode(Node):
         self._crash_is_known = self._vehicle.has_crashed
 
     def _on_clock_timer(self):
+        before = self._ticks
         if self._is_unheard():
             self._ticks += self._ticks_until_anything_happens()
         else:
             self._ticks += 1
             self._catch_up()
-        self._set_clock(self._tick_time(self._ticks))
+        self._set_clock(*map(self._tick_time, range(before + 1, self._ticks + 1)))
 
     def _ticks_until_anything_happens(self):
         parameters = self._parameters

@@ -20,7 +20,7 @@ from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer, Number, Text
-from crazyflie_utils.vectors import from_vector, to_tuple
+from crazyflie_utils.vectors import from_vector, stamped, to_tuple
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
 
@@ -141,6 +141,7 @@ class StateEstimatorNode(Node):
         self._last_success = 0.0
         self._stamp: int | None = None
         self._is_tilted: bool | None = None
+        self._inner_type = type(self.state_type().state)
 
     def state(self, motion: Motion) -> list[float]:
         """Return the state, in the order of the message's fields."""
@@ -217,11 +218,9 @@ class StateEstimatorNode(Node):
             self._report_no_state(now, "", pose)
             return
         self._last_success = now
-        message = self.state_type()
-        message.state = from_vector(type(message.state), self.state(motion))
-        message.header.stamp = pose.time
-        message.header.frame_id = self._parameters.fixed_frame
-        self._publisher.publish(message)
+        state = from_vector(self._inner_type, self.state(motion))
+        frame = self._parameters.fixed_frame
+        self._publisher.publish(stamped(self.state_type, pose.time, frame, state=state))
 
     def _update(self, pose, now):
         if pose.stamp == self._stamp:

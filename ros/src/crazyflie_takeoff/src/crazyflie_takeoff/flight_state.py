@@ -20,12 +20,17 @@ class FlightState(enum.Enum):
     @property
     def in_flight(self) -> bool:
         """Whether the vehicle is the controller's: what the topic in_flight toggles."""
-        return self in (FlightState.FLYING, FlightState.DESCENDING)
+        return self in _IN_FLIGHT
 
     @property
     def is_settled(self) -> bool:
         """Whether no takeoff or landing is under way."""
-        return self in (FlightState.ON_GROUND, FlightState.FLYING)
+        return self in _SETTLED
+
+
+# Found here once: an enumeration takes its time to look a member up.
+_IN_FLIGHT = (FlightState.FLYING, FlightState.DESCENDING)
+_SETTLED = (FlightState.ON_GROUND, FlightState.FLYING)
 
 
 UNKNOWN = "unknown"

@@ -54,6 +54,13 @@ class Mode(enum.Enum):
         return self in (Mode.SINKING, Mode.DOWN, Mode.EMERGENCY)
 
 
+_TAKEOVERS = {
+    Mode.SINKING: Takeover.SINKING,
+    Mode.DOWN: Takeover.DOWN,
+    Mode.EMERGENCY: Takeover.EMERGENCY,
+}
+
+
 @dataclass(frozen=True)
 class Patience:
     """How long a filter waits.
@@ -143,12 +150,7 @@ class SafeFilter(Generic[Control]):
     @property
     def takeover(self) -> Takeover | None:
         """What the server has to know; None while controls are passed on, or will be again."""
-        takeovers = {
-            Mode.SINKING: Takeover.SINKING,
-            Mode.DOWN: Takeover.DOWN,
-            Mode.EMERGENCY: Takeover.EMERGENCY,
-        }
-        return takeovers.get(self.mode)
+        return _TAKEOVERS.get(self.mode)
 
     @property
     def explanation(self) -> str:

@@ -18,6 +18,7 @@ from crazyflie_takeoff.safe_filter import Mode, Patience, SafeFilter
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
 from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.vectors import stamped
 
 TIME_STEP = 0.01
 """Period of the controls that the filter makes itself, s."""
@@ -260,8 +261,7 @@ class TakeoffControlFilterNode(Node):
 
     def _publish(self, control):
         if isinstance(control, Setpoint):
-            control = ControlStamped(control=Control(*control))
-            control.header.stamp = self._handle.stamp()
+            control = stamped(ControlStamped, self._handle.stamp(), control=Control(*control))
         if control is not None:
             self._final.publish(control)
 

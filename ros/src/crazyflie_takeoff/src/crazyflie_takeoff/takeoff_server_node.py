@@ -25,7 +25,7 @@ from crazyflie_takeoff.recovery import recover_state
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters
 from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.vectors import from_vector
+from crazyflie_utils.vectors import from_vector, stamped
 
 TIME_STEP = 0.01
 """Period of the server, s."""
@@ -313,16 +313,14 @@ class TakeoffServerNode(Node):
         if output.toggle:
             self._in_flight.publish(Empty())
         if output.reference is not None:
-            message = PositionVelocityStateStamped()
-            message.header.stamp = self._handle.stamp()
-            message.state = from_vector(PositionVelocityState, output.reference)
+            state = from_vector(PositionVelocityState, output.reference)
+            message = stamped(PositionVelocityStateStamped, self._handle.stamp(), state=state)
             self._reference.publish(message)
             if output.state is FlightState.DESCENDING:
                 self._descent.publish(message)
         if output.thrust is not None:
-            message = ControlStamped(control=Control(thrust=output.thrust))
-            message.header.stamp = self._handle.stamp()
-            self._control.publish(message)
+            control = Control(thrust=output.thrust)
+            self._control.publish(stamped(ControlStamped, self._handle.stamp(), control=control))
         if output.state.is_settled:
             self._calls.finish(EmptyResponse())
 

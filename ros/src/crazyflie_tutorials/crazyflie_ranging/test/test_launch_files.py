@@ -1,11 +1,12 @@
 """What the launch files start, and that all of it can be initialized."""
 
+import re
 from pathlib import Path
 
 import pytest
 import rospkg
 
-from crazyflie_dev import launch_files
+from crazyflie_dev import launch_files, launching
 from crazyflie_ranging.deck_ranger_node import DeckRangerNode
 from crazyflie_ranging.follow_object_node import FollowObjectNode
 from crazyflie_ranging.obstacle_stop_node import ObstacleStopNode
@@ -17,6 +18,9 @@ LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "launch"
 
 COMMON = {"obstacle_stop": ObstacleStopNode}
 FOLLOW = {**COMMON, "follow_object": FollowObjectNode}
+
+LIMIT = 60.0
+"""How long a launch may take to end, s."""
 
 
 @pytest.mark.parametrize(
@@ -39,6 +43,13 @@ def test_launch_files(file, flight, composed, classes):
     process = FakeProcess(parameters)
     for name, node in classes.items():
         assert (f"/{name}" in nodes) == (composed == "false")
+        if composed == "false":
+            # Who reads files ends the launch, once, when they are wrong.
+            reads_files = name in ("simulated_ranger", "deck_ranger")
+            assert (nodes[f"/{name}"].required, nodes[f"/{name}"].respawn) == (
+                reads_files,
+                not reads_files,
+            )
         assert process.launch(node(), f"/{name}"), process.logged("error")
     if composed == "true":
         assert classes.items() <= NodeClasses()(launch_files.composed_nodes(parameters)).items()
@@ -52,3 +63,20 @@ def test_launch_files(file, flight, composed, classes):
         assert parameters["/virtual_crazyflie/world"] == parameters["/world/world"]
         assert parameters["/crazyflie/crazyflie_add/genericLogTopics"] == ["ranges"]
         assert parameters["/deck_ranger/topics/log"] == "/crazyflie/ranges"
+
+
+@pytest.mark.parametrize("wrong", ["world", "sensors"])
+def test_a_wrong_file_ends_the_launch(tmp_path, monkeypatch, wrong):
+    # So that they are as before, after the test.
+    monkeypatch.setenv("ROS_MASTER_URI", "")
+    monkeypatch.setenv("ROS_IP", "")
+    file, log = tmp_path / "wrong.yaml", tmp_path / "log"
+    file.write_text("shape: cube\n")
+    with launching.roslaunch(
+        ["crazyflie_ranging", "ranging.launch", f"{wrong}:={file}"], log
+    ) as run:
+        run.wait(LIMIT)
+    told = re.findall(rf"(/\w+): {re.escape(str(file))}:1: ", log.read_text())
+    # Once by each node that reads it, if the end of the other leaves it the time.
+    assert told and len(told) == len(set(told))
+    assert "REQUIRED process" in log.read_text()

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from crazyflie_utils.runtime.handle import NodeHandle
     from crazyflie_utils.runtime.poses import StampedPose
     from crazyflie_utils.runtime.runner import run, run_composed, run_nodes
-    from crazyflie_utils.runtime.transforms import TransformError
+    from crazyflie_utils.runtime.tf2_memory import TransformError
     from crazyflie_utils.runtime.transport import ServiceError
 
 _HOME = {
@@ -23,7 +23,7 @@ _HOME = {
     "Parameters": "crazyflie_utils.parameters",
     "ServiceError": "crazyflie_utils.runtime.transport",
     "StampedPose": "crazyflie_utils.runtime.poses",
-    "TransformError": "crazyflie_utils.runtime.transforms",
+    "TransformError": "crazyflie_utils.runtime.tf2_memory",
     "parameter": "crazyflie_utils.parameters",
     "run": "crazyflie_utils.runtime.runner",
     "run_composed": "crazyflie_utils.runtime.runner",

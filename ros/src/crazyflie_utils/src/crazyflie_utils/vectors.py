@@ -9,13 +9,36 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import genpy
+from std_msgs.msg import Header
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+M = TypeVar("M", bound=genpy.Message)
+
+
+def stamped(message_type: type[M], stamp: genpy.Time, frame_id: str = "", **fields: Any) -> M:
+    """Return a message with a header, several times quicker than the type itself makes it.
+
+    Parameters
+    ----------
+    message_type : type
+    stamp : genpy.Time
+    frame_id : str, optional
+    **fields
+        All its other fields.
+    """
+    header = object.__new__(Header)
+    header.seq, header.stamp, header.frame_id = 0, stamp, frame_id
+    message = object.__new__(message_type)
+    message.header = header
+    for field, value in fields.items():
+        setattr(message, field, value)
+    return message
 
 
 def to_tuple(message: genpy.Message) -> tuple[float, ...]:

@@ -118,7 +118,7 @@ class FlightPlanNode(Node):
         # A takeoff that is not answered may have begun all the same.
         self._is_flying |= step.service == "takeoff"
         answer = self._handle.call_service(step.service, step.service_type, step.request, _LIMIT)
-        answer.add_done_callback(self._handle.guard(self._on_answer))
+        answer.add_done_callback(self._on_answer)
 
     def _on_answer(self, done):
         step = self._steps.popleft()

@@ -88,7 +88,7 @@ class StreamNode(Node):
             if answer is None:
                 self._handle.end(0)
             else:
-                answer.add_done_callback(self._handle.guard(self._on_answer))
+                answer.add_done_callback(self._on_answer)
 
     def _on_answer(self, done):
         if (error := done.exception()) is not None:

@@ -7,10 +7,10 @@ from typing_extensions import override
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_description.flown_path import FlownPath, circle
-from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.last_valid import LastValid
-from crazyflie_utils.parameter_types import FRAME, TOPIC
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TOPIC
 
 PERIOD = 0.05
 """Between two looks at the vehicle's pose, s."""
@@ -37,6 +37,12 @@ class VisualizerParameters(Parameters):
     fixed_frame: str = parameter(FRAME, "frame in which it is drawn", name="frames/fixed")
     robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
     reference_topic: str = parameter(TOPIC, "where references come from", name="topics/reference")
+    has_yaw: bool = parameter(
+        BOOLEAN,
+        "references are PositionVelocityYawStateStamped, and not PositionVelocityStateStamped",
+        False,
+        "reference/yaw",
+    )
     markers_topic: str = parameter(TOPIC, "where markers go", name="topics/markers")
 
 
@@ -63,7 +69,7 @@ class VisualizerNode(Node):
         self._lookup = handle.listen_to_transforms()
         handle.subscribe(
             parameters.reference_topic,
-            PositionVelocityStateStamped,
+            PositionVelocityYawStateStamped if parameters.has_yaw else PositionVelocityStateStamped,
             self._on_reference,
             finite="state",
             on_invalid=self._on_invalid_reference,

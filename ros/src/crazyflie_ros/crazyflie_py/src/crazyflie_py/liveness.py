@@ -143,5 +143,8 @@ class Liveness:
             return Life.SILENT
         if self._log_limit is None or now - self._logged <= self._log_limit:
             return Life.ALIVE
+        # The answer to a ping may have come just after the last log packet; both are missing then.
+        if self._received - self._logged < 0.5 * self._log_limit:
+            return Life.ALIVE
         # Until its log data come, too, nobody knows.
         return Life.RESTARTED if now - self._heard_since > _HEARD_FOR else Life.SILENT

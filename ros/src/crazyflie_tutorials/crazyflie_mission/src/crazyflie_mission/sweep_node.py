@@ -126,7 +126,7 @@ class SweepNode(Node):
                 self._finish(str(reply.exception()))
 
         future = self._handle.call_service(service, Empty, EmptyRequest(), FLIGHT_LIMIT)
-        future.add_done_callback(self._handle.guard(on_reply))
+        future.add_done_callback(on_reply)
 
     def _sweep(self):
         if self._position is None:
@@ -240,7 +240,7 @@ class SweepNode(Node):
         future = self._handle.call_service(
             self._parameters.velocity_service, VelocityAt, request, self._parameters.velocity_limit
         )
-        future.add_done_callback(self._handle.guard(self._on_velocity))
+        future.add_done_callback(self._on_velocity)
 
     def _on_velocity(self, reply):
         self._is_asking = False

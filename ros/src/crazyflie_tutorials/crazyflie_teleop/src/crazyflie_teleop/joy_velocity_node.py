@@ -109,4 +109,4 @@ class JoyVelocityNode(Node):
                 self._handle.warn(str(reply.exception()))
 
         future = self._handle.call_service(service, Empty, EmptyRequest(), FLIGHT_LIMIT)
-        future.add_done_callback(self._handle.guard(on_reply))
+        future.add_done_callback(on_reply)

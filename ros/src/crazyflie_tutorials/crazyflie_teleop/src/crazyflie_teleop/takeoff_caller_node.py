@@ -35,7 +35,7 @@ class TakeoffCallerNode(Node):
             return
         self._timer.stop()
         future = self._handle.call_service(self._service, Empty, EmptyRequest(), FLIGHT_LIMIT)
-        future.add_done_callback(self._handle.guard(self._on_reply))
+        future.add_done_callback(self._on_reply)
 
     def _on_reply(self, reply):
         if reply.exception() is None:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from crazyflie_utils.runtime.handle import NodeHandle
+    from crazyflie_utils.runtime.handle_base import HandleBase
 
 
 class Faults:
@@ -15,11 +15,11 @@ class Faults:
 
     Parameters
     ----------
-    log : NodeHandle
+    log : HandleBase
         Its ``error`` and ``warn`` are used.
     """
 
-    def __init__(self, log: "NodeHandle"):
+    def __init__(self, log: "HandleBase"):
         self.make_safe: Callable[[], None] | None = None
         self._log = log
         self._counts: dict[tuple[type, str, int | None], int] = {}

@@ -1,36 +1,26 @@
 """The only door between a node and ROS: roscpp's NodeHandle for Python."""
 
-import math
-import time
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import genpy
 import rosgraph.names
-from geometry_msgs.msg import TransformStamped
-from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.parameter_types import ParameterType
 from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_parameter
-from crazyflie_utils.runtime import flights
-from crazyflie_utils.runtime.faults import Faults
-from crazyflie_utils.runtime.poses import StampedPose
-from crazyflie_utils.runtime.services import pass_on, serve
-from crazyflie_utils.runtime.throttle import Throttle
-from crazyflie_utils.runtime.timers import Timer
+from crazyflie_utils.runtime.handle_tf import TfHandle
+from crazyflie_utils.runtime.handle_time import TimeHandle
+from crazyflie_utils.runtime.services import Reply, pass_on, serve
 from crazyflie_utils.runtime.topics import Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite
-
-if TYPE_CHECKING:
-    from crazyflie_utils.runtime.process import Process
 
 P = TypeVar("P", bound=Parameters)
 M = TypeVar("M", bound=genpy.Message)
 
 
-class NodeHandle:
+class NodeHandle(TimeHandle, TfHandle):
     """Names, parameters, topics, services, timers, time, tf and log of one node.
 
     The node's callbacks, whatever calls for them, run one at a time, and never
@@ -45,15 +35,6 @@ class NodeHandle:
     name : str
         Absolute name of the node, such as /simulator.
     """
-
-    def __init__(self, process: "Process", name: str):
-        self._process = process
-        self._name = name
-        self._faults = Faults(self)
-        self._throttle = Throttle()
-        self._undo: list[Callable[[], None]] = []
-        self._is_closed = False
-        self._clock: Publisher | None = None
 
     def child(self) -> "NodeHandle":
         """Return another handle of the node, for what may be closed before the node ends.
@@ -73,21 +54,7 @@ class NodeHandle:
         while self._undo:
             self._undo.pop()()
 
-    @property
-    def is_closed(self) -> bool:
-        """Whether `close` has been called."""
-        return self._is_closed
-
-    def end(self, status: int = 0) -> None:
-        """End the process, and with it all its nodes, with an exit status."""
-        self._process.end(status)
-
     # Names and parameters.
-
-    @property
-    def name(self) -> str:
-        """Absolute name of the node."""
-        return self._name
 
     def resolve(self, name: str) -> str:
         """Return the absolute name of a topic, service or parameter.
@@ -269,7 +236,7 @@ class NodeHandle:
             machine's clock. What is added to it with ``add_done_callback`` runs
             like any callback; none may wait for it.
         """
-        outcome: Future[Any] = Future()
+        outcome = Reply(self)
         reply = self._process.transport.call_service(
             self.resolve(name), service_type, request, limit
         )
@@ -280,168 +247,3 @@ class NodeHandle:
     def service_nodes(self) -> dict[str, str]:
         """Return every service that is offered now -> its node; blocks for a few milliseconds."""
         return self._process.transport.service_nodes()
-
-    # Time.
-
-    @property
-    def uses_sim_time(self) -> bool:
-        """Whether the node lives by simulated time (/use_sim_time)."""
-        return self._process.uses_sim_time
-
-    def time(self) -> float:
-        """Return seconds for measuring intervals: simulated, or the machine's steady clock."""
-        return self._process.clock.time()
-
-    def stamp(self, moment: float | None = None) -> genpy.Time:
-        """Return the ROS time of a moment of `time`, by default now."""
-        return self._process.clock.stamp(moment)
-
-    def nanoseconds(self, moment: float | None = None) -> int:
-        """Return the same as `stamp` in whole ns, for a `StampedPose`."""
-        return self._process.clock.nanoseconds(moment)
-
-    def timer(self, period: float, callback: Callable[[], None], steady: bool = False) -> Timer:
-        """Have ``callback()`` called every ``period`` seconds of `time`.
-
-        With ``steady`` the period is of the machine's clock also when time is
-        simulated. Ticks that are missed are skipped.
-        """
-        timer = self._process.add_timer(period, self.guard(callback), steady)
-        self._undo.append(timer.stop)
-        return timer
-
-    def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
-        """Have ``callback(*arguments)`` called in its turn with all other callbacks.
-
-        This is how threads of a node's own hand over to it.
-        """
-        self._process.executor.submit(partial(self.guard(callback), *arguments))
-
-    def clock_publisher(self) -> Callable[[float], None]:
-        """Return a function that moves simulated time to a moment (s) for everybody.
-
-        In this process time moves after the present callback; then the timers
-        that are due run.
-        """
-        publisher = self._process.topics.publisher("/clock", Clock, latch=False)
-        self._clock = publisher
-
-        def set_clock(moment: float) -> None:
-            stamp = self.stamp(moment)
-            self._process.transport.clock_was_set(stamp)
-            publisher.publish(Clock(stamp))
-
-        return set_clock
-
-    def next_event(self) -> float:
-        """Return the next moment, s, at which simulated time has to stop.
-
-        That is when a timer of this process is due; or at once, where others listen to the clock.
-        """
-        # One listener is this process.
-        if self._clock is None or self._clock.has_subscribers(beside=1):
-            return -math.inf
-        return self._process.next_simulated_deadline()
-
-    def announce_flights(self) -> Callable[[bool], None]:
-        """Return ``tell(in_flight)``, which tells every process of flights that this node ends.
-
-        Processes with nodes that are needed in flight do not end at SIGINT before it.
-        """
-        tell, close = flights.announce(self._process, self._name)
-        self._undo.append(close)
-        return tell
-
-    # tf.
-
-    def broadcast_transforms(self) -> Callable[[list[TransformStamped]], None]:
-        """Announce to tf and return ``broadcast(list of TransformStamped)``."""
-        self._process.transforms.advertise()
-        return self._process.transforms.broadcast
-
-    def listen_to_transforms(self) -> Callable[[str, str], TransformStamped]:
-        """Begin to listen to tf and return ``lookup(target, source)``.
-
-        See `Transforms.lookup` for its result and its error.
-        """
-        self._process.transforms.listen()
-        return self._process.transforms.lookup
-
-    def broadcast_poses(
-        self, refresh: Callable[[], None] | None = None
-    ) -> Callable[[list[StampedPose]], None]:
-        """Announce to tf and return ``broadcast(list of StampedPose)``, which is the quicker way.
-
-        ``refresh()`` is called before a callback of this process looks poses up: as long as
-        `poses_are_heard` is false, it is early enough to broadcast then.
-        """
-        transforms, executor = self._process.transforms, self._process.executor
-        transforms.advertise()
-        if refresh is not None:
-            guarded = self.guard(refresh)
-            transforms.on_lookup(lambda: guarded() if executor.is_running_here else None)
-        return transforms.broadcast_poses
-
-    def poses_are_heard(self) -> bool:
-        """Tell whether anybody hears of each pose that is broadcast when it is."""
-        return self._process.transforms.is_heard()
-
-    def listen_to_poses(self) -> Callable[[str, str], StampedPose]:
-        """As `listen_to_transforms`, for ``lookup(target, source)`` that returns a pose."""
-        self._process.transforms.listen()
-        return self._process.transforms.lookup_pose
-
-    def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
-        """Have ``callback()`` called as soon as tf knows a new pose of a frame.
-
-        Of poses that come oftener than every ``period`` (s, by their stamps) only so many are
-        told of.
-        """
-        guarded, submit = self.guard(callback), self._process.executor.submit
-        self._process.transforms.on_pose(frame, period, lambda: submit(guarded))
-
-    def rejected_transforms(self) -> dict[str, int]:
-        """Return how many transforms were not taken into tf in this process, reason to number."""
-        return dict(self._process.transforms.rejected)
-
-    # Log and faults.
-
-    def info(self, text: str) -> None:
-        """Log what an operator may want to know."""
-        self._process.transport.log("info", f"{self._name}: {text}")
-
-    def warn(self, text: str, throttle: float = 0.0, key: Hashable = None) -> None:
-        """Log a warning; the same ``key`` (the text) at most once in ``throttle`` seconds.
-
-        The seconds are those of the machine's clock, so that a simulation that
-        runs fast does not flood the screen. A text that varies needs a key.
-        """
-        key = text if key is None else key
-        if throttle > 0.0 and not self._throttle.passes(key, throttle, time.monotonic()):
-            return
-        self._process.transport.log("warn", f"{self._name}: {text}")
-
-    def error(self, text: str) -> None:
-        """Log what makes the node fail."""
-        self._process.transport.log("error", f"{self._name}: {text}")
-
-    def report_fault(self, callback: Callable[..., Any], error: Exception) -> None:
-        """Log that a callback of this node has raised, and have the node made safe."""
-        self._faults.report(callback, error)
-
-    def on_fault(self, make_safe: Callable[[], None]) -> None:
-        """Have ``make_safe()`` called after a callback of this node has raised."""
-        self._faults.make_safe = make_safe
-
-    def guard(self, callback: Callable[..., Any]) -> Callable[..., None]:
-        """Return ``callback`` such that what it raises is reported and goes no further."""
-
-        def guarded(*args):
-            if self._is_closed:
-                return
-            try:
-                callback(*args)
-            except Exception as error:
-                self.report_fault(callback, error)
-
-        return guarded

@@ -46,8 +46,8 @@ class _RosPublisher(ExternalPublisher):
         implementation = self._publisher.impl
         return implementation is not None and bool(implementation.connections)
 
-    def publish(self, message: genpy.Message) -> None:
-        rospy_sending.publish(self._publisher, message)
+    def publish(self, *messages: genpy.Message) -> None:
+        rospy_sending.publish(self._publisher, *messages)
 
     def close(self) -> None:
         self._publisher.unregister()
@@ -59,6 +59,12 @@ class _RosSubscriber(ExternalSubscriber):
 
     def has_publishers(self) -> bool:
         return self._subscriber.get_num_connections() > 0
+
+    def read_lazily(self, is_lazy: bool) -> None:
+        rospy_receiving.read_lazily(self._subscriber, is_lazy)
+
+    def collect(self) -> None:
+        rospy_receiving.collect(self._subscriber)
 
     def close(self) -> None:
         self._subscriber.unregister()

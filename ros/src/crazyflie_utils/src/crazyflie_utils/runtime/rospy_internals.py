@@ -72,7 +72,12 @@ def take_over_remappings() -> dict[str, str]:
 
 def set_time(stamp: genpy.Time) -> None:
     """Set rospy's simulated clock, which stamps the log."""
-    rostime._set_rostime(stamp)
+    time = rospy.Time.__new__(rospy.Time)
+    time.secs, time.nsecs = stamp.secs, stamp.nsecs
+    rostime._rostime_current = time
+    # Hardly ever does anybody sleep by it, and then not without looking at it now and then.
+    if rostime._rostime_cond._waiters:
+        rostime._set_rostime(time)
 
 
 def register_again() -> None:

@@ -1,15 +1,17 @@
 """How messages come into a process, whatever publishers send; more of what rospy does not offer."""
 
 import functools
+import select
 import socket
 import struct
+import threading
 import time
 from typing import Any
 
 import genpy
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
-from rospy.impl import tcpros_base
+from rospy.impl import registration, tcpros_base
 from rospy.impl.tcpros_pubsub import TCPROSSub
 
 from crazyflie_utils.runtime.rospy_internals import Report
@@ -27,6 +29,13 @@ _BURST = 200.0
 
 _REST = 0.005
 """In a flood, one message is taken and then none for this long, s."""
+
+_TURNS = 16
+"""How often a socket is read for what waits there: a flood never ends, but a millionth part of it
+is enough."""
+
+_PAUSE = 0.05
+"""How long messages that are read lazily wait to be collected, at most, s."""
 
 
 class _Flow:
@@ -71,17 +80,16 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
         if self.socket is None:
             raise TransportException("connection not initialized")
         inbox = _inbox(self, report)
+        if _is_lazy(self):
+            inbox.wait()
+            return _note(self, inbox.take_waiting())
         messages: list[genpy.Message] = []
         while not (messages or self.done or rospy.core.is_shutdown()):
             frames = inbox.take()
             if limits_rate and frames and inbox.flow.is_flooded(len(frames)):
                 frames = _calm(self.protocol, inbox, frames, report)
-            for frame in frames:
-                _decode(self, frame, messages, report)
-        self.stat_num_msg += len(messages)
-        if self.is_latched and messages:
-            self.latch = messages[-1]
-        return messages
+            messages = inbox.decoded(frames)
+        return _note(self, messages)
 
     def validate_type(self, header):
         complaint = _complaint(self.protocol, header)
@@ -97,6 +105,37 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
     tcpros_base.TCPROSTransport._validate_header = validate_type
 
 
+def read_lazily(subscriber: rospy.Subscriber, is_lazy: bool) -> None:
+    """Let messages wait for `collect`, or for 50 ms, unless others subscribe here, too."""
+    subscriber.impl.is_lazy = is_lazy
+
+
+def collect(subscriber: rospy.Subscriber) -> None:
+    """Call back, in this thread, for messages that wait."""
+    implementation = subscriber.impl
+    if implementation is None:
+        return
+    for connection in implementation.connections:
+        inbox = getattr(connection, "inbox", None)
+        if inbox is not None and inbox.sock is connection.socket and _is_lazy(connection):
+            messages = _note(connection, inbox.take_waiting())
+            implementation.receive_callback(messages, connection)
+
+
+def _is_lazy(connection):
+    implementation = registration.get_topic_manager().get_subscriber_impl(
+        connection.protocol.resolved_name
+    )
+    return getattr(implementation, "is_lazy", False) and len(implementation.callbacks) == 1
+
+
+def _note(connection, messages):
+    connection.stat_num_msg += len(messages)
+    if connection.is_latched and messages:
+        connection.latch = messages[-1]
+    return messages
+
+
 def _inbox(connection, report):
     """Return the inbox of a connection's socket; after a reconnection it is another one."""
     inbox = getattr(connection, "inbox", None)
@@ -110,8 +149,7 @@ def _inbox(connection, report):
 def _calm(protocol, inbox, frames, report):
     """Return what is taken in a flood."""
     time.sleep(_REST)
-    # As long as a flood lasts there is always more; a millionth part of it is enough.
-    for _ in range(16):
+    for _ in range(_TURNS):
         try:
             frames += inbox.take(socket.MSG_DONTWAIT)
         except BlockingIOError:
@@ -121,19 +159,6 @@ def _calm(protocol, inbox, frames, report):
     key = ("flood", protocol.resolved_name)
     report(f"more than {_FLOOD:g} messages a second on {protocol.resolved_name}", key)
     return frames[-1:]
-
-
-def _decode(connection, frame, messages, report):
-    protocol = connection.protocol
-    try:
-        message = protocol.recv_data_class().deserialize(frame)
-    except Exception as error:
-        topic = protocol.resolved_name
-        text = f"ignoring a message on {topic} that cannot be read: {error}"
-        report(text, ("unreadable", topic))
-    else:
-        message._connection_header = connection.header
-        messages.append(message)
 
 
 class _Inbox:
@@ -155,6 +180,64 @@ class _Inbox:
         self._part = bytearray()
         self._read = read
         self.sock.setblocking(True)
+        # Of what is read lazily.
+        self._lock = threading.Lock()
+        self._is_behind = True
+        self._end: TransportTerminated | None = None
+
+    def wait(self) -> None:
+        """Wait a little, and then for data.
+
+        Raises
+        ------
+        TransportTerminated
+            The publisher has hung up, or makes messages without end.
+        """
+        if self._end is not None:
+            raise self._end
+        if not self._is_behind:
+            time.sleep(_PAUSE)
+        try:
+            poll = select.poll()
+            poll.register(self.sock, select.POLLIN)
+            poll.poll(1000)
+        # It may be closed by others at any moment.
+        except (OSError, ValueError) as error:
+            raise TransportTerminated(str(error)) from None
+
+    def take_waiting(self) -> list[genpy.Message]:
+        """Return the messages that are there.
+
+        A hang-up is left to `wait`.
+        """
+        frames: list[bytes] = []
+        with self._lock:
+            try:
+                for _ in range(_TURNS):
+                    frames += self.take(socket.MSG_DONTWAIT)
+                    if not self._is_behind:
+                        break
+            except BlockingIOError:
+                self._is_behind = False
+            except TransportTerminated as end:
+                self._end = end
+        return self.decoded(frames)
+
+    def decoded(self, frames: list[bytes]) -> list[genpy.Message]:
+        """Return messages without those that cannot be decoded."""
+        connection, messages = self._connection, []
+        protocol, header = connection.protocol, connection.header
+        for frame in frames:
+            try:
+                message = protocol.recv_data_class().deserialize(frame)
+            except Exception as error:
+                topic = protocol.resolved_name
+                text = f"ignoring a message on {topic} that cannot be read: {error}"
+                self._report(text, ("unreadable", topic))
+            else:
+                message._connection_header = header
+                messages.append(message)
+        return messages
 
     def take(self, flags: int = 0) -> list[bytes]:
         """Wait for data and return the messages that are complete, serialized.
@@ -193,6 +276,8 @@ class _Inbox:
         if not data:
             raise TransportTerminated("the publisher has hung up")
         self._connection.stat_bytes += len(data)
+        # A great part of what the socket holds.
+        self._is_behind = len(data) > self._connection.protocol.buff_size // 2
         return data
 
     def _needed(self, data, start=0):

@@ -7,6 +7,7 @@ publisher's thread as far as the socket takes it; only who does not keep up gets
 
 import functools
 import io
+import itertools
 import select
 import socket
 import struct
@@ -29,22 +30,23 @@ def never_wait_for_subscribers() -> None:
     rospy.topics.QueuedConnection = _PatientConnection
 
 
-def publish(publisher: rospy.Publisher, message: genpy.Message) -> None:
-    """Publish a message that is of the publisher's type.
+def publish(publisher: rospy.Publisher, *messages: genpy.Message) -> None:
+    """Publish messages that are of the publisher's type, all at once.
 
-    It does what ``publisher.publish(message)`` does, without looking at the message first.
+    It does what ``publisher.publish(message)`` does, without looking at them first.
     """
     implementation = publisher.impl
     if implementation is None or implementation.closed:
-        publisher.publish(message)
+        publisher.publish(messages[-1])
         return
     with implementation.publock:
         if implementation.is_latch:
-            implementation.latch = message
+            implementation.latch = messages[-1]
         if not implementation.connections:
             return
-        implementation.seq += 1
-        data = _on_the_wire(message, implementation.seq)
+        first = implementation.seq + 1
+        implementation.seq += len(messages)
+        data = b"".join(map(_on_the_wire, messages, itertools.count(first)))
         implementation.message_data_sent += len(data)
         for connection in implementation.connections:
             try:

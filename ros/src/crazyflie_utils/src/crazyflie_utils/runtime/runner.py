@@ -176,11 +176,13 @@ def ros_process() -> Process:
     """Return what the nodes of this process share, when it is a ROS node already."""
     transport = RosTransport()
     try:
-        use_sim_time = BOOLEAN(transport.get_param("/use_sim_time"))
+        value = transport.get_param("/use_sim_time")
     except KeyError:
-        use_sim_time = False
+        value = False
+    try:
+        use_sim_time = BOOLEAN(value)
     except ValueError:
-        transport.log("error", f"parameter /use_sim_time: expected {BOOLEAN}")
+        transport.log("error", f"parameter /use_sim_time is {value!r}; expected {BOOLEAN}")
         _fail()
     # In simulated time there is no such thing as too many messages a second.
     transport.receive(limits_rate=not use_sim_time)

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from typing import TYPE_CHECKING, Any
 
+from typing_extensions import override
+
 from crazyflie_utils.runtime.transport import ServiceError
 
 if TYPE_CHECKING:
@@ -42,6 +44,26 @@ def serve(
             response.add_done_callback(lambda done: pass_on(done, answer, handle))
         else:
             answer.set_result(response)
+
+
+class Reply(Future[Any]):
+    """What a call of a service brings; what is added to it is a callback of the node.
+
+    A plain future would only log what that raises, and the node would not be made safe.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+        Of the node that calls.
+    """
+
+    def __init__(self, handle: "NodeHandle"):
+        super().__init__()
+        self._guard = handle.guard
+
+    @override
+    def add_done_callback(self, fn: Callable[[Future[Any]], object]) -> None:
+        super().add_done_callback(self._guard(fn))
 
 
 def pass_on(done: Future[Any], to: Future[Any], handle: "NodeHandle") -> None:

@@ -14,6 +14,10 @@ _TOLERANCE = 1e-6
 """A timer is due this much early, s: more than the rounding of a float that holds
 the seconds since 1970, less than anyone can notice."""
 
+_TOGETHER = 0.1
+"""Timers of at most this period, s, are due together where they can be: waking up costs more than
+most of them do."""
+
 
 class Timer:
     """A callback that is due every ``period`` seconds; ends with `stop`."""
@@ -79,10 +83,14 @@ class TimerQueue:
         self._lock = threading.Lock()
         self._heap: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
+        self._origin: float | None = None
         self._is_stopped = False
 
     def add(self, period: float, work: Callable[[], None], now: float) -> Timer:
-        """Add a timer whose first deadline is one period from ``now`` (s).
+        """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
+
+        That of a short period, up to 0.1 s, is due at multiples of it since the first one began,
+        so that many of them need not wake the process up often.
 
         Raises
         ------
@@ -91,11 +99,19 @@ class TimerQueue:
         """
         if not 0.0 <= period < math.inf:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
-        timer = Timer(period, work, now)
         with self._lock:
+            timer = Timer(period, work, self._begin(period, now))
             timer.stopped = self._is_stopped
             self._push(timer)
         return timer
+
+    def _begin(self, period, now):
+        if not 0.0 < period <= _TOGETHER:
+            return now
+        if self._origin is None or now < self._origin:
+            self._origin = now
+        passed = (now - self._origin - _TOLERANCE) / period
+        return self._origin + math.ceil(passed) * period
 
     def next_deadline(self) -> float:
         """Return when the next timer is due; infinity without timers."""

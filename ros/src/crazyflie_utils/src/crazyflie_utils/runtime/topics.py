@@ -5,7 +5,7 @@ object, by a call, and to those outside only when there are any. Subscribers
 must therefore not change what they receive.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import genpy
@@ -60,10 +60,20 @@ class Publisher:
         beside : int
             So many receivers in this process do not count.
         """
-        return len(self._topic.receivers) > beside or self._external.has_subscribers()
+        return self.is_read_here(beside) or self._external.has_subscribers()
 
-    def publish(self, message: genpy.Message) -> None:
+    def is_read_here(self, beside: int = 0) -> bool:
+        """Tell whether anyone in this process receives; so many do not count."""
+        return len(self._topic.receivers) > beside
+
+    def publish(self, message: genpy.Message, before: Sequence[genpy.Message] = ()) -> None:
         """Send a message; it must not be changed afterwards.
+
+        Parameters
+        ----------
+        message : genpy.Message
+        before : sequence of genpy.Message, optional
+            Sent before it, in one go, to other processes only.
 
         Raises
         ------
@@ -80,7 +90,7 @@ class Publisher:
         if self._latch:
             self.latched = message
         if self._latch or self._external.has_subscribers():
-            self._external.publish(message)
+            self._external.publish(*before, message)
         self._topic.deliver(message)
 
     def close(self) -> None:
@@ -102,6 +112,14 @@ class Subscriber:
     def has_publishers(self) -> bool:
         """Tell whether anyone, here or outside, is connected and may publish."""
         return bool(self._topic.publishers) or self._external.has_publishers()
+
+    def read_lazily(self, is_lazy: bool) -> None:
+        """Let messages from outside wait for `collect`, though not for long; or not."""
+        self._external.read_lazily(is_lazy)
+
+    def collect(self) -> None:
+        """Deliver what has come from outside."""
+        self._external.collect()
 
     def close(self) -> None:
         """Receive no more."""

@@ -24,8 +24,8 @@ class ExternalPublisher(ABC):
         """Tell whether anyone outside this process subscribes."""
 
     @abstractmethod
-    def publish(self, message: genpy.Message) -> None:
-        """Send a message to those outside."""
+    def publish(self, *messages: genpy.Message) -> None:
+        """Send messages to those outside."""
 
     @abstractmethod
     def close(self) -> None:
@@ -38,6 +38,17 @@ class ExternalSubscriber(ABC):
     @abstractmethod
     def has_publishers(self) -> bool:
         """Tell whether anyone outside this process is connected and may publish."""
+
+    # Where all messages are delivered as they come, there is nothing to do.
+
+    def read_lazily(self, is_lazy: bool) -> None:  # noqa: B027
+        """Let messages wait for `collect`, though not for long; or be delivered as they come.
+
+        Nobody need wake up for one that waits.
+        """
+
+    def collect(self) -> None:  # noqa: B027
+        """Deliver what has come."""
 
     @abstractmethod
     def close(self) -> None:

@@ -205,8 +205,9 @@ class _Publication(ExternalPublisher):
     def has_subscribers(self) -> bool:
         return self._transport.graph.subscribes(self._topic, self._transport.name)
 
-    def publish(self, message: genpy.Message) -> None:
-        self._transport.graph.send(self._transport.name, self._topic, message, self._latch)
+    def publish(self, *messages: genpy.Message) -> None:
+        for message in messages:
+            self._transport.graph.send(self._transport.name, self._topic, message, self._latch)
 
     def close(self) -> None:
         self._transport.advertised.remove(self._topic)

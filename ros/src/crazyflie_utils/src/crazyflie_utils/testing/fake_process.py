@@ -27,10 +27,11 @@ class _Record(ExternalPublisher):
     def has_subscribers(self) -> bool:
         return True
 
-    def publish(self, message: genpy.Message) -> None:
-        # What cannot be sent must fail here as it would on a wire.
-        message.serialize(io.BytesIO())
-        self.messages.append(message)
+    def publish(self, *messages: genpy.Message) -> None:
+        for message in messages:
+            # What cannot be sent must fail here as it would on a wire.
+            message.serialize(io.BytesIO())
+            self.messages.append(message)
 
     def close(self) -> None:
         pass

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator
 import genpy
 import rospy
 
-LIMIT = 60.0
-"""The longest that a test waits for anything, s."""
+from crazyflie_utils.testing.waiting import LIMIT, wait_until
+
+__all__ = ["LIMIT", "Received", "exchange", "listening", "wait_until"]
 
 
 def _anything(message: genpy.Message) -> bool:
@@ -50,20 +51,6 @@ def listening(topic: str, message_type: type[genpy.Message]) -> Iterator[Receive
         yield received
     finally:
         subscriber.unregister()
-
-
-def wait_until(condition: Callable[[], bool], what: str, limit: float = LIMIT) -> None:
-    """Wait until ``condition()`` is true.
-
-    Raises
-    ------
-    AssertionError
-        It is not within ``limit`` seconds; the text names ``what`` was waited for.
-    """
-    end = time.monotonic() + limit
-    while not condition():
-        assert time.monotonic() < end, f"waited {limit:g} s for {what}"
-        time.sleep(0.01)
 
 
 def exchange(

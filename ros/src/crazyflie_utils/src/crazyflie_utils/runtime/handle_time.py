@@ -1,0 +1,96 @@
+"""A node's time: clock, timers, and the order of its callbacks."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import genpy
+from rosgraph_msgs.msg import Clock
+
+from crazyflie_utils.runtime import flights
+from crazyflie_utils.runtime.handle_base import HandleBase
+from crazyflie_utils.runtime.timers import Timer
+from crazyflie_utils.runtime.topics import Publisher
+
+if TYPE_CHECKING:
+    from crazyflie_utils.runtime.process import Process
+
+
+class TimeHandle(HandleBase):
+    """What a `NodeHandle` knows of time."""
+
+    def __init__(self, process: "Process", name: str):
+        super().__init__(process, name)
+        self._clock: Publisher | None = None
+
+    @property
+    def uses_sim_time(self) -> bool:
+        """Whether the node lives by simulated time (/use_sim_time)."""
+        return self._process.uses_sim_time
+
+    def time(self) -> float:
+        """Return seconds for measuring intervals: simulated, or the machine's steady clock."""
+        return self._process.clock.time()
+
+    def stamp(self, moment: float | None = None) -> genpy.Time:
+        """Return the ROS time of a moment of `time`, by default now."""
+        return self._process.clock.stamp(moment)
+
+    def nanoseconds(self, moment: float | None = None) -> int:
+        """Return the same as `stamp` in whole ns, for a `StampedPose`."""
+        return self._process.clock.nanoseconds(moment)
+
+    def timer(self, period: float, callback: Callable[[], None], steady: bool = False) -> Timer:
+        """Have ``callback()`` called every ``period`` seconds of `time`.
+
+        With ``steady`` the period is of the machine's clock also when time is
+        simulated. Ticks that are missed are skipped.
+        """
+        timer = self._process.add_timer(period, self.guard(callback), steady)
+        self._undo.append(timer.stop)
+        return timer
+
+    def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
+        """Have ``callback(*arguments)`` called in its turn with all other callbacks.
+
+        This is how threads of a node's own hand over to it.
+        """
+        self._process.executor.submit(partial(self.guard(callback), *arguments))
+
+    def clock_publisher(self) -> Callable[..., None]:
+        """Return ``set_clock(*moments)``, which moves simulated time to moments (s) for everybody.
+
+        Other processes are told of all of them, in one go. In this process time moves to the last
+        one, after the present callback; then the timers that are due run.
+        """
+        publisher = self._process.topics.publisher("/clock", Clock, latch=False)
+        self._clock = publisher
+
+        def set_clock(*moments: float) -> None:
+            stamp = self.stamp(moments[-1])
+            self._process.transport.clock_was_set(stamp)
+            before = [Clock(self.stamp(each)) for each in moments[:-1]]
+            publisher.publish(Clock(stamp), before)
+
+        return set_clock
+
+    def next_event(self) -> float:
+        """Return the next moment, s, at which simulated time has to stop.
+
+        That is when a timer of this process is due; or at once, where somebody in it listens to
+        the clock.
+        """
+        # One listener is the process itself.
+        if self._clock is None or self._clock.is_read_here(beside=1):
+            return -math.inf
+        return self._process.next_simulated_deadline()
+
+    def announce_flights(self) -> Callable[[bool], None]:
+        """Return ``tell(in_flight)``, which tells every process of flights that this node ends.
+
+        Processes with nodes that are needed in flight do not end at SIGINT before it.
+        """
+        tell, close = flights.announce(self._process, self._name)
+        self._undo.append(close)
+        return tell

@@ -1,0 +1,26 @@
+"""Waiting for a condition, with a limit; without ROS."""
+
+import time
+from collections.abc import Callable
+
+LIMIT = 60.0
+"""The longest that a test waits for anything, s."""
+
+
+def wait_until(
+    condition: Callable[[], object],
+    what: str = "a condition",
+    limit: float = LIMIT,
+    period: float = 0.01,
+) -> None:
+    """Wait until ``condition()`` is true; it is asked every ``period`` (s).
+
+    Raises
+    ------
+    AssertionError
+        It is not within ``limit`` seconds; the text names ``what`` was waited for.
+    """
+    end = time.monotonic() + limit
+    while not condition():
+        assert time.monotonic() < end, f"waited {limit:g} s for {what}"
+        time.sleep(period)

@@ -25,6 +25,9 @@ _NUMBERS = range(10, 200, 10)
 
 _START_LIMIT = 180.0
 
+_CALM = 3.0
+"""From there to the takeoff, s: before, vehicles do not know where they are."""
+
 _SETTLING = 2.0
 """From the end of the takeoff on, s."""
 
@@ -77,6 +80,7 @@ def measure(n: int, arguments: Sequence[str] = (), core: int = 0) -> SwarmFigure
                 # Some are there for a moment only.
                 with contextlib.suppress(ProcessLookupError):
                     os.sched_setaffinity(int(thread.name), {core})
+            time.sleep(_CALM)
             graph.call("/all/takeoff")
             time.sleep(_SETTLING)
             used = graph.cpu_time([process])

@@ -11,8 +11,6 @@ import math
 from collections.abc import Sequence
 from typing import overload
 
-import numpy as np
-
 from crazyflie_model.elementwise import Many, Number, clip, functions
 
 Triple = tuple[float, float, float]
@@ -45,6 +43,8 @@ def wrap_to_pi(angle: Many) -> Many:
     """
     if type(angle) is float:
         return (angle + math.pi) % (2.0 * math.pi) - math.pi
+    import numpy as np
+
     wrapped = np.remainder(np.asarray(angle) + math.pi, 2.0 * math.pi) - math.pi
     return wrapped if wrapped.ndim else float(wrapped)
 

@@ -11,8 +11,6 @@ import math
 from collections.abc import Sequence
 from typing import overload
 
-import numpy as np
-
 from crazyflie_model.elementwise import Many, Number, clip, functions
 
 Triple = tuple[float, float, float]
@@ -46,6 +44,8 @@ def wrap_to_pi(angle: Many) -> Many:
     turned = angle + math.pi
     if isinstance(turned, float):
         return turned % (2.0 * math.pi) - math.pi
+    import numpy as np
+
     # The remainder, by what anything else that takes part in numpy's functions knows, too.
     return turned - 2.0 * math.pi * np.floor(turned / (2.0 * math.pi)) - math.pi
 

@@ -5,20 +5,26 @@ for one vehicle, on which Python is several times quicker than numpy; arrays of
 shape (n,), or of any shape that broadcasts, for many. What differs between the
 two is in this module. Anything else that takes part in numpy's ``sin``, ``where``
 and ``clip`` (NEP 13, NEP 18) is taken as well.
+
+numpy is imported where arrays are: a process that flies one vehicle does without its 12 MiB.
 """
 
+from __future__ import annotations
+
+import functools
 import math
 from collections.abc import Sequence
 from types import ModuleType, SimpleNamespace
-from typing import TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, overload
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
-Many = float | NDArray[np.float64]
+Many: TypeAlias = "float | NDArray[np.float64]"
 """A component of many vehicles: an array, or a float that holds for all of them."""
 
-Number = TypeVar("Number", float, Many)
+Number = TypeVar("Number", float, "Many")
 """A component of one vehicle or of many: what is made of floats only is a float."""
 
 Vector = list[Number]
@@ -37,30 +43,45 @@ def split(vectors: ArrayLike) -> Vector[Many]:
     list of float, or of ndarray, shape (...)
         m entries.
     """
+    import numpy as np
+
     vectors = np.asarray(vectors, dtype=float)
     return vectors.tolist() if vectors.ndim == 1 else list(np.moveaxis(vectors, -1, 0))
 
 
 def join(components: Sequence[Many]) -> NDArray[np.float64]:
     """Return components as one array, shape (m,) or (..., m); inverse of `split`."""
+    import numpy as np
+
     return np.stack(np.broadcast_arrays(*components), axis=-1)
 
 
-_NUMPY = SimpleNamespace(
-    sin=np.sin,
-    cos=np.cos,
-    tan=np.tan,
-    sqrt=np.sqrt,
-    hypot=np.hypot,
-    asin=np.arcsin,
-    atan2=np.arctan2,
-)
-"""numpy by math's names, which numpy itself knows since version 2 only."""
+@functools.cache
+def _numpy() -> Any:
+    # The statement alone takes as long as some operations.
+    import numpy
+
+    return numpy
+
+
+@functools.cache
+def _numpy_functions() -> SimpleNamespace:
+    """Return numpy by math's names, which numpy itself knows since version 2 only."""
+    np = _numpy()
+    return SimpleNamespace(
+        sin=np.sin,
+        cos=np.cos,
+        tan=np.tan,
+        sqrt=np.sqrt,
+        hypot=np.hypot,
+        asin=np.arcsin,
+        atan2=np.arctan2,
+    )
 
 
 def functions(value: Many) -> ModuleType | SimpleNamespace:
     """Return math, or numpy under the same names, whose sin, cos, ... take ``value``."""
-    return math if isinstance(value, float) else _NUMPY
+    return math if isinstance(value, float) else _numpy_functions()
 
 
 @overload
@@ -73,7 +94,10 @@ def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many
 
 def where(condition: bool | NDArray[np.bool_], value: Many, other: Many) -> Many:
     """Return ``value`` where a condition, bool or array of bool, holds, else ``other``."""
-    if isinstance(condition, (bool, np.bool_)):
+    if isinstance(condition, bool):
+        return value if condition else other
+    np = _numpy()
+    if isinstance(condition, np.bool_):
         return value if condition else other
     return np.where(condition, value, other)
 
@@ -90,4 +114,4 @@ def clip(value: Many, low: float, high: float) -> Many:
     """Return ``value`` limited to [low, high]."""
     if isinstance(value, float):
         return low if value < low else high if value > high else value
-    return np.clip(value, low, high)
+    return _numpy().clip(value, low, high)

@@ -1,13 +1,18 @@
 """The errors of a motion capture system."""
 
+from __future__ import annotations
+
+import functools
 import math
 from collections import deque
 from collections.abc import Sequence
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from crazyflie_model.angles import Quaternion, Triple
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 Pose = tuple[float, Triple, Quaternion]
 """Time of a measurement (s), position (m), quaternion (x, y, z, w)."""
@@ -49,8 +54,15 @@ class MotionCapture:
         self.attitude_noise = attitude_noise
         self.latency = latency
         self.dropout = dropout
-        self._random = np.random.default_rng(seed)
+        self._seed = seed
         self._in_transit: deque[Pose] = deque()
+
+    @functools.cached_property
+    def _random(self) -> np.random.Generator:
+        # Here, since most vehicles are seen as they are, and do without numpy's 12 MiB.
+        import numpy as np
+
+        return np.random.default_rng(self._seed)
 
     @property
     def is_perfect(self) -> bool:

@@ -43,7 +43,7 @@ class MasterWatch:
             was_there = True
             if not is_known and not self._end.is_set():
                 rospy.logwarn("the ROS master was started anew; registering with it")
-                rospy_internals.register_again()
+                rospy_internals.register()
 
     def _knows_this_process(self):
         try:

@@ -4,7 +4,7 @@ import contextlib
 import math
 import threading
 from collections import Counter
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import Future, InvalidStateError, wait
 from functools import partial
 from time import monotonic
@@ -88,10 +88,22 @@ class RosTransport(Transport):
         rospy_internals.never_fail_to_log()
         self._remappings = rospy_internals.take_over_remappings()
         self._calls: dict[str, threading.Semaphore] = {}
+        self._services_at_start: dict[str, str] | None = None
+        self._is_starting = False
 
     def receive(self, limits_rate: bool) -> None:
         """Get ready for what publishers may send; see `rospy_receiving`."""
         rospy_receiving.bear_hostile_publishers(self._refuse, limits_rate)
+
+    @contextlib.contextmanager
+    def starting(self) -> Iterator[None]:
+        """Register with the master in one request, and ask it for others' services once."""
+        self._is_starting = True
+        try:
+            with rospy_internals.registering_together():
+                yield
+        finally:
+            self._is_starting, self._services_at_start = False, None
 
     def _refuse(self, text, key):
         # Once, since a peer that is wrong stays so; and of the first 64 only.
@@ -174,8 +186,11 @@ class RosTransport(Transport):
 
     def service_nodes(self) -> dict[str, str]:
         """Ask the master."""
+        if self._is_starting and self._services_at_start is not None:
+            return self._services_at_start
         _, _, services = rosgraph.Master(rospy.get_name()).getSystemState()
-        return {name: nodes[0] for name, nodes in services}
+        self._services_at_start = {name: nodes[0] for name, nodes in services}
+        return self._services_at_start
 
     def log(self, level: str, text: str) -> None:
         """Log to the screen, the node's log file and /rosout."""

@@ -6,8 +6,10 @@ not provide for. The rostests of this package notice when a rospy differs.
 
 import contextlib
 import functools
+import http.client
 import threading
-from collections.abc import Callable, Hashable
+import xmlrpc.client
+from collections.abc import Callable, Hashable, Iterator
 
 import genpy
 import rosgraph.roslogging
@@ -80,18 +82,54 @@ def set_time(stamp: genpy.Time) -> None:
         rostime._set_rostime(time)
 
 
-def register_again() -> None:
-    """Register all topics and services of this process with the master, which knows none."""
+@contextlib.contextmanager
+def registering_together() -> Iterator[None]:
+    """Register what is announced in a with block at its end, in one request.
+
+    One after the other, each takes milliseconds. If the block raises, nobody hears of it.
+    """
+    listeners = registration.get_registration_listeners()
+    # What is announced is in rospy's tables by then, from where `register` takes it.
+    listeners.notify_added = lambda *_: None
+    try:
+        yield
+    finally:
+        del listeners.notify_added
+    register()
+
+
+def register() -> None:
+    """Register all topics and services of this process with the master."""
     listeners = registration.get_registration_listeners()
     topics, services = registration.get_topic_manager(), registration.get_service_manager()
     kinds = registration.Registration
-    for kind, registered in (
-        (kinds.PUB, topics.get_publications()),
-        (kinds.SUB, topics.get_subscriptions()),
-        (kinds.SRV, services.get_services()),
-    ):
-        for name, type_or_uri in registered:
+    # Of publishers who come first, the master need not tell the subscribers who come then.
+    registered = [
+        *((kinds.PUB, *each) for each in topics.get_publications()),
+        *((kinds.SUB, *each) for each in topics.get_subscriptions()),
+        *((kinds.SRV, *each) for each in services.get_services()),
+    ]
+    methods = {
+        kinds.PUB: "registerPublisher",
+        kinds.SUB: "registerSubscriber",
+        kinds.SRV: "registerService",
+    }
+    request = xmlrpc.client.MultiCall(rospy.core.xmlrpcapi(rosgraph.get_master_uri()))
+    for kind, name, type_or_uri in registered:
+        getattr(request, methods[kind])(rospy.get_name(), name, type_or_uri, rospy.get_node_uri())
+    try:
+        answers = list(request())
+    except (OSError, http.client.HTTPException, xmlrpc.client.Error):
+        # One by one, and each until the master is there.
+        for kind, name, type_or_uri in registered:
             listeners.notify_added(name, type_or_uri, kind)
+        return
+    for (kind, name, _), (code, text, uris) in zip(registered, answers, strict=True):
+        if code != 1:
+            rospy.logfatal(f"unable to register {name} with master: {text}")
+        elif kind == kinds.SUB and set(uris) - {rospy.get_node_uri()}:
+            for listener in listeners.listeners:
+                listener.publisher_update(name, uris)
 
 
 @functools.cache

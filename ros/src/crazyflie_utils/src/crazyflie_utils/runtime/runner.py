@@ -13,6 +13,10 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
+# Before all else that imports rospy.
+import crazyflie_utils.runtime.light_rospy  # noqa: F401
+
+# isort: split
 import rosgraph
 import rospy
 
@@ -43,19 +47,25 @@ _SWITCH_INTERVAL = 0.0005
 """How long, in s, a thread that has something to do waits for another that computes."""
 
 
-def run(node_class: type, default_name: str) -> None:
+def run(node_class: type | str, default_name: str) -> None:
     """Run one node in this process until ROS shuts down; does not return.
 
     Exits with status 1 when the node cannot be initialized.
 
     Parameters
     ----------
-    node_class : type
-        Subclass of `Node`.
+    node_class : type or str
+        Subclass of `Node`, or where it is, "package.module:Class": a process that has not
+        imported it yet begins sooner and is smaller by half, see `light_rospy`.
     default_name : str
         Name of the node unless the launch file gives another.
     """
-    run_nodes(default_name, lambda handle: {handle.name: node_class()})
+
+    def make_node(handle):
+        make = _node_class(node_class) if isinstance(node_class, str) else node_class
+        return {handle.name: make()}
+
+    run_nodes(default_name, make_node)
 
 
 def run_composed(default_name: str) -> None:
@@ -207,11 +217,12 @@ def _wait_for_master():
 def _run(process, make_nodes):
     handle = process.handle(rospy.get_name())
     try:
-        nodes = make_nodes(handle)
-        for name, node in nodes.items():
-            if not node.initialize(process.handle(name)):
-                process.transport.log("fatal", f"{name}: not initialized; the process exits")
-                _fail()
+        with process.transport.starting():
+            nodes = make_nodes(handle)
+            for name, node in nodes.items():
+                if not node.initialize(process.handle(name)):
+                    process.transport.log("fatal", f"{name}: not initialized; the process exits")
+                    _fail()
     except ParameterError as error:
         handle.error(str(error))
         _fail()

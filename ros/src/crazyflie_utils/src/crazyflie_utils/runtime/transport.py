@@ -7,6 +7,7 @@
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
 import genpy
@@ -57,6 +58,10 @@ class ExternalSubscriber(ABC):
 
 class Transport(ABC):
     """Parameters, topics, services, logging and life time, by absolute names."""
+
+    def starting(self) -> AbstractContextManager[None]:
+        """Return a with block that initializes nodes; those outside see all of them at its end."""
+        return nullcontext()
 
     @abstractmethod
     def remap(self, name: str) -> str:

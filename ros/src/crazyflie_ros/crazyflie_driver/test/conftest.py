@@ -10,7 +10,8 @@ from crazyflie_driver.srv import AddCrazyflieRequest, RemoveCrazyflieRequest
 from crazyflie_utils.testing import FakeProcess
 
 LIMIT = 60.0
-"""Within this, s, a call of the driver is answered, whatever is wrong with a vehicle."""
+"""The longest that a test waits for the driver, s; how soon it gives up by itself is in Limits of
+crazyflie_py."""
 
 LOG = {
     "acc.x": ("f", 0.5),

@@ -1,6 +1,7 @@
 """A server with a vehicle with scripted answers, and keeps what it is sent."""
 
 import pytest
+from safety_helpers import FLYING, is_, position, wait_for_words
 
 from crazyflie_dev.fake_vehicle import READ_ONLY, FakeVehicle
 from crazyflie_dev.fixtures import own_cache  # noqa: F401
@@ -138,6 +139,17 @@ def vehicle(server):
     vehicle.wait_for_packets(7, 1)
     vehicle.received.clear()
     return vehicle
+
+
+@pytest.fixture
+def hovering(server, vehicle):
+    """Return a server and a vehicle that flies on positions."""
+    is_(vehicle, FLYING)
+    wait_for_words(server, "flying")
+    position(server)
+    vehicle.wait_for_packets(7, 0)
+    vehicle.received.clear()
+    return server, vehicle
 
 
 @pytest.fixture

@@ -59,6 +59,11 @@ def test_the_turn_is_the_shorter_one():
 
 RADIUS = st.floats(0.0, 2.0)
 
+_SPIRAL_ERROR = 0.0176
+"""Part of the greater radius that the polynomial is beside the spiral in the middle of a quarter of a
+turn that ends, or begins, on the axis: it is the firmware's, which has no jerk at both ends, where a
+spiral has. Found by calculation: 0.01755, and less for all other radii and angles."""
+
 
 def on_spiral(start, angle, radii, ascent, sideways, clockwise, s):
     """Return where a spiral is at a part of its way, as a complex number, height and yaw."""
@@ -90,7 +95,7 @@ def test_spiral_piece(p, yaw, angle, radii, ascent, duration, sideways, clockwis
     for s in parts:
         goal = piece.evaluate(s * duration)
         place, height, heading = on_spiral(start, angle, radii, ascent, sideways, clockwise, s)
-        assert abs(complex(*goal.position[:2]) - place) < 0.02 * max(radii) + 1e-6
+        assert abs(complex(*goal.position[:2]) - place) < _SPIRAL_ERROR * max(radii) + 1e-6
         assert goal.position[2] == pytest.approx(height, abs=1e-6)
         assert goal.yaw == pytest.approx(heading, abs=1e-6)
         assert goal.yaw_rate == pytest.approx((-angle if clockwise else angle) / duration, abs=1e-6)

@@ -8,11 +8,6 @@ from std_srvs.srv import Trigger, TriggerResponse
 from crazyflie_utils.testing import FakeProcess
 
 
-@pytest.fixture
-def process():
-    return FakeProcess()
-
-
 def test_time_begins_where_it_is_told():
     assert FakeProcess().handle("/node").time() == 100.0
     assert FakeProcess(start=5.0).handle("/node").stamp() == genpy.Time(5)

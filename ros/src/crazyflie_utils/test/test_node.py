@@ -5,7 +5,6 @@ from std_msgs.msg import String
 
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import POSITIVE
-from crazyflie_utils.testing import FakeProcess
 
 
 class Echo(Node):
@@ -41,11 +40,6 @@ class Echo(Node):
         if message.data == "fail":
             raise RuntimeError(message.data)
         self._publisher.publish(message)
-
-
-@pytest.fixture
-def process():
-    return FakeProcess()
 
 
 def texts(process):

@@ -36,11 +36,12 @@ def test_a_test_flight():
     process = launch(HighLevelFlightNode(), height=0.8, distance=1.2, duration=3.0)
     process.advance(30.0)
     assert process.driver.names() == [*PREPARATION, "takeoff", "go_to", "go_to", "land", "stop"]
-    assert times(process) == pytest.approx([0.0, 0.0, 0.0, 3.5, 7.0, 10.5, 14.0])
+    assert times(process) == pytest.approx([0.0, 0.0, 0.0, 3.5, 7.0, 10.5, 15.5])
     (takeoff,), (land,) = requests(process, "takeoff"), requests(process, "land")
     assert takeoff.height == pytest.approx(0.8)
     assert takeoff.duration.to_sec() == 3.0
     assert land.height == 0.0
+    assert land.duration.to_sec() == 4.5
     there, back = requests(process, "go_to")
     assert there.relative and back.relative
     assert (there.goal.x, back.goal.x) == (1.2, -1.2)

@@ -1,6 +1,7 @@
 """A server with a vehicle with scripted answers, and keeps what it is sent."""
 
 import pytest
+from safety_helpers import FLYING, is_, position, wait_for_words
 
 from crazyflie_dev.fake_vehicle import READ_ONLY, FakeVehicle
 from crazyflie_dev.fixtures import own_cache  # noqa: F401
@@ -10,7 +11,8 @@ from crazyflie_driver.srv import AddCrazyflieRequest, RemoveCrazyflieRequest
 from crazyflie_utils.testing import FakeProcess
 
 LIMIT = 60.0
-"""Within this, s, a call of the driver is answered, whatever is wrong with a vehicle."""
+"""The longest that a test waits for the driver, s; how soon it gives up by itself is in Limits of
+crazyflie_py."""
 
 LOG = {
     "acc.x": ("f", 0.5),
@@ -137,6 +139,17 @@ def vehicle(server):
     vehicle.wait_for_packets(7, 1)
     vehicle.received.clear()
     return vehicle
+
+
+@pytest.fixture
+def hovering(server, vehicle):
+    """Return a server and a vehicle that flies on positions."""
+    is_(vehicle, FLYING)
+    wait_for_words(server, "flying")
+    position(server)
+    vehicle.wait_for_packets(7, 0)
+    vehicle.received.clear()
+    return server, vehicle
 
 
 @pytest.fixture

@@ -106,6 +106,8 @@ def test_a_removal_in_flight_is_a_landing_and_locks_nothing(flight):
 
 def test_a_streamed_flight_survives_a_second_of_silence(flight):
     flight.climb()
+    # The link is kept for 1.45 s from the last word before to the first one after; what is between
+    # these and the silence is the machine's.
     flight.virtual.switches.silence = 1.0
     count = len(flight.heights)
     flight.run(4.0, HEIGHT)

@@ -1,10 +1,14 @@
 """Fixtures of the tests: a vehicle with scripted answers."""
 
+import queue
+
 import pytest
 
 from crazyflie_dev.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
 from crazyflie_dev.fixtures import own_cache  # noqa: F401
 from crazyflie_py.crazyflie import Crazyflie
+
+LIMIT = 60.0
 
 LOG = {
     "stateEstimate.x": ("f", 1.5),
@@ -78,3 +82,24 @@ def shared(tmp_path_factory):
         Crazyflie(vehicle.uri, cache=cache) as link,
     ):
         yield vehicle, link, dict(PARAMETERS)
+
+
+class States:
+    """The states that a link goes through, to be waited for."""
+
+    def __init__(self):
+        self._states = queue.Queue()
+
+    def __call__(self, state, text):
+        self._states.put((state, text))
+
+    def wait_for(self, state):
+        while True:
+            seen, text = self._states.get(timeout=LIMIT)
+            if seen is state:
+                return text
+
+
+@pytest.fixture
+def states():
+    return States()

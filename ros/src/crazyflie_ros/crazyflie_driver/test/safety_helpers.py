@@ -1,0 +1,48 @@
+"""A vehicle's states, what it is sent and what is said of it, for the tests of safety."""
+
+import struct
+
+from genpy import Duration
+from geometry_msgs.msg import Twist, Vector3
+
+from crazyflie_driver.msg import Position
+from crazyflie_driver.srv import LandRequest, TakeoffRequest
+from crazyflie_utils.testing.peer import wait_until
+
+ZERO = struct.pack("<fffH", 0, 0, 0, 0)
+SETPOINTS_STOP = struct.pack("<BI", 0, 0)
+READY, FLYING, HIGH_LEVEL = 0b1010, 0b11010, 0b100011010
+LAND = LandRequest(0, 0.0, Duration(2))
+TAKEOFF = TakeoffRequest(0, 1.0, Duration(2))
+
+
+def is_(vehicle, state):
+    """Have a vehicle be in a state, as it is asked and as it logs it."""
+    vehicle.answers[9, 0, 0x0C] = b"\x8c" + struct.pack("<H", state)
+    vehicle.log["supervisor.info"] = ("H", state)
+
+
+def position(server):
+    server.process.publish("/cf1/cmd_position", Position(z=1.0))
+
+
+def thrust(server, pwm=1000.0):
+    server.process.publish("/cf1/cmd_vel", Twist(Vector3(0, 0, pwm), Vector3()))
+
+
+def commands(vehicle):
+    """Return the commands and setpoints that have come, as (port, channel)."""
+    return [(port, channel) for port, channel, _ in list(vehicle.received) if port in (3, 7, 8)]
+
+
+def said(server):
+    """Return what the vehicle's status topic said last."""
+    return server.process.published("/cf1/status")[-1].data
+
+
+def wait_for_words(server, words):
+    def is_said():
+        server.process.advance(0.1)
+        return words in said(server)
+
+    wait_until(is_said, words)

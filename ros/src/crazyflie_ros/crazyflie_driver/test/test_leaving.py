@@ -1,0 +1,146 @@
+"""A vehicle that is left, or handed over from one kind of command to the other."""
+
+import struct
+import threading
+
+import pytest
+from safety_helpers import (
+    FLYING,
+    HIGH_LEVEL,
+    LAND,
+    READY,
+    TAKEOFF,
+    commands,
+    is_,
+    position,
+    thrust,
+    wait_for_words,
+)
+
+from crazyflie_driver.srv import NotifySetpointsStopRequest
+from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.peer import wait_until
+
+LIMIT = 60.0
+
+
+def test_a_vehicle_on_the_ground_is_left_unlocked(server, vehicle):
+    server.remove(vehicle.uri)
+    assert commands(vehicle) == [(3, 0)] * 100 + [(7, 1)]
+
+
+def test_zeros_after_connecting_lock_nothing(server):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri)
+    vehicle.wait_for_packets(7, 1)
+    assert commands(vehicle) == [(3, 0)] * 100 + [(7, 1)]
+
+
+def test_a_vehicle_that_is_removed_in_flight_lands_first(hovering):
+    server, vehicle = hovering
+    is_(vehicle, HIGH_LEVEL)
+    begin = threading.Thread(target=server.remove, args=(vehicle.uri,))
+    begin.start()
+    vehicle.wait_for_packets(8, 0)
+    assert commands(vehicle)[:2] == [(7, 1), (8, 0)]
+    assert vehicle.packets(8, 0)[0][0] == 8
+    assert vehicle.packets(3, 0) == []
+    is_(vehicle, FLYING)
+    begin.join(LIMIT)
+    assert commands(vehicle) == [(7, 1), (8, 0)] + [(3, 0)] * 100 + [(7, 1)]
+
+
+def test_a_landing_outlives_the_server(hovering):
+    """What is sent after the landing would stop the motors in the air."""
+    server, vehicle = hovering
+    is_(vehicle, HIGH_LEVEL)
+    server.node.shutdown()
+    assert commands(vehicle) == [(7, 1), (8, 0)]
+
+
+def test_ctrl_c_while_the_link_is_silent_is_a_landing_all_the_same(server, vehicle):
+    server.call("/cf1/takeoff", TAKEOFF)
+    is_(vehicle, FLYING | HIGH_LEVEL)
+    wait_for_words(server, "flying: on high-level commands")
+    server.process.advance(0.2)
+    assert server.process.published("/flights")[-1].data == "/crazyflie_server in flight"
+    vehicle.is_frozen = True
+    wait_for_words(server, "lost")
+    vehicle.received.clear()
+    server.node.leave()
+    vehicle.is_frozen = False
+
+    def is_landed():
+        server.process.advance(0.1)
+        return any(packet[0] == 8 for packet in vehicle.packets(8, 0))
+
+    def has_told():
+        server.process.advance(0.1)
+        return server.process.published("/flights")[-1].data == "/crazyflie_server on ground"
+
+    wait_until(is_landed, "a landing")
+    is_(vehicle, READY)
+    wait_until(has_told, "the end of the flight")
+
+
+def test_a_flight_on_thrust_cannot_be_landed_by_the_vehicle(server, vehicle):
+    is_(vehicle, FLYING)
+    wait_for_words(server, "flying")
+    thrust(server)
+    vehicle.wait_for_packets(3, 0)
+    vehicle.received.clear()
+    server.remove(vehicle.uri)
+    assert commands(vehicle) == [(3, 0)] * 100 + [(7, 1)]
+
+
+def test_a_removal_without_a_link_says_what_it_could_not_do(server, vehicle):
+    vehicle.is_frozen = True
+    wait_for_words(server, "lost")
+    with pytest.raises(ServiceError, match="is removed, but its motors could not be stopped"):
+        server.remove(vehicle.uri)
+    vehicle.is_frozen = False
+    server.add(vehicle.uri)
+
+
+def test_a_stream_that_ends_at_rest_is_handed_over(server, vehicle):
+    for pwm, ends in ((1000.0, 0), (0.0, 1)):
+        vehicle.received.clear()
+        thrust(server, pwm)
+        vehicle.wait_for_packets(3, 0)
+        server.process.advance(0.4)
+        assert vehicle.packets(7, 1) == []
+        server.process.advance(1.0)
+        vehicle.wait_for_packets(15, 0, 2)
+        assert len(vehicle.packets(7, 1)) == ends
+
+
+# Handing over.
+
+
+def test_a_notice_waits_for_its_command(hovering):
+    server, vehicle = hovering
+    server.call("/cf1/notify_setpoints_stop", NotifySetpointsStopRequest(0, 250))
+    vehicle.wait_for_packets(15, 0, 2)
+    assert commands(vehicle) == []
+    server.call("/cf1/land", LAND)
+    assert commands(vehicle) == [(7, 1), (8, 0)]
+    assert vehicle.packets(7, 1) == [struct.pack("<BI", 0, 250)]
+    server.process.advance(1.0)
+    assert not any("notify" in text for text in server.process.logged("warn"))
+
+
+def test_a_notice_without_a_command_is_not_sent(hovering):
+    server, vehicle = hovering
+    server.call("/cf1/notify_setpoints_stop", NotifySetpointsStopRequest(0, 0))
+    server.process.advance(1.0)
+    vehicle.wait_for_packets(15, 0, 2)
+    assert commands(vehicle) == []
+    assert "notify_setpoints_stop was not sent" in server.process.logged("warn")[-1]
+
+
+def test_a_setpoint_under_way_does_not_stop_a_landing(hovering):
+    server, vehicle = hovering
+    server.call("/cf1/land", LAND)
+    position(server)
+    vehicle.wait_for_packets(15, 0, 2)
+    assert commands(vehicle) == [(7, 1), (8, 0)]

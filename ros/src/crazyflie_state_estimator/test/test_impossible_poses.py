@@ -1,0 +1,131 @@
+"""Poses that cannot be, and a vehicle that tips over."""
+
+import math
+
+import numpy as np
+import pytest
+from estimator_helpers import fly, launch, transform
+from tf2_msgs.msg import TFMessage
+
+# Poses that cannot be.
+
+
+def hover(process, duration, x=0.0, attitude=(0.0, 0.0, 0.0)):
+    """Broadcast a pose that does not move; return the new states."""
+    before = len(process.published("/state"))
+    fly(process, lambda elapsed: ((x, 0.0, 1.0), attitude), duration)
+    return [message.state for message in process.published("/state")[before:]]
+
+
+def rejected(process):
+    process.advance(1.0)
+    (status,) = process.published("/diagnostics")[-1].status
+    return {pair.key.removeprefix("rejected: "): int(pair.value) for pair in status.values}
+
+
+def test_one_pose_elsewhere_is_passed_over():
+    process = launch()
+    hover(process, 0.5)
+    assert hover(process, 0.01, x=0.5) == []
+    (state,) = hover(process, 0.01)
+    assert (state.x, state.x_dot) == (0.0, 0.0)
+    assert rejected(process)["is too far away"] == 1
+
+
+@pytest.mark.parametrize("speed", [4.9, 7.5])
+def test_a_vehicle_may_fly_fast_but_not_faster_than_it_can(speed):
+    process = launch()
+    fly(process, lambda elapsed: ((speed * elapsed, 0.0, 1.0), (0.0, 0.0, 0.0)), 5.0)
+    assert (rejected(process)["rejected"] > 0) == (speed > 5.0)
+
+
+def test_a_vehicle_that_was_carried_is_found_again_after_three_tenths_of_a_second():
+    process = launch()
+    hover(process, 0.5)
+    assert hover(process, 0.3, x=2.0) == []
+    states = hover(process, 0.2, x=2.0)
+    assert len(states) >= 18
+    assert {(state.x, state.x_dot) for state in states} == {(2.0, 0.0)}
+
+
+def test_poses_that_jump_to_and_fro_are_not_believed():
+    process = launch()
+    hover(process, 0.5)
+    before = len(process.published("/state"))
+    rng = np.random.default_rng(1)
+    fly(process, lambda elapsed: ((5.0, *rng.uniform(2.0, 9.0, 2)), (0.0, 0.0, 0.0)), 2.0)
+    assert len(process.published("/state")) == before
+
+
+def test_a_pose_from_the_future_does_not_silence_it():
+    process = launch()
+    hover(process, 0.5)
+    early = transform(process, (0.0, 0.0, 1.0))
+    early.header.stamp = process.clock.stamp(process.clock.time() + 8.0)
+    process.publish("/tf", TFMessage([early]))
+    assert len(hover(process, 0.5)) == 50
+    assert rejected(process)["is stamped in the future"] == 1
+
+
+def test_stamps_that_step_back_do_not_silence_it():
+    process = launch()
+    hover(process, 5.0)
+    before = len(process.published("/state"))
+    for _ in range(50):
+        late = transform(process, (0.0, 0.0, 1.0))
+        late.header.stamp = process.clock.stamp(process.clock.time() - 3.0)
+        process.publish("/tf", TFMessage([late]))
+        process.advance(0.01)
+    states = [message.state for message in process.published("/state")[before:]]
+    assert len(states) >= 45
+    assert max(abs(state.z_dot) for state in states) < 1e-9
+    assert rejected(process)["is stamped in the past"] == 2
+
+
+def test_when_nothing_good_comes_it_is_silent_and_says_why():
+    process = launch()
+    hover(process, 0.5)
+    before = len(process.published("/state"))
+    for _ in range(100):
+        process.publish("/tf", TFMessage([transform(process, (math.nan, 0.0, 0.0))]))
+        process.advance(0.01)
+    assert len(process.published("/state")) == before
+    assert rejected(process)["is not finite"] == 100
+    (status,) = process.published("/diagnostics")[-1].status
+    assert status.level == 2
+    assert "no state for" in status.message
+    assert any("poses were rejected" in text for text in process.logged("warn"))
+
+
+# Tipping over.
+
+
+def tilted(process):
+    return [message.data for message in process.published("/state_tilted")]
+
+
+@pytest.mark.parametrize(
+    ("attitude", "is_crash"),
+    [
+        ((1.04, 0.0, 2.0), False),
+        ((0.0, -1.06, 0.5), True),
+        ((1.06, 0.0, 0.0), True),
+        ((0.9, 0.9, 0.0), True),
+        ((3.1, 0.0, 0.0), True),
+        ((0.0, 0.0, 3.0), False),
+    ],
+)
+def test_tells_when_the_vehicle_has_tipped_over_and_when_it_stands_again(attitude, is_crash):
+    process = launch()
+    hover(process, 0.1)
+    hover(process, 0.1, attitude=attitude)
+    hover(process, 0.1)
+    assert tilted(process) == [False, True, False] if is_crash else [False]
+
+
+def test_a_marker_that_was_mistaken_is_no_crash():
+    process = launch()
+    for _ in range(10):
+        hover(process, 0.1)
+        hover(process, 0.02, attitude=(2.0, 0.0, 0.0))
+    assert tilted(process) == [False]

@@ -1,0 +1,110 @@
+"""The battery and the geofence, and what people are told."""
+
+import pytest
+from flight_words import until_on_ground, word
+from std_msgs.msg import Bool, Float32, String
+from std_srvs.srv import EmptyRequest
+from takeoff_helpers import SERVER, state
+
+from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
+from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.testing import FakeProcess
+
+# The battery.
+
+
+def with_battery(z, said):
+    process = FakeProcess()
+    parameters = {**SERVER, "topics/battery": "/battery"}
+    assert process.launch(TakeoffServerNode(), "/takeoff_server", parameters)
+    process.publish("/in_flight_filter", String(said))
+    discharge(process, 4.0, 1.0, z)
+    return process
+
+
+def discharge(process, voltage, duration, z=0.0):
+    for k in range(round(duration * 10)):
+        if k % 10 == 0:
+            process.publish("/battery", Float32(voltage))
+        process.publish("/state", state(z))
+        process.advance(0.1)
+
+
+def test_a_low_battery_keeps_on_the_ground():
+    process = with_battery(0.0, "on_ground")
+    discharge(process, 3.1, 4.0)
+    assert process.published("/in_flight_status")[-1].data == "on ground"
+    discharge(process, 3.1, 3.0)
+    with pytest.raises(ServiceError, match="/takeoff refused: the battery is low, 3.10 V"):
+        process.call("/takeoff", EmptyRequest())
+    assert "the battery is low" in process.logged("warn")[0]
+    discharge(process, 4.1, 1.0)
+    assert not process.call("/takeoff", EmptyRequest()).done()
+
+
+def test_a_critical_battery_lands():
+    process = with_battery(1.0, "flying")
+    for voltage, duration in ((2.9, 4.0), (3.3, 1.0), (3.1, 10.0), (2.9, 4.0)):
+        discharge(process, voltage, duration, 1.0)
+        assert word(process) == "flying"
+    discharge(process, 2.9, 3.0, 1.0)
+    assert word(process) == "descending"
+    status = process.published("/in_flight_status")[-1].data
+    assert status == "descending: the battery is low, 2.90 V"
+
+
+def test_a_battery_that_is_silent_or_not_a_number_says_nothing():
+    process = with_battery(1.0, "flying")
+    discharge(process, 2.9, 3.0, 1.0)
+    for _ in range(10):
+        process.publish("/battery", Float32(float("nan")))
+        process.publish("/state", state(1.0))
+        process.advance(1.0)
+    process.publish("/battery", Float32(2.9))
+    process.advance(0.1)
+    assert word(process) == "flying"
+
+
+# What people are told.
+
+
+def test_status_in_words():
+    process = FakeProcess()
+    assert process.launch(TakeoffServerNode(), "/takeoff_server", SERVER)
+    process.advance(0.2)
+    process.publish("/in_flight_filter", String("on_ground"))
+    process.publish("/in_flight_controller", Bool(True))
+    process.advance(2.0)
+    process.publish("/state", state(0.0))
+    process.advance(0.3)
+    said = [message.data for message in process.published("/in_flight_status")]
+    assert said[0] == "looking where the flight stands"
+    assert said[1].startswith("on ground: takeoff refused: no state has come on /state")
+    assert said[2] == "on ground"
+
+
+def test_diagnostics(network):
+    network.kill("controller")
+    network.advance(2.0)
+    for name in ("server", "filter"):
+        status = network.process(name).published("/diagnostics")[-1].status[0]
+        assert status.name == name
+        assert status.level == 2
+        assert "no control came for 0.6 s" in status.message
+    until_on_ground(network)
+    network.advance(1.0)
+    levels = [
+        network.process(name).published("/diagnostics")[-1].status[0].level
+        for name in ("server", "filter")
+    ]
+    assert levels == [1, 0]
+
+
+# The geofence.
+
+
+def test_a_hover_point_outside_the_geofence_is_refused():
+    process = FakeProcess()
+    fence = {"box/max/z": 0.9, "box/min/x": -1.0}
+    assert not process.launch(TakeoffServerNode(), "/takeoff_server", {**SERVER, **fence})
+    assert "0.10 m outside the geofence" in process.logged("error")[0]

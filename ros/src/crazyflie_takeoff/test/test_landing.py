@@ -1,0 +1,86 @@
+"""Landings, asked for in a takeoff and at the end of the launch."""
+
+import pytest
+from flight_words import states, until_on_ground
+from takeoff_helpers import SERVER, HoverNetwork
+
+from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_utils.runtime.transport import ServiceError
+
+# Landing.
+
+
+@pytest.mark.parametrize("moment", [0.3, 1.3, 3.0])
+def test_land_aborts_a_takeoff(moment):
+    network = HoverNetwork(SERVER)
+    network.advance(0.5)
+    takeoff = network.call("/takeoff")
+    network.advance(moment)
+    land = network.call("/land")
+    with pytest.raises(ServiceError, match="takeoff aborted: /land was called"):
+        takeoff.result(0)
+    network.advance_until(land.done)
+    assert land.exception() is None
+    assert network.vehicle.z == 0.0 or network.vehicle.z < 0.05
+    assert network.vehicle.touchdown_speed < 0.5
+
+
+def test_the_descent_has_a_topic_of_its_own(network):
+    network.call("/land")
+    begun = network.time
+    network.advance(1.0)
+    own = [message for _, message in network.on("/ref_descent", begun)]
+    shared = [message for _, message in network.on("/ref", begun)]
+    assert own == shared
+    assert len(own) == pytest.approx(100, abs=2)
+    assert isinstance(own[0], PositionVelocityStateStamped)
+    until_on_ground(network)
+    network.take_off()
+    assert network.on("/ref")[-1][0] > network.on("/ref_descent")[-1][0]
+
+
+# The end of the launch.
+
+
+def flights(network):
+    return [message.data for _, message in network.on("/flights")]
+
+
+def test_a_server_that_is_to_leave_lands_first(network):
+    assert flights(network)[-1].endswith(" in flight")
+    network.server.leave()
+    until_on_ground(network)
+    assert network.vehicle.touchdown_speed < 0.6
+    assert flights(network)[-1].endswith(" on ground")
+    assert network.last("/in_flight_status") == "on ground: the launch is to end"
+
+
+def test_from_far_above_a_server_that_is_to_leave_lands_faster():
+    network = HoverNetwork({**SERVER, "hover/z": 4.0, "duration/hover": 10.0})
+    network.take_off()
+    assert network.vehicle.z > 3.9
+    begin = network.time
+    network.server.leave()
+    until_on_ground(network)
+    assert network.time - begin < 10.0
+    assert network.vehicle.touchdown_speed < 1.0
+
+
+def test_a_server_that_is_to_leave_aborts_a_takeoff():
+    network = HoverNetwork(SERVER)
+    network.advance(1.0)
+    takeoff = network.call("/takeoff")
+    network.advance(3.0)
+    network.server.leave()
+    with pytest.raises(ServiceError, match="takeoff aborted: .* is to end"):
+        takeoff.result(timeout=0)
+    until_on_ground(network)
+    assert network.vehicle.z == 0.0
+
+
+def test_on_the_ground_there_is_nothing_to_land():
+    network = HoverNetwork(SERVER)
+    network.advance(1.0)
+    network.server.leave()
+    network.advance(1.0)
+    assert states(network) == ["on_ground"]

@@ -1,0 +1,170 @@
+"""The takeoff server waits until it knows where the flight stands, and for what it flies with."""
+
+import math
+
+import pytest
+from lone_server import call, flying, launch, on_ground, states, thrusts, toggles
+from std_msgs.msg import Bool, String
+from std_srvs.srv import EmptyResponse
+from takeoff_helpers import SERVER, state
+
+from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
+from crazyflie_utils.runtime.transport import ServiceError
+
+
+def test_says_nothing_until_it_knows_where_the_flight_stands():
+    process = launch()
+    process.advance(0.99)
+    assert thrusts(process) == []
+    assert states(process) == []
+    process.advance(0.03)
+    assert states(process) == ["on_ground"]
+    assert thrusts(process) == [0.0]
+
+
+def test_waits_for_the_height_if_there_is_one():
+    process = launch(SERVER)
+    process.publish("/in_flight_filter", String("unknown"))
+    process.advance(0.5)
+    assert states(process) == []
+    process.publish("/state", state(0.1))
+    process.advance(0.02)
+    assert states(process) == ["on_ground"]
+    assert "0.10 m" in process.logged("info")[0]
+
+
+@pytest.mark.parametrize(("said", "begins"), [("unknown", "on_ground"), ("commanded", "flying")])
+def test_a_high_vehicle_is_flying_only_if_a_controller_has_long_been_speaking(said, begins):
+    process = launch(SERVER)
+    process.publish("/in_flight_filter", String(said))
+    process.publish("/state", state(0.7))
+    process.advance(0.02)
+    assert states(process) == [begins]
+
+
+def test_flies_if_only_the_height_says_so():
+    process = launch(SERVER)
+    for _ in range(99):
+        process.publish("/state", state(0.5))
+        process.advance(0.01)
+    assert states(process) == []
+    process.publish("/state", state(0.5))
+    process.advance(0.02)
+    assert states(process) == ["flying"]
+    assert thrusts(process) == []
+    assert toggles(process) == 0
+
+
+def test_a_word_that_is_no_flight_state_is_ignored():
+    process = launch()
+    process.publish("/in_flight_filter", String("asleep"))
+    process.advance(0.5)
+    assert states(process) == []
+    assert "asleep" in process.logged("warn")[0]
+
+
+def test_calls_wait_until_it_is_known_where_the_flight_stands():
+    process = launch()
+    first, second = call(process, "/takeoff"), call(process, "/takeoff")
+    process.advance(0.5)
+    assert not first.done()
+    assert not second.done()
+    process.publish("/in_flight_filter", String("on_ground"))
+    process.advance(0.01)
+    with pytest.raises(ServiceError, match="a takeoff is under way"):
+        second.result(timeout=0)
+    process.advance(6.1)
+    assert first.result() == EmptyResponse()
+    process = launch()
+    first = call(process, "/takeoff")
+    process.publish("/in_flight_filter", String("flying"))
+    process.advance(0.01)
+    with pytest.raises(ServiceError, match="in flight"):
+        first.result(timeout=0)
+
+
+def test_what_the_filter_says_later_does_not_matter():
+    process = on_ground()
+    process.publish("/in_flight_filter", String("flying"))
+    process.advance(0.1)
+    assert states(process) == ["on_ground"]
+
+
+# Nothing to fly with.
+
+
+def test_takeoff_without_a_fresh_state_is_refused():
+    process = on_ground(SERVER)
+    process.advance(0.6)
+    with pytest.raises(
+        ServiceError, match="/takeoff refused: no state has come on /state for 0.5 s"
+    ):
+        call(process, "/takeoff")
+    process.advance(1.0)
+    assert (states(process), max(thrusts(process))) == (["on_ground"], 0.0)
+    process.publish("/state", state(0.0))
+    assert not call(process, "/takeoff").done()
+
+
+def test_takeoff_without_a_state_that_is_finite_is_refused():
+    process = on_ground(SERVER)
+    process.advance(0.6)
+    process.publish("/state", state(math.nan))
+    with pytest.raises(ServiceError, match="no state has come"):
+        call(process, "/takeoff")
+
+
+def test_takeoff_without_a_controller_is_refused():
+    process = on_ground(SERVER)
+    for is_there in (True, False):
+        process.publish("/in_flight_controller", Bool(is_there))
+    with pytest.raises(ServiceError, match="is the controller running"):
+        call(process, "/takeoff")
+    process.publish("/in_flight_controller", Bool(True))
+    assert not call(process, "/takeoff").done()
+
+
+def started(parameters=SERVER):
+    """Return a process with a server that knows the flight state, but has no state yet."""
+    process = launch(parameters)
+    process.publish("/in_flight_filter", String("on_ground"))
+    process.advance(RECOVERY_LIMIT)
+    assert states(process) == ["on_ground"]
+    return process
+
+
+def test_takeoff_waits_for_the_first_state():
+    process = started()
+    answer = call(process, "/takeoff")
+    process.advance(2.0)
+    assert states(process) == ["on_ground"]
+    process.publish("/state", state(0.0))
+    process.advance(0.02)
+    assert (states(process)[-1], answer.done()) == ("taking_off", False)
+
+
+def test_takeoff_waits_for_a_controller():
+    process = on_ground(SERVER)
+    process.publish("/in_flight_controller", Bool(False))
+    call(process, "/takeoff")
+    process.publish("/in_flight_controller", Bool(True))
+    process.publish("/state", state(0.0))
+    process.advance(0.02)
+    assert states(process)[-1] == "taking_off"
+
+
+def test_takeoff_does_not_wait_for_ever():
+    process = started()
+    answer = call(process, "/takeoff")
+    process.advance(START_LIMIT)
+    with pytest.raises(ServiceError, match="no state has come on /state"):
+        answer.result(0)
+    with pytest.raises(ServiceError, match="no state has come on /state"):
+        call(process, "/takeoff")
+
+
+def test_landing_needs_neither():
+    process = flying(SERVER)
+    process.publish("/in_flight_controller", Bool(False))
+    process.advance(1.0)
+    assert not call(process, "/land").done()

@@ -24,11 +24,11 @@ def judge(times: np.ndarray, x: np.ndarray, tilts: np.ndarray, size: float) -> s
         Of the step, m.
     """
     share = x / size
-    rise = times[np.argmax(share > 0.9)] if share.max() > 0.9 else np.inf
+    rise = f"after {times[np.argmax(share > 0.9)]:.1f} s" if share.max() > 0.9 else "never"
     outside = times[np.abs(share - 1.0) > 0.05]
-    settled = outside[-1] if outside[-1] < times[-1] else np.inf
+    settled = f"after {outside[-1]:.1f} s" if outside[-1] < times[-1] else "never"
     return (
-        f"90 % after {rise:.1f} s, within 5 % after {settled:.1f} s, "
+        f"90 % {rise}, within 5 % {settled}, "
         f"overshoot {max(0.0, share.max() - 1.0):.0%}, "
         f"largest tilt {np.degrees(np.abs(tilts).max()):.0f} degrees"
     )

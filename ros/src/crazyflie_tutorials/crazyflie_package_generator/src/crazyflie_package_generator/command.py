@@ -28,5 +28,5 @@ def main(arguments: list[str] | None = None) -> int:
     except GeneratorError as error:
         print(f"create_package: {error}", file=sys.stderr)
         return 1
-    print(f"{folder}: build it with catkin_make, fly on from its README.md")
+    print(f"{folder}: build it with catkin_make; its README.md says what it is")
     return 0

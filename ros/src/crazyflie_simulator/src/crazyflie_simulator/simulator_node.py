@@ -207,7 +207,7 @@ class SimulatorNode(Node):
         step = self._parameters.time_step
         due = math.floor((now - self._start) / step + 1e-6)
         missed = min(due - self._ticks, math.ceil(MAX_LATENESS / step))
-        if missed > 0 and (self._is_idle or self._is_unheard()):
+        if missed > 1 and (self._is_idle or self._is_unheard()):
             missed = 1
         for tick in range(due - missed + 1, due + 1):
             self._advance_to(self._tick_time(tick))

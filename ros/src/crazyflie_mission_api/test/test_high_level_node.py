@@ -213,3 +213,22 @@ def test_what_makes_no_sense_is_refused(bench, text):
         REFUSED[text](bench)
     bench.process.advance(0.1)
     assert bench.references() == []
+
+
+def test_who_is_named_begins_what_was_uploaded(bench):
+    path = plan([(0, 0, 1), (0.5, 0, 1)])
+    pieces = [to_message(piece) for piece in path]
+    bench.be("flying")
+    bench.call("upload_trajectory", srv.UploadTrajectory, 0, 0, pieces)
+    bench.process.publish("/all/start_trajectory", String("/cf2/high_level /cf11/high_level"))
+    assert len(bench.fly(0.5)) == 0
+    bench.see((0.0, 0.0, 1.0))
+    bench.process.publish("/all/start_trajectory", String(f"/cf2/high_level {TOP}"))
+    assert bench.fly(5.0)[-1] == pytest.approx([0.5, 0, 1, 0, 0, 0], abs=0.01)
+
+
+def test_who_does_not_fly_does_not_begin(bench):
+    bench.be("on_ground", (0.0, 0.0, 0.0))
+    bench.process.publish("/all/start_trajectory", String(TOP))
+    assert len(bench.fly(0.5)) == 0
+    assert bench.process.logged("error") == [f"{TOP}: not started: the vehicle is on_ground"]

@@ -52,6 +52,16 @@ def test_ticks_run_in_the_order_of_their_deadlines(queue):
     assert order == ["fast", "slow", "slow too"]
 
 
+def test_what_is_due_at_one_moment_runs_in_the_order_in_which_it_was_added(queue):
+    order = []
+    for name, period, now in (("first", 0.01, 0.07), ("second", 0.01, 0.0), ("third", 0.1, 0.0)):
+        queue.add(period, lambda name=name: order.append(name), now=now)
+    for step in range(1, 101):
+        order.clear()
+        queue.run_due(step * 0.01)
+        assert order == sorted(order)
+
+
 def test_missed_ticks_are_skipped_and_the_phase_is_kept(queue):
     ticks = []
     queue.add(0.1, lambda: ticks.append(1), now=0.0)

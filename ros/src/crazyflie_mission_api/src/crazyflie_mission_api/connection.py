@@ -15,6 +15,7 @@ from crazyflie_driver.msg import FullState
 from crazyflie_mission_api.conversions import full_state_message, to_message
 from crazyflie_mission_api.course import Course
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
+from crazyflie_mission_api.starter import Starter
 from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
@@ -52,8 +53,8 @@ class RosVehicle:
     handle : NodeHandle
     services : dict of str to str
         Where its services are: go_to, takeoff and so on to absolute names.
-    is_driven : bool
-        Whether the driver flies it, and not a controller.
+    starter : Starter, optional
+        Of those that a controller flies, and not the driver.
     frames : tuple of str, optional
         The fixed frame and its own, if tf says where it is; with the driver this is how it is
         unless poses come.
@@ -64,14 +65,15 @@ class RosVehicle:
         name: str,
         handle: NodeHandle,
         services: dict[str, str],
-        is_driven: bool,
+        starter: Starter | None = None,
         frames: tuple[str, str] | None = None,
     ):
         self.name = name
         self.bounds = fence(handle, prefix(name))
         self._handle = handle
         self._services = services
-        self._is_driven = is_driven
+        self._starter = starter
+        self._is_driven = is_driven = starter is None
         self._position: Triple | None = None
         self._seen_at = 0.0
         self._ground = 0.0
@@ -94,6 +96,11 @@ class RosVehicle:
                 handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
             handle.subscribe(f"{top}/in_flight_state", String, self._on_flight_state)
             handle.subscribe(f"{top}/in_flight_status", String, self._on_status)
+
+    @property
+    def starts_together(self) -> bool:
+        """Whether those that are told to `start` in a row begin at the same moment."""
+        return self._starter is not None
 
     # Where it is, and how it is.
 
@@ -196,6 +203,9 @@ class RosVehicle:
         """Fly the trajectory that was prepared last."""
         if self._prepared is not None:
             self._stream = Course(self._prepared, self._handle.time())
+            return _done(None)
+        if self._starter is not None:
+            self._starter.start(self._services["start_trajectory"].rpartition("/")[0])
             return _done(None)
         return self._call("start_trajectory", srv.StartTrajectory, 0, 0, 1.0, False, False)
 

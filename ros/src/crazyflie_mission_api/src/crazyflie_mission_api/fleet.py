@@ -18,6 +18,7 @@ from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionErro
 from crazyflie_mission_api.rehearsal import rehearse
 from crazyflie_mission_api.ros_clock import RosClock
 from crazyflie_mission_api.roster import Rules
+from crazyflie_mission_api.starter import Starter
 from crazyflie_mission_api.team import Team
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.parameter_types import FRAME
@@ -164,10 +165,11 @@ def _connect(process, handle, names, limit):
     end = time.monotonic() + limit
     missing = list(names)
     found = {}
+    starter = Starter(handle)
     while missing:
         services = handle.service_nodes()
         for name in list(missing):
-            vehicle = _vehicle(process, handle, name, services)
+            vehicle = _vehicle(process, handle, name, services, starter)
             if vehicle is not None:
                 found[name] = vehicle
                 missing.remove(name)
@@ -185,20 +187,20 @@ def _connect(process, handle, names, limit):
     return [found[name] for name in names]
 
 
-def _vehicle(process, handle, name, services):
+def _vehicle(process, handle, name, services, starter):
     top = prefix(name)
     commander = f"{top}/high_level"
     if f"{commander}/go_to" in services:
-        return RosVehicle(name, handle, _below(commander), False, _frames(handle, commander))
+        return RosVehicle(name, handle, _below(commander), starter, _frames(handle, commander))
     driver = services.get(f"{top}/upload_trajectory")
     if driver is not None and services.get(f"{top}/takeoff") == driver:
-        return RosVehicle(name, handle, _below(top), is_driven=True)
+        return RosVehicle(name, handle, _below(top))
     if {f"{top}/takeoff", f"{top}/land"} <= services.keys():
         has_yaw = topic_types(handle).get(f"{top}/ref") == _YAW_STATE
         handle.set_param(f"{commander}/reference/yaw", has_yaw)
         if not HighLevelNode().initialize(process.handle(commander)):
             raise MissionError(f"{commander} could not be started; its reason is in the log")
-        return RosVehicle(name, handle, _below(commander), is_driven=False)
+        return RosVehicle(name, handle, _below(commander), starter)
     return None
 
 

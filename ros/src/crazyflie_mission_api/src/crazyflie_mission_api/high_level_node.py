@@ -24,6 +24,10 @@ from crazyflie_utils.refusal import RefusalError
 STATE_LIMIT = 0.5
 """A state older than this says nothing, and nor does a setpoint, s."""
 
+START_TOPIC = "/all/start_trajectory"
+"""Nodes, one space between two, that begin what was uploaded to them as trajectory 0: vehicles that
+are called one after the other do not begin together."""
+
 _CALL_LIMIT = 58.0
 """How long a takeoff or landing of the takeoff server may take, s of the machine's clock."""
 
@@ -47,6 +51,9 @@ class HighLevelParameters(Parameters):
     takeoff: str = parameter(SERVICE, "the takeoff server's", "takeoff", "srv/takeoff")
     land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
     emergency: str = parameter(SERVICE, "stops the motors", "emergency", "srv/emergency")
+    start_topic: str = parameter(
+        TOPIC, "names those that begin trajectory 0 at once", START_TOPIC, "topics/start"
+    )
     time_step: float = parameter(TIME_STEP, "from one reference to the next", 0.02)
 
 
@@ -104,6 +111,7 @@ class HighLevelNode(Node):
             self._on_state,
             finite="state",
         )
+        handle.subscribe(parameters.start_topic, String, self._on_start_all)
         handle.subscribe("~cmd_full_state", FullState, self._on_setpoint)
         handle.subscribe("~cmd_position", Position, self._on_setpoint)
         handle.timer(parameters.time_step, self._on_timer)
@@ -231,6 +239,14 @@ class HighLevelNode(Node):
             request.relative,
         )
         return srv.StartTrajectoryResponse()
+
+    def _on_start_all(self, message):
+        if self._handle.name not in message.data.split():
+            return
+        if self._flight_state == _FLYING:
+            self._begin_unasked(Follower.start, 0)
+        else:
+            self._handle.error(f"not started: the vehicle is {self._flight_state or 'not known'}")
 
     def _on_setpoints_stop(self, _):
         self._end_stream()

@@ -44,6 +44,8 @@ class RehearsedVehicle:
     bounds : Bounds
     """
 
+    starts_together = False
+
     def __init__(
         self, name: str, clock: RehearsalClock, position: Triple, bounds: Bounds = EVERYWHERE
     ):

@@ -95,7 +95,14 @@ class Team(Roster):
         ways = {name: trajectories.stretched(way, seconds) for name, way in ways.items()}
         self._check(ways, "go_to", "a longer duration")
 
+        # Calls take their time, and who begins later meets others.
+        together = [name for name in ways if len(ways) > 1 and self._vehicles[name].starts_together]
+        chosen = self._some(together)
+        chosen._tell("go_to", lambda name: self._vehicles[name].prepare(ways[name], False))
+
         def command(name):
+            if name in together:
+                return self._vehicles[name].start()
             return self._vehicles[name].go_to(places[name], yaw, seconds)
 
         self._fly(ways, "go_to", command, wait)

@@ -24,6 +24,10 @@ class Vehicle(Protocol):
     def bounds(self) -> Bounds:
         """The box that it is fenced in."""
 
+    @property
+    def starts_together(self) -> bool:
+        """Whether those that are told to `start` in a row begin at the same moment."""
+
     def position(self) -> Triple | None:
         """Return where it is, m; None when that is not known."""
 

@@ -6,6 +6,7 @@ import itertools
 import math
 import threading
 from collections.abc import Callable
+from operator import attrgetter
 
 from crazyflie_utils.runtime.clock import SteadyClock
 from crazyflie_utils.runtime.executor import Executor
@@ -24,6 +25,7 @@ class Timer:
 
     def __init__(self, period: float, work: Callable[[], None], now: float):
         self.deadline = math.nan
+        self.number = 0
         self.stopped = False
         self._period = period
         self._work = work
@@ -58,6 +60,9 @@ class Timer:
         """Call back, unless stopped."""
         if not self.stopped:
             self._work()
+
+
+_number = attrgetter("number")
 
 
 class TimerQueue:
@@ -101,6 +106,7 @@ class TimerQueue:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
         with self._lock:
             timer = Timer(period, work, self._begin(period, now))
+            timer.number = next(self._order)
             timer.stopped = self._is_stopped
             self._push(timer)
         return timer
@@ -159,6 +165,10 @@ class TimerQueue:
                 timer = heapq.heappop(self._heap)[2]
                 if not timer.stopped:
                     due.append(timer)
+            # Those of one moment differ by rounding only, each time in another way. Who was there
+            # first is first, so that it has an even period.
+            if due and due[-1].deadline - due[0].deadline < _TOLERANCE:
+                due.sort(key=_number)
             for timer in due:
                 timer.skip_to(now)
                 self._push(timer)

@@ -112,3 +112,15 @@ class Stick:
 def wait_for_service(name):
     """Wait until a service is there."""
     rospy.wait_for_service(name, LIMIT)
+
+
+@contextlib.contextmanager
+def observed_vehicle():
+    """Run a vehicle that the driver knows as /crazyflie; yield an observer of it."""
+    with (
+        Observer() as observer,
+        virtual_vehicle(**{"observer/port": observer.port}) as uri,
+        launched("crazyflie_demo", "customLogBlocks.launch", uri=uri),
+    ):
+        wait_for_service("/crazyflie/takeoff")
+        yield observer

@@ -5,7 +5,7 @@ import signal
 import numpy as np
 import pytest
 import rospy
-from flights import LIMIT, Observer, launched, node, virtual_vehicle, wait_for_service
+from flights import LIMIT, node, observed_vehicle
 
 from crazyflie_driver.msg import GenericLogData
 
@@ -13,12 +13,7 @@ from crazyflie_driver.msg import GenericLogData
 @pytest.fixture(scope="module")
 def observer():
     """Return an observer of a vehicle that the driver knows as /crazyflie."""
-    with (
-        Observer() as observer,
-        virtual_vehicle(**{"observer/port": observer.port}) as uri,
-        launched("crazyflie_demo", "customLogBlocks.launch", uri=uri),
-    ):
-        wait_for_service("/crazyflie/takeoff")
+    with observed_vehicle() as observer:
         yield observer
 
 

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from flights import LIMIT, Observer, launched, node, virtual_vehicle, wait_for_service
+from flights import LIMIT, node, observed_vehicle
 
 from crazyflie_demo.trajectory_file import save
 from crazyflie_model.hermite import hermite
@@ -44,12 +44,7 @@ cf.stop()
 @pytest.fixture(scope="module")
 def observer():
     """Return an observer of a vehicle that the driver knows as /crazyflie."""
-    with (
-        Observer() as observer,
-        virtual_vehicle(**{"observer/port": observer.port}) as uri,
-        launched("crazyflie_demo", "customLogBlocks.launch", uri=uri),
-    ):
-        wait_for_service("/crazyflie/takeoff")
+    with observed_vehicle() as observer:
         yield observer
 
 

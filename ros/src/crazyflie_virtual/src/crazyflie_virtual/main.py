@@ -74,4 +74,5 @@ def _run(
     try:
         server.run()
     except KeyboardInterrupt:
+        # Ctrl-C is how it ends.
         pass

@@ -37,6 +37,7 @@ class VirtualCrazyflieNode(ServerNode):
             try:
                 place = self._lookup(world.frame, each.name).transform.translation
             except TransformError:
+                # Nobody moves it at present: it stays where it is.
                 continue
             centres[each.name] = (place.x, place.y, place.z)
         physics.world = world.placed(centres)

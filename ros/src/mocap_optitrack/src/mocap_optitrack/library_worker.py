@@ -35,6 +35,7 @@ def main() -> int:
     try:
         _stream(system, host, out)
     except BrokenPipeError:
+        # Who reads the lines has ended.
         return 0
     except Exception as error:
         print(json.dumps({"error": str(error)}), file=out)

@@ -143,6 +143,7 @@ class NatNetSource(Source):
             if not ready:
                 continue
             datagram, sender = self._commands.recvfrom(_LARGEST)
+            # Anybody may send to the port; if nothing else comes, the caller says so.
             with contextlib.suppress(natnet.DecodeError):
                 number, payload = natnet.split(datagram)
                 if number == natnet.SERVER_INFO:

@@ -96,6 +96,7 @@ class JoyNode(Node):
         try:
             data = os.read(self._file, _EVENTS * EVENT.size)
         except BlockingIOError:
+            # Nothing has moved.
             return
         except OSError as error:
             self._lose(self._file, error)

@@ -158,6 +158,7 @@ class SetpointTopics:
         if not (self.is_streaming and self._is_at_rest):
             return
         if self._handle.time() - self._times[-1] > _REST:
+            # Without a link, which is said by its state; it is tried again.
             with contextlib.suppress(CrazyflieError):
                 self.hand_over()
 

@@ -123,8 +123,10 @@ class Backend(CflibCrazyflie):
         try:
             super().send_packet(pk, expected_reply, resend, timeout)
         except Exception as error:
+            # Not every error comes while it is taken.
             with contextlib.suppress(RuntimeError):
                 self._send_lock.release()
+            # Without a link it was closed meanwhile, which whoever did it knows.
             if self.link is not None:
                 self._on_error(f"cannot send: {error}")
 
@@ -177,5 +179,6 @@ class Backend(CflibCrazyflie):
 
 def _wake_receiver(link):
     # The thread that hands packets out looks up only once a second.
+    # A driver without a queue has no such thread.
     with contextlib.suppress(AttributeError):
         link.in_queue.put(None)

@@ -20,7 +20,8 @@ def forget_dead_radios() -> None:
             if not radio.is_alive():
                 RadioManager._radios[devid] = None
                 if radio._radio is not None:
-                    # The new owner cannot claim the device before.
+                    # The new owner cannot claim the device before. It is dead: what it raises, of
+                    # whatever type, is the reason why it is closed.
                     with contextlib.suppress(Exception):
                         radio._radio.close()
                     radio._radio = None

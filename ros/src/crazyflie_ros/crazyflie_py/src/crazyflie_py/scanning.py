@@ -51,7 +51,7 @@ def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError
             with contextlib.redirect_stdout(printed):
                 found += [uri for uri, *_ in driver_class().scan_interface(number)]
         except Exception as error:
-            printed.write(str(error))
+            printed.write(str(error) or repr(error))
         if printed.getvalue().strip():
             problems.append(explain(driver_class.__name__, printed.getvalue()))
     return found, problems

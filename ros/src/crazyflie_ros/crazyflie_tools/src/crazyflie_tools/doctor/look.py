@@ -99,6 +99,7 @@ def python_packages(entries: Iterable[str]) -> tuple[dict[str, str], dict[str, s
         if requirement.marker is None or requirement.marker.evaluate():
             exact = [s.version for s in requirement.specifier if s.operator == "=="]
             wanted[requirement.name] = exact[0] if exact else ""
+            # What is missing is what is wanted and not installed.
             with contextlib.suppress(importlib.metadata.PackageNotFoundError):
                 installed[requirement.name] = importlib.metadata.version(requirement.name)
     return wanted, installed
@@ -118,6 +119,7 @@ def _within(limit: float, work: Callable[[], T], otherwise: T) -> T:
     results: list[T] = []
 
     def attempt():
+        # A failure is told by ``otherwise``.
         with contextlib.suppress(OSError, UnicodeError):
             results.append(work())
 
@@ -148,6 +150,7 @@ def radio(root: Path = Path("/")) -> Radio:
     """Return the Crazyradios of this computer, and who may use them."""
     dongles = {}
     for device in (root / "sys/bus/usb/devices").glob("*"):
+        # Not everything there is a device with an identity, and any may be unplugged meanwhile.
         with contextlib.suppress(OSError, ValueError):
             identity = tuple(_text(device / f"id{key}") for key in ("Vendor", "Product"))
             if identity == _RADIO_ID:
@@ -267,6 +270,7 @@ def _ask(node: str) -> tuple[str, list[Any]] | str:
 
 def _offer(uri: str, topic: str) -> Type | None:
     """Return the type that a publisher offers; None if it cannot be asked."""
+    # Anything may listen on that port. Publishers that do not answer are found by `_ask`.
     with contextlib.suppress(Exception):
         answer: Any = ServerProxy(uri).requestTopic(_NAME, topic, [["TCPROS"]])
         _, host, port = answer[2]
@@ -276,6 +280,7 @@ def _offer(uri: str, topic: str) -> Type | None:
 
 
 def _service_type(service: str) -> Type | None:
+    # Likewise.
     with contextlib.suppress(Exception):
         uri = urlsplit(rosgraph.Master(_NAME).lookupService(service))
         with socket.create_connection((uri.hostname or "", uri.port or 0), LIMIT) as connection:

@@ -23,6 +23,7 @@ import rospy
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameter_types import BOOLEAN, GraphName, ParameterType
 from crazyflie_utils.parameters import ParameterError, Parameters, parameter
+from crazyflie_utils.runtime import rospy_internals
 from crazyflie_utils.runtime.flights import Flights
 from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.runtime.master_watch import MasterWatch
@@ -150,6 +151,7 @@ def begin(default_name: str) -> Process:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     _wait_for_master()
+    rospy_internals.never_wait_long_to_begin()
     rospy.init_node(default_name)
     return ros_process()
 
@@ -169,6 +171,7 @@ def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
     is_own = not rospy.core.is_initialized()
     if is_own:
         _wait_for_master()
+        rospy_internals.never_wait_long_to_begin()
         rospy.init_node(default_name, anonymous=True, disable_signals=True)
     process = ros_process()
     rospy.on_shutdown(lambda: process.end(0))

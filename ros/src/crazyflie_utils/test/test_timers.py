@@ -62,6 +62,26 @@ def test_what_is_due_at_one_moment_runs_in_the_order_in_which_it_was_added(queue
         assert order == sorted(order)
 
 
+def test_short_periods_that_a_process_begins_with_are_due_together(queue):
+    ticks = []
+    for name, period, now in (("a", 0.01, 1.0), ("b", 0.01, 1.0037), ("c", 0.02, 1.005)):
+        queue.add(period, lambda name=name: ticks.append(name), now=now)
+    queue.add(0.3, lambda: ticks.append("long"), now=1.005)
+    for moment, due in ((1.01, "a"), (1.02, "ab"), (1.03, "ab"), (1.04, "abc"), (1.05, "ab")):
+        ticks.clear()
+        queue.run_due(moment)
+        assert ticks == list(due)
+    ticks.clear()
+    queue.run_due(1.305)
+    assert "long" in ticks
+    # What is added later may be what somebody waits for.
+    queue.add(0.01, lambda: ticks.append("soon"), now=1.3337)
+    queue.run_due(1.3436)
+    assert "soon" not in ticks
+    queue.run_due(1.3437)
+    assert "soon" in ticks
+
+
 def test_missed_ticks_are_skipped_and_the_phase_is_kept(queue):
     ticks = []
     queue.add(0.1, lambda: ticks.append(1), now=0.0)

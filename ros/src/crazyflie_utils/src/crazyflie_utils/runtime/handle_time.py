@@ -45,7 +45,8 @@ class TimeHandle(HandleBase):
         """Have ``callback()`` called every ``period`` seconds of `time`.
 
         With ``steady`` the period is of the machine's clock also when time is
-        simulated. Ticks that are missed are skipped.
+        simulated. Ticks that are missed are skipped. Those of short periods, up to 0.1 s, with
+        which the nodes of a process begin are due together where their periods allow it.
         """
         timer = self._process.add_timer(period, self.guard(callback), steady)
         self._undo.append(timer.stop)

@@ -126,7 +126,8 @@ def register() -> None:
     for kind, name, type_or_uri in registered:
         getattr(request, methods[kind])(rospy.get_name(), name, type_or_uri, rospy.get_node_uri())
     try:
-        answers = list(request())
+        outcome = request()
+        answers = [outcome[k] for k in range(len(registered))]
     except (OSError, http.client.HTTPException, xmlrpc.client.Error):
         # One by one, and each until the master is there.
         for kind, name, type_or_uri in registered:

@@ -89,13 +89,15 @@ class TimerQueue:
         self._heap: list[tuple[float, int, Timer]] = []
         self._order = itertools.count()
         self._origin: float | None = None
+        self._is_running = False
         self._is_stopped = False
 
     def add(self, period: float, work: Callable[[], None], now: float) -> Timer:
         """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
 
-        That of a short period, up to 0.1 s, is due at multiples of it since the first one began,
-        so that many of them need not wake the process up often.
+        Before the first `run_due`, that of a short period, up to 0.1 s, is due at multiples of it
+        since the first timer began, so that many of them need not wake the process up often.
+        Later ones, which may be waited for, are not delayed.
 
         Raises
         ------
@@ -112,7 +114,7 @@ class TimerQueue:
         return timer
 
     def _begin(self, period, now):
-        if not 0.0 < period <= _TOGETHER:
+        if self._is_running or not 0.0 < period <= _TOGETHER:
             return now
         if self._origin is None or now < self._origin:
             self._origin = now
@@ -130,6 +132,7 @@ class TimerQueue:
         A timer that is late by more than a period skips what it missed and
         keeps its phase.
         """
+        self._is_running = True
         due = self._take_due(now)
         are_several = len(due) > 1
         if are_several and self._before is not None:

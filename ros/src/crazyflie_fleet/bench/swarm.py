@@ -26,19 +26,19 @@ def main() -> None:
     """Measure as the command line asks, and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "numbers",
+        "words",
         nargs="+",
-        type=int,
         metavar="N",
         help="of vehicles; NAME:=VALUE is passed to sw_swarm.launch",
     )
     parser.add_argument("--core", type=int, default=0, help="that flies them (0)")
     parser.add_argument("--json", type=Path, help="write the figures there, too")
-    options, rest = parser.parse_known_args()
+    options = parser.parse_args()
+    launch = [word for word in options.words if ":=" in word]
     rows = []
     print("   n  start  cpu %   p50   p99   max ms  MiB  additions", flush=True)
-    for n in options.numbers:
-        row = swarm.measure(n, rest, options.core)
+    for n in [int(word) for word in options.words if word not in launch]:
+        row = swarm.measure(n, launch, options.core)
         rows.append(dataclasses.asdict(row))
         print(
             f"{n:4d} {row.start:6.1f} {row.cpu:6.1f} {row.p50:5.1f} {row.p99:5.1f} "

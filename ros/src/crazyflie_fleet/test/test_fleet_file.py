@@ -194,7 +194,9 @@ def test_a_grid(n):
     assert np.abs(places).max() <= math.sqrt(n) / 2 + 0.5
 
 
-@pytest.mark.parametrize(("arguments", "text"), [((0,), "at least one"), ((9, 0.2), "grid is 0.2 m; expected")])
+@pytest.mark.parametrize(
+    ("arguments", "text"), [((0,), "at least one"), ((9, 0.2), "grid is 0.2 m; expected")]
+)
 def test_no_grid(arguments, text):
     with pytest.raises(ParameterError, match=text):
         fleet_file.grid(*arguments)

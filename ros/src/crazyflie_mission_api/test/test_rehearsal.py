@@ -112,8 +112,8 @@ BAD = {
     r"cf1 and cf2 would be 0\.\d+ m apart, \d\.\d s from now": lambda t: t["cf1"].go_to(
         (0.9, 0, 1)
     ),
-    "cf1: go_to: the speed is .* m/s at .* expected at most 0.5 m/s; a longer duration": lambda t: t["cf1"].go_to(
-        (0, 1, 1), duration=1.0
+    "cf1: go_to: the speed is .* m/s at .* expected at most 0.5 m/s; a longer duration": lambda t: (
+        t["cf1"].go_to((0, 1, 1), duration=1.0)
     ),
     "go_to: duration is 'long'; expected a finite number": lambda t: t["cf1"].go_to(
         (0, 1, 1), duration="long"
@@ -153,7 +153,10 @@ def test_commands_on_the_ground_are_refused(team):
         (lambda: Bounds((1, 1, 1), (0, 0, 0)), "bounds are"),
         (lambda: Limits(speed=-1.0), "limits: speed is -1.0; expected a finite number > 0"),
         (lambda: Limits(speed="fast"), "limits: speed is 'fast'; expected a finite number > 0"),
-        (lambda: Limits(min_thrust=12.0), "min_thrust is 12, and max_thrust 16; expected one below"),
+        (
+            lambda: Limits(min_thrust=12.0),
+            "min_thrust is 12, and max_thrust 16; expected one below",
+        ),
         (lambda: Bounds("room", (0, 0, 0)), "bounds are 'room' to"),
         (lambda: Rules(separation=-1), "separation is -1; expected a finite number >= 0"),
         (lambda: Rules(tolerance=0), "tolerance is 0; expected a finite number > 0"),

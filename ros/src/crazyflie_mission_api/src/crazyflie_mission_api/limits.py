@@ -126,9 +126,7 @@ def point(value: Sequence[float], what: str) -> Array:
     return array
 
 
-def number(
-    value: float, what: str, minimum: float = -math.inf, above: float = -math.inf
-) -> float:
+def number(value: float, what: str, minimum: float = -math.inf, above: float = -math.inf) -> float:
     """Return a finite number that is ``minimum`` at least, and more than ``above``.
 
     Raises

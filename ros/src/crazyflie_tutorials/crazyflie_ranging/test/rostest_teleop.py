@@ -19,7 +19,9 @@ def joy(forward=0.0, left=0.0, button=None):
 
 def press(button, state):
     """Hold a button until the takeoff server is in a state."""
-    peer.exchange({"/joy": joy(button=button)}, "/in_flight_state", String, lambda m: m.data == state)
+    peer.exchange(
+        {"/joy": joy(button=button)}, "/in_flight_state", String, lambda m: m.data == state
+    )
 
 
 def hold(operator, accept, **axes):

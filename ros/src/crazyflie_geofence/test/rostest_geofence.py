@@ -24,9 +24,10 @@ REGULAR = Control(roll=0.0, pitch=0.2, yaw_dot=0.3, thrust=9.81)
 def test_a_vehicle_is_left_alone_or_brought_back(x, is_right):
     state = PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=x, z=1.0))
     # The merger may answer a control with what the fence has said of the last vehicle.
-    exchange(
+    answer = exchange(
         {"/state": state, "/control/lqr": ControlStamped(control=REGULAR)},
         "/control/merged",
         ControlStamped,
         lambda message: is_right(message.control),
     )
+    assert is_right(answer.control)

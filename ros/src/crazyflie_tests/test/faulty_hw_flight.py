@@ -122,7 +122,7 @@ class Flight:
         """Take off and hover; return the greatest height, m."""
         begin = self.observer.now
         self.observer.takeoff()
-        self.observer.hover(2.5)
+        self.observer.hover(4.0)
         return self.observer.range_since(begin)[1]
 
     def is_back_at(self, height):
@@ -153,6 +153,20 @@ def call(service):
     """Call a service of type Empty."""
     rospy.wait_for_service(service, LIMIT)
     rospy.ServiceProxy(service, EmptyService)()
+
+
+def end_the_emergency():
+    """Reset the filter's stop, as soon as that is not refused."""
+
+    def is_accepted():
+        try:
+            call("/emergency_reset")
+        except rospy.ServiceException as error:
+            assert "less than 2 s ago" in str(error)
+            return False
+        return True
+
+    wait_until(is_accepted, "the end of the emergency", LIMIT)
 
 
 def lose_the_link(flight, duration):
@@ -192,10 +206,11 @@ def lose_motion_capture(flight):
     motion_capture = Client("/virtual_mocap", LIMIT)
     motion_capture.update_configuration({"fault/silent": True})
     flight.wait_for_the_ground()
+    seconds = rospy.get_time() - begin
     refusal = flight.refusal()
     motion_capture.update_configuration({"fault/silent": False})
     seen = {
-        "seconds to the ground": rospy.get_time() - begin,
+        "seconds to the ground": seconds,
         "fastest descent": flight.vehicle.fastest_descent_since(begin),
         "refusal": refusal,
     }
@@ -212,7 +227,7 @@ def stop_in_emergency(flight):
     flight.wait_for_the_ground()
     refusal = flight.refusal()
     flight.vehicle.wait_for_log_of(called + 2.1)
-    call("/emergency_reset")
+    end_the_emergency()
     return {"refusal": refusal, "seconds": flight.vehicle.motors_stop_after(called)}
 
 
@@ -222,11 +237,12 @@ def restart_the_firmware(flight):
     begin = rospy.get_time()
     # Earlier data may be from before the restart.
     flight.vehicle.wait_for_log_of(begin + 0.3)
+    came_back = rospy.get_time() - begin
     flight.wait_for_the_ground()
     flight.vehicle.wait_for_log_of(rospy.get_time() + 2.0)
     highest = flight.vehicle.highest_pwm_since(begin + 0.3)
     flight.observer.land()
-    return {"highest PWM": highest}
+    return {"topics came back after": came_back, "highest PWM": highest}
 
 
 def empty_the_battery(flight):
@@ -263,7 +279,7 @@ def stop_all_in_emergency(flight):
     flight.wait_for_the_ground()
     flight.vehicle.wait_for_log_of(begin + 2.1)
     # The filter's stop can be reset, the driver's not.
-    call("/emergency_reset")
+    end_the_emergency()
     status = next_message("/crazyflie/status", String)
     return {"status": status, "seconds": flight.vehicle.motors_stop_after(begin)}
 

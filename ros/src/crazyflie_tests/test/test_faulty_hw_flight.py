@@ -10,7 +10,17 @@ import pytest
 _SCRIPT = Path(__file__).parent / "faulty_hw_flight.py"
 
 AT_ONCE = 1.0
-"""Also on a busy machine, s; a vehicle that only hears no more runs its motors for 2 s."""
+"""From the call of a service, s: less than 0.2 on a machine that has nothing else to do. A vehicle
+that only hears no more levels out after 0.5 s, and runs its motors for 2 s."""
+
+TO_THE_GROUND = 15.0
+"""When nobody commands any more, s. Without poses: 0.5 s in which they may come back, then 5 s of
+descent (`loss/return_limit`, `loss/descent_limit`). Without a driver: 2 s until the firmware stops
+the motors, and 0.7 s of fall from 2.5 m. The rest is for a machine that is too slow, on which the
+virtual vehicle loses time."""
+
+BACK = 10.0
+"""After a restart the link is lost after 0.45 s, kept for 1 s, and set up anew, s."""
 
 
 @pytest.fixture(scope="module")
@@ -51,13 +61,14 @@ def test_flies_on_after_0_3_s_without_motion_capture(seen):
 
 def test_sinks_without_motion_capture_and_stays_down(seen):
     loss = seen["motion capture lost"]
-    assert loss["seconds to the ground"] < 15.0
+    assert loss["seconds to the ground"] < TO_THE_GROUND
     assert loss["fastest descent"] < 1.0
     assert "refused" in loss["refusal"]
     assert loss["highest PWM afterwards"] == 0.0
 
 
 def test_a_firmware_that_restarts_under_a_stream_does_not_start_the_motors(seen):
+    assert seen["firmware restarted"]["topics came back after"] < BACK
     assert seen["firmware restarted"]["highest PWM"] == 0.0
 
 
@@ -79,7 +90,7 @@ def test_the_emergency_of_all_vehicles_is_latched_in_the_driver(seen):
 def test_without_a_driver_the_vehicle_comes_down_and_is_locked(seen):
     # It climbed when the driver died, and does so until the watchdog stops the motors.
     assert max(seen["driver killed"]["heights"]) < 2.5
-    assert seen["driver killed"]["seconds to the ground"] < 15.0
+    assert seen["driver killed"]["seconds to the ground"] < TO_THE_GROUND
     assert seen["driver killed"]["locked"]
 
 

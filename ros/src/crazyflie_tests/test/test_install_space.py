@@ -40,7 +40,10 @@ def put_away(top):
 
 @pytest.fixture
 def terminal(workspace, install_space, shell):
-    """Return a shell that knows the install space, and nothing else is there."""
+    """Return a shell that knows the install space, and nothing else is there.
+
+    Its ``run`` asserts that a command succeeds.
+    """
     with put_away(workspace):
         terminal = shell(workspace)
         terminal.run(f"source {install_space}/setup.bash")

@@ -110,6 +110,16 @@ def test_every_node_is_shut_down_though_one_fails(process):
     assert ticks == []
 
 
+class Talker(Node):
+    """Could say something."""
+
+    def load_parameters(self, handle):
+        pass
+
+    def register_callbacks(self, handle):
+        handle.publisher("out", String)
+
+
 def test_messages_of_shutdown_still_reach_the_other_nodes(process):
     node = Echo()
     assert process.launch(node, "/ns/echo", {"gain": 1.0})
@@ -121,9 +131,13 @@ def test_messages_of_shutdown_still_reach_the_other_nodes(process):
     assert heard == ["safe"]
 
 
-def test_default_is_silence():
-    Node().make_safe()
-    Node().shutdown()
+def test_default_is_silence(process):
+    node = Talker()
+    assert process.launch(node, "/ns/talker")
+    node.make_safe()
+    process.shut_down({"/ns/talker": node})
+    assert process.published("/ns/out") == []
+    assert process.logged("error") == []
 
 
 @pytest.mark.parametrize("method", ["load_parameters", "register_callbacks"])

@@ -189,7 +189,7 @@ def read(datagram, version):
         assert all(map(math.isfinite, (frame.exposure, frame.sent)))
 
 
-def refused_or_read(datagram, version):
+def assert_refused_or_read(datagram, version):
     """Read a datagram; the one exception that is allowed is the documented one."""
     with contextlib.suppress(natnet.DecodeError):
         read(datagram, version)
@@ -218,12 +218,12 @@ READABLE = st.sampled_from(["2.5", "2.9", "3.0", "3.1", "4.1"])
 
 @given(st.binary(max_size=400), READABLE)
 def test_noise(content, version):
-    refused_or_read(content, version)
+    assert_refused_or_read(content, version)
 
 
 @given(NUMBERS, st.binary(max_size=400), READABLE)
 def test_noise_with_a_header_that_fits(number, content, version):
-    refused_or_read(datagram(number, content), version)
+    assert_refused_or_read(datagram(number, content), version)
 
 
 @given(NUMBERS, st.sampled_from(["2.9", "3.0", "3.1", "4.1"]), st.data())
@@ -233,9 +233,9 @@ def test_valid_messages_with_bytes_changed_cut_out_or_added(number, version, dat
         begin = data.draw(st.integers(0, len(content)))
         end = data.draw(st.integers(begin, min(begin + 8, len(content))))
         content = content[:begin] + data.draw(st.binary(max_size=8)) + content[end:]
-    refused_or_read(datagram(number, content), version)
+    assert_refused_or_read(datagram(number, content), version)
     # And in a stream of another version.
-    refused_or_read(datagram(number, content), data.draw(READABLE))
+    assert_refused_or_read(datagram(number, content), data.draw(READABLE))
 
 
 @pytest.mark.parametrize("version", ["2.9", "4.1"])
@@ -249,7 +249,7 @@ def test_the_largest_datagrams_take_little_time_and_memory(number, version, fill
     tracemalloc.start()
     begin = time.process_time()
     try:
-        refused_or_read(datagram(number, content), version)
+        assert_refused_or_read(datagram(number, content), version)
         _, peak = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

@@ -93,9 +93,9 @@ def test_parameters_of_the_firmware(added):
 def test_a_flight(added):
     with listening("/cf1/pose", PoseStamped) as poses:
         call("/cf1/takeoff", Takeoff, 0, 0.4, Duration(1))
-        poses.next(lambda message: message.pose.position.z > 0.35)
+        assert poses.next(lambda message: message.pose.position.z > 0.35)
         call("/cf1/land", Land, 0, 0.0, Duration(1))
-        poses.next(lambda message: message.pose.position.z < 0.05)
+        assert poses.next(lambda message: message.pose.position.z < 0.05)
 
 
 def test_setpoints_and_diagnostics(added):

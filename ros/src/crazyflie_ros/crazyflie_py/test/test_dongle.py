@@ -133,15 +133,15 @@ def connected(bus, tmp_path):
         each.link.close()
 
 
-def emergency_arrives(bus, connected):
+def assert_emergency_arrives(bus, connected):
     for vehicle, each in zip(bus.vehicles.values(), connected, strict=True):
         vehicle.received.clear()
         each.link.supervisor.emergency_stop()
-        vehicle.wait_for_packets(9, 1, limit=LIMIT)
+        assert vehicle.wait_for_packets(9, 1, limit=LIMIT)
 
 
 def test_two_vehicles_share_a_dongle(bus, connected):
-    emergency_arrives(bus, connected)
+    assert_emergency_arrives(bus, connected)
 
 
 @pytest.mark.parametrize("is_absent", [False, True])
@@ -157,7 +157,7 @@ def test_a_usb_error_ends_no_vehicle_for_good(bus, connected, is_absent):
     bus.plug_in()
     for each in connected:
         each.wait_for(LinkState.CONNECTED)
-    emergency_arrives(bus, connected)
+    assert_emergency_arrives(bus, connected)
 
 
 def test_it_can_happen_again(bus, connected):
@@ -168,7 +168,7 @@ def test_it_can_happen_again(bus, connected):
         bus.plug_in()
         for each in connected:
             each.wait_for(LinkState.CONNECTED)
-    emergency_arrives(bus, connected)
+    assert_emergency_arrives(bus, connected)
 
 
 def test_closing_has_a_limit(bus, connected):

@@ -110,6 +110,7 @@ def test_no_packet_ends_the_thread_that_receives(shared, packets):
 )
 def test_no_packet_ends_the_set_up_without_a_reason(packets):
     link = Link(Address.parse("udp://127.0.0.1:1"), backend=Backend)
+    # What is asserted is that it raises nothing: that would end the thread that receives.
     for port, channel, data in packets:
         link.cflib.packet_received.call(packet(port, channel, data))
     link.close()

@@ -1,8 +1,10 @@
 """However a process is asked to end: it says a last word, and ends."""
 
 import signal
+import xmlrpc.client
 
 import pytest
+import rosgraph
 import rosnode
 import rospy
 from processes import composed, small_node
@@ -90,7 +92,14 @@ def flight():
     ):
         ticks.get(timeout=LIMIT)
         measurements.get(timeout=LIMIT)
+        wait_until(lambda: hears_of_flights("/cf/sensors/instrument"), "the connection")
         yield pilot, other
+
+
+def hears_of_flights(node):
+    slave = xmlrpc.client.ServerProxy(rosgraph.Master("/test").lookupNode(node))
+    connections = slave.getBusInfo("/test")[2]
+    return any(each[2] == "i" and each[4] == "/flights" and each[5] for each in connections)
 
 
 def test_processes_that_are_needed_in_flight_end_after_the_landing(flight):

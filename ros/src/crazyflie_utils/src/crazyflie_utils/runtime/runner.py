@@ -226,6 +226,7 @@ def _run(process, make_nodes):
                 if not node.initialize(process.handle(name)):
                     process.transport.log("fatal", f"{name}: not initialized; the process exits")
                     _fail()
+            flights = _flights(process, nodes)
     except ParameterError as error:
         handle.error(str(error))
         _fail()
@@ -236,7 +237,6 @@ def _run(process, make_nodes):
     rospy.on_shutdown(ending.run)
     watch = MasterWatch()
     watch.start()
-    flights = _flights(process, nodes)
     signals = _catch_signals()
     _stop_for_nobody()
     # Not in this thread, which must stay free to end a callback that does not.

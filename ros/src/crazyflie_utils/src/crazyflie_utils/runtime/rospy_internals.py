@@ -12,6 +12,7 @@ import time
 import xmlrpc.client
 from collections.abc import Callable, Hashable, Iterator
 from types import SimpleNamespace
+from typing import Any
 
 import genpy
 import rosgraph.roslogging
@@ -126,7 +127,7 @@ def register() -> None:
     for kind, name, type_or_uri in registered:
         getattr(request, methods[kind])(rospy.get_name(), name, type_or_uri, rospy.get_node_uri())
     try:
-        outcome = request()
+        outcome: Any = request()
         answers = [outcome[k] for k in range(len(registered))]
     except (OSError, http.client.HTTPException, xmlrpc.client.Error):
         # One by one, and each until the master is there.

@@ -10,8 +10,8 @@ import pytest
 _SCRIPT = Path(__file__).parent / "faulty_hw_flight.py"
 
 AT_ONCE = 0.2
-"""From the call of a service, s: 0.03 also on a machine so busy that the vehicle loses time. One that
-only hears no more levels out after 0.5 s, and runs its motors for 2 s."""
+"""From the call of a service, s: 0.03 also on a machine so busy that the vehicle loses time. One
+that only hears no more levels out after 0.5 s, and runs its motors for 2 s."""
 
 TO_THE_GROUND = 15.0
 """When nobody commands any more, s. Without poses: 0.5 s in which they may come back, then 5 s of

@@ -57,7 +57,8 @@ def test_controller_is_the_one_asked_for(controller, dynamics):
     for name, node_class in classes.items():
         node = nodes[f"/{name}"]
         executable = Path(PACKAGES.get_path(node.package)) / "exec" / node.type
-        assert f"run({node_class.__name__}," in executable.read_text()
+        path = f"{node_class.__module__}:{node_class.__name__}"
+        assert f'run("{path}",' in executable.read_text()
 
 
 @pytest.mark.parametrize("controller", CLASSES)

@@ -32,7 +32,8 @@ def test_executables_and_classes_are_the_same_nodes(dynamics):
     for name, node_class in classes.items():
         node = nodes[f"/{name}"]
         executable = Path(PACKAGES.get_path(node.package)) / "exec" / node.type
-        assert f"run({node_class.__name__}," in executable.read_text()
+        path = f"{node_class.__module__}:{node_class.__name__}"
+        assert f'run("{path}",' in executable.read_text()
 
 
 @pytest.mark.parametrize("estimator_filter", ["finite_difference", "kalman"])

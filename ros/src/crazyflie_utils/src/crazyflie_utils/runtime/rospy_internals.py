@@ -12,6 +12,7 @@ import time
 import xmlrpc.client
 from collections.abc import Callable, Hashable, Iterator
 from types import SimpleNamespace
+from typing import Any
 
 import genpy
 import rosgraph.roslogging
@@ -117,7 +118,7 @@ def register() -> None:
         kinds.SUB: "registerSubscriber",
         kinds.SRV: "registerService",
     }
-    request = xmlrpc.client.MultiCall(rospy.core.xmlrpcapi(rosgraph.get_master_uri()))
+    request: Any = xmlrpc.client.MultiCall(rospy.core.xmlrpcapi(rosgraph.get_master_uri()))
     for kind, name, type_or_uri in registered:
         getattr(request, methods[kind])(rospy.get_name(), name, type_or_uri, rospy.get_node_uri())
     try:

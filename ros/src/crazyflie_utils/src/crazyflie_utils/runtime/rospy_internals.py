@@ -123,7 +123,7 @@ def register() -> None:
         kinds.SUB: "registerSubscriber",
         kinds.SRV: "registerService",
     }
-    request = xmlrpc.client.MultiCall(rospy.core.xmlrpcapi(rosgraph.get_master_uri()))
+    request: Any = xmlrpc.client.MultiCall(rospy.core.xmlrpcapi(rosgraph.get_master_uri()))
     for kind, name, type_or_uri in registered:
         getattr(request, methods[kind])(rospy.get_name(), name, type_or_uri, rospy.get_node_uri())
     try:

@@ -58,7 +58,7 @@ def test_controller_is_the_one_asked_for(controller, dynamics):
         node = nodes[f"/{name}"]
         executable = Path(PACKAGES.get_path(node.package)) / "exec" / node.type
         path = f"{node_class.__module__}:{node_class.__name__}"
-        assert f'run("{path}",' in executable.read_text()
+        assert f'"{path}"' in executable.read_text()
 
 
 @pytest.mark.parametrize("controller", CLASSES)

@@ -33,7 +33,7 @@ def test_executables_and_classes_are_the_same_nodes(dynamics):
         node = nodes[f"/{name}"]
         executable = Path(PACKAGES.get_path(node.package)) / "exec" / node.type
         path = f"{node_class.__module__}:{node_class.__name__}"
-        assert f'run("{path}",' in executable.read_text()
+        assert f'"{path}"' in executable.read_text()
 
 
 @pytest.mark.parametrize("estimator_filter", ["finite_difference", "kalman"])

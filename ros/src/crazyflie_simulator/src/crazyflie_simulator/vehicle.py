@@ -1,15 +1,19 @@
 """A vehicle simulated in fixed steps, independent of when its state is asked for."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Sequence
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 _LEVEL_STEPS = round(LEVEL_AGE / STEP)
 _OFF_STEPS = round(OFF_AGE / STEP)
@@ -62,6 +66,8 @@ class SimulatedVehicle:
     @property
     def state(self) -> NDArray[np.float64]:
         """State of the dynamics, shape (x_dim,)."""
+        import numpy as np
+
         return np.array(self._x)
 
     @property

@@ -72,6 +72,15 @@ def test_linear_feedback_is_k_times_the_error(x, x_ref):
     np.testing.assert_allclose(u, U_REF + GENTLE @ heading_error(x, x_ref, 6))
 
 
+def test_gains_and_hover_may_be_set_later():
+    x = state(x=1.0, z=2.0, x_dot=0.3)
+    later, gentle = LinearFeedback(10.0 * GENTLE, 0.5 * U_REF, 6), LinearFeedback(GENTLE, U_REF, 6)
+    later.K, later.u_ref = GENTLE, U_REF
+    np.testing.assert_array_equal(
+        later.control(x, np.zeros(7), 0.0), gentle.control(x, np.zeros(7), 0.0)
+    )
+
+
 @given(states, st.floats(-1.0, 1.0))
 def test_a_quarter_turn_of_the_world_does_not_change_the_control(x, yaw):
     x[6] = yaw

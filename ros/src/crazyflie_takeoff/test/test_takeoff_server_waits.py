@@ -128,7 +128,8 @@ def started(parameters=SERVER):
     """Return a process with a server that knows the flight state, but has no state yet."""
     process = launch(parameters)
     process.publish("/in_flight_filter", String("on_ground"))
-    process.advance(RECOVERY_LIMIT)
+    # It is published at the next tick.
+    process.advance(RECOVERY_LIMIT + 0.01)
     assert states(process) == ["on_ground"]
     return process
 

@@ -87,8 +87,26 @@ class LinearFeedback:
         self.K = K
         self.u_ref = u_ref
         self.yaw_index = yaw_index
-        self._u_ref = [float(each) for each in u_ref]
-        self._rows = [[float(each) for each in row] for row in K]
+
+    @property
+    def K(self) -> NDArray[np.float64]:  # noqa: N802
+        """Gains, shape (u_dim, x_dim); they may be set, though not changed in place."""
+        return self._K
+
+    @K.setter
+    def K(self, K: NDArray[np.float64]) -> None:  # noqa: N802
+        self._K = K
+        self._rows = [_floats(row) for row in K]
+
+    @property
+    def u_ref(self) -> NDArray[np.float64]:
+        """Control at the reference, shape (u_dim,); it may be set, too."""
+        return self._u_ref_array
+
+    @u_ref.setter
+    def u_ref(self, u_ref: NDArray[np.float64]) -> None:
+        self._u_ref_array = u_ref
+        self._u_ref = _floats(u_ref)
 
     def control(
         self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float

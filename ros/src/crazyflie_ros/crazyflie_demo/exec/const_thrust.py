@@ -1,7 +1,6 @@
 #!/usr/bin/env python
 """A constant thrust."""
 
-from crazyflie_demo.const_thrust_node import ConstThrustNode
 from crazyflie_utils import run
 
-run(ConstThrustNode, "const_thrust")
+run("crazyflie_demo.const_thrust_node:ConstThrustNode", "const_thrust")

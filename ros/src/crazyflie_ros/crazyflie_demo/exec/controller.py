@@ -1,7 +1,6 @@
 #!/usr/bin/env python
 """A joystick's buttons, for the vehicle in whose namespace this node is."""
 
-from crazyflie_demo.joystick_controller_node import JoystickControllerNode
 from crazyflie_utils import run
 
-run(JoystickControllerNode, "joystick_controller")
+run("crazyflie_demo.joystick_controller_node:JoystickControllerNode", "joystick_controller")

@@ -1,7 +1,6 @@
 #!/usr/bin/env python
 """A tour along waypoints."""
 
-from crazyflie_demo.waypoint_node import DemoNode
 from crazyflie_utils import run
 
-run(DemoNode, "demo")
+run("crazyflie_demo.waypoint_node:DemoNode", "demo")

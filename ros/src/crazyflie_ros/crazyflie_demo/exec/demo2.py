@@ -1,7 +1,6 @@
 #!/usr/bin/env python
 """A tour along waypoints, for the second of two vehicles."""
 
-from crazyflie_demo.waypoint_node import Demo2Node
 from crazyflie_utils import run
 
-run(Demo2Node, "demo")
+run("crazyflie_demo.waypoint_node:Demo2Node", "demo")

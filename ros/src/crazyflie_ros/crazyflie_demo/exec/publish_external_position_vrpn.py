@@ -1,7 +1,6 @@
 #!/usr/bin/env python
 """Poses of VRPN as the position of a vehicle."""
 
-from crazyflie_demo.external_nodes import ExternalPositionVrpnNode
 from crazyflie_utils import run
 
-run(ExternalPositionVrpnNode, "publish_external_position_vrpn")
+run("crazyflie_demo.external_nodes:ExternalPositionVrpnNode", "publish_external_position_vrpn")

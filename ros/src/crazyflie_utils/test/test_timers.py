@@ -82,6 +82,19 @@ def test_short_periods_that_a_process_begins_with_are_due_together(queue):
     assert "soon" in ticks
 
 
+def test_those_that_are_spread_are_due_one_after_the_other(queue):
+    ticks = []
+    for number in range(7):
+        queue.add(0.05, lambda number=number: ticks.append(number), now=1.0, is_spread=True)
+    for moment, due in ((1.05, [0, 5]), (1.06, [1, 6]), (1.07, [2]), (1.08, [3]), (1.09, [4])):
+        ticks.clear()
+        queue.run_due(moment)
+        assert ticks == due
+    ticks.clear()
+    queue.run_due(1.1)
+    assert ticks == [0, 5]
+
+
 def test_missed_ticks_are_skipped_and_the_phase_is_kept(queue):
     ticks = []
     queue.add(0.1, lambda: ticks.append(1), now=0.0)

@@ -191,7 +191,7 @@ class StateEstimatorNode(Node):
             handle.timer(max(parameters.time_step, SILENCE_PERIOD), self._watch)
         else:
             handle.timer(parameters.time_step, self._estimate)
-        handle.timer(REPORT_PERIOD, self._report)
+        handle.timer(REPORT_PERIOD, self._report, is_spread=True)
 
     def _on_control(self, message):
         self._control.command(to_tuple(message.control), self._handle.time())

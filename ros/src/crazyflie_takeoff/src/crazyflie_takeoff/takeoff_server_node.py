@@ -108,8 +108,8 @@ class TakeoffServerNode(Node):
         # Whether connections come about has nothing to do with simulated time.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover_state, steady=True)
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
-        handle.timer(STATUS_PERIOD, self._publish_status, steady=True)
-        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True)
+        handle.timer(STATUS_PERIOD, self._publish_status, steady=True, is_spread=True)
+        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True, is_spread=True)
 
     @override
     def leave(self) -> None:

@@ -41,14 +41,22 @@ class TimeHandle(HandleBase):
         """Return the same as `stamp` in whole ns, for a `StampedPose`."""
         return self._process.clock.nanoseconds(moment)
 
-    def timer(self, period: float, callback: Callable[[], None], steady: bool = False) -> Timer:
+    def timer(
+        self,
+        period: float,
+        callback: Callable[[], None],
+        steady: bool = False,
+        is_spread: bool = False,
+    ) -> Timer:
         """Have ``callback()`` called every ``period`` seconds of `time`.
 
         With ``steady`` the period is of the machine's clock also when time is
         simulated. Ticks that are missed are skipped. Those of short periods, up to 0.1 s, with
-        which the nodes of a process begin are due together where their periods allow it.
+        which the nodes of a process begin are due together where their periods allow it. Those
+        with ``is_spread`` are not, so that many nodes do not all report at the same moment; their
+        first tick may be one period late.
         """
-        timer = self._process.add_timer(period, self.guard(callback), steady)
+        timer = self._process.add_timer(period, self.guard(callback), steady, is_spread)
         self._undo.append(timer.stop)
         return timer
 

@@ -63,7 +63,13 @@ class Process:
         """Return the handle of the node with this absolute name."""
         return NodeHandle(self, name)
 
-    def add_timer(self, period: float, work: Callable[[], None], steady: bool = False) -> Timer:
+    def add_timer(
+        self,
+        period: float,
+        work: Callable[[], None],
+        steady: bool = False,
+        is_spread: bool = False,
+    ) -> Timer:
         """Add a timer by this process's clock, or by the machine's if ``steady``.
 
         Raises
@@ -75,8 +81,8 @@ class Process:
         if self.uses_sim_time and not steady:
             if period == 0.0:
                 raise ValueError("a timer by simulated time needs a period > 0")
-            return self._simulated.add(period, work, self.clock.time())
-        return self._steady.add(period, work)
+            return self._simulated.add(period, work, self.clock.time(), is_spread)
+        return self._steady.add(period, work, is_spread)
 
     def next_simulated_deadline(self) -> float:
         """Return when the next timer by simulated time is due, s."""

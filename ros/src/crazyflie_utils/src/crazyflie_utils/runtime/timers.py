@@ -5,6 +5,7 @@ import heapq
 import itertools
 import math
 import threading
+from collections import Counter
 from collections.abc import Callable
 from operator import attrgetter
 
@@ -18,6 +19,9 @@ the seconds since 1970, less than anyone can notice."""
 _TOGETHER = 0.1
 """Timers of at most this period, s, are due together where they can be: waking up costs more than
 most of them do."""
+
+_SLOT = 0.01
+"""Timers that are spread are due so far apart, s: most others are due as often as that."""
 
 
 class Timer:
@@ -90,14 +94,19 @@ class TimerQueue:
         self._order = itertools.count()
         self._origin: float | None = None
         self._is_running = False
+        self._spread: Counter[float] = Counter()
         self._is_stopped = False
 
-    def add(self, period: float, work: Callable[[], None], now: float) -> Timer:
+    def add(
+        self, period: float, work: Callable[[], None], now: float, is_spread: bool = False
+    ) -> Timer:
         """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
 
         Before the first `run_due`, that of a short period, up to 0.1 s, is due at multiples of it
         since the first timer began, so that many of them need not wake the process up often.
-        Later ones, which may be waited for, are not delayed.
+        Those that are to be spread are due at different ones of such moments, 10 ms apart; the
+        first deadline comes up to one period later. What is added later may be waited for, and is
+        not delayed.
 
         Raises
         ------
@@ -107,15 +116,22 @@ class TimerQueue:
         if not 0.0 <= period < math.inf:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
         with self._lock:
-            timer = Timer(period, work, self._begin(period, now))
+            timer = Timer(period, work, self._begin(period, now, is_spread))
             timer.number = next(self._order)
             timer.stopped = self._is_stopped
             self._push(timer)
         return timer
 
-    def _begin(self, period, now):
-        if self._is_running or not 0.0 < period <= _TOGETHER:
+    def _begin(self, period, now, is_spread):
+        if self._is_running or period == 0.0:
             return now
+        if is_spread:
+            slot = self._spread[period] % max(round(period / _SLOT), 1)
+            self._spread[period] += 1
+            return self._next_multiple(_SLOT, now) + slot * _SLOT
+        return self._next_multiple(period, now) if period <= _TOGETHER else now
+
+    def _next_multiple(self, period, now):
         if self._origin is None or now < self._origin:
             self._origin = now
         passed = (now - self._origin - _TOLERANCE) / period
@@ -203,9 +219,9 @@ class SteadyTimers:
         """Begin to fire."""
         self._thread.start()
 
-    def add(self, period: float, work: Callable[[], None]) -> Timer:
-        """Add a timer; its first deadline is one period from now."""
-        timer = self._queue.add(period, work, self._clock.time())
+    def add(self, period: float, work: Callable[[], None], is_spread: bool = False) -> Timer:
+        """Add a timer; its first deadline is one period from now, or see `TimerQueue.add`."""
+        timer = self._queue.add(period, work, self._clock.time(), is_spread)
         self._tell()
         return timer
 

@@ -182,9 +182,15 @@ class FakeProcess(Process):
         self.executor.submit(lambda: outcome.append(node.initialize(self.handle(name))))
         return outcome[0]
 
-    def add_timer(self, period: float, work: Callable[[], None], steady: bool = False) -> Timer:
+    def add_timer(
+        self,
+        period: float,
+        work: Callable[[], None],
+        steady: bool = False,
+        is_spread: bool = False,
+    ) -> Timer:
         """Add a timer; the machine's time, too, is moved by hand here."""
-        return super().add_timer(period, work)
+        return super().add_timer(period, work, is_spread=is_spread)
 
     def publish(self, topic: str, message: genpy.Message) -> None:
         """Publish from outside the process."""

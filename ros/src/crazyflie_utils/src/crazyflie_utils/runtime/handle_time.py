@@ -79,8 +79,8 @@ class TimeHandle(HandleBase):
         def set_clock(*moments: float) -> None:
             stamp = self.stamp(moments[-1])
             self._process.transport.clock_was_set(stamp)
-            before = [Clock(self.stamp(each)) for each in moments[:-1]]
-            publisher.publish(Clock(stamp), before)
+            passed = moments[:-1] if publisher.is_heard_outside() else ()
+            publisher.publish(Clock(stamp), [Clock(self.stamp(each)) for each in passed])
 
         return set_clock
 

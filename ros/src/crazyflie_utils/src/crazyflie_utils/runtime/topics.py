@@ -60,7 +60,11 @@ class Publisher:
         beside : int
             So many receivers in this process do not count.
         """
-        return self.is_read_here(beside) or self._external.has_subscribers()
+        return self.is_read_here(beside) or self.is_heard_outside()
+
+    def is_heard_outside(self) -> bool:
+        """Tell whether anyone in another process is connected."""
+        return self._external.has_subscribers()
 
     def is_read_here(self, beside: int = 0) -> bool:
         """Tell whether anyone in this process receives; so many do not count."""

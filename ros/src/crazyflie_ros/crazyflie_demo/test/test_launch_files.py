@@ -207,7 +207,8 @@ def node_class(node):
     """Return the class that an executable runs."""
     package = Path(rospkg.RosPack().get_path(node.package))
     text = (package / "exec" / node.type).read_text()
-    module, name = re.search(r"^from (crazyflie_\w+\.\w+) import (\w+)$", text, re.M).groups()
+    # In quotes, or imported, where the command line decides.
+    module, name = re.search(r"(crazyflie_\w+\.\w+)(?::| import )(\w+)", text).groups()
     return getattr(importlib.import_module(module), name)
 
 

@@ -121,6 +121,20 @@ def test_what_cannot_be_read_is_dropped_and_the_connection_kept(
         assert process.transport.refused["unreadable", topic] == 50
 
 
+def test_a_publisher_that_is_not_ready_is_asked_again(handle):
+    received = heard(handle, "/late", Int64)
+    with HostilePublisher("/late", Int64, is_ready=False) as late:
+        wait_until(lambda: late.accepted, "the first question")
+        late.is_ready = True
+        wait_until(lambda: late.accepted == 2, "the second one")
+
+        def is_heard():
+            late.send(frame(Int64(1)))
+            return received
+
+        wait_until(is_heard, "a message")
+
+
 def test_a_message_without_end_is_not_waited_for(process, handle, warnings):
     received = heard(handle, "/endless", String)
     with HostilePublisher("/endless", String) as hostile:

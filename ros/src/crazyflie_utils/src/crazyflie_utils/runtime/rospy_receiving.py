@@ -99,7 +99,14 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
             self.close()
             report(f"ignoring {peer} on {topic}: {complaint}", ("type", topic, peer))
             raise rospy.exceptions.TransportInitError(complaint)
-        validate_header(self, header)
+        try:
+            validate_header(self, header)
+        except rospy.exceptions.TransportInitError:
+            # Such as of a publisher that is not quite there. rospy means to try again, but takes a
+            # connection that has a socket for one that was made.
+            self.socket.close()
+            self.socket = None
+            raise
 
     tcpros_base.TCPROSTransport.receive_once = receive
     tcpros_base.TCPROSTransport._validate_header = validate_type

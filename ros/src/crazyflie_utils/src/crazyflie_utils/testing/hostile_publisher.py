@@ -44,9 +44,18 @@ class HostilePublisher:
         What it says it sends.
     md5sum : str, optional
         In the place of that of the type.
+    is_ready : bool, optional
+        Otherwise it says that it is no publisher, until the attribute is set.
     """
 
-    def __init__(self, topic: str, message_type: type[genpy.Message], md5sum: str = ""):
+    def __init__(
+        self,
+        topic: str,
+        message_type: type[genpy.Message],
+        md5sum: str = "",
+        is_ready: bool = True,
+    ):
+        self.is_ready = is_ready
         self._topic = topic
         self._type = message_type
         self._header = {
@@ -62,7 +71,8 @@ class HostilePublisher:
         """How many connections have been made so far."""
         self._server = socket.create_server((_ADDRESS, 0))
         self._slave = SimpleXMLRPCServer((_ADDRESS, 0), logRequests=False)
-        self._slave.register_instance(_Slave(self._server.getsockname()[1]))
+        port = self._server.getsockname()[1]
+        self._slave.register_instance(_Slave(port, [[topic, message_type._type]]))
         for work in (self._slave.serve_forever, self._accept):
             threading.Thread(target=work, daemon=True).start()
         self._master = rosgraph.Master(self._header["callerid"])
@@ -108,16 +118,24 @@ class HostilePublisher:
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 with contextlib.suppress(OSError, rosgraph.network.ROSHandshakeException):
                     read_ros_handshake_header(connection, io.BytesIO(), 4096)
+                    if not self.is_ready:
+                        refusal = {"error": f"this is not a publisher of [{self._topic}]"}
+                        write_ros_handshake_header(connection, refusal)
+                        connection.close()
+                        continue
                     write_ros_handshake_header(connection, self._header)
                     self._sockets.append(connection)
 
 
 class _Slave:
-    def __init__(self, port: int):
-        self._port = port
+    def __init__(self, port: int, publications: list[list[str]]):
+        self._answers = {
+            "requestTopic": ["TCPROS", _ADDRESS, port],
+            "getPublications": publications,
+        }
 
     def _dispatch(self, method, _):
-        return 1, "", ["TCPROS", _ADDRESS, self._port] if method == "requestTopic" else 0
+        return 1, "", self._answers.get(method, 0)
 
 
 def frame(message: genpy.Message) -> bytes:

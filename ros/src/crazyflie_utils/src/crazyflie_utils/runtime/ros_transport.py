@@ -86,6 +86,7 @@ class RosTransport(Transport):
         rospy_internals.never_connect_to_oneself()
         rospy_sending.never_wait_for_subscribers()
         rospy_internals.never_fail_to_log()
+        rospy_internals.check_topics_in_turns()
         self._remappings = rospy_internals.take_over_remappings()
         self._calls: dict[str, threading.Semaphore] = {}
         self._services_at_start: dict[str, str] | None = None

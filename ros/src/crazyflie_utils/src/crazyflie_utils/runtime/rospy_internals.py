@@ -23,6 +23,9 @@ from rospy.impl import init, registration, tcpros_base
 _HEADER_LIMIT = 5.0
 """How long, in s, who connects may take to say what for."""
 
+_CHECKED_AT_ONCE = 100
+"""Topics; most processes have fewer."""
+
 _MOST_NEWCOMERS = 32
 """Connections that have not said yet what for."""
 
@@ -44,6 +47,25 @@ def never_connect_to_oneself() -> None:
         return endpoint_id == rospy.get_node_uri() or has_connection(self, endpoint_id)
 
     implementation.has_connection = has_connection_or_is_own
+
+
+@functools.cache
+def check_topics_in_turns() -> None:
+    """Look for subscribers that have hung up at no more than 100 topics at a time.
+
+    rospy does so at all of them every half second, which takes milliseconds where a process flies
+    a fleet. Whoever publishes notices it anyway.
+    """
+
+    def check_some(self):
+        with self.lock:
+            topics = [*self.pubs.values(), *self.subs.values()]
+        start = getattr(self, "checked", 0) % max(len(topics), 1)
+        self.checked = start + _CHECKED_AT_ONCE
+        for topic in topics[start : self.checked]:
+            topic.check()
+
+    rospy.topics._TopicManager.check_all = check_some
 
 
 @functools.cache

@@ -80,14 +80,14 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
         if self.socket is None:
             raise TransportException("connection not initialized")
         inbox = _inbox(self, report)
-        if _is_lazy(self):
+        if inbox.is_lazy:
             inbox.wait()
-            return _note(self, inbox.take_waiting())
+            return _note(self, inbox.take_waiting(_TURNS))
         messages: list[genpy.Message] = []
         while not (messages or self.done or rospy.core.is_shutdown()):
             frames = inbox.take()
             if limits_rate and frames and inbox.flow.is_flooded(len(frames)):
-                frames = _calm(self.protocol, inbox, frames, report)
+                frames = _calm(inbox, frames, report)
             messages = inbox.decoded(frames)
         return _note(self, messages)
 
@@ -124,16 +124,11 @@ def collect(subscriber: rospy.Subscriber) -> None:
         return
     for connection in implementation.connections:
         inbox = getattr(connection, "inbox", None)
-        if inbox is not None and inbox.sock is connection.socket and _is_lazy(connection):
-            messages = _note(connection, inbox.take_waiting())
+        if inbox is not None and inbox.sock is connection.socket and inbox.is_lazy:
+            # Once: in a flood the connection's own thread is at work as well, and whoever looks
+            # something up has no time for all of it.
+            messages = _note(connection, inbox.take_waiting(1))
             implementation.receive_callback(messages, connection)
-
-
-def _is_lazy(connection):
-    implementation = registration.get_topic_manager().get_subscriber_impl(
-        connection.protocol.resolved_name
-    )
-    return getattr(implementation, "is_lazy", False) and len(implementation.callbacks) == 1
 
 
 def _note(connection, messages):
@@ -153,8 +148,9 @@ def _inbox(connection, report):
     return inbox
 
 
-def _calm(protocol, inbox, frames, report):
+def _calm(inbox, frames, report):
     """Return what is taken in a flood."""
+    protocol = inbox.protocol
     time.sleep(_REST)
     for _ in range(_TURNS):
         try:
@@ -182,6 +178,8 @@ class _Inbox:
     def __init__(self, connection: Any, read: bytes, report: Report):
         self.flow = _Flow()
         self.sock = connection.socket
+        # The connection forgets it when it is closed, which another thread may do at any moment.
+        self.protocol = connection.protocol
         self._connection = connection
         self._report = report
         self._part = bytearray()
@@ -191,6 +189,14 @@ class _Inbox:
         self._lock = threading.Lock()
         self._is_behind = True
         self._end: TransportTerminated | None = None
+
+    @property
+    def is_lazy(self) -> bool:
+        """Whether messages may wait; see `read_lazily`."""
+        implementation = registration.get_topic_manager().get_subscriber_impl(
+            self.protocol.resolved_name
+        )
+        return getattr(implementation, "is_lazy", False) and len(implementation.callbacks) == 1
 
     def wait(self) -> None:
         """Wait a little, and then for data.
@@ -212,15 +218,15 @@ class _Inbox:
         except (OSError, ValueError) as error:
             raise TransportTerminated(str(error)) from None
 
-    def take_waiting(self) -> list[genpy.Message]:
-        """Return the messages that are there.
+    def take_waiting(self, turns: int) -> list[genpy.Message]:
+        """Return the messages that are there, read at most so many times.
 
         A hang-up is left to `wait`.
         """
         frames: list[bytes] = []
         with self._lock:
             try:
-                for _ in range(_TURNS):
+                for _ in range(turns):
                     frames += self.take(socket.MSG_DONTWAIT)
                     if not self._is_behind:
                         break
@@ -232,8 +238,8 @@ class _Inbox:
 
     def decoded(self, frames: list[bytes]) -> list[genpy.Message]:
         """Return messages without those that cannot be decoded."""
-        connection, messages = self._connection, []
-        protocol, header = connection.protocol, connection.header
+        messages: list[genpy.Message] = []
+        protocol, header = self.protocol, self._connection.header
         for frame in frames:
             try:
                 message = protocol.recv_data_class().deserialize(frame)
@@ -275,7 +281,7 @@ class _Inbox:
 
     def _receive(self, flags):
         try:
-            data = self.sock.recv(self._connection.protocol.buff_size, flags)
+            data = self.sock.recv(self.protocol.buff_size, flags)
         except BlockingIOError:
             raise
         except OSError as error:
@@ -284,7 +290,7 @@ class _Inbox:
             raise TransportTerminated("the publisher has hung up")
         self._connection.stat_bytes += len(data)
         # A great part of what the socket holds.
-        self._is_behind = len(data) > self._connection.protocol.buff_size // 2
+        self._is_behind = len(data) > self.protocol.buff_size // 2
         return data
 
     def _needed(self, data, start=0):
@@ -293,7 +299,7 @@ class _Inbox:
             return _LENGTH.size
         (size,) = _LENGTH.unpack_from(data, start)
         if size > _LONGEST:
-            topic = self._connection.protocol.resolved_name
+            topic = self.protocol.resolved_name
             text = f"disconnecting a publisher of {topic}: {size} bytes a message"
             self._report(text, ("long", topic))
             raise TransportTerminated("message too long")

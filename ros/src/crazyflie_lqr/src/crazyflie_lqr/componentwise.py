@@ -5,7 +5,7 @@ What a controller remembers is a list of components, as states are; nothing is c
 
 from collections.abc import Sequence
 
-from crazyflie_lqr.linear_feedback import MAX_GAP, PITCH, ROLL, THRUST
+from crazyflie_lqr.linear_feedback import INTEGRATED, MAX_GAP, PITCH, ROLL, THRUST
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_model.elementwise import Number, Vector, clip, functions, where
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
@@ -18,9 +18,6 @@ LIMITS = {
     PITCH: (-MAX_TILT, MAX_TILT),
     THRUST: (MIN_THRUST, MAX_THRUST),
 }
-
-_INTEGRATED = (PITCH, ROLL, THRUST)
-"""The controls that the integrals of x, y and z act on."""
 
 
 def heading_error(x: Sequence[Number], x_ref: Sequence[Number]) -> Vector[Number]:
@@ -79,7 +76,7 @@ def integrate(
     """
     dt = where(dt <= MAX_GAP, dt, 0.0)
     after = []
-    for axis, control in enumerate(_INTEGRATED):
+    for axis, control in enumerate(INTEGRATED):
         low, high = LIMITS[control]
         grown = integral[axis] + error[axis] * dt
         grown = where(grown < -limit[axis], -limit[axis], grown)
@@ -98,7 +95,7 @@ def limited_control(
 ) -> Vector[Number]:
     """Return the control with its integral part, within what controllers ask for."""
     u = list(linear)
-    for axis, control in enumerate(_INTEGRATED):
+    for axis, control in enumerate(INTEGRATED):
         low, high = LIMITS[control]
         u[control] = clip(u[control] + k[axis] * integral[axis], low, high)
     return u

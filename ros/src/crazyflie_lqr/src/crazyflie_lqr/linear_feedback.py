@@ -27,7 +27,7 @@ _MOST = (MAX_TILT, MAX_TILT, math.inf, MAX_THRUST)
 _LEAST_DAMPING = 0.7
 """A height loop with this damping ratio overshoots a step by 5 %."""
 
-_INTEGRATED = (PITCH, ROLL, THRUST)
+INTEGRATED = (PITCH, ROLL, THRUST)
 """The controls that the integrals of x, y and z act on."""
 
 MAX_GAP = 0.5
@@ -223,7 +223,7 @@ class IntegralStateFeedback(LinearFeedback):
         u = self._linear(error)
         if not self._is_resting:
             self._integrate(error[:3], dt, u)
-        for index, k, integral in zip(_INTEGRATED, self._integrator_k, self._integral, strict=True):
+        for index, k, integral in zip(INTEGRATED, self._integrator_k, self._integral, strict=True):
             u[index] += k * integral
         u[THRUST] += climb_thrust
         u = [min(max(a, b), c) for a, b, c in zip(u, _LEAST, _MOST, strict=True)]
@@ -271,7 +271,7 @@ class IntegralStateFeedback(LinearFeedback):
         # An error that overflowed must not stay in the integral.
         if dt == 0.0 or not all(map(math.isfinite, error)):
             return
-        for axis, (index, k) in enumerate(zip(_INTEGRATED, self._integrator_k, strict=True)):
+        for axis, (index, k) in enumerate(zip(INTEGRATED, self._integrator_k, strict=True)):
             if axis == 2 and self._climb is not None:
                 continue
             integral = self._within_limit(axis, self._integral[axis] + error[axis] * dt)

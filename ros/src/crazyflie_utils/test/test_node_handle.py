@@ -93,6 +93,21 @@ def test_periods_that_never_end_are_refused(handle, period):
         handle.timer(period, lambda: None)
 
 
+def test_a_timer_whose_period_varies(process, handle):
+    moments = []
+    timer = handle.varying_timer(0.5, lambda: moments.append(handle.time()))
+    process.advance(1.0)
+    timer.set_period(0.5)
+    process.advance(0.25)
+    timer.set_period(0.125)
+    process.advance(0.25)
+    assert moments == [100.5, 101.0, 101.375, 101.5]
+    timer.stop()
+    timer.set_period(0.25)
+    process.advance(1.0)
+    assert len(moments) == 4
+
+
 def test_timers_go_on_after_a_reset_of_time(process, handle):
     moments = []
     handle.timer(0.5, lambda: moments.append(handle.time()))

@@ -56,6 +56,17 @@ def test_a_flood_is_read_in_turns(publisher):
     assert numbers(inbox.take_waiting(16)) == list(range(10, 25))
 
 
+def test_where_only_the_latest_counts_others_are_not_read(publisher, monkeypatch):
+    here, connection = publisher
+    monkeypatch.setattr(_Inbox, "remind", lambda: None)
+    inbox = inbox_of(connection)
+    assert inbox.take_waiting(1) == []
+    here.sendall(b"".join(frame(Int64(number)) for number in range(5)) + frame(Int64(5))[:7])
+    assert numbers(inbox.take_waiting(1)) == [4]
+    here.sendall(frame(Int64(5))[7:])
+    assert numbers(inbox.take_waiting(1)) == [5]
+
+
 def test_a_hang_up_is_left_to_the_thread_of_the_connection(publisher):
     here, connection = publisher
     inbox = inbox_of(connection)

@@ -95,6 +95,17 @@ def test_those_that_are_spread_are_due_one_after_the_other(queue):
     assert ticks == [0, 5]
 
 
+def test_what_is_first_comes_before_whatever_is_due(queue):
+    done = []
+    queue.first = lambda: done.append("first")
+    for name in ("a", "b"):
+        queue.add(1.0, lambda name=name: done.append(name), now=0.0)
+    run(queue, 0.5)
+    assert done == []
+    run(queue, 1.0)
+    assert done == ["first", "a", "b"]
+
+
 def test_missed_ticks_are_skipped_and_the_phase_is_kept(queue):
     ticks = []
     queue.add(0.1, lambda: ticks.append(1), now=0.0)

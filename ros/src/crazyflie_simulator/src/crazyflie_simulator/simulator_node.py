@@ -168,7 +168,7 @@ class SimulatorNode(Node):
             period = parameters.time_step / factor if factor > 0.0 else 0.0
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
-            self._timer = handle.timer(parameters.time_step, self._on_timer)
+            self._timer = handle.varying_timer(parameters.time_step, self._on_timer)
 
     def _on_control(self, message):
         self._catch_up()
@@ -188,7 +188,6 @@ class SimulatorNode(Node):
             self._broadcast_pose()
         else:
             self._catch_up()
-            self._set_pace()
 
     def _catch_up(self):
         """Be where the clock is, with all poses that somebody hears."""
@@ -197,6 +196,7 @@ class SimulatorNode(Node):
             self._broadcast_pose()
         elif not self._handle.uses_sim_time:
             self._make_up(self._handle.time())
+            self._set_pace()
 
     def _make_up(self, now):
         """Broadcast the poses of all time steps until now, s, that have not been.
@@ -215,14 +215,9 @@ class SimulatorNode(Node):
         self._ticks = due
 
     def _set_pace(self):
-        is_idle = self._is_unheard()
-        if is_idle != self._is_idle:
-            self._is_idle = is_idle
-            self._timer.stop()
-            step = self._parameters.time_step
-            self._timer = self._handle.timer(
-                max(IDLE_PERIOD, step) if is_idle else step, self._on_timer
-            )
+        self._is_idle = self._is_unheard()
+        step = self._parameters.time_step
+        self._timer.set_period(max(IDLE_PERIOD, step) if self._is_idle else step)
 
     def _is_unheard(self):
         """Tell whether it is early enough to broadcast a pose when it is looked up."""

@@ -62,6 +62,11 @@ class Persistence:
         self._age = math.inf
         self._lasted = 0.0
 
+    @property
+    def is_wrong(self) -> bool:
+        """Whether the latest measurement was wrong."""
+        return bool(self._text)
+
     def measure(self, text: str) -> None:
         """Take what is wrong by the latest measurement, or an empty text."""
         self._text = text

@@ -130,7 +130,7 @@ class SafeFilter(Generic[Control]):
     @property
     def control_age(self) -> float:
         """How long no commanded control has come, s."""
-        return self._silence
+        return max(self._silence, 0.0)
 
     @property
     def lacks_control(self) -> bool:
@@ -151,6 +151,14 @@ class SafeFilter(Generic[Control]):
     def takeover(self) -> Takeover | None:
         """What the server has to know; None while controls are passed on, or will be again."""
         return _TAKEOVERS.get(self.mode)
+
+    @property
+    def is_calm(self) -> bool:
+        """Whether nothing can happen within half the time for which it holds on."""
+        is_heard = self._silence < 0.5 * self._patience.hold or self._is_on_ground
+        is_settled = self.mode is Mode.PASSING and self._return_age >= RETURN_TIME
+        is_well = not (self._is_tilted or self._position_limit.is_wrong)
+        return is_settled and is_heard and is_well
 
     @property
     def explanation(self) -> str:
@@ -213,7 +221,8 @@ class SafeFilter(Generic[Control]):
         setpoint : Setpoint
             Its numbers.
         """
-        self._silence = 0.0
+        # The next tick adds all of its step.
+        self._silence = -self._step_until(time)
         self._lacks_control = False
         chosen = self._choice.commanded(time, control)
         if self._has_to_look and self._choice.in_flight:
@@ -241,8 +250,7 @@ class SafeFilter(Generic[Control]):
 
     def tick(self, time: float) -> Setpoint | None:
         """Let time pass until ``time`` (s); return what to publish, or None."""
-        elapsed = time - self._ticked
-        step = min(max(elapsed, 0.0), LONGEST_STEP) if math.isfinite(elapsed) else 0.0
+        step = self._step_until(time)
         self._ticked = time
         self._in_mode += step
         self._silence += step
@@ -265,6 +273,10 @@ class SafeFilter(Generic[Control]):
             self._own = self._safe.advance(step, self._fresh_speed(), sinks)
             return self._own
         return MOTORS_OFF if self.mode in (Mode.DOWN, Mode.EMERGENCY) else None
+
+    def _step_until(self, time):
+        elapsed = time - self._ticked
+        return min(max(elapsed, 0.0), LONGEST_STEP) if math.isfinite(elapsed) else 0.0
 
     def _look(self):
         # The filter before this one was gone for too long, if the vehicle lies on the ground.

@@ -23,6 +23,9 @@ from crazyflie_utils.vectors import stamped
 TIME_STEP = 0.01
 """Period of the controls that the filter makes itself, s."""
 
+CALM_TIME_STEP = 0.04
+"""How often it looks after a vehicle with which all is well, s."""
+
 LISTENING_TIME = 0.4
 """How long a filter that has started listens before it passes a controller, s: some
 periods of the zero thrust on the ground, and less than a vehicle flies on without
@@ -165,12 +168,13 @@ class TakeoffControlFilterNode(Node):
                 PositionVelocityYawStateStamped,
                 self._on_measured_state,
                 finite="state",
+                latest_only=True,
             )
         if parameters.tilted_topic is not None:
             handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
 
     def _register_timers(self, handle):
-        handle.timer(TIME_STEP, self._on_timer)
+        self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
         # Whether connections come about has nothing to do with simulated time.
         self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
         self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)
@@ -191,10 +195,12 @@ class TakeoffControlFilterNode(Node):
                 key="flight state",
             )
         self._publish_state()
+        self._set_pace()
 
     def _on_toggle(self, _):
         self._filter.toggle()
         self._publish_state()
+        self._set_pace()
 
     def _on_measured_state(self, message):
         state = message.state
@@ -202,6 +208,7 @@ class TakeoffControlFilterNode(Node):
 
     def _on_tilted(self, message):
         self._filter.set_tilted(message.data)
+        self._set_pace()
 
     def _on_takeoff_control(self, message):
         now = self._handle.time()
@@ -241,6 +248,12 @@ class TakeoffControlFilterNode(Node):
     def _on_timer(self):
         self._publish(self._filter.tick(self._handle.time()))
         self._publish_state()
+        self._set_pace()
+
+    def _set_pace(self):
+        # With time enough to be quick again before the vehicle is taken over.
+        calm = max(TIME_STEP, min(CALM_TIME_STEP, 0.4 * self._parameters.hold))
+        self._timer.set_period(calm if self._filter.is_calm else TIME_STEP)
 
     def _stop_listening(self):
         # A server that is there, and looks where the flight stands, soon tells.

@@ -30,6 +30,9 @@ from crazyflie_utils.vectors import from_vector, stamped
 TIME_STEP = 0.01
 """Period of the server, s."""
 
+CRUISE_TIME_STEP = 0.1
+"""The same while it leaves the vehicle to the controller and only watches the battery, s."""
+
 STATUS_PERIOD = 0.1
 """How often it is looked whether there is anything new to tell people, s."""
 
@@ -103,8 +106,9 @@ class TakeoffServerNode(Node):
                 PositionVelocityYawStateStamped,
                 self._on_state,
                 finite="state",
+                latest_only=True,
             )
-        handle.timer(TIME_STEP, self._on_timer)
+        self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
         # Whether connections come about has nothing to do with simulated time.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover_state, steady=True)
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
@@ -120,6 +124,7 @@ class TakeoffServerNode(Node):
         self._calls.fail(ServiceError(f"takeoff aborted: {self._handle.name} is to end"))
         flight.land(LEAVE_LIMIT)
         self._cause = "the launch is to end"
+        self._set_pace()
 
     @override
     def make_safe(self) -> None:
@@ -151,6 +156,7 @@ class TakeoffServerNode(Node):
                 self._calls.wait(service, future)
             else:
                 self._begin(self._flight, service, future)
+        self._set_pace()
 
     def _lacks_what_may_come(self):
         # What was there and is gone is no matter of waiting.
@@ -210,6 +216,7 @@ class TakeoffServerNode(Node):
         self._filter = report
         if self._flight is not None:
             self._follow_filter(self._flight, report)
+            self._set_pace()
 
     def _follow_filter(self, flight, report):
         flight.is_held = report.is_held
@@ -303,6 +310,14 @@ class TakeoffServerNode(Node):
                 self._cause = "the vehicle has not lifted off"
                 self._calls.fail(ServiceError(f"takeoff aborted: {self._cause}; can it fly?"))
             self._publish(output)
+        self._set_pace()
+
+    def _set_pace(self):
+        state = None if self._flight is None else self._flight.state
+        # Once the world has been told.
+        is_flying = state is FlightState.FLYING and state is self._published_state
+        cruises = is_flying and not self._calls.has_waiting
+        self._timer.set_period(CRUISE_TIME_STEP if cruises else TIME_STEP)
 
     def _publish(self, output):
         if output.state is not self._published_state:

@@ -15,6 +15,9 @@ from crazyflie_dev.launching import roslaunch
 DURATION = 20.0
 """For how long a figure is measured, s."""
 
+_BEGINNING = 500_000_000
+"""So long, ns, rates are not counted."""
+
 _NODES = (
     "/simulator",
     "/state_estimator",
@@ -89,6 +92,8 @@ def _listen(nodes):
 
 def _rate(arrivals, topic):
     times = [arrival for name, arrival, _ in arrivals if name == topic]
+    # What came while the listener was still connecting to other topics waited for it.
+    times = [each for each in times if each > times[0] + _BEGINNING]
     if len(times) < 2:
         raise NotMeasuredError(f"nothing came on {topic}")
     return 1e9 * (len(times) - 1) / (times[-1] - times[0])

@@ -165,6 +165,7 @@ class NodeHandle(TimeHandle, TfHandle):
         callback: Callable[[M], None],
         finite: str = "",
         on_invalid: Callable[[], None] | None = None,
+        latest_only: bool = False,
     ) -> Subscriber:
         """Have ``callback(message)`` called for every message on a topic.
 
@@ -181,15 +182,24 @@ class NodeHandle(TimeHandle, TfHandle):
             Other messages are dropped with a warning, and
         on_invalid : callable, optional
             is called instead, without arguments.
+        latest_only : bool, optional
+            Only the latest message counts, and not at once. Those of other processes wait for the
+            next timer of this one, at most 50 ms of real time: it need not wake up for each of
+            them. Others in this process are told first.
         """
         if finite:
             callback = self._finite_only(self.resolve(topic), finite, callback, on_invalid)
         guarded = self.guard(callback)
         submit = self._process.executor.submit
         subscriber = self._process.topics.subscribe(
-            self.resolve(topic), message_type, lambda message: submit(partial(guarded, message))
+            self.resolve(topic),
+            message_type,
+            lambda message: submit(partial(guarded, message)),
+            is_patient=latest_only,
         )
         self._undo.append(subscriber.close)
+        if latest_only:
+            self._undo.append(self._process.let_wait(subscriber))
         return subscriber
 
     def _finite_only(self, topic, field, callback, on_invalid):

@@ -17,6 +17,27 @@ if TYPE_CHECKING:
     from crazyflie_utils.runtime.process import Process
 
 
+class VaryingTimer:
+    """A timer whose period can change; see `NodeHandle.varying_timer`."""
+
+    def __init__(self, begin: Callable[[float], Timer], period: float):
+        self._begin = begin
+        self._period = period
+        self._timer = begin(period)
+
+    def set_period(self, period: float) -> None:
+        """Be due one period, s, from now, and so on; if it is another one than before."""
+        if period != self._period:
+            self._period = period
+            self._timer.stop()
+            self._timer = self._begin(period)
+
+    def stop(self) -> None:
+        """Never be due again; a period that is set later changes nothing."""
+        self._begin = lambda period: self._timer
+        self._timer.stop()
+
+
 class TimeHandle(HandleBase):
     """What a `NodeHandle` knows of time."""
 
@@ -57,6 +78,13 @@ class TimeHandle(HandleBase):
         first tick may be one period late.
         """
         timer = self._process.add_timer(period, self.guard(callback), steady, is_spread)
+        self._undo.append(timer.stop)
+        return timer
+
+    def varying_timer(self, period: float, callback: Callable[[], None]) -> VaryingTimer:
+        """Do the same as `timer`; the period may be changed later."""
+        guarded = self.guard(callback)
+        timer = VaryingTimer(lambda period: self._process.add_timer(period, guarded), period)
         self._undo.append(timer.stop)
         return timer
 

@@ -10,7 +10,7 @@ from crazyflie_utils.runtime.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.runtime.executor import Executor
 from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.runtime.timers import SteadyTimers, Timer, TimerQueue
-from crazyflie_utils.runtime.topics import Topics
+from crazyflie_utils.runtime.topics import Subscriber, Topics
 from crazyflie_utils.runtime.transforms import AHEAD, SIMULATED_AHEAD, Transforms
 from crazyflie_utils.runtime.transport import Transport
 
@@ -43,8 +43,10 @@ class Process:
         self._steady_clock = SteadyClock()
         # The poses of vehicles that are simulated in one tick are one message.
         tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
+        self._steady_queue = TimerQueue(self.executor, *tf)
+        self._steady = SteadyTimers(self._steady_queue, self._steady_clock)
         self._simulated = TimerQueue(self.executor, *tf)
+        self._waiting: list[Subscriber] = []
         self.exit_status: int | None = None
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)
@@ -83,6 +85,28 @@ class Process:
                 raise ValueError("a timer by simulated time needs a period > 0")
             return self._simulated.add(period, work, self.clock.time(), is_spread)
         return self._steady.add(period, work, is_spread)
+
+    def let_wait(self, subscriber: Subscriber) -> Callable[[], None]:
+        """Let messages from other processes wait for the next timer of this one, 50 ms at most.
+
+        Only the last one is delivered. Simulated time may pass too quickly for that: then they
+        come at once.
+
+        Returns
+        -------
+        callable
+            Ends it.
+        """
+        if self.uses_sim_time:
+            return lambda: None
+        self._waiting.append(subscriber)
+        self._steady_queue.first = self._collect
+        subscriber.read_lazily(True, partial(self.executor.submit, self._collect))
+        return partial(self._waiting.remove, subscriber)
+
+    def _collect(self):
+        for subscriber in self._waiting:
+            subscriber.collect()
 
     def next_simulated_deadline(self) -> float:
         """Return when the next timer by simulated time is due, s."""

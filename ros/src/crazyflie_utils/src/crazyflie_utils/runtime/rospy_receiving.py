@@ -6,6 +6,7 @@ import socket
 import struct
 import threading
 import time
+from collections.abc import Callable
 from typing import Any
 
 import genpy
@@ -82,6 +83,9 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
         inbox = _inbox(self, report)
         if inbox.is_lazy:
             inbox.wait()
+            if (remind := inbox.remind) is not None:
+                remind()
+                return []
             return _note(self, inbox.take_waiting(_TURNS))
         messages: list[genpy.Message] = []
         while not (messages or self.done or rospy.core.is_shutdown()):
@@ -112,9 +116,15 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
     tcpros_base.TCPROSTransport._validate_header = validate_type
 
 
-def read_lazily(subscriber: rospy.Subscriber, is_lazy: bool) -> None:
-    """Let messages wait for `collect`, or for 50 ms, unless others subscribe here, too."""
+def read_lazily(
+    subscriber: rospy.Subscriber, is_lazy: bool, remind: Callable[[], None] | None = None
+) -> None:
+    """Let messages wait for `collect`, or for 50 ms, unless others subscribe here, too.
+
+    Then they are delivered, or ``remind()`` is called, with which only the last one is delivered.
+    """
     subscriber.impl.is_lazy = is_lazy
+    subscriber.impl.remind = remind
 
 
 def collect(subscriber: rospy.Subscriber) -> None:
@@ -128,7 +138,8 @@ def collect(subscriber: rospy.Subscriber) -> None:
             # Once: in a flood the connection's own thread is at work as well, and whoever looks
             # something up has no time for all of it.
             messages = _note(connection, inbox.take_waiting(1))
-            implementation.receive_callback(messages, connection)
+            if messages:
+                implementation.receive_callback(messages, connection)
 
 
 def _note(connection, messages):
@@ -193,10 +204,16 @@ class _Inbox:
     @property
     def is_lazy(self) -> bool:
         """Whether messages may wait; see `read_lazily`."""
-        implementation = registration.get_topic_manager().get_subscriber_impl(
-            self.protocol.resolved_name
-        )
+        implementation = self._implementation()
         return getattr(implementation, "is_lazy", False) and len(implementation.callbacks) == 1
+
+    @property
+    def remind(self) -> Callable[[], None] | None:
+        """Who is told of messages that have waited; see `read_lazily`."""
+        return getattr(self._implementation(), "remind", None)
+
+    def _implementation(self):
+        return registration.get_topic_manager().get_subscriber_impl(self.protocol.resolved_name)
 
     def wait(self) -> None:
         """Wait a little, and then for data.
@@ -234,7 +251,7 @@ class _Inbox:
                 self._is_behind = False
             except TransportTerminated as end:
                 self._end = end
-        return self.decoded(frames)
+        return self.decoded(frames if self.remind is None else frames[-1:])
 
     def decoded(self, frames: list[bytes]) -> list[genpy.Message]:
         """Return messages without those that cannot be decoded."""

@@ -78,6 +78,11 @@ class TimerQueue:
         Where their callbacks run.
     before, after : callable, optional
         Called before and after several that are due at once.
+
+    Attributes
+    ----------
+    first : callable or None
+        Called before whatever is due.
     """
 
     def __init__(
@@ -86,6 +91,7 @@ class TimerQueue:
         before: Callable[[], None] | None = None,
         after: Callable[[], None] | None = None,
     ):
+        self.first: Callable[[], None] | None = None
         self._executor = executor
         self._before = before
         self._after = after
@@ -150,6 +156,8 @@ class TimerQueue:
         """
         self._is_running = True
         due = self._take_due(now)
+        if due and self.first is not None:
+            self._executor.submit(self.first)
         are_several = len(due) > 1
         if are_several and self._before is not None:
             self._executor.submit(self._before)

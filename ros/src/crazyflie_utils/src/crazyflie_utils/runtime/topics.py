@@ -23,6 +23,22 @@ class Topic:
         self.message_type = message_type
         self.publishers: list[Publisher] = []
         self.receivers: list[Receiver] = []
+        self._patient: list[Receiver] = []
+
+    def add(self, receiver: Receiver, is_patient: bool) -> None:
+        """Have messages handed to one more subscriber, after others if it is patient."""
+        if is_patient:
+            self._patient = [*self._patient, receiver]
+        self._order([*self.receivers, receiver])
+
+    def remove(self, receiver: Receiver) -> None:
+        """Hand messages to a subscriber no more."""
+        self._patient = [each for each in self._patient if each is not receiver]
+        self._order([each for each in self.receivers if each is not receiver])
+
+    def _order(self, receivers):
+        # Not in place: a message may be on its way to the others.
+        self.receivers = sorted(receivers, key=self._patient.__contains__)
 
     def deliver(self, message: genpy.Message) -> None:
         """Hand a message to every subscriber in this process."""
@@ -117,9 +133,9 @@ class Subscriber:
         """Tell whether anyone, here or outside, is connected and may publish."""
         return bool(self._topic.publishers) or self._external.has_publishers()
 
-    def read_lazily(self, is_lazy: bool) -> None:
-        """Let messages from outside wait for `collect`, though not for long; or not."""
-        self._external.read_lazily(is_lazy)
+    def read_lazily(self, is_lazy: bool, remind: Callable[[], None] | None = None) -> None:
+        """Let messages from outside wait for `collect`; see `ExternalSubscriber.read_lazily`."""
+        self._external.read_lazily(is_lazy, remind)
 
     def collect(self) -> None:
         """Deliver what has come from outside."""
@@ -127,9 +143,7 @@ class Subscriber:
 
     def close(self) -> None:
         """Receive no more."""
-        # Not in place: a message may be on its way to the others.
-        receivers = self._topic.receivers
-        self._topic.receivers = [each for each in receivers if each is not self._receiver]
+        self._topic.remove(self._receiver)
         self._external.close()
 
 
@@ -162,10 +176,12 @@ class Topics:
         message_type: type[genpy.Message],
         receiver: Receiver,
         outside_type: type[genpy.Message] | None = None,
+        is_patient: bool = False,
     ) -> Subscriber:
         """Have ``receiver(message)`` called for every message on a topic.
 
         Messages from outside come as ``outside_type``, a subclass of ``message_type``, if given.
+        Receivers that are patient are called after all others.
 
         Raises
         ------
@@ -173,7 +189,7 @@ class Topics:
             The topic has another type in this process.
         """
         topic = self._topic(name, message_type)
-        topic.receivers.append(receiver)
+        topic.add(receiver, is_patient)
         for publisher in topic.publishers:
             if publisher.latched is not None:
                 receiver(publisher.latched)

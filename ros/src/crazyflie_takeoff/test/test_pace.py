@@ -1,0 +1,76 @@
+"""Server and filter look after a flight less often while all is well, and are quick when not."""
+
+from unittest import mock
+
+import pytest
+from flight_words import thrusts
+from std_msgs.msg import Bool
+from takeoff_helpers import FILTER
+
+from crazyflie_takeoff.flight import FlightStateMachine
+from crazyflie_takeoff.safe_filter import SafeFilter
+from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
+
+
+@pytest.fixture(params=range(5))
+def moment(request, network):
+    """Return a flight at some moment between two looks."""
+    network.advance(0.5 + 0.01 * request.param)
+    return network
+
+
+def count(network, owner, duration=2.0):
+    """Return how often time passes for a part of a node in a second."""
+    with mock.patch.object(owner, "tick", autospec=True, side_effect=owner.tick) as tick:
+        network.advance(duration)
+    return tick.call_count / duration
+
+
+def test_in_flight_there_is_little_to_do(network):
+    network.advance(0.5)
+    assert count(network, FlightStateMachine) == pytest.approx(10, abs=1)
+    assert count(network, SafeFilter) == pytest.approx(25, abs=1)
+    network.call("/land")
+    network.advance(0.1)
+    assert count(network, FlightStateMachine, 1.0) == pytest.approx(100, abs=1)
+
+
+def test_a_landing_begins_at_once(moment):
+    called = moment.time
+    moment.call("/land")
+    moment.advance(0.02)
+    assert moment.on("/ref_descent", called)
+
+
+def test_a_lost_control_is_noticed_in_time(moment):
+    moment.vehicle_node.sees = False
+    last = moment.on("/control/lqr")[-1][0]
+    moment.advance(0.3)
+    taken_over = moment.on("/control/final", last)[0][0]
+    assert 0.1 < taken_over - last < 0.125
+    # From then on every 10 ms.
+    assert len(moment.on("/control/final", taken_over)) >= round((moment.time - taken_over) * 100) - 1
+
+
+def test_a_filter_that_is_to_hold_after_less_is_quicker(network):
+    filters = {**FILTER, "topics/state": "/state", "loss/hold_after": 0.02}
+    network.start("filter", TakeoffControlFilterNode(), filters)
+    network.advance(1.0)
+    network.vehicle_node.sees = False
+    last = network.on("/control/lqr")[-1][0]
+    network.advance(0.2)
+    assert 0.02 < network.on("/control/final", last)[0][0] - last < 0.045
+
+
+def test_a_vehicle_that_tilts_over_is_stopped_at_once(moment):
+    tilted = moment.time
+    moment.process("filter").publish("/state_tilted", Bool(True))
+    moment.advance(0.02)
+    assert thrusts(moment, tilted)[-1] == 0.0
+
+
+def test_one_that_is_below_the_ground_is_stopped_in_time(moment):
+    wrong = moment.time
+    moment.vehicle_node.offset = -2.0
+    moment.advance(0.18)
+    assert thrusts(moment, wrong)[-1] == 0.0

@@ -8,6 +8,7 @@ import rosgraph
 import rosnode
 import rospy
 from processes import composed, small_node
+from slow_master import slow_master
 from small_nodes import SAFE
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
@@ -62,6 +63,28 @@ def test_every_node_of_a_process_says_a_last_word():
         process.signal(signal.SIGINT)
         assert process.wait() == 0
         assert last_word(one) == last_word(two) == SAFE
+
+
+@pytest.mark.parametrize("ask", [interrupt, terminate])
+def test_node_that_is_asked_while_it_registers_ends_after_that(ask):
+    with (
+        slow_master() as (uri, asked, may_go_on),
+        small_node("Ticker", "early", "_time_step:=0.01", f"__master:={uri}") as process,
+    ):
+        assert asked.wait(LIMIT)
+        ask(process, "early")
+        may_go_on.set()
+        assert process.wait() == 0
+    assert "Traceback" not in process.output
+
+
+def test_node_that_is_asked_while_it_waits_for_a_master_ends():
+    with small_node("Ticker", "early", "__master:=http://127.0.0.1:1/") as process:
+        wait_until(lambda: "waiting for a ROS master" in process.output, "it to wait")
+        interrupt(process, "early")
+        assert process.wait() == 1
+    assert "ends before there was a ROS master" in process.output
+    assert "Traceback" not in process.output
 
 
 def test_node_may_end_its_process_with_a_status():

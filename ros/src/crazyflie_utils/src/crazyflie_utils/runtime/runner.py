@@ -95,7 +95,10 @@ def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, No
         ``make_nodes(handle)``, with the handle of that node, returns all nodes by absolute name.
         What it raises ends the process with status 1.
     """
-    _run(begin(default_name), make_nodes)
+    # Before rospy's own handlers, which shut down inside the handler, where any lock may be held
+    # by the very code that was interrupted: a node that registers would hang.
+    signals = _catch_signals()
+    _run(_begin(default_name, signals), make_nodes, signals)
 
 
 class NodeClasses(ParameterType):
@@ -147,12 +150,16 @@ def begin(default_name: str) -> Process:
 
     Exits with status 1 when there is no ROS master.
     """
+    return _begin(default_name, None)
+
+
+def _begin(default_name, signals):
     # rospy's log does not flush: what a node said before it died would be lost in a pipe.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
-    _wait_for_master()
+    _wait_for_master(signals)
     rospy_internals.never_wait_long_to_begin()
-    rospy.init_node(default_name)
+    rospy.init_node(default_name, disable_signals=signals is not None)
     return ros_process()
 
 
@@ -202,7 +209,7 @@ def ros_process() -> Process:
     return Process(transport, use_sim_time)
 
 
-def _wait_for_master():
+def _wait_for_master(signals=None):
     pause = threading.Event()
     waited = 0.0
     while not rosgraph.is_master_online():
@@ -215,9 +222,11 @@ def _wait_for_master():
             )
         pause.wait(0.5)
         waited += 0.5
+        if signals:
+            sys.exit(f"signal {signals[0]}: ends before there was a ROS master")
 
 
-def _run(process, make_nodes):
+def _run(process, make_nodes, signals):
     handle = process.handle(rospy.get_name())
     try:
         with process.transport.starting():
@@ -237,7 +246,6 @@ def _run(process, make_nodes):
     rospy.on_shutdown(ending.run)
     watch = MasterWatch()
     watch.start()
-    signals = _catch_signals()
     _stop_for_nobody()
     # Not in this thread, which must stay free to end a callback that does not.
     threading.Thread(target=process.start, name="start", daemon=True).start()
@@ -302,8 +310,6 @@ def _let_flights_end(process, nodes, flights, signals):
 
 
 def _catch_signals():
-    # rospy's own handlers shut down inside the handler, where any lock may be
-    # held by the very code that was interrupted.
     caught = []
 
     def note(number, _frame):

@@ -49,7 +49,9 @@ def test_a_lost_control_is_noticed_in_time(moment):
     taken_over = moment.on("/control/final", last)[0][0]
     assert 0.1 < taken_over - last < 0.125
     # From then on every 10 ms.
-    assert len(moment.on("/control/final", taken_over)) >= round((moment.time - taken_over) * 100) - 1
+    assert (
+        len(moment.on("/control/final", taken_over)) >= round((moment.time - taken_over) * 100) - 1
+    )
 
 
 def test_a_filter_that_is_to_hold_after_less_is_quicker(network):

@@ -26,7 +26,7 @@ def slow_master():
     asked, may_go_on = threading.Event(), threading.Event()
 
     class Handler(BaseHTTPRequestHandler):
-        def do_POST(self):  # noqa: N802
+        def do_POST(self):
             body = self.rfile.read(int(self.headers["Content-Length"]))
             if b"system.multicall" in body and b"registerPublisher" in body:
                 asked.set()

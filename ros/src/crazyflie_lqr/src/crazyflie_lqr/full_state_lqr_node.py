@@ -1,7 +1,6 @@
 """Full state; a reference of the same type."""
 
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING
 
 from crazyflie_lqr.gain_file import MatrixFile
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
@@ -9,12 +8,16 @@ from crazyflie_msgs.msg import FullStateStamped
 from crazyflie_utils import parameter
 from crazyflie_utils.parameter_types import Integer
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
 
 class FullStateLqrParameters(LinearFeedbackParameters):
     """Parameters of `FullStateLqrNode`."""
 
     x_dim: int = parameter(Integer(12, 12), "length of the state")
-    K: NDArray[np.float64] = parameter(
+    K: "NDArray[np.float64]" = parameter(
         MatrixFile(4, 12), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
     )
 

@@ -7,17 +7,19 @@ accelerates to the right of the heading, positive pitch along it.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from operator import mul
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
-import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_lqr.climb import Climb
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
@@ -73,44 +75,45 @@ def at_rest(x: Components, yaw_index: int) -> list[float]:
 class LinearFeedback:
     """The control law u = u_ref + K e, with e of `heading_error`.
 
+    A subclass overrides `control`; or `law`, which is the same in plain floats and what `control`
+    calls. A process that uses `law` only does without numpy.
+
     Parameters
     ----------
-    K : ndarray, shape (u_dim, x_dim)
+    K : array_like, shape (u_dim, x_dim)
         Gains, with the sign that belongs to the plus.
-    u_ref : ndarray, shape (u_dim,)
+    u_ref : array_like, shape (u_dim,)
         Control at the reference: hover.
     yaw_index : int
         Where the yaw is in the state.
     """
 
-    def __init__(self, K: NDArray[np.float64], u_ref: NDArray[np.float64], yaw_index: int):
+    def __init__(self, K: Iterable[Iterable[float]], u_ref: Iterable[float], yaw_index: int):
         self.K = K
         self.u_ref = u_ref
         self.yaw_index = yaw_index
 
     @property
-    def K(self) -> NDArray[np.float64]:  # noqa: N802
+    def K(self) -> "NDArray[np.float64]":  # noqa: N802
         """Gains, shape (u_dim, x_dim); they may be set, though not changed in place."""
-        return self._K
+        return _array(self._rows)
 
     @K.setter
-    def K(self, K: NDArray[np.float64]) -> None:  # noqa: N802
-        self._K = K
+    def K(self, K: Iterable[Iterable[float]]) -> None:  # noqa: N802
         self._rows = [_floats(row) for row in K]
 
     @property
-    def u_ref(self) -> NDArray[np.float64]:
+    def u_ref(self) -> "NDArray[np.float64]":
         """Control at the reference, shape (u_dim,); it may be set, too."""
-        return self._u_ref_array
+        return _array(self._u_ref)
 
     @u_ref.setter
-    def u_ref(self, u_ref: NDArray[np.float64]) -> None:
-        self._u_ref_array = u_ref
+    def u_ref(self, u_ref: Iterable[float]) -> None:
         self._u_ref = _floats(u_ref)
 
     def control(
-        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
-    ) -> NDArray[np.float64]:
+        self, x: "NDArray[np.float64]", x_ref: "NDArray[np.float64]", time: float
+    ) -> "NDArray[np.float64]":
         """Return the control for a state.
 
         Parameters
@@ -124,8 +127,11 @@ class LinearFeedback:
         -------
         ndarray, shape (u_dim,)
         """
-        error = heading_error(_floats(x), _floats(x_ref), self.yaw_index)
-        return np.array(self._linear(error))
+        return _array(self.law(_floats(x), _floats(x_ref), time))
+
+    def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
+        """Return the same as `control`, from floats and in floats."""
+        return self._linear(heading_error(x, x_ref, self.yaw_index))
 
     def _linear(self, error):
         return [
@@ -174,8 +180,8 @@ class IntegralStateFeedback(LinearFeedback):
 
     def __init__(
         self,
-        K: NDArray[np.float64],
-        u_ref: NDArray[np.float64],
+        K: Iterable[Iterable[float]],
+        u_ref: Iterable[float],
         yaw_index: int,
         integrator_k: Components = (0.0, 0.0, 0.0),
         integrator_limit: Components = (0.0, 0.0, 0.0),
@@ -208,18 +214,15 @@ class IntegralStateFeedback(LinearFeedback):
         self._thrust = self._u_ref[THRUST]
 
     @override
-    def control(
-        self, x: NDArray[np.float64], x_ref: NDArray[np.float64], time: float
-    ) -> NDArray[np.float64]:
+    def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
         """Return the control for a state; see `LinearFeedback.control`.
 
         A state that is not younger than the last one, or comes more than
         `MAX_GAP` after it, adds nothing to the integral.
         """
         dt = self._time_since_last(time)
-        state = _floats(x)
-        reference, climb_thrust = self._follow_climb(state, _floats(x_ref), dt)
-        error = heading_error(state, reference, self.yaw_index)
+        reference, climb_thrust = self._follow_climb(x, x_ref, dt)
+        error = heading_error(x, reference, self.yaw_index)
         u = self._linear(error)
         if not self._is_resting:
             self._integrate(error[:3], dt, u)
@@ -228,7 +231,7 @@ class IntegralStateFeedback(LinearFeedback):
         u[THRUST] += climb_thrust
         u = [min(max(a, b), c) for a, b, c in zip(u, _LEAST, _MOST, strict=True)]
         self._thrust = u[THRUST]
-        return np.array(u)
+        return u
 
     @override
     def take_over(self, previous: Self) -> None:
@@ -264,6 +267,7 @@ class IntegralStateFeedback(LinearFeedback):
         if climb.has_arrived:
             self._climb = None
             return x_ref, 0.0
+        x_ref = [*x_ref]
         x_ref[2], x_ref[5] = climb.z, climb.z_dot
         return x_ref, climb.z_ddot
 
@@ -287,4 +291,11 @@ class IntegralStateFeedback(LinearFeedback):
 
 
 def _floats(vector):
-    return np.asarray(vector, dtype=float).tolist()
+    return [float(each) for each in vector]
+
+
+def _array(numbers):
+    # Here, since most processes do without.
+    import numpy as np
+
+    return np.array(numbers)

@@ -1,10 +1,8 @@
 """ROS interface of every controller that turns a state and a reference into a control."""
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from std_msgs.msg import String
 from typing_extensions import override
 
@@ -18,6 +16,10 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameter_types import TOPIC, Integer, Number
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
 _SAME_CLOCK = 60.0
 """A stamp that is older than this, s, is of another clock and says nothing about an age."""
 
@@ -27,10 +29,10 @@ class LinearFeedbackParameters(Parameters):
 
     x_dim: int = parameter(Integer(7, 7), "length of the state")
     u_dim: int = parameter(Integer(4, 4), "length of the control")
-    K: NDArray[np.float64] = parameter(
+    K: "NDArray[np.float64]" = parameter(
         MatrixFile(4, 7), "gain file, `u_dim` rows of `x_dim` numbers", name="K_file", live=True
     )
-    u_ref: NDArray[np.float64] = parameter(
+    u_ref: "NDArray[np.float64]" = parameter(
         VectorFile(4),
         "control at the reference, `u_dim` numbers in one row or one column",
         name="u_ref_file",
@@ -75,7 +77,8 @@ class LinearFeedbackNode(Node):
     """Answer every state with a control that leads towards the reference.
 
     A subclass describes its state in class attributes, and may override
-    `complete_reference` and `make_controller`.
+    `complete_reference` and `make_controller`. Where neither `complete_reference` nor the
+    controller's `control` is overridden, no arrays are made.
 
     Attributes
     ----------
@@ -85,6 +88,8 @@ class LinearFeedbackNode(Node):
         `LinearFeedbackParameters` or a subclass.
     yaw_index : int
         Where the yaw is in the state, which begins with position and velocity.
+    reference_tail : tuple of float
+        What the state has behind the fields of a reference.
     """
 
     needed_in_flight = True
@@ -93,6 +98,7 @@ class LinearFeedbackNode(Node):
     reference_type: type
     parameters_type: type[LinearFeedbackParameters] = LinearFeedbackParameters
     yaw_index: int
+    reference_tail: tuple[float, ...] = ()
 
     def __init__(self) -> None:
         self._reference = GuardedReference(self.yaw_index, report=self._warn_of_jump)
@@ -100,7 +106,7 @@ class LinearFeedbackNode(Node):
         self._is_flown = False
         self._ground_guess = GroundGuess()
 
-    def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
+    def complete_reference(self, reference: "NDArray[np.float64]") -> "NDArray[np.float64]":
         """Return the reference state, shape (x_dim,), that a reference message means.
 
         Parameters
@@ -108,7 +114,9 @@ class LinearFeedbackNode(Node):
         reference : ndarray, shape (number of fields,)
             The fields of the message.
         """
-        return reference
+        import numpy as np
+
+        return np.append(reference, self.reference_tail)
 
     def make_controller(self, parameters: Any) -> LinearFeedback:
         """Return the control law, at the start and after a change of live parameters.
@@ -123,7 +131,8 @@ class LinearFeedbackNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(self.parameters_type, self._reconfigure)
-        self._controller = self.make_controller(self._parameters)
+        self._completes_itself = _overrides(self, LinearFeedbackNode, "complete_reference")
+        self._set_controller(self.make_controller(self._parameters))
         self._reference.max_jump = self._parameters.max_jump
 
     @override
@@ -146,8 +155,21 @@ class LinearFeedbackNode(Node):
     def _reconfigure(self, parameters):
         controller = self.make_controller(parameters)
         controller.take_over(self._controller)
-        self._controller = controller
+        self._set_controller(controller)
         self._reference.max_jump = parameters.max_jump
+
+    def _set_controller(self, controller):
+        uses_arrays = _overrides(controller, LinearFeedback, "control")
+        if uses_arrays or self._completes_itself:
+            # Now, since it takes a tenth of a second.
+            import numpy  # noqa: F401
+        self._controller = controller
+        self._law = self._control_by_arrays if uses_arrays else controller.law
+
+    def _control_by_arrays(self, x, x_ref, time):
+        import numpy as np
+
+        return self._controller.control(np.array(x), np.array(x_ref), time).tolist()
 
     def _on_reference(self, message):
         x_ref = self._completed(message)
@@ -164,7 +186,9 @@ class LinearFeedbackNode(Node):
             self._controller.take_off()
 
     def _completed(self, message):
-        return [float(each) for each in self.complete_reference(to_vector(message.state))]
+        if self._completes_itself:
+            return [float(each) for each in self.complete_reference(to_vector(message.state))]
+        return [*to_tuple(message.state), *self.reference_tail]
 
     def _on_invalid_reference(self):
         self._reference.invalidate(self._handle.time())
@@ -196,7 +220,7 @@ class LinearFeedbackNode(Node):
         if self._flight_state is None:
             self._guess_flight(x, x_ref)
         time = message.header.stamp.to_sec()
-        u = self._controller.control(np.array(x), np.array(x_ref), time).tolist()
+        u = self._law(x, x_ref, time)
         if not all(map(math.isfinite, u)):
             self._handle.warn(
                 f"the control {u} is not finite and is not sent", throttle=1.0, key="not finite"
@@ -224,3 +248,7 @@ class LinearFeedbackNode(Node):
 
     def _warn_of_jump(self, text):
         self._handle.warn(text, throttle=1.0, key="jump")
+
+
+def _overrides(instance, base, name):
+    return getattr(type(instance), name) is not getattr(base, name)

@@ -1,7 +1,5 @@
 """Position, velocity and yaw state; a reference without yaw."""
 
-import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
@@ -45,11 +43,8 @@ class PositionVelocityYawStateLiftLqrNode(LinearFeedbackNode):
     reference_type = PositionVelocityStateStamped
     parameters_type = LiftLqrParameters
     yaw_index = 6
-
-    @override
-    def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the reference with yaw 0."""
-        return np.append(reference, 0.0)
+    # The reference has no yaw; it is 0.
+    reference_tail: tuple[float, ...] = (0.0,)
 
     @override
     def make_controller(self, parameters: LiftLqrParameters) -> IntegralStateFeedback:

@@ -1,9 +1,5 @@
 """The controller of the hover examples, with limits and integrator, at a heading of choice."""
 
-import numpy as np
-from numpy.typing import NDArray
-from typing_extensions import override
-
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
 )
@@ -17,8 +13,4 @@ class HeadingLiftLqrNode(PositionVelocityYawStateLiftLqrNode):
     """
 
     reference_type = PositionVelocityYawStateStamped
-
-    @override
-    def complete_reference(self, reference: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the reference as it is: it has a yaw."""
-        return reference
+    reference_tail = ()

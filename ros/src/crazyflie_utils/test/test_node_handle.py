@@ -108,6 +108,22 @@ def test_a_timer_whose_period_varies(process, handle):
     assert len(moments) == 4
 
 
+def test_only_the_latest_message_comes_before_timers_and_services(process, handle):
+    seen = []
+    handle.subscribe("a", String, lambda message: seen.append(message.data), latest_only=True)
+    handle.timer(1.0, lambda: seen.append("tick"))
+    handle.advertise_service("go", Trigger, lambda _: seen.append("go") or TriggerResponse())
+    for word in ("1", "2", "3"):
+        process.publish("/ns/a", String(word))
+    assert seen == []
+    process.advance(1.0)
+    assert seen == ["3", "tick"]
+    process.publish("/ns/a", String("4"))
+    process.call("/ns/go", None)
+    process.advance(1.0)
+    assert seen[2:] == ["4", "go", "tick"]
+
+
 def test_timers_go_on_after_a_reset_of_time(process, handle):
     moments = []
     handle.timer(0.5, lambda: moments.append(handle.time()))

@@ -95,15 +95,20 @@ def test_those_that_are_spread_are_due_one_after_the_other(queue):
     assert ticks == [0, 5]
 
 
-def test_what_is_first_comes_before_whatever_is_due(queue):
-    done = []
-    queue.first = lambda: done.append("first")
-    for name in ("a", "b"):
-        queue.add(1.0, lambda name=name: done.append(name), now=0.0)
-    run(queue, 0.5)
-    assert done == []
-    run(queue, 1.0)
-    assert done == ["first", "a", "b"]
+def test_those_that_may_be_early_are_due_at_the_same_moments(queue):
+    due = []
+    queue.add(0.01, lambda: None, now=0.003)
+    run(queue, 0.013)
+    for name in "abcde":
+        queue.add(0.04, lambda name=name: due.append(name), 0.017, True, may_be_early=True)
+    queue.add(0.01, lambda: due.append("quick"), 0.0185, may_be_early=True)
+    moments = {}
+    while queue.next_deadline() < 0.06:
+        now = queue.next_deadline()
+        before = len(due)
+        queue.run_due(now)
+        moments[round(now * 1000)] = "".join(sorted(due[before:]))
+    assert moments == {23: "aequick", 33: "bquick", 43: "cquick", 53: "dquick"}
 
 
 def test_missed_ticks_are_skipped_and_the_phase_is_kept(queue):

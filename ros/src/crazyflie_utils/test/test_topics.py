@@ -160,19 +160,6 @@ def test_publisher_knows_its_topic(topics):
     assert topics.publisher("/a", String, latch=False).topic == "/a"
 
 
-def test_patient_subscribers_are_told_last(topics):
-    received = []
-    patient = topics.subscribe("/a", String, lambda _: received.append("patient"), is_patient=True)
-    for name in ("first", "second"):
-        topics.subscribe("/a", String, lambda _, name=name: received.append(name))
-    publisher = topics.publisher("/a", String, latch=False)
-    publisher.publish(String("x"))
-    assert received == ["first", "second", "patient"]
-    patient.close()
-    publisher.publish(String("y"))
-    assert received[3:] == ["first", "second"]
-
-
 def test_who_has_unsubscribed_is_told_no_more(topics, world):
     received = []
     first = topics.subscribe("/a", String, lambda message: received.append("first"))

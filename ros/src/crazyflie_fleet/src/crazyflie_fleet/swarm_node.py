@@ -131,7 +131,8 @@ class SwarmNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(SwarmParameters)
-        if not is_memoryless(self._parameters.K, self._parameters.u_ref):
+        self._K, self._u_ref = np.array(self._parameters.K), np.array(self._parameters.u_ref)
+        if not is_memoryless(self._K, self._u_ref):
             raise ParameterError(
                 f"{handle.name}: the gains' height loop overshoots, so that each vehicle needs a "
                 "controller of its own; fly it with together:=false"
@@ -256,10 +257,7 @@ class SwarmNode(Node):
         if not found:
             return
         numbers, x_refs = zip(*found, strict=True)
-        parameters = self._parameters
-        controls = batch_control(
-            parameters.K, parameters.u_ref, estimates[list(numbers)], np.array(x_refs)
-        )
+        controls = batch_control(self._K, self._u_ref, estimates[list(numbers)], np.array(x_refs))
         header = Header(0, header.stamp, "")
         for number, row in zip(numbers, controls.tolist(), strict=True):
             self._controls[number].publish(control_message(header, row))

@@ -157,7 +157,7 @@ class SafeFilter(Generic[Control]):
         """Whether nothing can happen within half the time for which it holds on."""
         is_heard = self._silence < 0.5 * self._patience.hold or self._is_on_ground
         is_settled = self.mode is Mode.PASSING and self._return_age >= RETURN_TIME
-        is_well = not (self._is_tilted or self._position_limit.is_wrong)
+        is_well = not (self._has_to_look or self._is_tilted or self._position_limit.is_wrong)
         return is_settled and is_heard and is_well
 
     @property

@@ -12,6 +12,7 @@ from crazyflie_utils.parameter_types import ParameterType
 from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters, read_parameter
 from crazyflie_utils.runtime.handle_tf import TfHandle
 from crazyflie_utils.runtime.handle_time import TimeHandle
+from crazyflie_utils.runtime.latest import Latest
 from crazyflie_utils.runtime.services import Reply, pass_on, serve
 from crazyflie_utils.runtime.topics import Publisher, Subscriber
 from crazyflie_utils.vectors import is_finite
@@ -183,23 +184,22 @@ class NodeHandle(TimeHandle, TfHandle):
         on_invalid : callable, optional
             is called instead, without arguments.
         latest_only : bool, optional
-            Only the latest message counts, and not at once. Those of other processes wait for the
-            next timer of this one, at most 50 ms of real time: it need not wake up for each of
-            them. Others in this process are told first.
+            Only the latest message counts, and not before the node's next timer, which it has to
+            have, or service call. Messages of other processes wait in their socket for that, at
+            most 50 ms of real time, so that the process does not wake up for each of them.
         """
         if finite:
             callback = self._finite_only(self.resolve(topic), finite, callback, on_invalid)
         guarded = self.guard(callback)
-        submit = self._process.executor.submit
-        subscriber = self._process.topics.subscribe(
-            self.resolve(topic),
-            message_type,
-            lambda message: submit(partial(guarded, message)),
-            is_patient=latest_only,
-        )
+        submit, topics = self._process.executor.submit, self._process.topics
+        latest = Latest(guarded)
+        receive = latest.take if latest_only else lambda message: submit(partial(guarded, message))
+        subscriber = topics.subscribe(self.resolve(topic), message_type, receive)
         self._undo.append(subscriber.close)
         if latest_only:
-            self._undo.append(self._process.let_wait(subscriber))
+            # Simulated time may pass too quickly to wait for it in a socket.
+            latest.begin(subscriber, submit, is_lazy=not self.uses_sim_time)
+            self._to_deliver.append(latest.deliver)
         return subscriber
 
     def _finite_only(self, topic, field, callback, on_invalid):
@@ -225,7 +225,9 @@ class NodeHandle(TimeHandle, TfHandle):
 
         def begin(request):
             answer: Future[Any] = Future()
-            self._process.executor.submit(partial(serve, callback, request, answer, self))
+            submit = self._process.executor.submit
+            submit(self._deliver_latest)
+            submit(partial(serve, callback, request, answer, self))
             return answer
 
         end = self._process.transport.advertise_service(

@@ -28,6 +28,7 @@ class HandleBase:
         self._faults = Faults(self)
         self._throttle = Throttle()
         self._undo: list[Callable[[], None]] = []
+        self._to_deliver: list[Callable[[], None]] = []
         self._is_closed = False
 
     @property

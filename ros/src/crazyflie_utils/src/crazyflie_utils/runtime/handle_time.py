@@ -20,21 +20,22 @@ if TYPE_CHECKING:
 class VaryingTimer:
     """A timer whose period can change; see `NodeHandle.varying_timer`."""
 
-    def __init__(self, begin: Callable[[float], Timer], period: float):
+    def __init__(self, begin: Callable[[float, bool], Timer], period: float):
         self._begin = begin
         self._period = period
-        self._timer = begin(period)
+        self._timer = begin(period, False)
+        self._is_stopped = False
 
     def set_period(self, period: float) -> None:
-        """Be due one period, s, from now, and so on; if it is another one than before."""
-        if period != self._period:
+        """Be due at most one period, s, from now, and so on; if it is another one than before."""
+        if period != self._period and not self._is_stopped:
             self._period = period
             self._timer.stop()
-            self._timer = self._begin(period)
+            self._timer = self._begin(period, True)
 
     def stop(self) -> None:
-        """Never be due again; a period that is set later changes nothing."""
-        self._begin = lambda period: self._timer
+        """Never be due again."""
+        self._is_stopped = True
         self._timer.stop()
 
 
@@ -77,14 +78,36 @@ class TimeHandle(HandleBase):
         with ``is_spread`` are not, so that many nodes do not all report at the same moment; their
         first tick may be one period late.
         """
-        timer = self._process.add_timer(period, self.guard(callback), steady, is_spread)
+        timer = self._process.add_timer(period, self._tick(callback), steady, is_spread)
         self._undo.append(timer.stop)
         return timer
 
-    def varying_timer(self, period: float, callback: Callable[[], None]) -> VaryingTimer:
-        """Do the same as `timer`; the period may be changed later."""
+    def _deliver_latest(self):
+        for deliver in self._to_deliver:
+            deliver()
+
+    def _tick(self, callback):
         guarded = self.guard(callback)
-        timer = VaryingTimer(lambda period: self._process.add_timer(period, guarded), period)
+
+        def tick():
+            self._deliver_latest()
+            guarded()
+
+        return tick
+
+    def varying_timer(self, period: float, callback: Callable[[], None]) -> VaryingTimer:
+        """Do the same as `timer`; the period may be changed later.
+
+        Then many of them with the same period are due at different moments, as with ``is_spread``.
+        """
+        tick = self._tick(callback)
+
+        def begin(period: float, is_change: bool) -> Timer:
+            return self._process.add_timer(
+                period, tick, is_spread=is_change, may_be_early=is_change
+            )
+
+        timer = VaryingTimer(begin, period)
         self._undo.append(timer.stop)
         return timer
 

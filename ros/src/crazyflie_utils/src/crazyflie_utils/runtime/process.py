@@ -10,7 +10,7 @@ from crazyflie_utils.runtime.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.runtime.executor import Executor
 from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.runtime.timers import SteadyTimers, Timer, TimerQueue
-from crazyflie_utils.runtime.topics import Subscriber, Topics
+from crazyflie_utils.runtime.topics import Topics
 from crazyflie_utils.runtime.transforms import AHEAD, SIMULATED_AHEAD, Transforms
 from crazyflie_utils.runtime.transport import Transport
 
@@ -43,10 +43,8 @@ class Process:
         self._steady_clock = SteadyClock()
         # The poses of vehicles that are simulated in one tick are one message.
         tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady_queue = TimerQueue(self.executor, *tf)
-        self._steady = SteadyTimers(self._steady_queue, self._steady_clock)
+        self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
         self._simulated = TimerQueue(self.executor, *tf)
-        self._waiting: list[Subscriber] = []
         self.exit_status: int | None = None
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)
@@ -71,6 +69,7 @@ class Process:
         work: Callable[[], None],
         steady: bool = False,
         is_spread: bool = False,
+        may_be_early: bool = False,
     ) -> Timer:
         """Add a timer by this process's clock, or by the machine's if ``steady``.
 
@@ -83,30 +82,8 @@ class Process:
         if self.uses_sim_time and not steady:
             if period == 0.0:
                 raise ValueError("a timer by simulated time needs a period > 0")
-            return self._simulated.add(period, work, self.clock.time(), is_spread)
-        return self._steady.add(period, work, is_spread)
-
-    def let_wait(self, subscriber: Subscriber) -> Callable[[], None]:
-        """Let messages from other processes wait for the next timer of this one, 50 ms at most.
-
-        Only the last one is delivered. Simulated time may pass too quickly for that: then they
-        come at once.
-
-        Returns
-        -------
-        callable
-            Ends it.
-        """
-        if self.uses_sim_time:
-            return lambda: None
-        self._waiting.append(subscriber)
-        self._steady_queue.first = self._collect
-        subscriber.read_lazily(True, partial(self.executor.submit, self._collect))
-        return partial(self._waiting.remove, subscriber)
-
-    def _collect(self):
-        for subscriber in self._waiting:
-            subscriber.collect()
+            return self._simulated.add(period, work, self.clock.time(), is_spread, may_be_early)
+        return self._steady.add(period, work, is_spread, may_be_early)
 
     def next_simulated_deadline(self) -> float:
         """Return when the next timer by simulated time is due, s."""

@@ -78,11 +78,6 @@ class TimerQueue:
         Where their callbacks run.
     before, after : callable, optional
         Called before and after several that are due at once.
-
-    Attributes
-    ----------
-    first : callable or None
-        Called before whatever is due.
     """
 
     def __init__(
@@ -91,7 +86,6 @@ class TimerQueue:
         before: Callable[[], None] | None = None,
         after: Callable[[], None] | None = None,
     ):
-        self.first: Callable[[], None] | None = None
         self._executor = executor
         self._before = before
         self._after = after
@@ -104,7 +98,12 @@ class TimerQueue:
         self._is_stopped = False
 
     def add(
-        self, period: float, work: Callable[[], None], now: float, is_spread: bool = False
+        self,
+        period: float,
+        work: Callable[[], None],
+        now: float,
+        is_spread: bool = False,
+        may_be_early: bool = False,
     ) -> Timer:
         """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
 
@@ -112,7 +111,8 @@ class TimerQueue:
         since the first timer began, so that many of them need not wake the process up often.
         Those that are to be spread are due at different ones of such moments, 10 ms apart; the
         first deadline comes up to one period later. What is added later may be waited for, and is
-        not delayed.
+        not delayed. But where the first deadline may be early, it is at such a moment all the
+        same, spread or not.
 
         Raises
         ------
@@ -122,7 +122,11 @@ class TimerQueue:
         if not 0.0 <= period < math.inf:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
         with self._lock:
-            timer = Timer(period, work, self._begin(period, now, is_spread))
+            if may_be_early and period > 0.0:
+                begin = self._next_moment(period, now, is_spread) - period
+            else:
+                begin = self._begin(period, now, is_spread)
+            timer = Timer(period, work, begin)
             timer.number = next(self._order)
             timer.stopped = self._is_stopped
             self._push(timer)
@@ -132,10 +136,18 @@ class TimerQueue:
         if self._is_running or period == 0.0:
             return now
         if is_spread:
-            slot = self._spread[period] % max(round(period / _SLOT), 1)
-            self._spread[period] += 1
-            return self._next_multiple(_SLOT, now) + slot * _SLOT
+            return self._next_multiple(_SLOT, now) + self._next_slot(period)
         return self._next_multiple(period, now) if period <= _TOGETHER else now
+
+    def _next_moment(self, period, now, is_spread):
+        first = self._next_multiple(_SLOT, now) + (self._next_slot(period) if is_spread else 0.0)
+        # Of the moments of its phase, the first one after now.
+        return first - math.floor((first - now - _TOLERANCE) / period) * period
+
+    def _next_slot(self, period):
+        slot = self._spread[period] % max(round(period / _SLOT), 1)
+        self._spread[period] += 1
+        return slot * _SLOT
 
     def _next_multiple(self, period, now):
         if self._origin is None or now < self._origin:
@@ -156,8 +168,6 @@ class TimerQueue:
         """
         self._is_running = True
         due = self._take_due(now)
-        if due and self.first is not None:
-            self._executor.submit(self.first)
         are_several = len(due) > 1
         if are_several and self._before is not None:
             self._executor.submit(self._before)
@@ -227,9 +237,15 @@ class SteadyTimers:
         """Begin to fire."""
         self._thread.start()
 
-    def add(self, period: float, work: Callable[[], None], is_spread: bool = False) -> Timer:
+    def add(
+        self,
+        period: float,
+        work: Callable[[], None],
+        is_spread: bool = False,
+        may_be_early: bool = False,
+    ) -> Timer:
         """Add a timer; its first deadline is one period from now, or see `TimerQueue.add`."""
-        timer = self._queue.add(period, work, self._clock.time(), is_spread)
+        timer = self._queue.add(period, work, self._clock.time(), is_spread, may_be_early)
         self._tell()
         return timer
 

@@ -23,22 +23,6 @@ class Topic:
         self.message_type = message_type
         self.publishers: list[Publisher] = []
         self.receivers: list[Receiver] = []
-        self._patient: list[Receiver] = []
-
-    def add(self, receiver: Receiver, is_patient: bool) -> None:
-        """Have messages handed to one more subscriber, after others if it is patient."""
-        if is_patient:
-            self._patient = [*self._patient, receiver]
-        self._order([*self.receivers, receiver])
-
-    def remove(self, receiver: Receiver) -> None:
-        """Hand messages to a subscriber no more."""
-        self._patient = [each for each in self._patient if each is not receiver]
-        self._order([each for each in self.receivers if each is not receiver])
-
-    def _order(self, receivers):
-        # Not in place: a message may be on its way to the others.
-        self.receivers = sorted(receivers, key=self._patient.__contains__)
 
     def deliver(self, message: genpy.Message) -> None:
         """Hand a message to every subscriber in this process."""
@@ -143,7 +127,9 @@ class Subscriber:
 
     def close(self) -> None:
         """Receive no more."""
-        self._topic.remove(self._receiver)
+        # Not in place: a message may be on its way to the others.
+        receivers = self._topic.receivers
+        self._topic.receivers = [each for each in receivers if each is not self._receiver]
         self._external.close()
 
 
@@ -176,12 +162,10 @@ class Topics:
         message_type: type[genpy.Message],
         receiver: Receiver,
         outside_type: type[genpy.Message] | None = None,
-        is_patient: bool = False,
     ) -> Subscriber:
         """Have ``receiver(message)`` called for every message on a topic.
 
         Messages from outside come as ``outside_type``, a subclass of ``message_type``, if given.
-        Receivers that are patient are called after all others.
 
         Raises
         ------
@@ -189,7 +173,7 @@ class Topics:
             The topic has another type in this process.
         """
         topic = self._topic(name, message_type)
-        topic.add(receiver, is_patient)
+        topic.receivers.append(receiver)
         for publisher in topic.publishers:
             if publisher.latched is not None:
                 receiver(publisher.latched)

@@ -188,9 +188,10 @@ class FakeProcess(Process):
         work: Callable[[], None],
         steady: bool = False,
         is_spread: bool = False,
+        may_be_early: bool = False,
     ) -> Timer:
         """Add a timer; the machine's time, too, is moved by hand here."""
-        return super().add_timer(period, work, is_spread=is_spread)
+        return super().add_timer(period, work, is_spread=is_spread, may_be_early=may_be_early)
 
     def publish(self, topic: str, message: genpy.Message) -> None:
         """Publish from outside the process."""

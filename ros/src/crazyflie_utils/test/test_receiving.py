@@ -58,7 +58,7 @@ def test_a_flood_is_read_in_turns(publisher):
 
 def test_where_only_the_latest_counts_others_are_not_read(publisher, monkeypatch):
     here, connection = publisher
-    monkeypatch.setattr(_Inbox, "remind", lambda: None)
+    monkeypatch.setattr(_Inbox, "reminders", [lambda: None])
     inbox = inbox_of(connection)
     assert inbox.take_waiting(1) == []
     here.sendall(b"".join(frame(Int64(number)) for number in range(5)) + frame(Int64(5))[:7])

@@ -7,10 +7,10 @@ import platform
 import sys
 from pathlib import Path
 
-from crazyflie_dev.bench import batch, hover, simulated, start, swarm
+from crazyflie_dev.bench import batch, hover, machine, simulated, start, swarm
 from crazyflie_dev.bench.row import NotMeasuredError, Row
 
-ROWS = [*hover.ROWS, *simulated.ROWS, *start.ROWS, *swarm.ROWS, *batch.ROWS]
+ROWS = [*machine.ROWS, *hover.ROWS, *simulated.ROWS, *start.ROWS, *swarm.ROWS, *batch.ROWS]
 
 
 def measure(rows: list[Row]) -> list[dict[str, object]]:
@@ -50,12 +50,12 @@ def main() -> int:
     rows = [row for row in ROWS if row.name.startswith(chosen)]
     results = measure(rows)
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    machine = {
+    about = {
         "processor": platform.machine(),
         "cores": os.cpu_count(),
         "load of the last minutes": os.getloadavg()[2],
     }
-    text = json.dumps({"machine": machine, "rows": results}, indent=2)
+    text = json.dumps({"machine": about, "rows": results}, indent=2)
     options.out.write_text(text + "\n")
     print(f"data: {options.out}")
     return 0

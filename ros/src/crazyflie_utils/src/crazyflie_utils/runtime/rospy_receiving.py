@@ -83,8 +83,9 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
         inbox = _inbox(self, report)
         if inbox.is_lazy:
             inbox.wait()
-            if (remind := inbox.remind) is not None:
-                remind()
+            if reminders := inbox.reminders:
+                for remind in reminders:
+                    remind()
                 return []
             return _note(self, inbox.take_waiting(_TURNS))
         messages: list[genpy.Message] = []
@@ -123,8 +124,11 @@ def read_lazily(
 
     Then they are delivered, or ``remind()`` is called, with which only the last one is delivered.
     """
-    subscriber.impl.is_lazy = is_lazy
-    subscriber.impl.remind = remind
+    # It is shared with those who have subscribed here before, or will.
+    implementation = subscriber.impl
+    implementation.is_lazy = is_lazy
+    if remind is not None:
+        implementation.reminders = [*getattr(implementation, "reminders", ()), remind]
 
 
 def collect(subscriber: rospy.Subscriber) -> None:
@@ -208,9 +212,9 @@ class _Inbox:
         return getattr(implementation, "is_lazy", False) and len(implementation.callbacks) == 1
 
     @property
-    def remind(self) -> Callable[[], None] | None:
+    def reminders(self) -> list[Callable[[], None]]:
         """Who is told of messages that have waited; see `read_lazily`."""
-        return getattr(self._implementation(), "remind", None)
+        return getattr(self._implementation(), "reminders", [])
 
     def _implementation(self):
         return registration.get_topic_manager().get_subscriber_impl(self.protocol.resolved_name)
@@ -251,7 +255,7 @@ class _Inbox:
                 self._is_behind = False
             except TransportTerminated as end:
                 self._end = end
-        return self.decoded(frames if self.remind is None else frames[-1:])
+        return self.decoded(frames[-1:] if self.reminders else frames)
 
     def decoded(self, frames: list[bytes]) -> list[genpy.Message]:
         """Return messages without those that cannot be decoded."""

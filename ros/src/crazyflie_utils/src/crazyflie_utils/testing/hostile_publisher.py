@@ -68,7 +68,9 @@ class HostilePublisher:
         }
         self._sockets: list[socket.socket] = []
         self.accepted = 0
-        """How many connections have been made so far."""
+        """How many connections have been made so far,"""
+        self.refused = 0
+        """and how many of them came too early."""
         self._server = socket.create_server((_ADDRESS, 0))
         self._slave = SimpleXMLRPCServer((_ADDRESS, 0), logRequests=False)
         port = self._server.getsockname()[1]
@@ -122,6 +124,7 @@ class HostilePublisher:
                         refusal = {"error": f"this is not a publisher of [{self._topic}]"}
                         write_ros_handshake_header(connection, refusal)
                         connection.close()
+                        self.refused += 1
                         continue
                     write_ros_handshake_header(connection, self._header)
                     self._sockets.append(connection)

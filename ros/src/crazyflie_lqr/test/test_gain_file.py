@@ -1,5 +1,7 @@
 """Gain files: what can be read, and the messages about what cannot."""
 
+import copy
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -138,3 +140,4 @@ def test_gains_have_no_more_than_arrays(write):
     with pytest.raises(AttributeError, match="gain"):
         gains.gain  # noqa: B018
     assert not hasattr(gains, "__fspath__")
+    assert list(copy.deepcopy(gains)) == [1.0]

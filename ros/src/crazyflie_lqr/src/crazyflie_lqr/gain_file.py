@@ -55,7 +55,7 @@ class Gains:
         return np.array(self._numbers, dtype)
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):
+        if name.startswith("_"):
             raise AttributeError(name)
         return getattr(self.__array__(), name)
 

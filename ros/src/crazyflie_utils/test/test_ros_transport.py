@@ -1,14 +1,16 @@
-"""How long the caller of a service waits."""
+"""How long the caller of a service waits, and how connections come about."""
 
 import itertools
 import threading
 from concurrent.futures import Future
+from types import SimpleNamespace
 
 import pytest
+from rospy.impl import registration
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from crazyflie_utils import ServiceError
-from crazyflie_utils.runtime import ros_transport
+from crazyflie_utils.runtime import ros_transport, rospy_internals
 from crazyflie_utils.runtime.ros_transport import RosTransport, wait_for_answer
 
 
@@ -70,3 +72,32 @@ def test_calls_that_nobody_answers_do_not_pile_up(monkeypatch):
     assert other.done()
     revived = transport.call_service("/slow", Empty, EmptyRequest(), 20.0)
     assert revived.result(timeout=20.0) == EmptyResponse()
+
+
+# Connections.
+
+
+def test_a_publisher_is_connected_to_by_one_thread_at_a_time():
+    rospy_internals.connect_once()
+    entered, may_return = threading.Semaphore(0), threading.Semaphore(0)
+
+    def connect(topic, uri):
+        entered.release()
+        assert may_return.acquire(timeout=60.0)
+        return 1, "", 0
+
+    manager = registration.RegManager(SimpleNamespace(_connect_topic=connect, done=False))
+    threads = [
+        threading.Thread(target=manager._connect_topic_thread, args=("/a", uri), daemon=True)
+        for uri in ("http://x", "http://x", "http://y")
+    ]
+    for thread in threads:
+        thread.start()
+    assert entered.acquire(timeout=60.0)
+    assert entered.acquire(timeout=60.0)
+    # One to each publisher; the third waits.
+    assert not entered.acquire(timeout=0.2)
+    may_return.release(3)
+    for thread in threads:
+        thread.join(60.0)
+    assert entered.acquire(blocking=False)

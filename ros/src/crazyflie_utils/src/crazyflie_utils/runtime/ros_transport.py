@@ -87,6 +87,7 @@ class RosTransport(Transport):
         rospy_sending.never_wait_for_subscribers()
         rospy_internals.never_fail_to_log()
         rospy_internals.check_topics_in_turns()
+        rospy_internals.connect_once()
         self._remappings = rospy_internals.take_over_remappings()
         self._calls: dict[str, threading.Semaphore] = {}
         self._services_at_start: dict[str, str] | None = None

@@ -9,6 +9,7 @@ import functools
 import http.client
 import threading
 import time
+import weakref
 import xmlrpc.client
 from collections.abc import Callable, Hashable, Iterator
 from types import SimpleNamespace
@@ -66,6 +67,28 @@ def check_topics_in_turns() -> None:
             topic.check()
 
     rospy.topics._TopicManager.check_all = check_some
+
+
+@functools.cache
+def connect_once() -> None:
+    """Connect to a publisher of a topic once, however often the master tells of it meanwhile.
+
+    rospy makes a connection for each time. The subscriber then keeps the one it made last, the
+    publisher the one that came last; where these are not the same, both are closed and nothing is
+    heard any more.
+    """
+    connect = registration.RegManager._connect_topic_thread
+    turns: weakref.WeakValueDictionary[tuple[str, str], Any] = weakref.WeakValueDictionary()
+    guard = threading.Lock()
+
+    def connect_in_turn(self, topic, uri):
+        with guard:
+            turn = turns.setdefault((topic, uri), threading.Lock())
+        # Whoever comes second finds the connection.
+        with turn:
+            connect(self, topic, uri)
+
+    registration.RegManager._connect_topic_thread = connect_in_turn
 
 
 @functools.cache

@@ -130,6 +130,9 @@ def test_gains_are_an_array_to_who_calculates_with_them(write):
     assert (len(K), K.shape, K[1, 0], K[:, 1].tolist()) == (2, (2, 2), 3.0, [2.0, 4.0])
     assert (K == array).all()
     assert not (K != array).any()
+    assert (K < 5.0).all()
+    assert (K**2 >= array).all()
+    np.testing.assert_array_equal(2.0**K, 2.0**array)
     assert list(K) == [[1.0, 2.0], [3.0, 4.0]]
     assert np.asarray(K, dtype=int).dtype == int
     assert VectorFile(3)(write("1\n2\n3\n")).sum() == 6.0

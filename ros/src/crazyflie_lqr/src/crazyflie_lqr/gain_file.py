@@ -68,10 +68,10 @@ def _as_array(name):
 
 
 # Python looks these up in the class only.
-for _name in ("add", "sub", "mul", "truediv", "matmul"):
+for _name in ("add", "sub", "mul", "truediv", "pow", "matmul"):
     for _side in ("", "r"):
         setattr(Gains, f"__{_side}{_name}__", _as_array(f"__{_side}{_name}__"))
-for _name in ("neg", "abs", "eq", "ne", "getitem"):
+for _name in ("neg", "abs", "eq", "ne", "lt", "le", "gt", "ge", "getitem"):
     setattr(Gains, f"__{_name}__", _as_array(f"__{_name}__"))
 
 

@@ -67,6 +67,28 @@ def test_where_only_the_latest_counts_others_are_not_read(publisher, monkeypatch
     assert numbers(inbox.take_waiting(1)) == [5]
 
 
+def test_who_collects_by_themselves_are_not_reminded(publisher, monkeypatch):
+    here, connection = publisher
+    inbox = inbox_of(connection)
+    assert inbox.take_waiting(1) == []
+    now = [10.0]
+    collected = []
+
+    def sleep(duration):
+        now[0] += duration
+        if len(collected) < 2:
+            here.sendall(frame(Int64(len(collected))))
+            collected.extend(numbers(inbox.take_waiting(1)))
+
+    clock = SimpleNamespace(sleep=sleep, monotonic=lambda: now[0])
+    monkeypatch.setattr("crazyflie_utils.runtime.rospy_receiving.time", clock)
+    assert [inbox.wait(), inbox.wait()] == [False, False]
+    assert collected == [0, 1]
+    here.sendall(frame(Int64(2)))
+    assert inbox.wait()
+    assert numbers(inbox.take_waiting(1)) == [2]
+
+
 def test_a_hang_up_is_left_to_the_thread_of_the_connection(publisher):
     here, connection = publisher
     inbox = inbox_of(connection)

@@ -186,7 +186,7 @@ class NodeHandle(TimeHandle, TfHandle):
         latest_only : bool, optional
             Only the latest message counts, and not before the node's next timer, which it has to
             have, or service call. Messages of other processes wait in their socket for that, at
-            most 50 ms of real time, so that the process does not wake up for each of them.
+            most 150 ms of real time, so that the process does not wake up for each of them.
         """
         if finite:
             callback = self._finite_only(self.resolve(topic), finite, callback, on_invalid)

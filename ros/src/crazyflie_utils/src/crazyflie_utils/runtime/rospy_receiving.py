@@ -1,6 +1,7 @@
 """How messages come into a process, whatever publishers send; more of what rospy does not offer."""
 
 import functools
+import math
 import select
 import socket
 import struct
@@ -36,7 +37,10 @@ _TURNS = 16
 is enough."""
 
 _PAUSE = 0.05
-"""How long messages that are read lazily wait to be collected, at most, s."""
+"""How long messages that are read lazily wait to be collected, at most, s;"""
+
+_LATEST_PAUSE = 0.15
+"""and where only the last one counts: less often than their nodes collect them by themselves."""
 
 
 class _Flow:
@@ -82,7 +86,8 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
             raise TransportException("connection not initialized")
         inbox = _inbox(self, report)
         if inbox.is_lazy:
-            inbox.wait()
+            if not inbox.wait():
+                return []
             if reminders := inbox.reminders:
                 for remind in reminders:
                     remind()
@@ -122,7 +127,8 @@ def read_lazily(
 ) -> None:
     """Let messages wait for `collect`, or for 50 ms, unless others subscribe here, too.
 
-    Then they are delivered, or ``remind()`` is called, with which only the last one is delivered.
+    Then they are delivered; or after 150 ms ``remind()`` is called, with which only the last one
+    is delivered.
     """
     # It is shared with those who have subscribed here before, or will.
     implementation = subscriber.impl
@@ -202,6 +208,7 @@ class _Inbox:
         self.sock.setblocking(True)
         # Of what is read lazily.
         self._lock = threading.Lock()
+        self._collected = -math.inf
         self._is_behind = True
         self._end: TransportTerminated | None = None
 
@@ -219,8 +226,13 @@ class _Inbox:
     def _implementation(self):
         return registration.get_topic_manager().get_subscriber_impl(self.protocol.resolved_name)
 
-    def wait(self) -> None:
-        """Wait a little, and then for data.
+    def wait(self) -> bool:
+        """Wait a little, and then for data, unless somebody has collected it meanwhile.
+
+        Returns
+        -------
+        bool
+            Whether nobody has.
 
         Raises
         ------
@@ -230,7 +242,11 @@ class _Inbox:
         if self._end is not None:
             raise self._end
         if not self._is_behind:
-            time.sleep(_PAUSE)
+            pause = _LATEST_PAUSE if self.reminders else _PAUSE
+            rest = self._collected + pause - time.monotonic()
+            time.sleep(rest if rest > 0.0 else pause)
+            if time.monotonic() < self._collected + pause:
+                return False
         try:
             poll = select.poll()
             poll.register(self.sock, select.POLLIN)
@@ -238,6 +254,7 @@ class _Inbox:
         # It may be closed by others at any moment.
         except (OSError, ValueError) as error:
             raise TransportTerminated(str(error)) from None
+        return True
 
     def take_waiting(self, turns: int) -> list[genpy.Message]:
         """Return the messages that are there, read at most so many times.
@@ -245,6 +262,7 @@ class _Inbox:
         A hang-up is left to `wait`.
         """
         frames: list[bytes] = []
+        self._collected = time.monotonic()
         with self._lock:
             try:
                 for _ in range(turns):

@@ -41,8 +41,12 @@ def said(server):
 
 
 def wait_for_words(server, words):
+    """Wait until the status topic says these words, if only for a moment, or says them already."""
+    before = len(server.process.published("/cf1/status")) - 1
+
     def is_said():
         server.process.advance(0.1)
-        return words in said(server)
+        news = server.process.published("/cf1/status")[max(0, before) :]
+        return any(words in message.data for message in news)
 
     wait_until(is_said, words)

@@ -37,11 +37,11 @@ def script(path, *arguments, **options):
     return subprocess.Popen(command, stderr=subprocess.PIPE, text=True, **options)
 
 
-def run(path, *arguments):
+def run(path, *arguments, limit=LIMIT):
     """Run a script to its end; return its exit status and what it has complained of."""
     with script(path, *arguments) as process:
         try:
-            _, errors = process.communicate(timeout=LIMIT)
+            _, errors = process.communicate(timeout=limit)
         except BaseException:
             process.kill()
             raise

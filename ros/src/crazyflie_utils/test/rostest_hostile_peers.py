@@ -287,8 +287,10 @@ def test_those_who_are_silent_or_talk_nonsense_keep_nobody_waiting(handle, warni
     strangers = [socket.create_connection(address(handle)) for _ in range(5)]
     for stranger in strangers[2:]:
         stranger.sendall(struct.pack("<I", 2**31) + bytes(100))
-    answer = handle.call_service("~alive", Trigger, Trigger._request_class(), LIMIT)
-    assert answer.result(LIMIT).message == "yes"
+    # By a connection, as outsiders do.
+    name = handle.resolve("~alive")
+    rospy.wait_for_service(name, LIMIT)
+    assert rospy.ServiceProxy(name, Trigger)().message == "yes"
     for stranger in strangers:
         stranger.close()
 

@@ -166,6 +166,27 @@ def test_calls_of_outsiders(handle, outsiders):
     assert "the ledger is closed" in str(refusal)
 
 
+def test_services_of_this_process_are_called_without_connections(handle, monkeypatch):
+    names = [f"~number{k}" for k in range(150)]
+    for name in names:
+        answer = TriggerResponse(True, name)
+        handle.advertise_service(name, Trigger, lambda request, answer=answer: answer)
+    monkeypatch.delattr(rospy, "ServiceProxy")
+    answers = [handle.call_service(name, Trigger, TriggerRequest(), LIMIT) for name in names]
+    assert [answer.result(LIMIT).message for answer in answers] == names
+
+
+def test_a_service_that_somebody_else_has_taken_over(handle, outsiders):
+    called = []
+    handle.advertise_service("~mine", Trigger, called.append)
+    master = rosgraph.Master("/other")
+    uri = master.lookupService("/ledger/report")
+    master.registerService(handle.resolve("~mine"), uri, "http://127.0.0.1:1/")
+    error = handle.call_service("~mine", Trigger, TriggerRequest(), LIMIT).exception(LIMIT)
+    assert "is not a provider of" in str(error)
+    assert called == []
+
+
 def test_call_of_a_service_that_is_not_there(handle):
     error = handle.call_service("/nowhere", Trigger, TriggerRequest(), 0.1).exception(LIMIT)
     assert isinstance(error, ServiceError)

@@ -1,6 +1,8 @@
 """How long the caller of a service waits, and how connections come about."""
 
 import itertools
+import subprocess
+import sys
 import threading
 from concurrent.futures import Future
 from types import SimpleNamespace
@@ -101,3 +103,16 @@ def test_a_publisher_is_connected_to_by_one_thread_at_a_time():
     for thread in threads:
         thread.join(60.0)
     assert entered.acquire(blocking=False)
+
+
+def test_a_process_may_have_more_topics_than_a_shell_lets_it_have_files():
+    program = """
+import resource
+from crazyflie_utils.runtime import rospy_internals
+
+_, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+resource.setrlimit(resource.RLIMIT_NOFILE, (100, most))
+rospy_internals.allow_many_topics()
+files = [open("/dev/null") for _ in range(200)]
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60.0)

@@ -82,6 +82,7 @@ class RosTransport(Transport):
         self.refused: Counter[Hashable] = Counter()
         self._complaints = Throttle()
         rospy_internals.bear_hostile_newcomers(self._refuse)
+        rospy_internals.allow_many_topics()
         rospy_internals.never_connect_to_oneself()
         rospy_sending.never_wait_for_subscribers()
         rospy_internals.never_fail_to_log()

@@ -7,6 +7,7 @@ not provide for. The rostests of this package notice when a rospy differs.
 import contextlib
 import functools
 import http.client
+import resource
 import threading
 import time
 import weakref
@@ -48,6 +49,18 @@ def never_connect_to_oneself() -> None:
         return endpoint_id == rospy.get_node_uri() or has_connection(self, endpoint_id)
 
     implementation.has_connection = has_connection_or_is_own
+
+
+def allow_many_topics() -> None:
+    """Let this process have as many files open as the system lets it.
+
+    rospy holds one for each topic, and a shell allows 1024 unless told otherwise: too few for
+    forty vehicles.
+    """
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    # Where it is refused, a process with few topics does not need it.
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 @functools.cache

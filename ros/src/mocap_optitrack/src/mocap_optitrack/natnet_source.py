@@ -11,6 +11,7 @@ from typing_extensions import override
 
 from mocap_optitrack import natnet_messages as natnet
 from mocap_optitrack.frames import Frame
+from mocap_optitrack.natnet_network import any_address_may_answer, interface_towards, join_group
 from mocap_optitrack.parameters import NatNetParameters
 from mocap_optitrack.source import Source, SourceError
 
@@ -30,12 +31,20 @@ knows its clients no more."""
 _KEEP_ALIVE = 1.0
 """From one sign of life to the next, without which a server stops sending, s."""
 
+_FOREIGN_AGAIN = 5.0
+"""From one warning about datagrams of other senders than the server to the next, s."""
+
 _LARGEST = 65536
 _THIS_MACHINE = "127.0.0.1"
+_ALL_INTERFACES = "0.0.0.0"
 
 
 class NatNetSource(Source):
     """A NatNet server, unicast or multicast as the server has it.
+
+    UDP is not authenticated, and every machine in the network can send to the ports. Only
+    datagrams from the server's address count: the configured one, else that of the first
+    server that answers, else that of the first frame of the group.
 
     Parameters
     ----------
@@ -54,6 +63,8 @@ class NatNetSource(Source):
         self._warn = warn
         self._sockets: list[socket.socket] = []
         self._server: tuple[str, int] | None = None
+        self._sender: str | None = None
+        self._foreign_told_at: float | None = None
         self._group: tuple[str, int] | None = None
         self._names: dict[int, str] = {}
         self._wants_names = True
@@ -64,13 +75,16 @@ class NatNetSource(Source):
     @override
     def open(self) -> str:
         try:
+            targets = self._targets()
+            self._sender = self._configured_sender(targets)
             self._commands = self._udp_socket()
             self._commands.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-            self._commands.bind(("", 0))
-            self._info = self._ask_for_server() or self._silent_server()
+            self._commands.bind((self._interface(), 0))
+            self._info = self._ask_for_server(targets) or self._silent_server()
             self._group = self._find_group()
             if self._group is not None:
-                self._join(*self._group)
+                address, port = self._group
+                join_group(self._udp_socket(), address, port, self._interface())
             self._heard_at = time.monotonic()
         except OSError as error:
             raise SourceError(f"cannot open a NatNet connection: {error}") from None
@@ -127,8 +141,21 @@ class NatNetSource(Source):
                 f"optitrack_config/server_address {parameters.server_address!r} is unknown: {error}"
             ) from None
 
-    def _ask_for_server(self):
-        targets = self._targets()
+    def _configured_sender(self, targets):
+        if self._parameters.server_address is None or any_address_may_answer(targets[0]):
+            return None
+        return targets[0]
+
+    def _interface(self):
+        if self._parameters.local_address is not None:
+            return self._parameters.local_address
+        # Without a route, sending fails with the reason.
+        with contextlib.suppress(OSError):
+            if self._sender is not None:
+                return interface_towards(self._sender) or _ALL_INTERFACES
+        return _ALL_INTERFACES
+
+    def _ask_for_server(self, targets):
         port = self._parameters.command_port
         if self._parameters.local_address is not None:
             interface = socket.inet_aton(self._parameters.local_address)
@@ -143,12 +170,16 @@ class NatNetSource(Source):
             if not ready:
                 continue
             datagram, sender = self._commands.recvfrom(_LARGEST)
-            # Anybody may send to the port; if nothing else comes, the caller says so.
+            if self._sender not in (None, sender[0]):
+                self._tell_of_foreign(sender[0])
+                continue
+            # What is no answer is skipped; if nothing else comes, the caller says so.
             with contextlib.suppress(natnet.DecodeError):
                 number, payload = natnet.split(datagram)
                 if number == natnet.SERVER_INFO:
                     info = natnet.read_server_info(payload)
                     self._server = sender
+                    self._sender = sender[0]
                     return info
         return None
 
@@ -183,23 +214,6 @@ class NatNetSource(Source):
             return None
         return address, info.data_port or parameters.data_port
 
-    def _join(self, address, port):
-        frames = self._udp_socket()
-        # Other programs on this machine may listen to the same group.
-        frames.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        frames.bind((address, port))
-        membership = socket.inet_aton(address) + socket.inet_aton(self._interface())
-        frames.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
-
-    def _interface(self):
-        if self._parameters.local_address is not None:
-            return self._parameters.local_address
-        if self._server is None:
-            return "0.0.0.0"
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect(self._server)
-            return probe.getsockname()[0]
-
     def _send_requests(self):
         now = time.monotonic()
         if not self._info.is_multicast and _is_due(self._kept_alive_at, _KEEP_ALIVE, now):
@@ -218,14 +232,29 @@ class NatNetSource(Source):
             self._commands.sendto(natnet.request(number, text), self._server)
 
     def _take(self, datagram, sender, arrival):
+        if self._sender not in (None, sender[0]):
+            self._tell_of_foreign(sender[0])
+            return None
         try:
             number, payload = natnet.split(datagram)
             if number == natnet.SERVER_INFO and sender == self._server:
                 self._check(natnet.read_server_info(payload))
-            return self._decode(number, payload, arrival)
+            frame = self._decode(number, payload, arrival)
         except natnet.DecodeError as error:
             self._warn(f"ignoring a datagram from {sender[0]}: {error}")
             return None
+        if frame is not None:
+            self._sender = sender[0]
+        return frame
+
+    def _tell_of_foreign(self, address):
+        now = time.monotonic()
+        if _is_due(self._foreign_told_at, _FOREIGN_AGAIN, now):
+            self._foreign_told_at = now
+            self._warn(
+                f"ignoring a datagram from {address}: the NatNet server is at {self._sender}; if "
+                f"{address} is the server, name it in optitrack_config/server_address"
+            )
 
     def _check(self, info):
         if info != self._info:
@@ -233,7 +262,7 @@ class NatNetSource(Source):
 
     def _decode(self, number, payload, arrival):
         version = self._info.version
-        if number == natnet.MODEL:
+        if number == natnet.MODEL and self._sender is not None:
             self._names = natnet.read_names(payload, version)
             self._wants_names = False
         if number != natnet.FRAME:

@@ -192,14 +192,14 @@ class NatNetParameters(Parameters):
 
     server_address: str | None = parameter(
         TEXT,
-        "natnet: host name or address of the server. Without it the multicast group and this "
-        "machine are asked",
+        "natnet: host name or address of the server, the only one that datagrams are taken from. "
+        "Without it the multicast group and this machine are asked, and the first answer decides",
         None,
     )
     local_address: str | None = parameter(
         Address(),
-        "natnet: address of this machine in the cameras' network. Without it, of the interface "
-        "that leads to the server",
+        "natnet: address of this machine in the cameras' network, the only one that datagrams are "
+        "received at. Without it, that of the interface that leads to the server",
         None,
     )
     multicast_address: str | None = parameter(

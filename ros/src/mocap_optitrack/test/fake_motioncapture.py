@@ -2,12 +2,17 @@
 
 import ctypes
 import signal
+from pathlib import Path
 from types import SimpleNamespace
+
+DONE = Path("done")
+"""Appears in the working folder when a script is over."""
 
 SCRIPTS = {
     # What frames show of "cf1" and "still": x of the position, or None for nothing.
     "127.0.0.1": [(1.0, 5.0), (2.0, 5.0), (3.0, 6.0)],
     "127.0.0.2": [(1.0, 5.0), (1.0, 5.0), (1.0, 5.0)],
+    "127.0.0.6": [(float(number), 5.0) for number in range(20000)],
     "127.0.0.5": [(1.0, 5.0), (float("nan"), 6.0)],
 }
 
@@ -40,6 +45,7 @@ class _Connection:
 
     def waitForNextFrame(self):  # noqa: N802
         if not self._script:
+            DONE.touch()
             hang()
         names = ("cf1", "still")
         self.rigidBodies = {

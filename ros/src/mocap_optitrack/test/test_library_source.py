@@ -3,6 +3,7 @@
 import contextlib
 import math
 import platform
+import signal
 import socket
 import time
 from pathlib import Path
@@ -21,6 +22,7 @@ def _fake_package(tmp_path, monkeypatch):
     fake = Path(__file__).with_name("fake_motioncapture.py")
     (tmp_path / "motioncapture.py").symlink_to(fake)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=":")
+    monkeypatch.chdir(tmp_path)
 
 
 @contextlib.contextmanager
@@ -70,6 +72,30 @@ def test_frames_that_repeat_are_none():
     with connection("127.0.0.2") as source:
         assert frames(source)[0] == []
         assert "no body that moves" in source.silence_hint
+
+
+@pytest.mark.usefixtures("_fake_package")
+def test_frames_that_have_waited_are_as_old_as_they_are():
+    with connection("127.0.0.1") as source:
+        source._worker.wait(LIMIT)
+        ended = time.monotonic()
+        received, _ = frames(source)
+    assert len(received) == 2
+    for frame in received:
+        assert frame.arrival >= ended
+        assert frame.arrival - frame.waited < ended
+
+
+@pytest.mark.usefixtures("_fake_package")
+def test_a_reader_that_stands_still_does_not_hold_up_the_system(tmp_path):
+    with connection("127.0.0.6") as source:
+        assert source._worker.wait(LIMIT) == -signal.SIGALRM
+        assert (tmp_path / "done").exists()
+        received, _ = frames(source)
+    # More than the pipe holds: the newest are missing, and no line is broken.
+    numbers = [frame.bodies[0].position[0] for frame in received]
+    assert 0 < len(numbers) < 20000
+    assert numbers == sorted(numbers)
 
 
 @pytest.mark.usefixtures("_fake_package")

@@ -78,6 +78,13 @@ def test_frames_without_a_time_have_that_of_their_arrival():
     assert seen.time == 12.5
 
 
+def test_frames_that_have_waited_are_older():
+    tracked = tracker(stale_after=0.2)
+    assert tracked.take(Frame(None, None, 12.5, (body(),), waited=0.25)) == []
+    (seen,) = tracked.take(Frame(None, None, 12.5, (body(),), waited=0.125))
+    assert seen.time == 12.375
+
+
 def test_a_frame_that_is_not_new_is_dropped():
     one = tracker()
     assert one.take(frame(body()))

@@ -45,11 +45,14 @@ class Frame(NamedTuple):
     sent : float or None
         When the server sent it, s of the same clock; None like `exposure`.
     arrival : float
-        When it arrived, s of the local clock.
+        When it was received, s of the local clock.
     bodies : tuple of Body
+    waited : float
+        How long it had been on this machine by then, s; for streams without `exposure`.
     """
 
     exposure: float | None
     sent: float | None
     arrival: float
     bodies: tuple[Body, ...]
+    waited: float = 0.0

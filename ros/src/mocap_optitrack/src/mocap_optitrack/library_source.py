@@ -7,11 +7,13 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 
 from typing_extensions import override
 
 from mocap_optitrack import library_worker
+from mocap_optitrack.arrival_times import ArrivalTimes
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.source import Source, SourceError
 
@@ -28,7 +30,8 @@ class LibrarySource(Source):
     """A system that the motioncapture package knows.
 
     The package tells neither when a frame was taken nor which bodies are tracked.
-    So frames have the time of their arrival, and a body counts as tracked when its
+    So frames have the time of their arrival at the package, which `ArrivalTimes` estimates
+    for those that have waited there, and a body counts as tracked when its
     pose is not, to the last bit, the one it had in the frame before: measurements of
     a body at rest differ by their noise, and a system that has lost a body, or its
     cameras, repeats itself.
@@ -49,6 +52,7 @@ class LibrarySource(Source):
         self._clock = clock
         self._worker: subprocess.Popen[bytes] | None = None
         self._received = b""
+        self._times = ArrivalTimes()
         self._last: dict[str, tuple[float, ...]] = {}
 
     @override
@@ -76,12 +80,15 @@ class LibrarySource(Source):
         line = self._read_line(limit)
         if line is None:
             return None
-        arrival = self._clock()
-        bodies = [self._body(*entry) for entry in self._parse(line)]
-        if not any(body.is_tracked for body in bodies):
+        moment, entries = self._parse(line)
+        waited, arrival = time.monotonic() - moment, self._clock()
+        time_of_arrival = self._times.update(moment)
+        bodies = [self._body(*entry) for entry in entries]
+        if time_of_arrival is None or not any(body.is_tracked for body in bodies):
             # Some systems give frames whether they know anything new or not.
             return None
-        return Frame(None, None, arrival, tuple(bodies))
+        waited += moment - time_of_arrival
+        return Frame(None, None, arrival, tuple(bodies), waited)
 
     @property
     @override

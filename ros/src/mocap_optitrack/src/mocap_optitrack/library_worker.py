@@ -1,19 +1,23 @@
 """A process of its own for the motioncapture package.
 
 ``python -m mocap_optitrack.library_worker TYPE HOST`` writes JSON to its standard
-output, one value a line: first null, when it is connected, then for every frame a
-list of [name, x, y, z, qx, qy, qz, qw]; m and z up, as the system has them. When the
-package fails it writes {"error": text} and ends.
+output, one value a line: first null, when it is connected, then for every frame
+[moment, bodies], where moment is when the package returned it, s of time.monotonic(), and
+bodies a list of [name, x, y, z, qx, qy, qz, qw]; m and z up, as the system has them. When
+the package fails it writes {"error": text} and ends. Frames for which the pipe has no room
+are dropped: waiting for the reader would let frames grow old before they have a moment.
 
 Without a server the package may wait for ever, in C++ and with Python's interpreter
 lock held. So nothing in this process can limit it but a signal that kills, and
 nothing else should live in this process.
 """
 
+import contextlib
 import json
 import os
 import signal
 import sys
+import time
 from typing import Any
 
 CONNECT_LIMIT = 10.0
@@ -27,32 +31,58 @@ def main() -> int:
     """Run until the system or the reader goes away; return the exit status."""
     system, host = sys.argv[1:]
     # The package's own messages must not come between the lines.
-    out = os.fdopen(os.dup(sys.stdout.fileno()), "w", buffering=1)
+    lines = _Lines(os.dup(sys.stdout.fileno()))
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
     # Signals that Python handles wait for the lock; these kill, also in C++.
     signal.signal(signal.SIGALRM, signal.SIG_DFL)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
-        _stream(system, host, out)
+        _stream(system, host, lines)
     except BrokenPipeError:
         # Who reads the lines has ended.
         return 0
     except Exception as error:
-        print(json.dumps({"error": str(error)}), file=out)
+        lines.write_last({"error": str(error)})
     return 1
 
 
-def _stream(system, host, out):
+class _Lines:
+    # JSON values to a pipe; one that does not fit at once is completed before the next.
+    def __init__(self, descriptor: int):
+        self._descriptor = descriptor
+        self._rest = b""
+        os.set_blocking(descriptor, False)
+
+    def write(self, value):
+        self._flush()
+        if not self._rest:
+            self._rest = json.dumps(value).encode() + b"\n"
+            self._flush()
+
+    def write_last(self, value):
+        os.set_blocking(self._descriptor, True)
+        while self._rest:
+            self._flush()
+        self.write(value)
+
+    def _flush(self):
+        if self._rest:
+            with contextlib.suppress(BlockingIOError):
+                self._rest = self._rest[os.write(self._descriptor, self._rest) :]
+
+
+def _stream(system, host, lines):
     signal.setitimer(signal.ITIMER_REAL, CONNECT_LIMIT)
     import motioncapture
 
     connection = motioncapture.connect(system, {"hostname": host})
-    print(json.dumps(None), file=out)
+    lines.write(None)
     while True:
         signal.setitimer(signal.ITIMER_REAL, FRAME_LIMIT)
         connection.waitForNextFrame()
+        moment = time.monotonic()
         bodies = connection.rigidBodies.items()
-        print(json.dumps([[name, *pose(body)] for name, body in bodies]), file=out)
+        lines.write([moment, [[name, *pose(body)] for name, body in bodies]])
 
 
 def pose(body: Any) -> list[float]:

@@ -120,7 +120,7 @@ class Tracker:
 
     def _time_of(self, frame):
         if frame.exposure is None:
-            return frame.arrival
+            return frame.arrival - frame.waited
         verdict = self._clock.update(frame.sent, frame.arrival)
         if verdict is Verdict.OLD:
             self._health.repeated()

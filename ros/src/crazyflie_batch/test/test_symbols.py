@@ -50,6 +50,26 @@ def test_all_processors_fly_the_same(monkeypatch, expected, lanes, has_vector_fu
         program.program.cache_clear()
 
 
+def works():
+    """Do nothing: the library is initialized already."""
+
+
+def raises():
+    """Do what llvmlite 0.45 and later do."""
+    raise RuntimeError("llvmlite.binding.initialize() is deprecated and will be removed.")
+
+
+@pytest.mark.parametrize("initialize", [works, raises, None])
+def test_llvmlite_is_initialized_where_it_must_be(monkeypatch, expected, initialize):
+    called = []
+    if initialize is None:
+        monkeypatch.delattr(binding, "initialize")
+    else:
+        monkeypatch.setattr(binding, "initialize", lambda: (called.append(True), initialize()))
+    assert (fly() == expected).all()
+    assert called == [True] * (initialize is not None)
+
+
 def test_what_is_not_known_is_refused():
     emitter = SimpleNamespace(builder=None)
     with pytest.raises(TypeError, match="must not branch"):

@@ -2,7 +2,7 @@
 
 import ctypes
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import lru_cache
 from typing import Any
 
@@ -75,8 +75,9 @@ def program(plan: Plan) -> Program:
 
 def _machine() -> tuple[int, Any, bool]:
     """Return lanes and target of this processor, and whether there are functions of vectors."""
-    # Debian 13's initializes itself.
-    getattr(binding, "initialize", lambda: None)()
+    # Later versions than Debian 12's initialize themselves: theirs raises, or is gone.
+    with suppress(AttributeError, RuntimeError):
+        binding.initialize()
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     features = binding.get_host_cpu_features()

@@ -1,23 +1,35 @@
 """Symbols calculate as floats do, whatever the processor has."""
 
+import contextlib
 import math
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from llvmlite import binding
 
-from crazyflie_batch import Controller, Measurement, program, quadrotor, simulate
+from crazyflie_batch import (
+    Controller,
+    FiniteDifferences,
+    Measurement,
+    program,
+    quadrotor,
+    simulate,
+)
 from crazyflie_batch.elementwise import turn, yaw_from_quaternion
+from crazyflie_batch.flight import Plan
 from crazyflie_batch.symbols import Condition, Emitter
 from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
+from crazyflie_model.dynamics import NearHover
 
 FEATURES = {8: {"avx512f": True}, 4: {"avx2": True}, 2: {}}
 
 
 def fly():
     """Return the states at the end of flights with errors of everything, compiled anew."""
-    program.program.cache_clear()
+    program.clear()
     flights = simulate(
         quadrotor(np.linspace(-0.1, 0.1, 5)),
         Controller(np.tile([0.0, 0.1, 0.0, 0.0, 0.3, 0.0, -0.2], (4, 1))),
@@ -47,7 +59,7 @@ def test_all_processors_fly_the_same(monkeypatch, expected, lanes, has_vector_fu
     try:
         assert fly() == pytest.approx(expected, rel=1e-9, abs=1e-9)
     finally:
-        program.program.cache_clear()
+        program.clear()
 
 
 def works():
@@ -68,6 +80,28 @@ def test_llvmlite_is_initialized_where_it_must_be(monkeypatch, expected, initial
         monkeypatch.setattr(binding, "initialize", lambda: (called.append(True), initialize()))
     assert (fly() == expected).all()
     assert called == [True] * (initialize is not None)
+
+
+def test_threads_that_need_the_same_program_compile_it_once(monkeypatch):
+    compiled = []
+    begun = threading.Barrier(4)
+
+    class Slow(program.Program):
+        def __init__(self, plan):
+            compiled.append(plan)
+            # Time for the others to begin, too, if nothing stops them.
+            with contextlib.suppress(threading.BrokenBarrierError):
+                begun.wait(0.2)
+
+    monkeypatch.setattr(program, "Program", Slow)
+    plan = Plan(NearHover, (), math.inf, FiniteDifferences, 10)
+    program.clear()
+    try:
+        with ThreadPoolExecutor(4) as executor:
+            found = set(executor.map(program.program, [plan] * 4))
+    finally:
+        program.clear()
+    assert len(found) == len(compiled) == 1
 
 
 def test_what_is_not_known_is_refused():

@@ -1,6 +1,7 @@
 """The machine code that flies a group of vehicles, made from the formulas of `flight`."""
 
 import ctypes
+import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import lru_cache
@@ -67,10 +68,23 @@ class Program:
         )
 
 
-@lru_cache(maxsize=16)
+_compiling = threading.Lock()
+
+
 def program(plan: Plan) -> Program:
-    """Return the program for a plan, made once in a process."""
+    """Return the program for a plan, made once in a process, whatever thread asks first."""
+    with _compiling:
+        return _compiled(plan)
+
+
+@lru_cache(maxsize=16)
+def _compiled(plan):
     return Program(plan)
+
+
+def clear() -> None:
+    """Forget all programs, so that they are compiled anew."""
+    _compiled.cache_clear()
 
 
 def _machine() -> tuple[int, Any, bool]:

@@ -2,8 +2,10 @@
 
 import contextlib
 import math
+import re
 import threading
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,13 +16,14 @@ from crazyflie_batch import (
     Controller,
     FiniteDifferences,
     Measurement,
+    Model,
     program,
     quadrotor,
     simulate,
 )
 from crazyflie_batch.elementwise import turn, yaw_from_quaternion
 from crazyflie_batch.flight import Plan
-from crazyflie_batch.symbols import Condition, Emitter
+from crazyflie_batch.symbols import Condition, Emitter, Symbol
 from crazyflie_model.angles import quaternion_from_rpy, rpy_from_quaternion
 from crazyflie_model.dynamics import NearHover
 
@@ -102,6 +105,40 @@ def test_threads_that_need_the_same_program_compile_it_once(monkeypatch):
     finally:
         program.clear()
     assert len(found) == len(compiled) == 1
+
+
+class Power(NearHover):
+    """A model whose rate along x is a power of its height, and whose other rates are numbers."""
+
+    def __init__(self, exponent):
+        self._exponent = exponent
+
+    def rates(self, t, x, u):
+        """See `Dynamics.rates`."""
+        return [(x[2] - 1.5) ** self._exponent, *[0.0] * 6]
+
+
+@pytest.mark.parametrize("exponent", [-3, -1, 0, 1, 2, 5, 2.0, np.int64(4)])
+@pytest.mark.parametrize("z", [0.75, 2.25])
+def test_powers_are_those_of_floats(exponent, z):
+    flights = simulate(
+        Model(partial(Power, exponent)), Controller(np.zeros((4, 7))), x0=(0.0, 0.0, z)
+    )
+    # 10 s, but for the first two ticks, in which nothing has been commanded yet.
+    assert flights.x[0, 0] == pytest.approx(9.99 * (z - 1.5) ** exponent)
+
+
+@pytest.mark.parametrize("exponent", [0.5, -1.5, math.nan, math.inf, "2"])
+def test_powers_that_are_not_whole_are_refused(exponent):
+    symbol = Symbol(None, None)
+    text = f"the exponent {exponent!r}; expected a whole number"
+    with pytest.raises(TypeError, match=re.escape(text)):
+        symbol**exponent
+
+
+def test_a_symbol_does_not_tell_whether_it_is_zero():
+    with pytest.raises(TypeError, match="must not branch"):
+        bool(Symbol(None, None))
 
 
 def test_what_is_not_known_is_refused():

@@ -44,6 +44,9 @@ _OPERATORS: dict[Any, Callable[[Any, Any], Any]] = {
 """Arrive as functions where numpy's own numbers are on the left."""
 
 
+_MUST_NOT_BRANCH = "a formula of a batch must not branch; it chooses with where() or clip()"
+
+
 class Emitter:
     """Writes instructions for vectors of numbers into an LLVM function.
 
@@ -114,17 +117,25 @@ class Condition:
         self.value = value
         self._emitter = emitter
 
-    def __and__(self, other: "Condition") -> "Condition":
-        return Condition(self._emitter, self._emitter.builder.and_(self.value, other.value))
+    def __and__(self, other: "Condition | bool") -> "Condition":
+        return Condition(self._emitter, self._emitter.builder.and_(self.value, self._of(other)))
 
-    def __or__(self, other: "Condition") -> "Condition":
-        return Condition(self._emitter, self._emitter.builder.or_(self.value, other.value))
+    def __or__(self, other: "Condition | bool") -> "Condition":
+        return Condition(self._emitter, self._emitter.builder.or_(self.value, self._of(other)))
+
+    __rand__, __ror__ = __and__, __or__
 
     def __invert__(self) -> "Condition":
         return Condition(self._emitter, self._emitter.builder.not_(self.value))
 
+    def _of(self, other):
+        # What does not depend on a symbol is a bool.
+        if isinstance(other, Condition):
+            return other.value
+        return ir.Constant(self.value.type, [bool(other)] * self.value.type.count)
+
     def __bool__(self) -> bool:
-        raise TypeError("a formula of a batch must not branch; it chooses with where() or clip()")
+        raise TypeError(_MUST_NOT_BRANCH)
 
     def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
         """Take part in ``numpy.where``."""
@@ -173,11 +184,21 @@ class Symbol:
     def __neg__(self) -> "Symbol":
         return self._binary("fsub", -0.0, self)
 
-    def __pow__(self, exponent: int) -> "Symbol":
-        power = self
-        for _ in range(exponent - 1):
+    def __pow__(self, exponent: Any) -> "Symbol":
+        try:
+            count = abs(int(exponent))
+            is_whole = count == abs(exponent)
+        except (TypeError, ValueError, OverflowError):
+            is_whole = False
+        if not is_whole:
+            raise TypeError(f"a formula has the exponent {exponent!r}; expected a whole number")
+        power = Symbol(self._emitter, self._emitter.value(1.0))
+        for _ in range(count):
             power = power * self
-        return power
+        return 1.0 / power if exponent < 0 else power
+
+    def __bool__(self) -> bool:
+        raise TypeError(_MUST_NOT_BRANCH)
 
     def _compare(self, sign: str, other: Any) -> Condition:
         values = self.value, self._emitter.value(other)

@@ -78,12 +78,62 @@ def test_a_state_that_overflows_counts_as_a_crash():
         ({"model": quadrotor([0.0, 0.1, 0.2])}, "mass_error has the shape"),
         ({"model": quadrotor(np.nan)}, "mass_error is not finite"),
         ({"measurement": Measurement(dropout=[0.1] * 3)}, "dropout has the shape"),
+        ({"settle_time": 10.0}, r"settle_time is 10; expected 0 to 9\.99, when the last tick"),
+        ({"settle_time": 9.995}, r"settle_time is 9\.995; expected 0 to 9\.99"),
+        ({"settle_time": -0.5}, r"settle_time is -0\.5; expected 0 to"),
+        ({"settle_time": np.nan}, "settle_time is nan; expected 0 to"),
+        ({"settle_time": np.inf}, "settle_time is inf; expected 0 to"),
+        ({"duration": np.inf}, "duration is inf; expected"),
+        ({"duration": np.nan}, "duration is nan; expected"),
+        ({"period": np.inf}, "period is inf; expected a whole number"),
+        ({"period": np.nan}, "period is nan; expected a whole number"),
     ],
 )
 def test_what_is_wrong_is_told(wrong, words):
     arguments = {"model": near_hover(), "controller": CONTROLLER, "n": 2, **wrong}
     with pytest.raises(ValueError, match=words):
         simulate(**arguments)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"position_noise": -1e-3}, r"position_noise is -0\.001; expected at least 0"),
+        ({"position_noise": [0.0, -2.0]}, "position_noise is -2; expected at least 0"),
+        ({"attitude_noise": -0.1}, r"attitude_noise is -0\.1; expected at least 0"),
+        ({"latency": -0.01}, r"latency is -0\.01; expected at least 0"),
+        ({"dropout": 1.5}, r"dropout is 1\.5; expected 0 to 1"),
+        ({"dropout": [0.5, -0.1]}, r"dropout is -0\.1; expected 0 to 1"),
+    ],
+)
+def test_errors_of_measurement_that_cannot_be_are_refused(wrong, words):
+    with pytest.raises(ValueError, match=words):
+        simulate(near_hover(), CONTROLLER, n=2, duration=0.1, measurement=Measurement(**wrong))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: quadrotor(mass_error=[0.0, -1.0]), "mass_error is -1; expected more than -1"),
+        (lambda: quadrotor(thrust_error=-3.0), "thrust_error is -3; expected more than -1"),
+        (lambda: Kalman(noise=0.0), "noise is 0; expected more than 0"),
+        (lambda: Kalman(acceleration_walk=[-1.0]), "acceleration_walk is -1; expected more than 0"),
+        (
+            lambda: Controller(K, integrator_limit=(1.0, -1.0, 1.0)),
+            "integrator_limit is -1; expected at least 0",
+        ),
+    ],
+)
+def test_vehicles_that_cannot_be_are_refused(make, words):
+    with pytest.raises(ValueError, match=words):
+        make()
+
+
+def test_a_flight_counts_that_has_a_single_tick_to_be_judged():
+    start = (0.5, 0.0, 1.0)
+    flights = simulate(near_hover(), CONTROLLER, x0=start, duration=0.02, settle_time=0.01)
+    assert flights.largest_error == pytest.approx(0.5, abs=1e-3)
+    assert flights.rms_error == flights.largest_error
 
 
 class Weak(Coupled7D):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from typing_extensions import override
 
+from crazyflie_batch.per_vehicle import check_above
 from crazyflie_model.elementwise import Vector, where
 from crazyflie_state_estimator import kalman
 from crazyflie_state_estimator.rate_filter import FiniteDifference, RateFilter
@@ -108,12 +109,21 @@ class Kalman(Estimator):
         Standard deviation of the poses' coordinates, m.
     acceleration_walk : float or ndarray, shape (n,)
         m/s^2/sqrt(s).
+
+    Raises
+    ------
+    ValueError
+        One of them is not positive.
     """
 
     noise: ArrayLike = kalman.POSITION_NOISE
     acceleration_walk: ArrayLike = kalman.ACCELERATION_WALK
     memory_dim = 15
     parameter_dim = 2
+
+    def __post_init__(self) -> None:
+        check_above("noise", self.noise, 0.0)
+        check_above("acceleration_walk", self.acceleration_walk, 0.0)
 
     @property
     @override

@@ -113,10 +113,16 @@ class RunParameters(Parameters):
     def complaints(self) -> list[str]:
         """See `Parameters.complaints`."""
         found = []
-        if self.settle_time >= self.duration:
+        ticks = round(self.duration / self.period)
+        last = (ticks - 1) * self.period
+        if ticks < 1:
             found.append(
-                f"settle_time is {self.settle_time:g}; expected less than the duration, "
-                f"{self.duration:g}"
+                f"duration is {self.duration:g}; expected at least one period, {self.period:g} s"
+            )
+        elif self.settle_time > last + 1e-6 * self.period:
+            found.append(
+                f"settle_time is {self.settle_time:g}; expected at most {last:g}, one period "
+                f"less than the duration, {self.duration:g}"
             )
         samples = self.period / inner_loops.PERIOD
         if abs(samples - round(samples)) > 1e-6:

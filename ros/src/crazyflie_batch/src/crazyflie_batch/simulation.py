@@ -11,6 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from crazyflie_batch.batch import Batch, Flights, fly
 from crazyflie_batch.estimators import Estimator, FiniteDifferences
 from crazyflie_batch.flight import SAMPLE_STEPS, Plan
+from crazyflie_batch.per_vehicle import (
+    check_above,
+    check_at_least,
+    check_probability,
+    columns,
+    together,
+)
 from crazyflie_lqr import componentwise
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Coupled7D, Dynamics, NearHover
@@ -20,6 +27,9 @@ from crazyflie_model.units import GRAVITY
 
 HOVER = (0.0, 0.0, 0.0, GRAVITY)
 """Control at the reference."""
+
+_ROUNDING = 1e-6
+"""Of a whole number of periods."""
 
 
 @dataclass(frozen=True)
@@ -61,9 +71,17 @@ def quadrotor(
     Parameters
     ----------
     mass_error, thrust_error : float or array_like, shape (n,)
+        > -1
     wind : array_like, shape (3,) or (n, 3)
         Velocity of the air, m/s, constant.
+
+    Raises
+    ------
+    ValueError
+        Something is out of its range.
     """
+    check_above("mass_error", mass_error, -1.0)
+    check_above("thrust_error", thrust_error, -1.0)
     wind_x, wind_y, wind_z = np.moveaxis(np.asarray(wind, dtype=float), -1, 0)
     parameters = {
         "mass_error": mass_error,
@@ -94,12 +112,21 @@ class Controller:
     K : array_like, shape (4, 7)
     u_ref : array_like, shape (4,)
     integrator_k, integrator_limit : array_like, shape (3,)
+        The limit is >= 0.
+
+    Raises
+    ------
+    ValueError
+        A limit is negative.
     """
 
     K: ArrayLike
     u_ref: ArrayLike = HOVER
     integrator_k: ArrayLike = (0.0, 0.0, 0.0)
     integrator_limit: ArrayLike = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        check_at_least("integrator_limit", self.integrator_limit, 0.0)
 
 
 @dataclass(frozen=True)
@@ -109,13 +136,24 @@ class Measurement:
     Attributes
     ----------
     position_noise, attitude_noise, latency, dropout : float or array_like, shape (n,)
-        In m, rad, s, and a probability.
+        In m, rad, s, all >= 0, and a probability.
+
+    Raises
+    ------
+    ValueError
+        Something is out of its range.
     """
 
     position_noise: ArrayLike = 0.0
     attitude_noise: ArrayLike = 0.0
     latency: ArrayLike = 0.0
     dropout: ArrayLike = 0.0
+
+    def __post_init__(self) -> None:
+        check_at_least("position_noise", self.position_noise, 0.0)
+        check_at_least("attitude_noise", self.attitude_noise, 0.0)
+        check_at_least("latency", self.latency, 0.0)
+        check_probability("dropout", self.dropout)
 
 
 def simulate(
@@ -157,7 +195,7 @@ def simulate(
     period : float
         Of motion capture, estimator and controller, s; a whole number of 2 ms.
     settle_time : float
-        Errors count from then on, s.
+        Errors count from then on, s; at most the time of the last tick, ``duration - period``.
     measurement : Measurement, optional
         By default without errors.
     seed : int
@@ -209,12 +247,17 @@ def prepare(
     """Return the flights of `simulate` before they are flown."""
     if n <= 0:
         raise ValueError(f"n is {n}; expected at least one vehicle")
-    steps = round(period / STEP)
+    steps = round(period / STEP) if math.isfinite(period) else 0
     if steps <= 0 or steps % SAMPLE_STEPS or abs(steps * STEP - period) > 1e-9:
         raise ValueError(f"period is {period}; expected a whole number of {inner_loops.PERIOD} s")
-    ticks = round(duration / period)
+    ticks = round(duration / period) if math.isfinite(duration) else 0
     if ticks < 1:
         raise ValueError(f"duration is {duration}; expected at least one period, {period} s")
+    last = (ticks - 1) * period
+    if not 0.0 <= settle_time <= last + _ROUNDING * period:
+        raise ValueError(
+            f"settle_time is {settle_time:g}; expected 0 to {last:g}, when the last tick is"
+        )
     plan = Plan(model.make, tuple(model.parameters), model.max_tilt, type(estimator), steps)
     noise = {
         "position_noise": measurement.position_noise,
@@ -223,19 +266,19 @@ def prepare(
     # What would arrive after the end need not be on its way for longer.
     delay = np.minimum(delay_ticks(measurement.latency, plan.period), ticks)
     parameters = {
-        "model": _together(model.parameters, n),
-        "estimator": _together(estimator.parameters, n),
-        "K": _columns("K", controller.K, (componentwise.U_DIM, componentwise.X_DIM), n),
-        "u_ref": _columns("u_ref", controller.u_ref, (componentwise.U_DIM,), n),
-        "integrator_k": _columns("integrator_k", controller.integrator_k, (3,), n),
-        "integrator_limit": _columns("integrator_limit", controller.integrator_limit, (3,), n),
-        "goal": _columns("goal", goal, (componentwise.X_DIM,), n),
-        "noise": _together(noise, n),
-        "delay": _columns("latency", delay, (), n),
-        "dropout": _columns("dropout", measurement.dropout, (), n),
-        "settled": _columns("settle_time", math.ceil(settle_time / period - 1e-6), (), n),
+        "model": together(model.parameters, n),
+        "estimator": together(estimator.parameters, n),
+        "K": columns("K", controller.K, (componentwise.U_DIM, componentwise.X_DIM), n),
+        "u_ref": columns("u_ref", controller.u_ref, (componentwise.U_DIM,), n),
+        "integrator_k": columns("integrator_k", controller.integrator_k, (3,), n),
+        "integrator_limit": columns("integrator_limit", controller.integrator_limit, (3,), n),
+        "goal": columns("goal", goal, (componentwise.X_DIM,), n),
+        "noise": together(noise, n),
+        "delay": columns("latency", delay, (), n),
+        "dropout": columns("dropout", measurement.dropout, (), n),
+        "settled": columns("settle_time", math.ceil(settle_time / period - _ROUNDING), (), n),
     }
-    positions = _columns("x0", x0, (3,), n)
+    positions = columns("x0", x0, (3,), n)
     return Batch(plan, parameters, _initial_states(model, positions), ticks, seed, first)
 
 
@@ -249,19 +292,3 @@ def _initial_states(model, positions):
     parameters = {name: np.asarray(value, float) for name, value in model.parameters.items()}
     x = model.make(**parameters).initial_state(list(positions))
     return np.array([np.broadcast_to(part, positions.shape[1:]) for part in x])
-
-
-def _together(values, n):
-    """Return numbers or arrays of shape (n,), by name, as one of shape (len(values), n)."""
-    columns = [_columns(name, value, (), n) for name, value in values.items()]
-    return np.concatenate([np.empty((0, n)), *columns])
-
-
-def _columns(name, values, shape, n):
-    """Return an array of shape (..., *shape) as one of shape (size, n)."""
-    array = np.asarray(values, dtype=float)
-    if array.shape not in (shape, (n, *shape)):
-        raise ValueError(f"{name} has the shape {array.shape}; expected {shape} or {(n, *shape)}")
-    if not np.isfinite(array).all():
-        raise ValueError(f"{name} is not finite")
-    return np.broadcast_to(array, (n, *shape)).reshape(n, -1).T

@@ -1,6 +1,7 @@
 """The command: what it answers, that it goes on where it was interrupted, and on a cluster."""
 
 import csv
+import json
 import socket
 
 import matplotlib.image
@@ -92,10 +93,10 @@ def test_an_interrupted_run_goes_on(command, tmp_path, monkeypatch):
     _, whole, _ = command("--out", "whole")
     fly_piece = monte_carlo.fly_piece
 
-    def interrupt(settings, first, values):
+    def interrupt(settings, first, values, code):
         if first == 16:
             raise KeyboardInterrupt
-        return fly_piece(settings, first, values)
+        return fly_piece(settings, first, values, code)
 
     monkeypatch.setattr(monte_carlo, "fly_piece", interrupt)
     status, _, errors = command("--out", "half")
@@ -104,9 +105,9 @@ def test_an_interrupted_run_goes_on(command, tmp_path, monkeypatch):
 
     flown = []
 
-    def note(settings, first, values):
+    def note(settings, first, values, code):
         flown.append(first)
-        return fly_piece(settings, first, values)
+        return fly_piece(settings, first, values, code)
 
     monkeypatch.setattr(monte_carlo, "fly_piece", note)
     kept = [path.name for path in (tmp_path / "half" / "pieces").glob("0*.npy")]
@@ -125,6 +126,50 @@ def test_flights_of_other_settings_are_not_mixed(command, tmp_path):
     status, output, _ = command("--restart")
     assert status == 0
     assert "error at most 0.2 m" in output
+
+
+def test_flights_of_two_versions_of_the_code_are_not_mixed(command, monkeypatch):
+    command()
+    monkeypatch.setattr(monte_carlo, "code_version", lambda: "another")
+    status, _, errors = command()
+    assert status == 1
+    assert "settings has flights of another version of the code; expected another --out" in errors
+    assert command("--restart")[0] == 0
+
+
+@pytest.mark.parametrize("noted", [b"", b"[1]", b"\xff\0", b"{}"])
+def test_a_folder_that_does_not_tell_what_it_has_is_refused(command, tmp_path, noted):
+    command()
+    (tmp_path / "settings" / "settings.json").write_bytes(noted)
+    status, _, errors = command()
+    assert status == 1
+    assert "settings has flights of other settings; expected another --out" in errors
+
+
+def test_a_folder_of_before_versions_were_noted_is_refused(command, tmp_path):
+    command()
+    path = tmp_path / "settings" / "settings.json"
+    noted = json.loads(path.read_text())
+    del noted["code"]
+    path.write_text(json.dumps(noted))
+    assert "another version of the code" in command()[2]
+
+
+def test_a_worker_with_another_version_of_the_code_does_not_fly(command, monkeypatch):
+    fly_piece = monte_carlo.fly_piece
+
+    def fly_elsewhere(*arguments):
+        with monkeypatch.context() as context:
+            context.setattr(monte_carlo, "code_version", lambda: "another")
+            return fly_piece(*arguments)
+
+    monkeypatch.setattr(monte_carlo, "fly_piece", fly_elsewhere)
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        status, _, errors = command("--scheduler", cluster.scheduler_address)
+    assert status == 1
+    assert "a worker has another version of the code" in errors
 
 
 def test_a_damaged_piece_is_flown_anew(command, tmp_path):

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_batch import simulation
+from crazyflie_batch.code_version import OtherCodeError, code_version
 from crazyflie_batch.estimators import Estimator, FiniteDifferences, Kalman
 from crazyflie_batch.settings import Settings
 
@@ -33,6 +34,8 @@ class OtherSettingsError(Exception):
 class Results:
     """The folder where flights are kept, from which an interrupted run goes on.
 
+    It also keeps the settings and the `code_version`, without which flights mean nothing.
+
     Parameters
     ----------
     folder : Path
@@ -42,6 +45,7 @@ class Results:
     Raises
     ------
     OtherSettingsError
+    OtherCodeError
     OSError
     """
 
@@ -50,13 +54,12 @@ class Results:
         self._pieces = folder / "pieces"
         self._flights = settings.run.flights
         self._pieces.mkdir(parents=True, exist_ok=True)
-        present = json.dumps(dataclasses.asdict(settings), indent=1, sort_keys=True)
+        present = {**dataclasses.asdict(settings), "code": code_version()}
+        text = json.dumps(present, indent=1, sort_keys=True)
         noted = folder / "settings.json"
-        if noted.exists() and noted.read_text(encoding="utf-8") != present:
-            raise OtherSettingsError(
-                f"{folder} has flights of other settings; expected another --out, or --restart"
-            )
-        noted.write_text(present, encoding="utf-8")
+        if noted.exists():
+            _check(folder, json.loads(text), _parsed(noted.read_bytes()))
+        noted.write_text(text, encoding="utf-8")
 
     def missing(self) -> list[int]:
         """Return the numbers of the first flights of the pieces that have not been flown."""
@@ -88,6 +91,23 @@ class Results:
         return self._pieces / f"{first:08d}.npy"
 
 
+def _parsed(text):
+    try:
+        noted = json.loads(text)
+    except ValueError:
+        return {}
+    return noted if isinstance(noted, dict) else {}
+
+
+def _check(folder, present, noted):
+    if noted == present:
+        return
+    advice = "expected another --out, or --restart"
+    if {**noted, "code": present["code"]} == present:
+        raise OtherCodeError(f"{folder} has flights of another version of the code; {advice}")
+    raise OtherSettingsError(f"{folder} has flights of other settings; {advice}")
+
+
 def run(
     settings: Settings, results: Results, executor: Executor, report: Callable[[int], object]
 ) -> None:
@@ -112,7 +132,7 @@ def run(
     done: Queue[Any] = Queue()
     for first in results.missing():
         own = {name: part[first : first + PIECE] for name, part in values.items()}
-        future = executor.submit(fly_piece, settings, first, own)
+        future = executor.submit(fly_piece, settings, first, own, code_version())
         futures[future] = first
         future.add_done_callback(done.put)
     try:
@@ -129,7 +149,7 @@ def run(
 
 
 def fly_piece(
-    settings: Settings, first: int, values: dict[str, NDArray[np.float64]]
+    settings: Settings, first: int, values: dict[str, NDArray[np.float64]], code: str
 ) -> NDArray[np.float64]:
     """Return the outcomes of some flights, shape (flights, len(OUTCOMES)).
 
@@ -140,7 +160,16 @@ def fly_piece(
         Number of the first one.
     values : dict
         What is swept, arrays of these flights; see `Settings.values`.
+    code : str
+        The `code_version` of the other flights.
+
+    Raises
+    ------
+    OtherCodeError
+        That of this process is another one.
     """
+    if code != code_version():
+        raise OtherCodeError("a worker has another version of the code")
     flights = simulate(settings, first, values)
     return np.column_stack([getattr(flights, name) for name in OUTCOMES]).astype(float)
 

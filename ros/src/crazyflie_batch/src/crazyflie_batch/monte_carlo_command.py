@@ -11,6 +11,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
+from crazyflie_batch.code_version import OtherCodeError
 from crazyflie_batch.monte_carlo import OtherSettingsError, Results, run
 from crazyflie_batch.report import findings, table, write_csv
 from crazyflie_batch.settings import read_settings
@@ -55,7 +56,7 @@ def main(arguments: list[str] | None = None) -> int:
         from crazyflie_batch.figure import save_figure
 
         save_figure(found, folder / "figure.png")
-    except (ParameterError, OtherSettingsError, SchedulerError, OSError) as error:
+    except (ParameterError, OtherSettingsError, OtherCodeError, SchedulerError, OSError) as error:
         print(f"monte_carlo: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:

@@ -156,6 +156,21 @@ def test_all_that_is_wrong_with_a_command_line_is_said(capsys):
         assert text in said
 
 
+@pytest.mark.parametrize("text", ["1_000", "1e", "-", "1,5", "0x1p3", "1__0", "١"])
+def test_a_word_that_only_python_takes_for_a_number_is_none(capsys, text):
+    with pytest.raises(SystemExit):
+        parse(f"--hover-z={text}", "--PIDs-X-kp=2", f"--motors={text}")
+    said = capsys.readouterr().err
+    assert f"--hover-z is {text!r}; expected a finite number (m)" in said
+    if text != "١":
+        assert f"--motors is {text!r}; expected an integer from 1 to 4" in said
+
+
+@pytest.mark.parametrize("text", ["1", "7.", ".5", "+2.5e-3", "1E5", " 7 "])
+def test_a_number_on_a_command_line(text):
+    assert parse(f"--hover-z={text}", "--PIDs-X-kp=2").height == float(text)
+
+
 def test_help_says_unit_and_default(capsys):
     with pytest.raises(SystemExit):
         parse("--help")

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from crazyflie_utils.messages import shown
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
     DURATION,
@@ -125,7 +126,15 @@ def test_error_names_parameter_value_and_expectation(kind, raw):
     handle = FakeProcess({"/ns/node/a/b": raw}).handle("/ns/node")
     with pytest.raises(ParameterError) as error:
         handle.get_param("~a/b", kind)
-    assert str(error.value).startswith(f"parameter /ns/node/a/b is {raw!r}; expected {kind}")
+    assert str(error.value).startswith(f"parameter /ns/node/a/b is {shown(raw)}; expected {kind}")
+
+
+def test_error_cuts_a_value_that_is_long():
+    handle = FakeProcess({"/node/a": "x" * 200_000}).handle("/node")
+    with pytest.raises(ParameterError) as error:
+        handle.get_param("~a", FINITE)
+    assert str(error.value).startswith("parameter /node/a is 'xxxx")
+    assert len(str(error.value)) < 200
 
 
 @pytest.mark.parametrize(("kind", "text"), EXPECTATIONS)

@@ -1,6 +1,7 @@
 """Settings in YAML files: what is read, and how messages name file and line."""
 
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -138,12 +139,102 @@ def test_a_file_that_cannot_be_read(tmp_path):
     with pytest.raises(ParameterError, match=r"none\.yaml: cannot be read: No such file"):
         yaml_file.load(tmp_path / "none.yaml")
     (tmp_path / "latin.yaml").write_bytes(b"name: Stra\xdfe\n")
-    with pytest.raises(ParameterError, match=r"latin\.yaml: is no text in UTF-8"):
+    with pytest.raises(ParameterError, match=r"latin\.yaml:1: is no text in UTF-8"):
         yaml_file.load(tmp_path / "latin.yaml")
+    with pytest.raises(ParameterError, match=r"cannot be read: embedded null byte"):
+        yaml_file.load("lab\0.yaml")
+    with pytest.raises(ParameterError, match=r"cannot be read: File name too long") as caught:
+        yaml_file.load("a" * 200_000)
+    assert len(str(caught.value)) < 300
 
 
-def test_a_file_without_an_end_to_its_nesting(load):
-    assert complaints_of(load, "[" * 100_000) == [": is nested too deep"]
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (b"a: 1\nname: Stra\xdfe\n", ":2: is no text in UTF-8"),
+        (b"\xef\xbb\xbfa: 1\n\nname: \xff\n", ":3: is no text in UTF-8"),
+        (b"a: 1\nb: 2\nc: \0\n", ":3: has a NUL"),
+        (b"a: 1\nb: \x07\n", ":2: is no YAML: it has the character U+0007"),
+        (b"a: " + b"x" * 2_000_000, ": is too long; expected at most 1000000 bytes"),
+    ],
+)
+def test_bytes_that_are_no_settings_are_told_with_their_line(tmp_path, content, complaint):
+    path = tmp_path / "lab.yaml"
+    path.write_bytes(content)
+    with pytest.raises(ParameterError) as caught:
+        yaml_file.load(path)
+    assert str(caught.value).startswith(f"{path}{complaint}")
+
+
+def test_a_byte_order_mark_does_not_matter(tmp_path):
+    path = tmp_path / "lab.yaml"
+    path.write_bytes(b"\xef\xbb\xbfsize: 1\n")
+    assert yaml_file.load(path)["size"].value == 1
+
+
+TEN_TIMES = "a0: &a0 [1, 2]\n" + "".join(
+    f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 10)}]\n" for k in range(1, 30)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("a: 1\nb: " + "[" * 20_000, ":2: is nested too deep; expected at most 50 levels"),
+        ("a: " + "[" * 20_000 + "]" * 20_000, ":1: is nested too deep"),
+        ("{a: " * 20_000, ":1: is nested too deep"),
+        ("- " * 20_000 + "1", ":1: is nested too deep"),
+        ("a: [" + "1," * 60_000 + "]", ":1: holds too much; expected at most 50000 values"),
+        (TEN_TIMES, ":6: holds too much"),
+        ("a: 1\nb: &b {c: [*b]}\n", ":2: has the alias *b in what it stands for"),
+        ("a: *" + "x" * 200_000, ":1: is no YAML: found undefined alias"),
+    ],
+    ids=map(str, range(8)),
+)
+def test_what_no_settings_are_like_is_refused_at_once(load, text, complaint, monkeypatch):
+    composed = []
+    compose_scalar = yaml.SafeLoader.compose_scalar_node
+
+    def count(self, anchor):
+        composed.append(anchor)
+        return compose_scalar(self, anchor)
+
+    monkeypatch.setattr(yaml.SafeLoader, "compose_scalar_node", count)
+    (found,) = complaints_of(load, text)
+    assert found.startswith(complaint)
+    assert len(found) < 400
+    assert len(composed) <= 50_001
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "boxes: {table: {size: " + "x" * 200_000 + "}}\n",
+        "boxes: {table: {? " + "x" * 200_000 + "\n : 1}}\n",
+        "boxes: {? " + "x" * 200_000 + "\n : {size: 1}}\n",
+        "boxes: {table: {size: 0x" + "f" * 200_000 + "}}\n",
+        "boxes: {table: [" + "1, " * 20_000 + "]}\n",
+        "boxes: {table: {size: ! " + "x" * 200_000 + "}}\n",
+        "boxes: {table: {size: !" + "x" * 200_000 + " 1}}\n",
+        "boxes: {table: {center: [0, 0, {a: [" + "1, " * 20_000 + "]}]}}\n",
+    ],
+    ids=map(str, range(8)),
+)
+def test_what_is_long_is_shortened_in_messages(load, text):
+    def read(lab):
+        for entry in lab["boxes"].entries().values():
+            entry.read(BoxParameters)
+        lab["boxes"]["chair"]
+
+    assert max(map(len, complaints_of(load, text, read))) < 600
+
+
+@pytest.mark.parametrize(
+    "text", ["!!bool x", "!!timestamp x", '!!int ""', "!!float x", "!!binary é", "!!set [1]"]
+)
+def test_a_text_that_does_not_fit_its_tag_is_told(load, text):
+    found = complaints_of(load, f"boxes: {{table: {{size: {text}}}}}\n")
+    assert any("cannot be read" in each for each in found)
 
 
 @given(st.text())

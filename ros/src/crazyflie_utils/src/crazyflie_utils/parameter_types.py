@@ -9,6 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+from crazyflie_utils.text_input import number_from_text
+
 
 class ParameterType:
     """Base class of parameter types.
@@ -74,7 +76,7 @@ class Number(ParameterType):
 
     def from_text(self, text: str) -> float:
         """Return the number in a text."""
-        return float(text)
+        return number_from_text(text)
 
     def __call__(self, value: Any) -> float:
         """Return the value as float."""
@@ -114,6 +116,9 @@ class Integer(ParameterType):
 
     def from_text(self, text: str) -> int:
         """Return the integer in a text; 0x begins a hexadecimal one."""
+        # Python's own way to write large numbers is nobody else's.
+        if "_" in text:
+            raise ValueError
         return int(text, 0)
 
     def __call__(self, value: Any) -> int:

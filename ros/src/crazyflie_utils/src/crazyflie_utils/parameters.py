@@ -12,6 +12,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Self, dataclass_transform
 
+from crazyflie_utils.messages import shown
 from crazyflie_utils.parameter_types import ParameterType
 
 REQUIRED = dataclasses.MISSING
@@ -201,7 +202,7 @@ def read_parameter(
         # The latter two are Python's own words about a number that is none.
         reason = f" ({error})" if isinstance(error, ValueError) and str(error) else ""
         raise ParameterError(
-            f"parameter {full_name(declaration.name)} is {raw!r}; expected {expected}{reason}"
+            f"parameter {full_name(declaration.name)} is {shown(raw)}; expected {expected}{reason}"
         ) from None
 
 

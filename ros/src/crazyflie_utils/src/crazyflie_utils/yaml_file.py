@@ -14,7 +14,10 @@ from typing import Any, TypeVar
 
 import yaml
 
+from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters import ParameterError, Parameters
+from crazyflie_utils.text_input import TextFileError, read_text
+from crazyflie_utils.yaml_loader import MAX_SIZE, compose
 
 P = TypeVar("P", bound=Parameters)
 
@@ -25,22 +28,15 @@ def load(path: str | Path) -> "Entry":
     Raises
     ------
     ParameterError
-        It cannot be read, is no YAML, no mapping, or has a key twice.
+        It cannot be read, is no YAML, no mapping, has a key twice, or is larger than a file of
+        settings can be: see `yaml_loader`.
     """
     path = Path(path)
     try:
-        node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
-    except OSError as error:
-        raise ParameterError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise ParameterError(f"{path}: is no text in UTF-8: {error.reason}") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f"{path}:{mark.line + 1}" if mark else f"{path}"
-        problem = getattr(error, "problem", None) or str(error)
-        raise ParameterError(f"{where}: is no YAML: {problem}") from None
-    except RecursionError:
-        raise ParameterError(f"{path}: is nested too deep") from None
+        node = compose(read_text(path, MAX_SIZE))
+    except TextFileError as error:
+        where = shortened(str(path)) if error.line is None else f"{path}:{error.line}"
+        raise ParameterError(f"{where}: {error}") from None
     if node is None:
         raise ParameterError(f"{path}: is empty; expected a mapping")
     entry = Entry(path, "", node)
@@ -82,14 +78,15 @@ class Entry:
         loader = yaml.SafeLoader("")
         try:
             return loader.construct_document(self.node)
-        except (yaml.YAMLError, ValueError, TypeError) as error:
-            raise self.error(f"cannot be read: {error}") from None
+        except (yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
+            # The latter two are how PyYAML finds that a text does not fit its tag.
+            raise self.error(f"cannot be read: {shortened(str(error))}") from None
         finally:
             loader.dispose()
 
     def error(self, text: str) -> ParameterError:
         """Return an error about it: file, line and name, then the text."""
-        return ParameterError(f"{self.file}:{self.line}: {self.name or 'the file'} {text}")
+        return ParameterError(f"{self.file}:{self.line}: {self._title()} {text}")
 
     def entries(self) -> dict[str, "Entry"]:
         """Return what it holds, by key.
@@ -100,13 +97,13 @@ class Entry:
             It is no mapping, a key is no string, or it is there twice.
         """
         if not isinstance(self.node, yaml.MappingNode):
-            raise self.error(f"is {self._short()}; expected a mapping")
+            raise self.error(f"is {shown(self.value)}; expected a mapping")
         found: dict[str, Entry] = {}
         for key_node, node in self.node.value:
             key = Entry(self.file, self.name, key_node).value
             if not isinstance(key, str):
                 raise Entry(self.file, self.name, key_node).error(
-                    f"has the key {key!r}; expected a string"
+                    f"has the key {shown(key)}; expected a string"
                 )
             entry = Entry(self.file, f"{self.name}/{key}".lstrip("/"), node)
             if key in found:
@@ -123,7 +120,7 @@ class Entry:
             It is no list.
         """
         if not isinstance(self.node, yaml.SequenceNode):
-            raise self.error(f"is {self._short()}; expected a list")
+            raise self.error(f"is {shown(self.value)}; expected a list")
         return [
             Entry(self.file, f"{self.name}[{index}]", node)
             for index, node in enumerate(self.node.value)
@@ -143,7 +140,7 @@ class Entry:
         """
         entries = self.entries()
         if key not in entries:
-            raise self.error(f"has no {key}; it has {', '.join(entries) or 'nothing'}")
+            raise self.error(f"has no {key}; it has {shortened(', '.join(entries)) or 'nothing'}")
         return entries[key]
 
     def read(self, parameters: type[P], besides: tuple[str, ...] = ()) -> P:
@@ -173,7 +170,7 @@ class Entry:
 
         def place(name: str) -> str:
             entry = known.get(name, self)
-            return f"{f'{self.name}/{name}'.lstrip('/')} ({self.file}:{entry.line})"
+            return f"{shortened(f'{self.name}/{name}'.lstrip('/'))} ({self.file}:{entry.line})"
 
         try:
             result = parameters.read(lambda name: known[name].value, place)
@@ -196,8 +193,7 @@ class Entry:
         # One about how values fit together does not know where they stand.
         if str(self.file) in complaint:
             return complaint
-        return f"{self.file}:{self.line}: {self.name or 'the file'}: {complaint}"
+        return f"{self.file}:{self.line}: {self._title()}: {complaint}"
 
-    def _short(self) -> str:
-        text = repr(self.value)
-        return text if len(text) <= 40 else text[:37] + "..."
+    def _title(self) -> str:
+        return shortened(self.name) or "the file"

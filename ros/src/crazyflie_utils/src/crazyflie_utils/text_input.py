@@ -1,0 +1,72 @@
+"""Text that people write: files, and numbers in them."""
+
+import re
+from pathlib import Path
+
+from crazyflie_utils.messages import shown
+
+MAX_SIZE = 10_000_000
+"""Bytes of a file of text; longer ones are something else."""
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+class TextFileError(Exception):
+    """A file holds no text.
+
+    Parameters
+    ----------
+    reason : str
+    line : int or None
+        Number of the line at fault, from 1.
+    """
+
+    def __init__(self, reason: str, line: int | None = None):
+        super().__init__(reason)
+        self.line = line
+
+
+def read_text(path: str | Path, max_size: int = MAX_SIZE) -> str:
+    """Return the text of a file in UTF-8, without a byte order mark.
+
+    Raises
+    ------
+    TextFileError
+        It cannot be read, is longer than ``max_size`` bytes, is not in UTF-8, or has a NUL.
+    """
+    try:
+        with open(path, "rb") as file:
+            content = file.read(max_size + 1)
+    except OSError as error:
+        raise TextFileError(f"cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        # A path with a NUL.
+        raise TextFileError(f"cannot be read: {error}") from None
+    if len(content) > max_size:
+        raise TextFileError(f"is too long; expected at most {max_size} bytes")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        # The bytes that failed are counted without the byte order mark.
+        failed = error.object[: error.start]
+        line = bytes(failed).count(b"\n") + 1
+        raise TextFileError(f"is no text in UTF-8: {error.reason}", line) from None
+    before, nul, _ = text.partition("\0")
+    if nul:
+        raise TextFileError("has a NUL; expected text", before.count("\n") + 1)
+    return text
+
+
+def number_from_text(text: str) -> float:
+    """Return the number in a text as all other programs read it: 1e-3, but not 1_000.
+
+    ``nan`` and ``inf`` are numbers that the caller may refuse.
+
+    Raises
+    ------
+    ValueError
+    """
+    word = text.strip()
+    if _NUMBER.fullmatch(word) or word.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+        return float(word)
+    raise ValueError(f"{shown(text)} is no number")

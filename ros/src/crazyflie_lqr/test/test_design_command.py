@@ -88,6 +88,7 @@ def test_weights_may_be_numbers_or_a_file(form, tmp_path):
         ({"R": "0 1 1 1"}, "R is not positive definite"),
         ({"R": "1 1 0 0  0 1 0 0  0 0 1 0  0 0 0 1"}, "R is not symmetric"),
         ({"R": "1 1 one 1"}, "'one'"),
+        ({"R": "1 1_0 1 1"}, "'1_0' is no number"),
         ({"Q": "nan 1 4 1 1 4 100"}, "Q has entries that are not finite"),
         ({"Q": "Q.txt"}, "nor is there such a file"),
         ({"Q": "1 0 4 1 1 4 0"}, "do not see"),

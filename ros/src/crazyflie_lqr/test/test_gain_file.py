@@ -57,6 +57,16 @@ def test_reads_vectors_of_one(write):
         ("1 2 3\n", "line 1", "ends after 1 row"),
         ("# nothing\n", "line 0", "ends after 0 rows"),
         ("\udcff\udcfe", "line 1", "is not a number"),
+        ("1 2 3\n4 1_000 6\n", "line 2", "'1_000' is not a number"),
+        ("1 2 3\n4 ٥ 6\n", "line 2", "is not a number"),
+        ("1 2 3\n4 5 -", "line 2", "'-' is not a number"),
+        ("1 2 3\n4 5 1e", "line 2", "'1e' is not a number"),
+        ("1 2 3\n4 5 1.5e-", "line 2", "'1.5e-' is not a number"),
+        ("1 2 3\n4 5 -1.", "line 2", "the file ends in a number without the digits"),
+        ("1 2 3\n4 5", "line 2", "2 numbers"),
+        ("1 2 3\n4 5 \0006\n", "line 2", "'\\x006' is not a number"),
+        ("1 2 " + "x" * 200_000, "line 1", "xxx' is not a number"),
+        ("1 2 1" + "0" * 200_000, "line 1", "000' is not finite"),
     ],
 )
 def test_a_bad_matrix_is_told_by_file_line_and_shape(tmp_path, text, line, reason):
@@ -66,6 +76,13 @@ def test_a_bad_matrix_is_told_by_file_line_and_shape(tmp_path, text, line, reaso
         load_matrix(str(path), 2, 3)
     for part in (str(path), line, reason, "expected 2 rows of 3 numbers"):
         assert part in str(caught.value)
+    assert len(str(caught.value)) < len(str(path)) + 250
+
+
+def test_numbers_as_programs_write_them(write):
+    path = write("-1. .5 +2e3\r\n1E-3 0x 7.\n".replace("0x", "0"))
+    np.testing.assert_array_equal(load_matrix(path, 2, 3), [[-1, 0.5, 2000], [1e-3, 0, 7]])
+    np.testing.assert_array_equal(load_vector(write("1 2. # 9."), 2), [1, 2])
 
 
 @pytest.mark.parametrize(
@@ -95,6 +112,11 @@ def test_a_file_that_cannot_be_read_is_named(tmp_path):
         load_matrix(str(tmp_path / "none.txt"), 4, 7)
     with pytest.raises(GainFileError, match="directory"):
         load_matrix(str(tmp_path), 4, 7)
+    with pytest.raises(GainFileError, match=r"null byte.*expected 4 rows of 7"):
+        load_matrix("K\0.txt", 4, 7)
+    with pytest.raises(GainFileError, match=r"File name too long") as caught:
+        load_matrix("K" * 200_000, 4, 7)
+    assert len(str(caught.value)) < 300
 
 
 @given(arrays(float, (2, 3), elements=st.floats(-1e6, 1e6)))

@@ -11,6 +11,7 @@ from crazyflie_lqr.design import Design, DesignError, Weights, design_gains
 from crazyflie_lqr.gain_file import save_matrix
 from crazyflie_lqr.margins import loop_margins
 from crazyflie_lqr.models import CONTROLS, MODELS, LinearModel
+from crazyflie_utils.text_input import number_from_text
 
 _DESCRIPTION = """
 Design the gains K of u = u_ref + K (x - x_ref) that cost least, where the cost is the
@@ -138,7 +139,7 @@ def _matrix(name, words, rows, columns):
 
 
 def _numbers(text):
-    return [float(word) for word in text.replace(",", " ").split()]
+    return [number_from_text(word) for word in text.replace(",", " ").split()]
 
 
 def _comment(model, weights, options):

@@ -3,6 +3,9 @@
 One row of the matrix a line, numbers separated by blanks; empty lines, and what
 follows a ``#``, are skipped. Files that are written have their comments at the end:
 the reader of the C++ workspace knows no comments, and stops at the first.
+
+Of a file that was cut, as when a disk was full, can be seen that numbers are missing, and that the
+last one ends in its point (``-1.``), its sign or its exponent. That 9.8 was once 9.81 cannot.
 """
 
 import math
@@ -13,7 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 from typing_extensions import override
 
+from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameter_types import TEXT, ParameterType
+from crazyflie_utils.text_input import number_from_text
 
 if TYPE_CHECKING:
     import numpy as np
@@ -209,11 +214,18 @@ def _rows(path, expected):
     """Yield line number and numbers of every line that has any."""
     try:
         with open(path, encoding="utf-8", errors="replace") as file:
-            lines = file.read().splitlines()
-    except OSError as error:
+            lines = file.read().split("\n")
+    except (OSError, ValueError) as error:
+        # The latter: a path with a NUL.
+        reason = error.strerror if isinstance(error, OSError) else error
+        where = shortened(os.path.abspath(path))
+        raise GainFileError(f"cannot read {where}: {reason}, {expected}") from None
+    if lines[-1].endswith(".") and "#" not in lines[-1]:
+        # With a line break behind it, that is a way to write a number.
         raise GainFileError(
-            f"cannot read {os.path.abspath(path)}: {error.strerror}, {expected}"
-        ) from None
+            f"{path}, line {len(lines)}: the file ends in a number without the digits behind its "
+            f"point; expected them, or a line break, {expected}"
+        )
     for number, line in enumerate(lines, start=1):
         tokens = line.partition("#")[0].split()
         if tokens:
@@ -222,11 +234,11 @@ def _rows(path, expected):
 
 def _number(token, where, expected):
     try:
-        value = float(token)
+        value = number_from_text(token)
     except ValueError:
-        raise GainFileError(f"{where}: {token[:20]!r} is not a number, {expected}") from None
+        raise GainFileError(f"{where}: {shown(token)} is not a number, {expected}") from None
     if not math.isfinite(value):
-        raise GainFileError(f"{where}: {token!r} is not finite, {expected}")
+        raise GainFileError(f"{where}: {shown(token)} is not finite, {expected}")
     return value
 
 

@@ -62,8 +62,60 @@ def test_a_bad_file_is_refused(path, lines, reason):
     assert reason in refusal(write(path, *lines))
 
 
+@pytest.mark.parametrize(
+    ("first", "reason"),
+    [
+        (["1_5", *LINE[1:]], "line 1: '1_5' is no finite number"),
+        (["nan", *LINE[1:]], "line 1: 'nan' is no finite number"),
+        (["٣", *LINE[1:]], "line 1: '٣' is no finite number"),
+        ([*LINE[:-1], "7" * 1000], "line 1: '777"),
+        ([*LINE[:-1], "x" * 1000], "line 1: 'xxx"),
+        ([*LINE[:-1], "x" * 200_000], "line 1: field larger than field limit"),
+        ([*LINE[:-1], '"' + "x" * 200_000], "line 1: field larger than field limit"),
+    ],
+    ids=map(str, range(7)),
+)
+def test_a_first_line_with_numbers_is_no_heading(path, first, reason):
+    text = refusal(write(path, first, LINE))
+    assert reason in text
+    assert len(text) < len(str(path)) + 200
+
+
+def test_a_field_that_is_too_long_is_told_with_its_line(path):
+    text = refusal(write(path, ["duration"], LINE, ["x" * 200_000]))
+    assert f"{path}, line 3: field larger than field limit" in text
+
+
+def test_lines_are_counted_as_editors_do(path):
+    path.write_text('duration,"two\nlines"\n' + ",".join(LINE) + "\n1\n")
+    assert "line 4 has 1 columns" in refusal(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"duration\n\nStra\xdfe\n", ", line 3: is no text in UTF-8"),
+        (b"duration\n1,\0\n", ", line 2: has a NUL"),
+    ],
+)
+def test_bytes_that_are_no_text_are_told_with_their_line(path, content, reason):
+    path.write_bytes(content)
+    assert f"{path}{reason}" in refusal(path)
+
+
+def test_a_byte_order_mark_does_not_hide_the_first_piece(path):
+    line = ",".join(LINE)
+    path.write_bytes(f"\ufeff{line}\r\n{line}\r\n".encode())
+    assert len(load(path)) == 2
+
+
 def test_a_file_that_is_not_there_is_refused(path):
-    assert "cannot read" in refusal(path)
+    assert "cannot be read: No such file" in refusal(path)
+    with pytest.raises(TrajectoryError, match="null byte"):
+        load("a\0.csv")
+    with pytest.raises(TrajectoryError, match="File name too long") as error:
+        load("a" * 200_000)
+    assert len(str(error.value)) < 300
 
 
 def test_a_summary_of_a_circle():

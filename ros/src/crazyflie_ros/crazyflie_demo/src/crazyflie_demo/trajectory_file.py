@@ -1,6 +1,7 @@
 """Files of trajectories made of polynomials, and what these ask of a vehicle."""
 
 import csv
+import io
 import math
 from pathlib import Path
 from typing import NamedTuple
@@ -9,7 +10,9 @@ import numpy as np
 
 from crazyflie_model.elementwise import join
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
+from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameter_types import TEXT, ParameterType
+from crazyflie_utils.text_input import TextFileError, number_from_text, read_text
 
 COLUMNS = 1 + 4 * COEFFICIENTS
 """Of a line in a file: duration, then the coefficients of x, y, z and yaw."""
@@ -39,7 +42,7 @@ class TrajectoryFile(ParameterType):
 def load(path: str | Path) -> list[PolynomialPiece]:
     """Return the pieces of a trajectory in a CSV file.
 
-    Each line is a piece, with `COLUMNS` numbers; a first line without numbers is a
+    Each line is a piece, with `COLUMNS` numbers; a first line without any number is a
     heading, and empty lines do not count.
 
     Raises
@@ -47,16 +50,11 @@ def load(path: str | Path) -> list[PolynomialPiece]:
     TrajectoryError
         The file cannot be read; a line is malformed; or two pieces do not meet.
     """
-    try:
-        text = Path(path).read_text()
-    except (OSError, UnicodeDecodeError) as error:
-        raise TrajectoryError(f"cannot read {path}: {error}") from None
     pieces = []
-    for number, line in enumerate(csv.reader(text.splitlines()), start=1):
-        cells = [cell.strip() for cell in line]
-        is_heading = number == 1 and cells and not _is_number(cells[0])
+    for index, (line, cells) in enumerate(_rows(path)):
+        is_heading = index == 0 and not any(map(_is_number, cells))
         if any(cells) and not is_heading:
-            pieces.append(_piece(cells, f"{path}, line {number}"))
+            pieces.append(_piece(cells, f"{path}, line {line}"))
     if not pieces:
         raise TrajectoryError(f"{path} holds no pieces")
     for number, (one, two) in enumerate(zip(pieces, pieces[1:], strict=False)):
@@ -70,6 +68,21 @@ def load(path: str | Path) -> list[PolynomialPiece]:
     return pieces
 
 
+def _rows(path):
+    """Yield number and cells of every line; of one with line breaks in a cell, its last number."""
+    try:
+        text = read_text(path)
+    except TextFileError as error:
+        where = shortened(str(path)) if error.line is None else f"{path}, line {error.line}"
+        raise TrajectoryError(f"{where}: {error}") from None
+    reader = csv.reader(io.StringIO(text, newline=""))
+    try:
+        for row in reader:
+            yield reader.line_num, [cell.strip() for cell in row]
+    except csv.Error as error:
+        raise TrajectoryError(f"{path}, line {reader.line_num}: {error}") from None
+
+
 def _piece(cells, where):
     if cells[-1] == "" and len(cells) == COLUMNS + 1:
         # Some programs end a line with a comma.
@@ -81,7 +94,7 @@ def _piece(cells, where):
         )
     for cell in cells:
         if not _is_number(cell):
-            raise TrajectoryError(f"{where}: {cell!r} is no finite number")
+            raise TrajectoryError(f"{where}: {shown(cell)} is no finite number")
     duration, *coefficients = map(float, cells)
     if duration <= 0.0:
         raise TrajectoryError(f"{where}: the duration is {duration:g}; expected more than 0 s")
@@ -90,7 +103,7 @@ def _piece(cells, where):
 
 def _is_number(cell):
     try:
-        return math.isfinite(float(cell))
+        return math.isfinite(number_from_text(cell))
     except ValueError:
         return False
 

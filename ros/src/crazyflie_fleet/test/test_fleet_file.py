@@ -156,6 +156,15 @@ def test_simulated_vehicles_need_no_address(load):
             ":1) is not set; expected a list of 3, each entry a finite number (m)",
         ),
         (
+            TWO.replace("[0, 1, 0]", "[0, 1, -1]"),
+            ":7) is [0, 1, -1]; expected a list of 3, each entry a finite number (m), z at least 0 "
+            "(z is -1, below the ground)",
+        ),
+        (
+            TWO.replace("[0, 1, 0]", "[0, 1, -0.001]\n    enabled: false"),
+            ":7) is [0, 1, -0.001]; expected a list of 3",
+        ),
+        (
             "robots: {a: {enabled: false, initial_position: [0, 0, 0]}}\n",
             ":1: robots has no vehicle that is enabled",
         ),
@@ -169,6 +178,30 @@ def test_simulated_vehicles_need_no_address(load):
 )
 def test_what_is_wrong_is_named_with_its_line(load, text, expected):
     assert complaints_of(load, text)[0].startswith(expected)
+
+
+@pytest.mark.parametrize("value", ["'1_0'", "1e400", "nan", "0x" + "f" * 4000, "[1]", "'٣'"])
+def test_firmware_parameters_are_finite_numbers(load, value):
+    text = TWO + f"all: {{firmware_params: {{a: {{b: {value}}}}}}}\n"
+    (found,) = complaints_of(load, text)
+    assert found.startswith(":8: all/firmware_params/a/b is ")
+    assert found.endswith("; expected a finite number")
+
+
+def test_messages_cut_what_is_long(load):
+    long = "x" * 200_000
+    for text in (
+        TWO.replace("cf2", f"? {long}-\n  "),
+        TWO + f"    machine: {long}\n",
+        TWO + f"    type: {long}\nrobot_types: {{? {long}y\n : {{}}}}\n",
+        TWO + f"all: {{firmware_params: {{a: {{b: {long}}}}}}}\n",
+    ):
+        assert max(map(len, complaints_of(load, text))) < 700
+
+
+def test_aliases_within_themselves_are_refused(load):
+    (found,) = complaints_of(load, "robots: &a\n  cf1: {initial_position: [0, 0, 0], more: *a}\n")
+    assert found == ":2: has the alias *a in what it stands for"
 
 
 def test_what_is_inherited_is_wrong_once(load):

@@ -21,6 +21,7 @@ from crazyflie_fleet.settings import (
     same_vehicle,
 )
 from crazyflie_utils import ParameterError
+from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameter_types import BOOLEAN, ParameterType
 from crazyflie_utils.yaml_file import Entry
 from crazyflie_utils.yaml_file import load as load_yaml
@@ -163,7 +164,7 @@ class _Reading:
         try:
             return expected(value)
         except ValueError:
-            self._complain(entry, f"is {value!r}; expected {expected}")
+            self._complain(entry, f"is {shown(value)}; expected {expected}")
             return None
 
     def _check_choice(self, entry, key, known):
@@ -171,9 +172,11 @@ class _Reading:
             chosen = entry[key]
             if chosen.value and chosen.value not in list(known):
                 expected = (
-                    f"one of {', '.join(known)}" if known else f"none, as there are no {key}s"
+                    f"one of {shortened(', '.join(known))}"
+                    if known
+                    else f"none, as there are no {key}s"
                 )
-                self._complain(chosen, f"is {chosen.value!r}; expected {expected}")
+                self._complain(chosen, f"is {shown(chosen.value)}; expected {expected}")
 
     def _check_apart(self, vehicles, robots):
         seen: dict[str, str] = {}

@@ -1,6 +1,5 @@
 """What a fleet file may say: the declared settings of vehicles, and what their values may be."""
 
-import math
 import re
 from collections.abc import Iterable
 from typing import Any
@@ -10,6 +9,7 @@ from typing_extensions import override
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
+    FINITE,
     FRAME,
     POSITION,
     TEXT,
@@ -18,6 +18,7 @@ from crazyflie_utils.parameter_types import (
     ParameterType,
     Text,
 )
+from crazyflie_utils.text_input import number_from_text
 
 RESERVED = ("all",)
 """Names that vehicles cannot have: /all/takeoff is everybody's."""
@@ -87,6 +88,23 @@ def same_vehicle(uri: str) -> str:
     return f"radio {int(match['channel'])} {match['rate']} {address:010X}"
 
 
+class StartPosition(ParameterType):
+    """Where a vehicle stands before takeoff: x, y, z in m, z not below the ground."""
+
+    label, unit, range = POSITION.label, POSITION.unit, "z >= 0"
+
+    @override
+    def __call__(self, value: Any) -> tuple[float, float, float]:
+        x, y, z = POSITION(value)
+        if z < 0.0:
+            raise ValueError(f"z is {z:g}, below the ground")
+        return x, y, z
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return f"{POSITION}, z at least 0"
+
+
 class FirmwareNumber(ParameterType):
     """The value of a firmware parameter; 1e-3, which YAML takes for a text, is a number too."""
 
@@ -95,10 +113,11 @@ class FirmwareNumber(ParameterType):
     @override
     def __call__(self, value: Any) -> int | float:
         if isinstance(value, str):
-            value = float(value)
-        if not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise ValueError
-        return int(value) if isinstance(value, bool) else value
+            value = number_from_text(value)
+        if isinstance(value, bool):
+            return int(value)
+        FINITE(value)
+        return value
 
     def __str__(self) -> str:
         """Return what is expected."""
@@ -172,7 +191,7 @@ class RobotSettings(Settings):
     enabled: bool = parameter(BOOLEAN, "whether it takes part", True)
     uri: str | None = parameter(Uri(), "its address; not needed in simulation", None)
     position: tuple[float, float, float] = parameter(
-        POSITION, "where it stands before takeoff", name="initial_position"
+        StartPosition(), "where it stands before takeoff", name="initial_position"
     )
     type: str | None = parameter(TEXT, "of `robot_types`", None)
 

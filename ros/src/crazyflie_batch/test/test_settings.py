@@ -58,6 +58,10 @@ def complaint(path):
         ("duration: 1.0\nsettle_time: 0.5", "duration: 0.004\nsettle_time: 0", 1, ["one period"]),
         ("settle_time: 0.5", "period: 0.0011", 1, ["period", "0.002 s"]),
         ("K_soft.txt", "K_none.txt", 4, ["K_none.txt", "expected 4 rows of 7 numbers"]),
+        ("K_soft.txt", "K" * 1000, 4, ["KKK", "File name too long, expected 4 rows"]),
+        ("K_soft.txt", '"a\\0b"', 4, ["null byte, expected 4 rows of 7 numbers"]),
+        ("[-0.2, 0.2]", "[-0.2, " + "x" * 1000 + "]", 8, ["xxx", "a finite number"]),
+        ("uniform:", "? " + "x" * 1000 + "\n   :", 8, ["xxx", "uniform", "normal", "values"]),
         ("attitude_noise", "attitude_nose", 6, ["attitude_nose", "attitude_noise"]),
         ("0.002", "-0.002", 6, ["attitude_noise", ">= 0"]),
         ("mass_error", "mas_error", 8, ["mas_error is no parameter", "mass_error"]),
@@ -78,6 +82,7 @@ def test_what_is_wrong_is_told_with_its_line(write, old, new, line, words):
     text = complaint(write(GOOD.replace(old, new)))
     assert f"FILE:{line}" in text
     assert all(word in text for word in words), text
+    assert len(text) < 800
 
 
 def test_a_file_that_is_not_there_is_told(tmp_path):

@@ -77,6 +77,15 @@ def test_weights_may_be_numbers_or_a_file(form, tmp_path):
     assert out.read_text() == (CONFIG / "K_hover.txt").read_text()
 
 
+def test_a_matrix_may_be_longer_than_a_name_of_a_file(tmp_path):
+    out = tmp_path / "K.txt"
+    words = ",".join(f"{value:.6f}" for value in np.diag([1, 1, 4, 1, 1, 4, 100]).ravel())
+    assert main(arguments(Q=words, out=out)) == 0
+    assert (
+        load_matrix(str(out), 4, 7).tolist() == load_matrix(CONFIG / "K_hover.txt", 4, 7).tolist()
+    )
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -56,6 +56,22 @@ def test_all_that_is_wrong_is_named_at_once():
 
 
 @pytest.mark.parametrize(
+    "value",
+    [
+        {"1": "x" * 200_000},
+        {"x" * 200_000: {}},
+        {"1": {"pose": "x " * 100_000}},
+        {"1": {"pose": "x" * 200_000}, "2": {"pose": "x" * 200_000}},
+    ],
+    ids=map(str, range(4)),
+)
+def test_what_is_long_is_cut_in_messages(value):
+    with pytest.raises(ValueError) as error:
+        RigidBodyDictionary()(value)
+    assert 0 < len(str(error.value)) < 500
+
+
+@pytest.mark.parametrize(
     ("value", "reason"),
     [
         ([], ""),

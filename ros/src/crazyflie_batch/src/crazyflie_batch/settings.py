@@ -1,5 +1,6 @@
 """What a Monte-Carlo run is told: a YAML file, checked before anything flies."""
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from crazyflie_model import inner_loops
 from crazyflie_model.limits import CRASH_TILT
 from crazyflie_state_estimator import kalman
 from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameter_types import DURATION, METRES, TEXT, Integer, Number, Text
 from crazyflie_utils.parameter_types import FINITE as ANY
 from crazyflie_utils.parameters import Declaration
@@ -227,19 +229,20 @@ def read_settings(path: str | Path) -> Settings:
     try:
         K = load_matrix(str(_gain_file(file.file, run.K_file)), 4, 7)
     except GainFileError as error:
-        raise file["K_file"].error(f"is {run.K_file}: {error}") from None
+        raise file["K_file"].error(f"is {shortened(run.K_file)}: {error}") from None
     return Settings(file.file.stem, run, vehicle, sweeps, tuple(map(tuple, K.tolist())))
 
 
 def _gain_file(settings: Path, name: str) -> Path:
     beside = settings.parent / name
-    if beside.exists():
+    # Unlike pathlib's, this takes a name that is too long for one.
+    if os.path.exists(beside):
         return beside
     try:
         shipped = Path(RosPack().get_path("crazyflie_lqr"), "config", name)
     except ResourceNotFound:
         return beside
-    return shipped if shipped.exists() else beside
+    return shipped if os.path.exists(shipped) else beside
 
 
 def _sweep(entry: Entry, name: str) -> Sweep:
@@ -249,7 +252,7 @@ def _sweep(entry: Entry, name: str) -> Sweep:
     declaration = declarations[name]
     kinds = entry.entries()
     if len(kinds) != 1 or next(iter(kinds)) not in (UNIFORM, NORMAL, VALUES):
-        raise entry.error(f"has {', '.join(kinds) or 'nothing'}; expected {_EXPECTED}")
+        raise entry.error(f"has {shortened(', '.join(kinds)) or 'nothing'}; expected {_EXPECTED}")
     ((kind, content),) = kinds.items()
     elements = content.elements()
     if kind != VALUES and len(elements) != 2 or not elements:
@@ -265,7 +268,7 @@ def _number(entry: Entry, declaration: Declaration) -> float:
     try:
         return declaration.type(entry.value)
     except ValueError:
-        raise entry.error(f"is {entry.value!r}; expected {declaration.type}") from None
+        raise entry.error(f"is {shown(entry.value)}; expected {declaration.type}") from None
 
 
 __all__ = ["FlightParameters", "ParameterError", "RunParameters", "Settings", "read_settings"]

@@ -5,6 +5,7 @@ from typing import Any
 
 from typing_extensions import override
 
+from crazyflie_utils.messages import shown
 from crazyflie_utils.parameter_types import METRES, ParameterType
 
 Point = tuple[float, float, float]
@@ -43,7 +44,7 @@ def _point(number, item):
         x, y, z = item
         return METRES(x), METRES(y), METRES(z)
     except (TypeError, ValueError):
-        raise ValueError(f"point {number} is {item!r}") from None
+        raise ValueError(f"point {number} is {shown(item)}") from None
 
 
 class Route:

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import os
 import sys
 from pathlib import Path
 
@@ -120,7 +121,8 @@ def _weights(options, model):
 
 def _matrix(name, words, rows, columns):
     text = " ".join(words)
-    if len(words) == 1 and Path(text).is_file():
+    # Unlike pathlib's, this takes a text that is too long for a name.
+    if len(words) == 1 and os.path.isfile(text):
         lines = Path(text).read_text(encoding="utf-8", errors="replace").splitlines()
         text = " ".join(line.partition("#")[0] for line in lines)
     try:

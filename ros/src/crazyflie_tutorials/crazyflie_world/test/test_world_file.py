@@ -92,6 +92,8 @@ def test_the_lab():
         ("name: other", "name: other\n    centre: [0, 0, 1]", 10, "a centre and a path, or none"),
         ("size: [4, 3]", "size: [4, 0]", 1, "floor/size"),
         ("yaw: 0.5", "picture: none.png", 3, "objects[0]/picture is 'none.png'; expected a file"),
+        ("yaw: 0.5", f"picture: {'x' * 1000}", 3, "objects[0]/picture is 'xxxxx"),
+        ("yaw: 0.5", 'picture: "a\\0b"', 3, "objects[0]/picture is 'a\\x00b'; expected a file"),
         ("floor: {size: [4, 3]}", "floor: {size: [4, 3], texture: lawn}", 1, "one of plain"),
         ("floor:", "ceiling:", 1, "ceiling is not known"),
         ("floor: {size: [4, 3]}", "frame: world", 1, "floor/size"),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from typing_extensions import override
 
+from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameter_types import (
     FRAME,
     TEXT,
@@ -97,19 +98,20 @@ class RigidBodyDictionary(ParameterType):
         known = {declaration.name for declaration in RigidBodyParameters.declarations()}
         bodies, unknown, complaints = [], [], []
         for key, entry in value.items():
+            label = shortened(str(key))
             if not isinstance(entry, dict):
-                complaints.append(f"{key} is {entry!r}; expected a dictionary")
+                complaints.append(f"{label} is {shown(entry)}; expected a dictionary")
                 continue
-            unknown += [f"{key}/{name}" for name in entry if name not in known]
+            unknown += [f"{label}/{shortened(str(name))}" for name in entry if name not in known]
             values = {name: entry[name] for name in entry if name in known}
             try:
-                parameters = RigidBodyParameters.from_mapping(values, f"{key}/")
+                parameters = RigidBodyParameters.from_mapping(values, f"{label}/")
             except ParameterError as error:
                 complaints += error.complaints
                 continue
             bodies.append(RigidBody(str(key), parameters))
             if not (parameters.pose or parameters.pose2d or parameters.child_frame_id):
-                complaints.append(f"{key} has neither pose nor pose2d nor child_frame_id")
+                complaints.append(f"{label} has neither pose nor pose2d nor child_frame_id")
         complaints += _shared("topic", [(b, t) for b in bodies for t in _topics(b)])
         complaints += _shared("child_frame_id", [(b, b.parameters.child_frame_id) for b in bodies])
         complaints += _shared("name", [(b, b.name) for b in bodies])
@@ -133,7 +135,7 @@ def _shared(what, owned):
     owners: dict[str, str] = {}
     for body, value in owned:
         if value in owners:
-            yield f"{owners[value]} and {body.key} share {what} {value!r}"
+            yield f"{owners[value]} and {body.key} share {what} {shown(value)}"
         elif value is not None:
             owners[value] = body.key
 

@@ -4,6 +4,7 @@ import math
 from typing import NamedTuple
 
 from crazyflie_model.angles import wrap_to_pi
+from crazyflie_utils.messages import shown
 from crazyflie_utils.parameter_types import DURATION, FINITE, ParameterType
 
 
@@ -39,13 +40,13 @@ class WaypointList(ParameterType):
     @staticmethod
     def _waypoint(number: int, entry: object) -> Waypoint:
         if not isinstance(entry, (list, tuple)) or len(entry) != len(Waypoint._fields):
-            raise ValueError(f"waypoint {number} is {entry!r}")
+            raise ValueError(f"waypoint {number} is {shown(entry)}")
         *pose, duration = entry
         try:
             x, y, z, yaw = map(FINITE, pose)
             return Waypoint(x, y, z, yaw, DURATION(duration))
         except ValueError:
-            raise ValueError(f"waypoint {number} is {entry!r}") from None
+            raise ValueError(f"waypoint {number} is {shown(entry)}") from None
 
 
 class WaypointFollower:

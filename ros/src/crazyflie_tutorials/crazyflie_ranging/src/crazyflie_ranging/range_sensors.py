@@ -10,6 +10,7 @@ from typing_extensions import override
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
 from crazyflie_utils import ParameterError, Parameters, parameter, yaml_file
+from crazyflie_utils.messages import shown
 from crazyflie_utils.parameter_types import (
     FRAME,
     POSITION,
@@ -174,7 +175,7 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
             for key, taken in lines.items():
                 value = entry[key]
                 if value.value in taken:
-                    text = f"is {value.value!r}, which is there in line {taken[value.value]}"
+                    text = f"is {shown(value.value)}, which is there in line {taken[value.value]}"
                     raise value.error(text)
                 taken[value.value] = value.line
         except ParameterError as error:

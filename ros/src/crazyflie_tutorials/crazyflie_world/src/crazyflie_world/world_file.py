@@ -1,5 +1,6 @@
 """Worlds in YAML files."""
 
+import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,6 +11,7 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_utils import ParameterError, Parameters, parameter, yaml_file
+from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
     FINITE,
@@ -232,7 +234,7 @@ def load(path: str | FilePath) -> World:
             made = _object(entry)
             name = entry["name"]
             if made.name in lines:
-                raise name.error(f"is {made.name!r}, which is the name of {lines[made.name]}")
+                raise name.error(f"is {shown(made.name)}, which is the name of {lines[made.name]}")
             lines[made.name] = f"the object in line {name.line}"
             objects.append(made)
         except ParameterError as error:
@@ -259,9 +261,10 @@ def _with_picture(shape: Shape, entry: Entry) -> Shape:
     if not isinstance(shape, Box) or not shape.picture:
         return shape
     picture = entry.file.parent / shape.picture
-    if not picture.is_file():
+    # Unlike pathlib's, this takes a name that is too long for one.
+    if not os.path.isfile(picture):
         raise entry["picture"].error(
-            f"is {shape.picture!r}; expected a file, and {picture} is none"
+            f"is {shown(shape.picture)}; expected a file, and {shortened(str(picture))} is none"
         )
     return replace(shape, picture=str(picture))
 
@@ -273,5 +276,5 @@ def _path(entry: Entry) -> Path:
 def _type(entry: Entry, choices: tuple[str, ...]) -> str:
     kind = entry["type"]
     if kind.value not in choices:
-        raise kind.error(f"is {kind.value!r}; expected one of {', '.join(choices)}")
+        raise kind.error(f"is {shown(kind.value)}; expected one of {', '.join(choices)}")
     return kind.value

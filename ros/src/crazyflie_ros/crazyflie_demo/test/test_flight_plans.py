@@ -129,7 +129,7 @@ def test_says_when_there_is_no_driver():
         (HighLevelFlightNode, {"height": 0.0}, "/cf/flight/height"),
         (HighLevelFlightNode, {"duration": 0.0}, "/cf/flight/duration"),
         (TrajectoryFlightNode, {}, "/cf/flight/file is not set"),
-        (TrajectoryFlightNode, {"file": "/nowhere.csv"}, "(cannot read /nowhere.csv"),
+        (TrajectoryFlightNode, {"file": "/nowhere.csv"}, "(/nowhere.csv: cannot be read"),
         (TrajectoryFlightNode, {"file": str(FIGURE8), "timescale": 0.0}, "/cf/flight/timescale"),
     ],
 )

@@ -45,7 +45,7 @@ def test_a_trajectory_is_streamed_as_it_is():
 def test_a_bad_file_ends_the_node():
     process = FakeProcess()
     assert not process.launch(TrajectoryStreamNode("/none.csv"), "/flight")
-    assert "cannot read /none.csv" in process.logged("error")[0]
+    assert "/none.csv: cannot be read" in process.logged("error")[0]
 
 
 def test_begins_when_somebody_listens():

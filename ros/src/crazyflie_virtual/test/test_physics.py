@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 from crazyflie_virtual.body.battery import FULL_VOLTAGE
 from crazyflie_virtual.body.physics import STEP, Physics
@@ -67,6 +68,43 @@ def test_coming_down_on_the_back():
     physics.put_upright()
     fly(physics, (60000.0,) * 4, 0.5)
     assert physics.position[2] > 0.0
+
+
+def tilt(physics):
+    """Return the tilt of the body, deg."""
+    x, y, _, _ = physics.quaternion
+    return np.degrees(np.arccos(1.0 - 2.0 * (x * x + y * y)))
+
+
+def test_feet_hold_what_the_weight_on_them_can_hold():
+    # Half of the weight is on the feet: they hold 0.5 m g d, rotors on one side ask for less.
+    physics = Physics()
+    half = 0.5 * HOVER_PWM
+    fly(physics, (0.7 * half, 0.7 * half, 1.3 * half, 1.3 * half), 1.0)
+    assert tilt(physics) == 0.0
+    assert physics.rates == (0.0, 0.0, 0.0)
+
+
+def test_rotors_on_one_side_tip_a_vehicle_that_stands_and_its_weight_brings_it_back():
+    # Motors 3 and 4 are on the left. They carry 0.7 of the weight with the lever d: more than the
+    # 0.3 on the feet of the right side hold.
+    physics = Physics((1.0, 2.0, 0.0), yaw=0.5)
+    while tilt(physics) < 10.0:
+        fly(physics, (0.0, 0.0, 1.4 * HOVER_PWM, 1.4 * HOVER_PWM), STEP)
+    roll, _, yaw = zyx_from_quaternion(physics.quaternion)
+    assert np.degrees(roll) == pytest.approx(10.0, abs=0.5)
+    assert yaw == pytest.approx(0.5)
+    assert physics.position == pytest.approx((1.0, 2.0, 0.0), abs=1e-4)
+    fly(physics, (0.0,) * 4, 0.5)
+    assert tilt(physics) == 0.0
+    assert physics.position == pytest.approx((1.0, 2.0, 0.0), abs=1e-4)
+    assert not physics.is_overturned
+
+
+def test_a_vehicle_that_is_tipped_too_far_lies_on_its_back():
+    physics = Physics()
+    fly(physics, (0.0, 0.0, 1.4 * HOVER_PWM, 1.4 * HOVER_PWM), 1.0)
+    assert physics.is_overturned
 
 
 def test_sensors_see_what_there_is():

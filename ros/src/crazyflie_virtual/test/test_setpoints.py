@@ -136,3 +136,22 @@ def test_what_is_no_setpoint_changes_nothing(packet):
     before = bench.firmware.commander.setpoint
     assert bench.ask(*packet) == []
     assert bench.firmware.commander.setpoint is before
+
+
+@pytest.mark.parametrize("goal", [(0.5, 0.0), (0.5, 0.5), (1.0, -1.0), (-0.3, 0.3)])
+def test_a_position_aside_lifts_a_vehicle_that_stands(goal):
+    """Roll and pitch together: the rotors tip the body on its feet until it has its attitude.
+
+    A ground that held it level would let the firmware's integrators wind up on both axes, whose sum
+    the mixer takes from the thrust of all motors: the vehicle would stand there for ever.
+    """
+    bench = Bench()
+    bench.stream(generic(7, "ffff", *goal, 0.7, 0.0), 5.0)
+    assert bench.physics.position == pytest.approx((*goal, 0.7), abs=0.12)
+
+
+def test_a_position_with_another_heading_does_not_lift_a_vehicle_that_stands():
+    """As recorded of the firmware: the feet hold the heading, the rate loop winds up."""
+    bench = Bench()
+    bench.stream(generic(7, "ffff", 0.0, 0.0, 0.5, 30.0), 4.0)
+    assert bench.height == 0.0

@@ -7,6 +7,7 @@ from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.quadrotor import CRAZYFLIE, STILL_AIR, Airframe
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body.battery import FULL_VOLTAGE
+from crazyflie_virtual.body.feet import tip
 from crazyflie_world.world import World
 
 STEP = PERIOD
@@ -16,7 +17,7 @@ MotorCommands = tuple[float, float, float, float]
 """PWM of the four motors."""
 
 _OVERTURNING = 0.5
-"""Cosine of the tilt beyond which a vehicle that comes down lies on its back."""
+"""Cosine of the tilt on the ground beyond which a vehicle lies on its back."""
 
 
 class Physics:
@@ -110,9 +111,13 @@ class Physics:
         if self.is_overturned:
             commands = (0.0, 0.0, 0.0, 0.0)
         speeds = [min(top, CRAZYFLIE.rotor_speed(command)) for command in commands]
-        after = self._x = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
+        after = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
+        if after[2] <= 0.0:
+            after = tip(self._airframe, before, after, STEP)
+        self._x = after
         if before[2] > 0.0 and after[2] <= 0.0:
             self.impact_speed = max(0.0, -before[5])
+        if after[2] <= 0.0 and not self.is_overturned:
             up = 1.0 - 2.0 * (before[6] ** 2 + before[7] ** 2)
             self.is_overturned = up < _OVERTURNING
         if self.is_overturned:

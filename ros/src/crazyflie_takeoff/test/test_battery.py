@@ -6,6 +6,7 @@ from std_msgs.msg import Bool, Float32, String
 from std_srvs.srv import EmptyRequest
 from takeoff_helpers import SERVER, state
 
+from crazyflie_takeoff.battery import Battery, Charge
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.testing import FakeProcess
@@ -63,6 +64,16 @@ def test_a_battery_that_is_silent_or_not_a_number_says_nothing():
     process.publish("/battery", Float32(2.9))
     process.advance(0.1)
     assert word(process) == "flying"
+
+
+def test_with_duration_zero_one_low_voltage_is_enough_and_a_good_one_is_good():
+    battery = Battery(low=3.2, critical=3.0, duration=0.0)
+    assert battery.charge(0.0) is Charge.UNKNOWN
+    for time, (voltage, charge) in enumerate(
+        [(4.0, Charge.GOOD), (3.1, Charge.LOW), (2.9, Charge.CRITICAL), (3.9, Charge.GOOD)]
+    ):
+        battery.measure(float(time), voltage)
+        assert battery.charge(float(time)) is charge
 
 
 # What people are told.

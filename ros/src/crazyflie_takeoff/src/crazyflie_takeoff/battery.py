@@ -19,6 +19,9 @@ FRESHNESS = 5.0
 _LONGEST_STEP = 1.5
 """Voltages that are further apart count as this far, s."""
 
+_NOT_LOWER = -math.inf
+"""How long a voltage has been lower that is not, s."""
+
 
 class Battery:
     """The charge of a battery, by how long its voltage has been below two levels.
@@ -30,13 +33,13 @@ class Battery:
     low, critical : float
         V.
     duration : float
-        How long it has to be lower, s.
+        How long it has to be lower, s; with 0 a single low voltage is enough.
     """
 
     def __init__(self, low: float, critical: float, duration: float):
         self._levels = (critical, low)
         self._duration = duration
-        self._lasted = [0.0, 0.0]
+        self._lasted = [_NOT_LOWER, _NOT_LOWER]
         self.voltage = math.nan
         self._time = math.nan
 
@@ -45,7 +48,7 @@ class Battery:
         elapsed = time - self._time
         step = min(max(elapsed, 0.0), _LONGEST_STEP) if math.isfinite(elapsed) else 0.0
         self._lasted = [
-            lasted + step if voltage < level else 0.0
+            max(lasted, 0.0) + step if voltage < level else _NOT_LOWER
             for lasted, level in zip(self._lasted, self._levels, strict=True)
         ]
         self.voltage, self._time = voltage, time

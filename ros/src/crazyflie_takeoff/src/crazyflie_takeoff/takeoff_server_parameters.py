@@ -1,6 +1,7 @@
 """The parameters of the takeoff server."""
 
 from collections.abc import Iterator
+from typing import Any
 
 from typing_extensions import override
 
@@ -9,6 +10,35 @@ from crazyflie_takeoff.flight import Plan
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
 from crazyflie_utils import parameter
 from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
+
+SLOWEST_DESCENT = 0.05
+"""A slower descent would hardly ever end, m/s."""
+
+FASTEST_DESCENT = 1.0
+"""A vehicle meets the ground with the speed of its descent, m/s."""
+
+LONGEST_OPEN_LOOP = 5.0
+"""Without a controller a vehicle climbs by 2.5 m in this time, s: half of 0.2 m/s^2 times t^2."""
+
+
+class DescentSpeed(Number):
+    """The speed of a descent, or 0."""
+
+    @property
+    @override
+    def range(self) -> str:  # type: ignore[override]
+        return f"0, or {SLOWEST_DESCENT:g} to {self.maximum:g}"
+
+    @override
+    def __call__(self, value: Any) -> float:
+        speed = super().__call__(value)
+        if 0.0 < speed < SLOWEST_DESCENT:
+            raise ValueError
+        return speed
+
+    @override
+    def __str__(self) -> str:
+        return f"{self.range} ({self.unit})"
 
 
 class TakeoffServerParameters(FlightTopicParameters):
@@ -41,13 +71,16 @@ class TakeoffServerParameters(FlightTopicParameters):
     hover_y: float = parameter(METRES, "hover point after takeoff", name="hover/y", live=True)
     hover_z: float = parameter(METRES, "hover point after takeoff", name="hover/z", live=True)
     open_loop: float = parameter(
-        DURATION, "how long thrust g + 0.2 lifts off", 1.0, "duration/open_loop"
+        Number("s", minimum=0.0, maximum=LONGEST_OPEN_LOOP),
+        "how long thrust g + 0.2 lifts off; 0 leaves it to the controller",
+        1.0,
+        "duration/open_loop",
     )
     settle: float = parameter(
         DURATION, "how long the controller has to reach the hover point", 5.0, "duration/hover"
     )
     descent_speed: float = parameter(
-        Number("m/s", minimum=0.0),
+        DescentSpeed("m/s", minimum=0.0, maximum=FASTEST_DESCENT),
         "how fast a landing sinks before the ramp; 0 for the bare ramp",
         0.3,
         "landing/descent_speed",
@@ -63,7 +96,10 @@ class TakeoffServerParameters(FlightTopicParameters):
         "battery/critical",
     )
     battery_duration: float = parameter(
-        DURATION, "how long the voltage has to be lower", 5.0, "battery/duration"
+        DURATION,
+        "how long the voltage has to be lower; with 0 a single low voltage is enough",
+        5.0,
+        "battery/duration",
     )
 
     @override

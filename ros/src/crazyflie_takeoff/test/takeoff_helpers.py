@@ -149,6 +149,8 @@ class ControllerNode(Node):
 class Network:
     """Nodes in fake processes of their own, connected as on a ROS master.
 
+    Messages on the topics in ``unheard``, (name, topic), do not reach the process of this name.
+
     All live by one clock. A process can be killed at any moment, and another
     one be started in its place, which is told what is latched by those alive.
     """
@@ -160,6 +162,7 @@ class Network:
         self.time = 100.0
         self.heard = []
         self.unpublished = set()
+        self.unheard = set()
         self._processes = {}
         self._sent = {}
 
@@ -227,9 +230,10 @@ class Network:
                         self._deliver(process, topic, message)
 
     def _deliver(self, sender, topic, message):
-        for other in self._processes.values():
+        for name, other in self._processes.items():
             if other is not sender and topic in other.transport.subscribers:
-                other.publish(topic, message)
+                if (name, topic) not in self.unheard:
+                    other.publish(topic, message)
 
 
 class HoverNetwork(Network):

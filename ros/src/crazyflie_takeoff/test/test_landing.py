@@ -39,6 +39,30 @@ def test_the_descent_has_a_topic_of_its_own(network):
     assert network.on("/ref")[-1][0] > network.on("/ref_descent")[-1][0]
 
 
+@pytest.mark.parametrize("gap", [1.0, 2.5, 10.0])
+def test_a_landing_whose_states_do_not_reach_the_server(network, gap):
+    """The controller sees, and flies what is asked for."""
+    land = network.call("/land")
+    network.advance(1.0)
+    network.unheard.add(("server", "/state"))
+    network.advance_until(land.done, gap) if gap > 8.0 else network.advance(gap)
+    network.unheard.clear()
+    network.advance_until(land.done)
+    network.advance(0.2)
+    assert network.vehicle.z == 0.0
+    assert 0.0 < network.vehicle.touchdown_speed < 0.5
+
+
+def test_a_landing_that_begins_while_no_states_reach_the_server(network):
+    network.unheard.add(("server", "/state"))
+    network.advance(5.0)
+    land = network.call("/land")
+    network.advance_until(land.done)
+    network.advance(0.2)
+    assert network.vehicle.z == 0.0
+    assert 0.0 < network.vehicle.touchdown_speed < 0.5
+
+
 # The end of the launch.
 
 
@@ -64,6 +88,21 @@ def test_from_far_above_a_server_that_is_to_leave_lands_faster():
     until_on_ground(network)
     assert network.time - begin < 10.0
     assert network.vehicle.touchdown_speed < 1.0
+
+
+@pytest.mark.parametrize("moment", [0.02, 1.0, 5.0])
+def test_a_server_that_is_to_leave_makes_a_landing_under_way_faster(moment):
+    network = HoverNetwork({**SERVER, "hover/z": 4.0, "landing/descent_speed": 0.2})
+    network.take_off()
+    land = network.call("/land")
+    network.advance(moment)
+    begin = network.time
+    network.server.leave()
+    until_on_ground(network)
+    assert network.time - begin < 10.0
+    assert network.vehicle.z == 0.0
+    assert network.vehicle.touchdown_speed < 1.0
+    assert land.exception(0) is None
 
 
 def test_a_server_that_is_to_leave_aborts_a_takeoff():

@@ -79,16 +79,24 @@ def test_the_descent_is_straight_down_and_fed_forward():
 
 
 @pytest.mark.parametrize("bad", [None, math.nan])
-def test_a_descent_without_states_ends_in_the_ramp(bad):
+def test_a_descent_without_states_goes_on_for_as_long_as_it_takes(bad):
     process = flying(SERVER)
     future = call(process, "/land")
-    for _ in range(60):
-        if bad is not None:
-            process.publish("/state", state(bad))
-        process.advance(0.01)
+
+    def advance(duration):
+        for _ in range(round(duration * 100)):
+            if bad is not None:
+                process.publish("/state", state(bad))
+            process.advance(0.01)
+
+    advance(6.2)
+    assert states(process) == ["flying", "descending"]
+    assert thrusts(process) == []
+    assert len(process.published("/ref")) == pytest.approx(620, abs=2)
+    advance(0.2)
     assert states(process) == ["flying", "descending", "landing"]
     assert thrusts(process)[0] == GRAVITY
-    process.advance(1.0)
+    advance(1.0)
     assert future.done()
     assert len(process.logged("warn")) == (0 if bad is None else 1)
 

@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 
 from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.descent import Descent, Position
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_utils.refusal import RefusalError
 
@@ -29,18 +30,14 @@ TOUCHDOWN_HEIGHT = 0.05
 LIFT_OFF_TIME = 3.0
 """A vehicle that is still down although a controller has had so long to lift it, s, cannot fly."""
 
-DESCENT_MARGIN = 3.0
-"""How much longer than calculated a descent may take, s."""
-
 TOUCHDOWN_LIMIT = 2.0
 """How long after the ramp a vehicle may take to come down, s."""
 
-PRESS_DEPTH = 0.3
-"""How far below the ground a descent's reference goes, m, so that the vehicle
-meets the ground with its speed also when it hangs above the reference."""
+SHORTEST_DESCENT = 1.0
+"""A descent that has to end within a time takes at least this, s, however late it is."""
 
 FILTER_LIMIT = 60.0
-"""How long the filter may take to bring a vehicle down, s."""
+"""How long the filter may take to bring a vehicle down, or hold it, s."""
 
 _ROUNDING = 1e-6
 """Tolerance of comparisons between times, s."""
@@ -52,9 +49,6 @@ _REFUSALS = {
     FlightState.DESCENDING: "a landing is under way",
     FlightState.LANDING: "a landing is under way",
 }
-
-
-Position = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -108,8 +102,8 @@ class FlightStateMachine:
     plan : Plan
         May be replaced at any time; what has begun already goes on as it was planned.
     is_held : bool
-        Whether the filter keeps the vehicle level because no control comes. A descent then
-        waits for the state: either it comes back, or the filter brings the vehicle down.
+        Whether the filter keeps the vehicle level because no control comes. A descent waits
+        then: either control comes back, or the filter brings the vehicle down.
 
     Parameters
     ----------
@@ -138,8 +132,12 @@ class FlightStateMachine:
         self._time = -math.inf
         self._entered: float | None = None
         self._hover_sent = False
-        self._descent: _Descent | None = None
-        self._descent_time = math.inf
+        # Where the vehicle is, measured or, in a descent, dead-reckoned; None until it is measured.
+        self._position: Position | None = None
+        self._is_seen = False
+        self._descent: Descent | None = None
+        self._descent_speed = plan.descent_speed
+        self._descent_limit = math.inf
         self._zero_sent = -math.inf
         self._is_lost = is_lost
 
@@ -169,13 +167,8 @@ class FlightStateMachine:
         """Whether `land` makes sense."""
         return self._state in (FlightState.FLYING, FlightState.TAKING_OFF)
 
-    def land(self, within: float = math.inf) -> None:
+    def land(self) -> None:
         """Begin to land.
-
-        Parameters
-        ----------
-        within : float
-            How long the descent may take, s; if need be it is faster than planned.
 
         Raises
         ------
@@ -185,7 +178,13 @@ class FlightStateMachine:
         if not self.may_land:
             raise RefusalError(_REFUSALS[self._state])
         self._enter(self._way_down())
-        self._descent_time = within
+
+    def hurry(self, within: float) -> None:
+        """Have a descent that is under way end within a time, s; anything else goes on as it is."""
+        if self._state is FlightState.DESCENDING:
+            elapsed = 0.0 if self._entered is None else self._time - self._entered
+            self._descent_limit = elapsed + within
+            self._descent = None
 
     def abort(self) -> None:
         """Turn a takeoff into a landing; anything else goes on as it is."""
@@ -223,7 +222,10 @@ class FlightStateMachine:
         Output
         """
         self._follow_clock(time)
+        if position is not None:
+            self._position = position
         thrust, reference = self._ACTIONS[self._state](self, time, position)
+        self._is_seen = position is not None
         toggle = self._state.in_flight != self._announced
         self._announced = self._state.in_flight
         return Output(self._state, thrust, reference, toggle)
@@ -251,19 +253,25 @@ class FlightStateMachine:
         return None, None
 
     def _descend(self, time, position):
-        if position is not None and self._descent is None:
-            speed = max(self.plan.descent_speed, (position[2] - self._ground) / self._descent_time)
-            self._descent = _Descent(position, self._ground, speed)
-        descent = self._descent
         elapsed = time - self._entered
-        limit = DESCENT_MARGIN if descent is None else descent.limit
-        if position is None and self.is_held and elapsed < limit:
-            return None, None
-        if descent is None or self._is_down(position) or elapsed > limit:
+        is_seen_again = position is not None and not self._is_seen
+        waits = self.is_held and elapsed < FILTER_LIMIT
+        if self._position is not None and (self._descent is None or is_seen_again or waits):
+            self._descent = self._descend_from(self._position, elapsed)
+        descent = self._descent
+        if descent is None or self._is_down(position) or descent.is_over(elapsed):
             self._enter(FlightState.LANDING)
             self._follow_clock(time)
             return self._ramp_down(time, position)
-        return None, descent.reference(elapsed)
+        reference = descent.reference(elapsed)
+        if position is None:
+            self._position = reference[:3]
+        return None, reference
+
+    def _descend_from(self, position, elapsed):
+        remaining = max(self._descent_limit - elapsed, SHORTEST_DESCENT)
+        speed = max(self._descent_speed, (position[2] - self._ground) / remaining)
+        return Descent(elapsed, position, self._ground, speed)
 
     def _ramp_down(self, time, position):
         elapsed = time - self._entered + _ROUNDING
@@ -271,7 +279,9 @@ class FlightStateMachine:
             return None, None
         if elapsed < RAMP_DURATION:
             return GRAVITY - RAMP_RATE * (time - self._entered), None
-        if self._is_down(position) or elapsed > RAMP_DURATION + TOUCHDOWN_LIMIT:
+        # The motors are off already: without a height there is nothing to wait for.
+        is_known = position is not None
+        if not is_known or self._is_down(position) or elapsed > RAMP_DURATION + TOUCHDOWN_LIMIT:
             self._enter(FlightState.ON_GROUND)
         return self._zero_thrust(time), None
 
@@ -288,7 +298,8 @@ class FlightStateMachine:
         self._entered = None
         self._hover_sent = False
         self._descent = None
-        self._descent_time = math.inf
+        self._descent_speed = self.plan.descent_speed
+        self._descent_limit = math.inf
         self._zero_sent = -math.inf
         self._is_lost = False
 
@@ -304,31 +315,13 @@ class FlightStateMachine:
         return FlightState.DESCENDING if self.plan.descent_speed > 0.0 else FlightState.LANDING
 
     def _is_down(self, position):
-        # Who does not know the height has to take it for reached.
-        return position is None or position[2] - self._ground < TOUCHDOWN_HEIGHT
+        return position is not None and position[2] - self._ground < TOUCHDOWN_HEIGHT
 
     def _stays_down(self, position):
-        may_judge = position is not None and self.plan.settle >= LIFT_OFF_TIME
-        return may_judge and self._is_down(position)
+        return self.plan.settle >= LIFT_OFF_TIME and self._is_down(position)
 
     def _zero_thrust(self, time):
         if time - self._zero_sent < ZERO_THRUST_PERIOD - _ROUNDING:
             return None
         self._zero_sent = time
         return 0.0
-
-
-class _Descent:
-    """A reference that sinks straight down from where the vehicle is."""
-
-    def __init__(self, position: Position, ground: float, speed: float):
-        self._x, self._y, self._z = position
-        self._speed = speed
-        self._lowest = min(ground - PRESS_DEPTH, self._z)
-        self.limit = max(self._z - ground, 0.0) / speed + DESCENT_MARGIN
-
-    def reference(self, elapsed):
-        z = self._z - self._speed * elapsed
-        if z <= self._lowest:
-            return (self._x, self._y, self._lowest, 0.0, 0.0, 0.0)
-        return (self._x, self._y, z, 0.0, 0.0, -self._speed)

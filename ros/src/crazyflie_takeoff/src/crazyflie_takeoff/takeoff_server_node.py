@@ -119,11 +119,13 @@ class TakeoffServerNode(Node):
     def leave(self) -> None:
         """Land: the process is to end."""
         flight = self._flight
-        if flight is None or not flight.may_land:
+        if flight is None or flight.state is FlightState.ON_GROUND:
             return
-        self._calls.fail(ServiceError(f"takeoff aborted: {self._handle.name} is to end"))
-        flight.land(LEAVE_LIMIT)
-        self._cause = "the launch is to end"
+        if flight.may_land:
+            self._calls.fail(ServiceError(f"takeoff aborted: {self._handle.name} is to end"))
+            flight.land()
+            self._cause = "the launch is to end"
+        flight.hurry(LEAVE_LIMIT)
         self._set_pace()
 
     @override

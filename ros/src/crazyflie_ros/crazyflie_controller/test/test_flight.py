@@ -236,6 +236,28 @@ def test_lands_on_a_floor_that_is_higher_than_the_start():
     assert loop.setpoints[-1] == OFF
 
 
+@pytest.mark.parametrize("moment", [0.0, 1.0, 6.0])
+def test_a_landing_under_way_is_made_faster(moment):
+    loop = flying(Pose(0.0, 0.0, 5.0, 0.0))
+    loop.run(20.0)
+    assert loop.pose().z > 4.5
+    loop.flight.land()
+    loop.run(moment)
+    loop.flight.hurry(7.0)
+    track = loop.run_until(lambda: loop.flight.state is State.IDLE, 10.0)
+    assert track[-1, 2] == 0.0
+    assert contact_speed(track) < 1.0
+
+
+def test_only_a_landing_is_made_faster():
+    loop = flying()
+    loop.run(5.0)
+    loop.flight.hurry(7.0)
+    loop.run(5.0)
+    assert loop.flight.state is State.AUTOMATIC
+    assert loop.pose().z == pytest.approx(1.0, abs=0.12)
+
+
 def test_a_goal_during_a_landing_waits_for_the_next_takeoff():
     loop = flying()
     loop.run(5.0)

@@ -77,7 +77,8 @@ class ControllerNode(Node):
         """Land: the process is to end."""
         # On the ground, or landing already.
         with contextlib.suppress(RefusalError):
-            self._flight.land(_LEAVE_LIMIT)
+            self._flight.land()
+        self._flight.hurry(_LEAVE_LIMIT)
 
     def _reconfigure(self, parameters):
         self._controller.reconfigure(parameters.pids)

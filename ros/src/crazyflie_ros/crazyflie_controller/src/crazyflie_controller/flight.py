@@ -119,13 +119,8 @@ class GoToFlight:
         self._ground = self._pose.z
         self._enter(State.TAKING_OFF)
 
-    def land(self, within: float = math.inf) -> None:
+    def land(self) -> None:
         """Begin to land where the vehicle is.
-
-        Parameters
-        ----------
-        within : float
-            How long the descent may take, s; if need be it is faster than `DESCENT_SPEED`.
 
         Raises
         ------
@@ -135,11 +130,18 @@ class GoToFlight:
         if self._state in (State.IDLE, State.LANDING):
             raise RefusalError(f"the controller is {self._state.value}")
         self._descent_from = self._pose
-        self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / within)
+        self._descent_speed = DESCENT_SPEED
         self._touchdown = None
         if self._state is State.TAKING_OFF:
             self._touch_down()
         self._enter(State.LANDING)
+
+    def hurry(self, within: float) -> None:
+        """Have a descent that is under way end within a time, s; anything else goes on as it is."""
+        if self._state is State.LANDING and self._touchdown is None:
+            self._descent_from = self._descent_from._replace(z=self._pose.z)
+            self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / within)
+            self._enter(State.LANDING)
 
     def tick(self, time: float, stamp: float | None, pose: Pose | None) -> Setpoint | None:
         """Go on.

@@ -42,9 +42,12 @@ def control(thrust):
     return ControlStamped(control=Control(thrust=thrust))
 
 
-def state(z, z_dot=0.0):
-    """Return a state message above the origin."""
-    return PositionVelocityYawStateStamped(state=PositionVelocityYawState(z=z, z_dot=z_dot))
+def state(z, z_dot=0.0, stamp=None):
+    """Return a state message above the origin; without a stamp (ROS time) by default."""
+    message = PositionVelocityYawStateStamped(state=PositionVelocityYawState(z=z, z_dot=z_dot))
+    if stamp is not None:
+        message.header.stamp = stamp
+    return message
 
 
 class PointMass:
@@ -118,7 +121,8 @@ class VehicleNode(Node):
     def _on_timer(self):
         self.vehicle.advance(0.01)
         if self.sees:
-            self._state.publish(state(self.vehicle.z + self.offset, self.vehicle.z_dot))
+            height = self.vehicle.z + self.offset
+            self._state.publish(state(height, self.vehicle.z_dot, self._handle.stamp()))
 
 
 class ControllerNode(Node):

@@ -2,7 +2,7 @@
 
 import pytest
 from flight_words import states, until_on_ground
-from takeoff_helpers import SERVER, HoverNetwork
+from takeoff_helpers import SERVER, HoverNetwork, state
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.runtime.transport import ServiceError
@@ -50,6 +50,21 @@ def test_a_landing_whose_states_do_not_reach_the_server(network, gap):
     network.advance_until(land.done)
     network.advance(0.2)
     assert network.vehicle.z == 0.0
+    assert 0.0 < network.vehicle.touchdown_speed < 0.5
+
+
+def test_a_height_that_is_old_is_no_touchdown(network):
+    """Such as one that has waited in a socket: the vehicle stood on the ground then."""
+    network.call("/land")
+    network.advance(0.5)
+    network.unheard.add(("server", "/state"))
+    server = network.process("server")
+    for _ in range(100):
+        server.publish("/state", state(0.0, stamp=server.clock.stamp(network.time - 2.0)))
+        network.advance(0.01)
+    assert network.last("/in_flight_state") == "descending"
+    network.unheard.clear()
+    until_on_ground(network)
     assert 0.0 < network.vehicle.touchdown_speed < 0.5
 
 

@@ -114,6 +114,26 @@ def test_takeoff_without_a_state_that_is_finite_is_refused():
         call(process, "/takeoff")
 
 
+def test_takeoff_with_states_that_are_old_when_they_come_is_refused():
+    process = on_ground(SERVER)
+    process.advance(0.6)
+    for age in (0.6, 2.0, 99.0):
+        now = process.clock.time()
+        process.publish("/state", state(0.0, stamp=process.clock.stamp(now - age)))
+        with pytest.raises(ServiceError, match=f"states on /state are {age:.1f} s old when they"):
+            call(process, "/takeoff")
+
+
+@pytest.mark.parametrize("ahead", [None, 0.0, 1000.0])
+def test_a_stamp_that_is_missing_or_ahead_says_nothing_about_age(ahead):
+    process = on_ground(SERVER)
+    process.advance(0.6)
+    now = process.clock.time()
+    stamp = None if ahead is None else process.clock.stamp(now + ahead)
+    process.publish("/state", state(0.0, stamp=stamp))
+    assert not call(process, "/takeoff").done()
+
+
 def test_takeoff_without_a_controller_is_refused():
     process = on_ground(SERVER)
     for is_there in (True, False):

@@ -2,6 +2,7 @@
 
 import threading
 
+import genpy
 import pytest
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
@@ -141,6 +142,17 @@ def test_clock_from_outside_moves_time(process, handle):
     assert handle.time() == 101.5
     assert handle.stamp() == stamp
     assert ticks == [101.5]
+
+
+@pytest.mark.parametrize("age", [0.0, 0.25, 70.0])
+def test_age_is_the_time_since_the_stamp(process, handle, age):
+    process.advance(1000.0)
+    assert handle.age(handle.stamp(handle.time() - age)) == pytest.approx(age)
+
+
+def test_no_stamp_and_one_ahead_say_nothing_about_age(handle):
+    assert handle.age(genpy.Time()) == 0.0
+    assert handle.age(handle.stamp(handle.time() + 5.0)) == 0.0
 
 
 def test_clock_publisher_moves_time_after_the_present_callback(process):

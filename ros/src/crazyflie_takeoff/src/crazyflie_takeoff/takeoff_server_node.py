@@ -21,6 +21,7 @@ from crazyflie_takeoff.calls import Calls
 from crazyflie_takeoff.filter_report import NO_FILTER, parse
 from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.flight_state import SEPARATOR, FlightState, Takeover
+from crazyflie_takeoff.measured_position import MeasuredPosition
 from crazyflie_takeoff.recovery import recover_state
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters
 from crazyflie_utils import Node, NodeHandle, ServiceError
@@ -35,9 +36,6 @@ CRUISE_TIME_STEP = 0.1
 
 STATUS_PERIOD = 0.1
 """How often it is looked whether there is anything new to tell people, s."""
-
-STATE_LIMIT = 0.5
-"""A measured state older than this is not used, s."""
 
 RECOVERY_LIMIT = 1.0
 """How long a server that has started looks for the state of the flight, s."""
@@ -64,8 +62,7 @@ class TakeoffServerNode(Node):
         self._filter = NO_FILTER
         self._has_controller = True
         self._had_controller = False
-        self._position: tuple[float, float, float] | None = None
-        self._position_time = 0.0
+        self._position = MeasuredPosition()
         self._published_state: FlightState | None = None
         self._published_status = ""
         self._cause = ""
@@ -162,7 +159,7 @@ class TakeoffServerNode(Node):
 
     def _lacks_what_may_come(self):
         # What was there and is gone is no matter of waiting.
-        lacks_state = self._parameters.state_topic is not None and self._position is None
+        lacks_state = self._expects_states and not self._position.is_measured
         lacks_controller = not self._has_controller and not self._had_controller
         return self._is_starting and (lacks_state or lacks_controller)
 
@@ -190,11 +187,10 @@ class TakeoffServerNode(Node):
         topic = self._parameters.state_topic
         if self._filter.takeover is Takeover.EMERGENCY:
             return f"emergency, {self._filter.reason}; it has to be reset first"
-        if topic is not None and self._known_position() is None:
-            return (
-                f"no state has come on {self._handle.resolve(topic)} for {STATE_LIMIT:g} s; are "
-                "the estimator and the source of /tf running?"
-            )
+        if topic is not None:
+            name = self._handle.resolve(topic)
+            if reason := self._position.explanation(self._handle.time(), name):
+                return reason
         if not self._has_controller:
             return "no commanded controls come; is the controller running?"
         if self._charge() in (Charge.LOW, Charge.CRITICAL):
@@ -245,19 +241,19 @@ class TakeoffServerNode(Node):
         self._had_controller = self._had_controller or message.data
 
     def _on_state(self, message):
-        self._position = (message.state.x, message.state.y, message.state.z)
-        self._position_time = self._handle.time()
+        state = message.state
+        age = self._handle.age(message.header.stamp)
+        self._position.measure(self._handle.time(), (state.x, state.y, state.z), age)
 
     def _known_position(self):
-        if self._position is None:
-            return None
-        now = self._handle.time()
-        # After a reset of the clock the age counts from there.
-        self._position_time = min(self._position_time, now)
-        return self._position if now - self._position_time < STATE_LIMIT else None
+        return self._position.value(self._handle.time())
+
+    @property
+    def _expects_states(self):
+        return self._parameters.state_topic is not None
 
     def _has_all_evidence(self):
-        sees_enough = self._parameters.state_topic is None or self._known_position() is not None
+        sees_enough = not self._expects_states or self._known_position() is not None
         return self._filter_reported and sees_enough
 
     def _recover_state(self):

@@ -63,6 +63,16 @@ class TimeHandle(HandleBase):
         """Return the same as `stamp` in whole ns, for a `StampedPose`."""
         return self._process.clock.nanoseconds(moment)
 
+    def age(self, stamp: genpy.Time) -> float:
+        """Return how long ago data was measured that has a stamp, s.
+
+        However long that is: a stamp of another clock is no exception, since nothing tells it from
+        that of a message that has waited. But 0 without a stamp (0), and for one ahead of now.
+        """
+        if not stamp:
+            return 0.0
+        return max(self.nanoseconds() - stamp.to_nsec(), 0) * 1e-9
+
     def timer(
         self,
         period: float,

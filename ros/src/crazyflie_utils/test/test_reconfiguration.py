@@ -21,6 +21,7 @@ class LimiterParameters(Parameters):
     steps: int = parameter(Integer(1, 9), "how often", default=3, live=True)
     is_on: bool = parameter(BOOLEAN, "whether to limit", default=True, live=True)
     topic: str = parameter(TOPIC, "what is limited", name="topics/in")
+    shared: float = parameter(Number(), "of all nodes", default=1.0, name="/shared")
 
     def complaints(self):
         """See `Parameters.complaints`."""
@@ -52,6 +53,7 @@ def process():
     """Return a process with a limiter in it."""
     process = FakeProcess()
     process.limiter = Limiter()
+    process.transport.parameters["/shared"] = 2.0
     assert process.launch(process.limiter, "/limiter", {"limit": 10, "topics/in": "/a"})
     return process
 
@@ -99,6 +101,17 @@ def test_a_change_is_checked_and_applied(process):
     assert (parameters.limit, parameters.gain, parameters.topic) == (11.0, 2.5, "/a")
     assert process.transport.parameters["/limiter/limit"] == 11.0
     assert updates(process)[-1]["loop/gain"] == 2.5
+
+
+def test_a_change_does_not_wait_for_the_master(process, monkeypatch):
+    def ask_the_master(*_):
+        raise AssertionError("the master was asked")
+
+    for call in ("set_param", "get_param"):
+        monkeypatch.setattr(process.transport, call, ask_the_master)
+    monkeypatch.setattr(process.transport, "set_param_later", lambda name, value: None)
+    assert change(process, limit=11.0)["limit"] == 11.0
+    assert process.limiter.changes[-1].shared == 2.0
 
 
 def test_changes_add_up(process):

@@ -148,6 +148,14 @@ class NodeHandle(TimeHandle, TfHandle):
         """
         self._process.transport.set_param(self.resolve(name), value)
 
+    def set_param_later(self, name: str, value: Any) -> None:
+        """Do the same as `set_param` soon, without waiting for the master.
+
+        Of several values of a parameter that wait, only the latest is set. What cannot be set is
+        logged.
+        """
+        self._process.transport.set_param_later(self.resolve(name), value)
+
     # Topics and services.
 
     def publisher(self, topic: str, message_type: type, latch: bool = False) -> Publisher:

@@ -5,6 +5,7 @@ through the node handle, so that a change comes between two callbacks and works
 for many nodes in one process. What goes over the wire is encoded by the library.
 """
 
+import contextlib
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -45,9 +46,9 @@ class Reconfiguration:
     ):
         self._handle = handle
         self._type = type(parameters)
-        self._get = get
         self._on_change = on_change
-        self._changes: dict[str, Any] = {}
+        # All of them now: at a change, in flight, nobody may wait for the master.
+        self._values = _read(self._type.declarations(), get)
         self._live = {d.name: d for d in self._type.declarations() if d.live}
         descriptions = handle.publisher("~parameter_descriptions", ConfigDescription, latch=True)
         self._updates = handle.publisher("~parameter_updates", Config, latch=True)
@@ -67,7 +68,7 @@ class Reconfiguration:
             self._updates.publish(encoding.encode_config(self._config()))
             raise ServiceError(str(error)) from None
         for name, value in wanted.items():
-            self._handle.set_param(f"~{name}", value)
+            self._handle.set_param_later(f"~{name}", value)
         self._updates.publish(encoding.encode_config(self._config()))
         return ReconfigureResponse(encoding.encode_config(self._config()))
 
@@ -78,30 +79,34 @@ class Reconfiguration:
                 f"{', '.join(sorted(unknown))} cannot be changed while {self._handle.name} runs; "
                 f"expected some of {', '.join(self._live)}"
             )
-        before = self._changes
-        self._changes = {**before, **wanted}
+        before = self._values
+        self._values = {**before, **wanted}
         try:
             full_name = self._handle.resolve
-            self._on_change(self._type.read(self._raw, lambda name: full_name(f"~{name}")))
+            self._on_change(
+                self._type.read(self._values.__getitem__, lambda name: full_name(f"~{name}"))
+            )
         except Exception:
-            self._changes = before
+            self._values = before
             raise
-
-    def _raw(self, name):
-        return self._changes[name] if name in self._changes else self._get(name)
 
     def _config(self):
         return {name: self._value(declaration) for name, declaration in self._live.items()}
 
     def _value(self, declaration):
-        try:
-            raw = self._raw(declaration.name)
-        except KeyError:
-            raw = declaration.default
+        raw = self._values.get(declaration.name, declaration.default)
         return _PYTHON_TYPES[_wire_type(declaration)](raw)
 
 
 _PYTHON_TYPES = {"double": float, "int": int, "bool": bool, "str": str}
+
+
+def _read(declarations, get):
+    values = {}
+    for declaration in declarations:
+        with contextlib.suppress(KeyError):
+            values[declaration.name] = get(declaration.name)
+    return values
 
 
 def _wire_type(declaration: Declaration) -> str:

@@ -6,6 +6,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
 from concurrent.futures import Future, InvalidStateError, wait
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -14,6 +15,7 @@ import rosgraph
 import rospy
 
 from crazyflie_utils.runtime import rospy_internals, rospy_receiving, rospy_sending
+from crazyflie_utils.runtime.parameter_writer import ParameterWriter
 from crazyflie_utils.runtime.throttle import Throttle
 from crazyflie_utils.runtime.transport import (
     ExternalPublisher,
@@ -91,6 +93,7 @@ class RosTransport(Transport):
         self._remappings = rospy_internals.take_over_remappings()
         self._calls: dict[str, threading.Semaphore] = {}
         self._own_services: dict[str, rospy.Service] = {}
+        self._parameter_writer = ParameterWriter(_write_param, partial(self.log, "warn"))
         self._services_at_start: dict[str, str] | None = None
         self._is_starting = False
 
@@ -127,6 +130,10 @@ class RosTransport(Transport):
     def set_param(self, name: str, value: Any) -> None:
         """Set a parameter on the parameter server."""
         rospy.set_param(name, value)
+
+    def set_param_later(self, name: str, value: Any) -> None:
+        """Set a parameter on the parameter server by a thread that may wait for it."""
+        self._parameter_writer.set(name, value)
 
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Register a publisher with the master."""
@@ -212,6 +219,11 @@ class RosTransport(Transport):
     def clock_was_set(self, stamp: genpy.Time) -> None:
         """Set rospy's own clock, which stamps the log."""
         rospy_internals.set_time(stamp)
+
+
+def _write_param(name, value):
+    # Not through rospy's own connection to the master, which other threads use.
+    rosgraph.Master(rospy.get_name()).setParam(name, value)
 
 
 _LOGGERS = {

@@ -79,6 +79,10 @@ class Transport(ABC):
     def set_param(self, name: str, value: Any) -> None:
         """Set a parameter."""
 
+    def set_param_later(self, name: str, value: Any) -> None:
+        """Set a parameter soon, without waiting for the master; by default, at once."""
+        self.set_param(name, value)
+
     @abstractmethod
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Announce a topic to those outside."""

@@ -153,7 +153,8 @@ class ControllerNode(Node):
 class Network:
     """Nodes in fake processes of their own, connected as on a ROS master.
 
-    Messages on the topics in ``unheard``, (name, topic), do not reach the process of this name.
+    They share the parameter server. Messages on the topics in ``unheard``, (name, topic), do not
+    reach the process of this name.
 
     All live by one clock. A process can be killed at any moment, and another
     one be started in its place, which is told what is latched by those alive.
@@ -167,6 +168,7 @@ class Network:
         self.heard = []
         self.unpublished = set()
         self.unheard = set()
+        self.parameters = {}
         self._processes = {}
         self._sent = {}
 
@@ -174,6 +176,7 @@ class Network:
         """Start a node in a process of its own; return the node."""
         process = FakeProcess(start=self.time)
         process.transport.unpublished |= self.unpublished
+        process.transport.parameters = self.parameters
         assert process.launch(node, f"/{name}", parameters), process.logged("error")
         for other in self._processes.values():
             for topic in self.LATCHED:

@@ -160,6 +160,56 @@ def test_server_during_landing_when_the_height_is_known(seeing, moment, gap):
     seeing.take_off()
 
 
+@pytest.mark.parametrize("ground", [-0.4, 0.7])
+@pytest.mark.parametrize("moment", [0.5, 2.0, 4.0, 4.9])
+def test_server_during_landing_where_the_ground_is_not_at_zero(seeing, ground, moment):
+    """Only the former server knew where the vehicle took off."""
+    seeing.vehicle_node.offset = ground
+    seeing.advance(0.5)
+    seeing.take_off()
+    assert seeing.vehicle.z == pytest.approx(1.0 - ground, abs=0.02)
+    begun = seeing.time
+    seeing.call("/land")
+    seeing.advance(moment * (1.0 - ground) / 1.4)
+    restart(seeing, "server", 0.1)
+    seeing.advance_until(lambda: seeing.last("/in_flight_state") == "on_ground")
+    assert seeing.time - begun < (1.0 - ground) / 0.3 + 3.0
+    seeing.advance(0.5)
+    assert seeing.vehicle.z == 0.0
+    assert 0.0 < seeing.vehicle.touchdown_speed < 0.5
+
+
+@pytest.mark.parametrize("ground", [-0.4, 0.7])
+def test_server_in_flight_where_the_ground_is_not_at_zero(seeing, ground):
+    seeing.vehicle_node.offset = ground
+    seeing.advance(0.5)
+    seeing.take_off()
+    restart(seeing, "server")
+    seeing.advance(2.0)
+    land = seeing.call("/land")
+    begun = seeing.time
+    seeing.advance_until(land.done)
+    assert seeing.time - begun < (1.0 - ground) / 0.3 + 3.0
+    seeing.advance(0.5)
+    assert seeing.vehicle.z == 0.0
+    assert 0.0 < seeing.vehicle.touchdown_speed < 0.5
+
+
+def test_a_ground_of_an_earlier_launch_does_not_make_a_vehicle_fly(seeing):
+    """The parameter server may be older than server and filter."""
+    seeing.vehicle_node.offset = -0.4
+    seeing.advance(0.5)
+    seeing.take_off()
+    seeing.advance_until(seeing.call("/land").done)
+    seeing.kill("server")
+    seeing.kill("filter")
+    seeing.vehicle_node.offset = 0.0
+    seeing.advance(3.0)
+    seeing.start_server()
+    seeing.advance(3.0)
+    assert seeing.last("/in_flight_state") == "on_ground"
+
+
 def test_server_during_the_ramp_when_the_height_is_unknown():
     """The filter gives the vehicle to the controller, the server leaves it there."""
     network = HoverNetwork(BARE)

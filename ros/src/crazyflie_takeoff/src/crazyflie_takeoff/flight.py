@@ -115,6 +115,8 @@ class FlightStateMachine:
         flight. By default it has been told the truth.
     is_lost : bool, optional
         Whether the filter is bringing the vehicle down; see `lose`.
+    ground : float, optional
+        z of the ground until a vehicle is seen on it, m.
     """
 
     def __init__(
@@ -123,12 +125,13 @@ class FlightStateMachine:
         state: FlightState = FlightState.ON_GROUND,
         announced: bool | None = None,
         is_lost: bool = False,
+        ground: float = 0.0,
     ):
         self.plan = plan
         self.is_held = False
         self._state = state
         self._announced = state.in_flight if announced is None else announced
-        self._ground = 0.0
+        self._ground = ground
         self._time = -math.inf
         self._entered: float | None = None
         self._hover_sent = False
@@ -145,6 +148,11 @@ class FlightStateMachine:
     def state(self) -> FlightState:
         """Where the flight stands."""
         return self._state
+
+    @property
+    def ground(self) -> float:
+        """Height (z) of the ground, where the vehicle stood before it took off, m."""
+        return self._ground
 
     def check_takeoff(self) -> None:
         """Raise a `RefusalError` when the vehicle is not on the ground."""

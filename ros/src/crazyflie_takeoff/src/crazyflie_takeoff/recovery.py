@@ -3,8 +3,10 @@
 It may be the first on the ground, or take the place of one that died at any moment.
 There are two sources: the control filter, which keeps the flight state that the former
 server published, or else tells whether a controller sends commands; and the measured
-height. A filter that has only just started, too, is evidence of a fresh launch, whatever a
-controller commands: it does not tell of commands in its first seconds.
+height above the ground. If there is a flight state, the ground is where the former server took
+off, by the parameter that it has left; else it is taken to be at z = 0. A filter that has only
+just started, too, is evidence of a fresh launch, whatever a controller commands: it does not tell
+of commands in its first seconds.
 """
 
 from dataclasses import dataclass
@@ -57,7 +59,7 @@ def recover_state(
     remembered : FlightState or None
         What the filter remembers; None when it knows nothing, or there is none.
     height : float or None
-        Measured z, m; None when it is not known.
+        Above the ground, m; None when it is not known.
     can_descend : bool
         Whether landings begin with a descent.
     is_commanded : bool

@@ -175,6 +175,7 @@ class TakeoffServerNode(Node):
                 if reason := self._takeoff_refusal():
                     raise RefusalError(reason)
                 flight.takeoff()
+                self._handle.set_param_later("~ground", flight.ground)
             else:
                 flight.land()
         except RefusalError as reason:
@@ -261,16 +262,18 @@ class TakeoffServerNode(Node):
         if self._flight is not None:
             return
         plan = self._parameters.plan()
-        position = self._known_position()
-        height = None if position is None else position[2]
-        can_descend = plan.descent_speed > 0.0
         told = self._filter
+        # Without a flight to go on with, the parameter may be of another launch.
+        ground = 0.0 if told.remembered is None else self._parameters.ground
+        position = self._known_position()
+        height = None if position is None else position[2] - ground
+        can_descend = plan.descent_speed > 0.0
         recovered = recover_state(
             told.remembered, height, can_descend, told.is_commanded, told.takeover
         )
         self._handle.info(f"begins {recovered.state.value}: {recovered.reason}")
         self._flight = FlightStateMachine(
-            plan, recovered.state, recovered.announced, recovered.is_lost
+            plan, recovered.state, recovered.announced, recovered.is_lost, ground
         )
         self._serve_waiting()
 

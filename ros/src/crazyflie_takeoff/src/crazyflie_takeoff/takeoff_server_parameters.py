@@ -102,6 +102,12 @@ class TakeoffServerParameters(FlightTopicParameters):
         "battery/duration",
     )
 
+    ground: float = parameter(
+        METRES,
+        "z where the last takeoff began, which the server notes for one that takes its place",
+        0.0,
+    )
+
     @override
     def complaints(self) -> Iterator[str]:
         excess = self.box.excess(self.hover)

@@ -104,6 +104,7 @@ class TakeoffControlFilterNode(Node):
 
     def __init__(self) -> None:
         self._published_state: str | None = None
+        self._logged_explanation = ""
         self._published_controller: bool | None = None
         self._is_fresh = True
 
@@ -292,8 +293,10 @@ class TakeoffControlFilterNode(Node):
         if state != self._published_state:
             self._published_state = state
             self._filter_state.publish(String(state))
-            if self._filter.explanation:
+            # Once, however the flight state in front of it changes.
+            if self._filter.explanation not in ("", self._logged_explanation):
                 self._handle.warn(state)
+            self._logged_explanation = self._filter.explanation
 
     def _word(self):
         told = [each.value for each in (self._filter.takeover, self._filter.remembered) if each]

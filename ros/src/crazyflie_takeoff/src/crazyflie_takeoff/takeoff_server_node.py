@@ -20,6 +20,7 @@ from crazyflie_takeoff.battery import Charge
 from crazyflie_takeoff.calls import Calls
 from crazyflie_takeoff.filter_report import NO_FILTER, parse
 from crazyflie_takeoff.flight import FlightStateMachine
+from crazyflie_takeoff.flight_log import FlightLog
 from crazyflie_takeoff.flight_state import SEPARATOR, FlightState, Takeover
 from crazyflie_takeoff.measured_position import MeasuredPosition
 from crazyflie_takeoff.recovery import recover_state
@@ -272,6 +273,7 @@ class TakeoffServerNode(Node):
             told.remembered, height, can_descend, told.is_commanded, told.takeover
         )
         self._handle.info(f"begins {recovered.state.value}: {recovered.reason}")
+        self._log = FlightLog(self._handle.info, recovered.state)
         self._flight = FlightStateMachine(
             plan, recovered.state, recovered.announced, recovered.is_lost, ground
         )
@@ -323,6 +325,7 @@ class TakeoffServerNode(Node):
     def _publish(self, output):
         if output.state is not self._published_state:
             self._published_state = output.state
+            self._log.note(output.state, self._cause)
             self._flight_state.publish(String(output.state.value))
             self._announce_flight(output.state is not FlightState.ON_GROUND)
             self._publish_status()

@@ -128,18 +128,20 @@ def hears_of_flights(node):
 def test_processes_that_are_needed_in_flight_end_after_the_landing(flight):
     for process in flight:
         interrupt(process, "")
-    for process in flight:
-        wait_for_notice(process)
+    wait_for_notice(flight[0])
     wait_until(lambda: "asked to land" in flight[0].output, "the pilot's leaving")
     with listening("/cf/sensors/instrument/time", Float64) as measurements:
         assert measurements.get(timeout=LIMIT).data != SAFE
         assert rospy.ServiceProxy("/cf/pilot/land", Trigger)().success
         assert last_word(measurements) == SAFE
     assert [process.wait() for process in flight] == [0, 0]
+    # Who ends the flight says so, once; the others need not.
+    assert [process.output.count("in flight; ends after") for process in flight] == [1, 0]
 
 
 def test_second_interrupt_ends_at_once_and_safely(flight):
-    for process in flight:
+    # The instrument is asked alone: nobody ends the flight, and so it says that it waits.
+    for process in reversed(flight):
         interrupt(process, "")
         wait_for_notice(process)
         interrupt(process, "")

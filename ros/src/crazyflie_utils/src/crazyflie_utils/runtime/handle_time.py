@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import genpy
 from rosgraph_msgs.msg import Clock
 
-from crazyflie_utils.runtime import flights
 from crazyflie_utils.runtime.handle_base import HandleBase
 from crazyflie_utils.runtime.timers import Timer
 from crazyflie_utils.runtime.topics import Publisher
@@ -161,6 +160,6 @@ class TimeHandle(HandleBase):
 
         Processes with nodes that are needed in flight do not end at SIGINT before it.
         """
-        tell, close = flights.announce(self._process, self._name)
-        self._undo.append(close)
-        return tell
+        announcement = self._process.announce_flights(self._name)
+        self._undo.append(announcement.close)
+        return announcement.tell

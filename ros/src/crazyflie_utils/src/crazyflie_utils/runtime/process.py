@@ -8,6 +8,7 @@ from rosgraph_msgs.msg import Clock
 from crazyflie_utils.node import Node
 from crazyflie_utils.runtime.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.runtime.executor import Executor
+from crazyflie_utils.runtime.flights import Announcement
 from crazyflie_utils.runtime.handle import NodeHandle
 from crazyflie_utils.runtime.timers import SteadyTimers, Timer, TimerQueue
 from crazyflie_utils.runtime.topics import Topics
@@ -45,6 +46,7 @@ class Process:
         tf = self.transforms.gather, self.transforms.send_gathered
         self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
         self._simulated = TimerQueue(self.executor, *tf)
+        self._announcements: list[Announcement] = []
         self.exit_status: int | None = None
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)
@@ -62,6 +64,17 @@ class Process:
     def handle(self, name: str) -> NodeHandle:
         """Return the handle of the node with this absolute name."""
         return NodeHandle(self, name)
+
+    def announce_flights(self, node: str) -> Announcement:
+        """Return what tells every process of the flights of a node, named absolutely."""
+        announcement = Announcement(self, node)
+        self._announcements.append(announcement)
+        return announcement
+
+    @property
+    def own_flights(self) -> list[str]:
+        """Names of the nodes of this process that are in flight."""
+        return [each.node for each in self._announcements if each.in_flight]
 
     def add_timer(
         self,
@@ -100,13 +113,15 @@ class Process:
         self._simulated.stop()
 
     def leave(self, nodes: dict[str, Node]) -> None:
-        """Have every node begin to end what needs time.
+        """Have every node begin to end what needs time, and other processes told of it.
 
         Parameters
         ----------
         nodes : dict of str to Node
             By absolute name.
         """
+        for announcement in self._announcements:
+            self.executor.submit(announcement.tell_of_end)
         for name, node in nodes.items():
             self.executor.submit(self.handle(name).guard(node.leave))
 

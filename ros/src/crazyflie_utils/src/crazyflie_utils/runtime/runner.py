@@ -40,6 +40,10 @@ _FLIGHT_LIMIT = 10.0
 """How long, in s, a process lives on for a flight that is to end: less than the 15 s
 that roslaunch gives it."""
 
+_NOTICE_DELAY = 1.0
+"""How long, in s, a process waits for the word of another that its flight is to end, before it says
+itself what it waits for."""
+
 _FLUSH_TIME = 0.2
 """How long, in s, the last messages have to be sent by rospy's threads and to be
 read: a subscriber hangs up as soon as the master tells it of the publisher's end."""
@@ -299,16 +303,27 @@ def _flights(process, nodes):
 def _let_flights_end(process, nodes, flights, signals):
     if not flights.in_flight:
         return
-    process.transport.log(
-        "warn",
-        f"{', '.join(flights.in_flight)}: in flight; ends after the landing, or in "
-        f"{_FLIGHT_LIMIT:g} s; a second SIGINT ends at once",
-    )
+
+    def say(names):
+        process.transport.log(
+            "warn",
+            f"{', '.join(names)}: in flight; ends after the landing, or in {_FLIGHT_LIMIT:g} s; "
+            "a second SIGINT ends at once",
+        )
+
+    own = process.own_flights
+    if own:
+        say(own)
     # Not in this thread: a callback may never return.
     threading.Thread(target=process.leave, args=(nodes,), name="leave", daemon=True).start()
-    end = time.monotonic() + _FLIGHT_LIMIT
-    while flights.in_flight and len(signals) == 1 and time.monotonic() < end:
+    begin = time.monotonic()
+    is_said = bool(own)
+    while flights.in_flight and len(signals) == 1 and time.monotonic() < begin + _FLIGHT_LIMIT:
         time.sleep(0.05)
+        if not is_said and time.monotonic() > begin + _NOTICE_DELAY:
+            is_said = True
+            if names := flights.unattended(2.0 * _NOTICE_DELAY):
+                say(names)
 
 
 def _catch_signals():

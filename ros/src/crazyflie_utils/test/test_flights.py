@@ -1,0 +1,76 @@
+"""What processes tell each other about flights."""
+
+import pytest
+from std_msgs.msg import String
+
+from crazyflie_utils.runtime.flights import Flights
+from crazyflie_utils.testing import FakeProcess
+
+PILOT = "/cf/pilot"
+
+
+@pytest.fixture
+def process():
+    """Return a process that may have flights of its own, and hears of others'."""
+    return FakeProcess()
+
+
+@pytest.fixture
+def flights(process):
+    """Return the flights that a node of the process is needed for."""
+    return Flights(process, ["/cf/sensors/instrument"])
+
+
+def told(process):
+    return [message.data for message in process.published("/flights")]
+
+
+def test_flights_are_known_until_they_have_ended(process, flights):
+    for state, in_flight in (("in flight", [PILOT]), ("on ground", [])):
+        process.publish("/flights", String(f"{PILOT} {state}"))
+        assert flights.in_flight == in_flight
+
+
+def test_flights_in_other_namespaces_do_not_matter(process, flights):
+    process.publish("/flights", String("/cf2/pilot in flight"))
+    assert flights.in_flight == []
+
+
+def test_a_flight_that_somebody_ends_needs_no_word_of_others(process, flights):
+    process.publish("/flights", String(f"{PILOT} in flight"))
+    assert flights.unattended(5.0) == [PILOT]
+    process.publish("/flights", String(f"{PILOT} in flight, to end"))
+    # It flies on, and says so at each change, until it has landed.
+    process.publish("/flights", String(f"{PILOT} in flight"))
+    assert flights.in_flight == [PILOT]
+    assert flights.unattended(5.0) == []
+
+
+def test_what_was_said_long_ago_does_not_count(process, flights, monkeypatch):
+    process.publish("/flights", String(f"{PILOT} in flight, to end"))
+    assert flights.unattended(5.0) == []
+    assert flights.unattended(0.0) == [PILOT]
+
+
+def test_a_process_that_is_to_leave_tells_of_its_flights(process):
+    tell = process.handle(PILOT).announce_flights()
+    other = process.handle("/other/pilot").announce_flights()
+    assert process.own_flights == []
+    tell(True)
+    other(False)
+    assert process.own_flights == [PILOT]
+    process.leave({})
+    assert told(process) == [
+        f"{PILOT} in flight",
+        "/other/pilot on ground",
+        f"{PILOT} in flight, to end",
+    ]
+    tell(False)
+    assert process.own_flights == []
+
+
+def test_a_handle_that_is_closed_has_no_flights(process):
+    handle = process.handle(PILOT)
+    handle.announce_flights()(True)
+    handle.close()
+    assert process.own_flights == []

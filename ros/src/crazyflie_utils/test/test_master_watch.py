@@ -1,0 +1,109 @@
+"""What a process does about a ROS master that is gone, started anew, or does not know it."""
+
+import pytest
+import rosgraph
+
+from crazyflie_utils.runtime import master_watch
+from crazyflie_utils.runtime.master_watch import MasterWatch
+
+
+class Master:
+    """A ROS master as a node sees it."""
+
+    def __init__(self):
+        self.pid = 1000
+        self.known = True
+        self.is_there = True
+        self.on_look = lambda: None
+
+    def lookupNode(self, name):  # noqa: N802
+        """Return the address of a node."""
+        self.on_look()
+        self._answer()
+        if not self.known:
+            raise rosgraph.MasterError("unknown node")
+        return "http://127.0.0.1:1/"
+
+    def getPid(self):  # noqa: N802
+        """Return the process of the master."""
+        self._answer()
+        return self.pid
+
+    def _answer(self):
+        if not self.is_there:
+            raise ConnectionRefusedError
+
+
+class World:
+    """A master, a watch, and what it did."""
+
+    def __init__(self, monkeypatch):
+        self.master = Master()
+        self.said = []
+        self.registered = 0
+        self.is_ending = False
+        monkeypatch.setattr("rosgraph.Master", lambda name: self.master)
+        monkeypatch.setattr("rospy.logwarn", self.said.append)
+        monkeypatch.setattr("rospy.core.is_shutdown_requested", lambda: self.is_ending)
+        monkeypatch.setattr(master_watch.rospy_internals, "register", self._register)
+        self.watch = MasterWatch()
+
+    def _register(self):
+        self.registered += 1
+        self.master.known = True
+
+
+@pytest.fixture
+def world(monkeypatch):
+    """Return a process that the master knows."""
+    world = World(monkeypatch)
+    world.watch.look()
+    assert (world.said, world.registered) == ([], 0)
+    return world
+
+
+def test_a_master_that_is_started_anew_is_told_of_this_process(world):
+    world.master.is_there = False
+    for _ in range(3):
+        world.watch.look()
+    assert world.said == ["the ROS master is gone; what is connected goes on"]
+    world.master.is_there, world.master.known, world.master.pid = True, False, 2000
+    for _ in range(3):
+        world.watch.look()
+    assert world.said[1:] == ["the ROS master was started anew; registering with it"]
+    assert world.registered == 1
+
+
+def test_so_is_one_that_was_away_too_shortly_to_be_missed(world):
+    world.master.known, world.master.pid = False, 2000
+    world.watch.look()
+    assert world.said == ["the ROS master was started anew; registering with it"]
+    assert world.registered == 1
+
+
+def test_a_process_that_ends_is_not_registered_again(world):
+    """It takes its registrations back while its last callbacks run."""
+
+    def end():
+        world.is_ending, world.master.known = True, False
+
+    world.master.on_look = end
+    world.watch.look()
+    assert (world.said, world.registered) == ([], 0)
+
+
+def test_a_master_that_only_forgot_this_process_is_not_said_to_be_new(world):
+    """As after rosnode cleanup while the process was frozen."""
+    world.master.known = False
+    world.watch.look()
+    assert world.said == ["the ROS master does not know this node any more; registering again"]
+    assert world.registered == 1
+
+
+def test_the_same_master_that_is_back_is_no_news(world):
+    world.master.is_there = False
+    world.watch.look()
+    world.master.is_there = True
+    world.watch.look()
+    assert len(world.said) == 1
+    assert world.registered == 0

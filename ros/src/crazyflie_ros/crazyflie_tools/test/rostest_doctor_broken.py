@@ -37,6 +37,10 @@ def lines():
         for name, port in (("/frozen", frozen.getsockname()[1]), ("/dead", 1)):
             uri = f"http://127.0.0.1:{port}"
             rosgraph.Master(name).registerPublisher(f"{name}/topic", "std_msgs/Empty", uri)
+        # Beside the takeoff server one may publish references, not two.
+        rosgraph.Master("/dead").registerPublisher(
+            "/ref", ControlStamped._type, "http://127.0.0.1:1"
+        )
         rospy.set_param("/cf1/add/uri", "radio://0/80/2M/E7E7E7E7E7")
         rospy.set_param("/cf2/add/uri", "radio://0/80/2M/E7E7E7E7E7")
         rospy.set_param("/use_sim_time", True)
@@ -69,7 +73,7 @@ def _loop(now):
         ("connections", "/composed cannot hear /doctor_broken"),
         ("publishers", "/control/takeof has no publisher, /composed waits for it"),
         ("publishers", "/control/lqr comes from /composed, /doctor_broken"),
-        ("publishers", "the reference /ref comes from /composed, /doctor_broken"),
+        ("publishers", "the reference /ref comes from /dead, /doctor_broken"),
         ("clock", "/use_sim_time is true, but nothing comes on /clock"),
         ("tf tree", "crazyflie/base_link has the parents crazyflie, world"),
         ("tf tree", "tf has a loop: egg -> hen -> egg"),

@@ -107,6 +107,32 @@ def test_two_sources():
     ]
 
 
+@pytest.mark.parametrize(
+    ("descent", "parameters"),
+    [
+        ("/ref_descent", {}),
+        (
+            "/down",
+            {"/server/topics/reference": "/ref", "/server/topics/descent_reference": "/down"},
+        ),
+    ],
+)
+def test_references_beside_those_of_the_takeoff_server(descent, parameters):
+    def findings(**sources):
+        publishers = {**WELL.publishers, "/ref": {"/server", *sources["of"]}, descent: {"/server"}}
+        publishers[descent] |= sources.get("of_descents", set())
+        return found(
+            graph.check_publishers(but(publishers=publishers, parameters=PARAMETERS | parameters))
+        )
+
+    assert not findings(of={"/me"})
+    assert findings(of={"/me", "/you"}) == [("warn", "the reference /ref comes from /me, /you")]
+    # Two takeoff servers are one too many, too.
+    assert findings(of={"/other"}, of_descents={"/other"}) == [
+        ("warn", "the reference /ref comes from /other, /server")
+    ]
+
+
 def test_two_drivers_of_one_vehicle():
     uri = "radio://0/80/2M"
     twice = but(parameters={"/cf1/add/uri": uri, "/cf2/add/uri": uri, "/cf3/add/uri": "udp://x:1"})

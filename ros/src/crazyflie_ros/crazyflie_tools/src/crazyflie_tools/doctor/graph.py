@@ -166,15 +166,30 @@ def _doubled(graph):
         if len(publishers) < 2:
             continue
         if topic in references:
-            yield warn(
-                f"the reference {topic} comes from {listed(publishers)}",
-                "end all but one: the vehicle jumps between them",
-            )
+            servers = publishers & _takeoff_servers(graph, topic)
+            others = publishers - servers
+            # A takeoff server leaves the vehicle to one other between takeoff and landing.
+            doubled = others if len(servers) == 1 else publishers
+            if len(doubled) > 1:
+                yield warn(
+                    f"the reference {topic} comes from {listed(doubled)}",
+                    "end all but one: the vehicle jumps between them",
+                )
         elif by_topic.get(topic) in CONTROLS | STATES_AND_REFERENCES:
             yield error(
                 f"{topic} comes from {listed(publishers)}",
                 "end all but one: each undoes what the other does",
             )
+
+
+def _takeoff_servers(graph, reference):
+    """Return the nodes that publish the references of descents, too."""
+    topics = {f"{reference}_descent"}
+    for name, value in graph.parameters.items():
+        node, _, key = name.rpartition("/topics/")
+        if key == "descent_reference" and f"{node}/topics/reference" in graph.topics[reference]:
+            topics.add("/" + str(value).strip("/"))
+    return {node for topic in topics for node in graph.publishers.get(topic, ())}
 
 
 def check_drivers(graph: Graph, reported: Mapping[str, set[str]]) -> Iterator[Finding]:

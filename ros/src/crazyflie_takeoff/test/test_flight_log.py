@@ -2,7 +2,7 @@
 
 import pytest
 from flight_words import until_on_ground
-from std_msgs.msg import Float32
+from std_msgs.msg import Empty
 from takeoff_helpers import SERVER, ControllerNode, HoverNetwork
 
 PROCESSES = ("vehicle", "controller", "filter", "server")
@@ -28,17 +28,18 @@ def test_an_ordinary_flight_logs_each_state_once():
 
 
 def test_a_lost_controller_is_logged_once_and_is_no_matter_of_the_next_flight(network):
+    before = len(said(network, "info", "server"))
     network.kill("controller")
     until_on_ground(network)
     warnings = said(network, "warn", "filter", "server")
     assert [text.split()[0] for text in warnings] == ["flying:", "sinking", "down"]
-    before = len(said(network, "info", "server"))
     network.start("controller", ControllerNode())
     network.take_off()
     network.call("/land")
     until_on_ground(network)
     assert said(network, "warn", "filter", "server") == warnings
-    flight = said(network, "info", "server")[before:]
+    landing, ground, *flight = said(network, "info", "server")[before:]
+    assert (landing, ground) == ("landing", "on the ground")
     assert flight == ["taking off", "flying", "landing", "on the ground"]
     assert network.last("/in_flight_status") == "on ground"
 
@@ -53,11 +54,13 @@ def test_a_reason_is_logged_once(network):
     ]
 
 
-def test_a_flight_that_ends_at_once_says_why(network):
+def test_what_the_filter_does_is_explained_by_the_filter_only(network):
     before = len(said(network, "info", "server"))
-    network.process("filter").publish("/all/emergency", Float32())
+    network.process("filter").publish("/all/emergency", Empty())
     network.advance(0.5)
-    assert said(network, "info", "server")[before:] == ["on the ground: all vehicles were stopped"]
+    assert said(network, "info", "server")[before:] == ["on the ground"]
+    assert said(network, "warn", "filter") == ["emergency from flying: all vehicles were stopped"]
+    assert "all vehicles were stopped" in network.last("/in_flight_status")
 
 
 @pytest.mark.parametrize("gap", [0.5, 1.5])

@@ -325,7 +325,9 @@ class TakeoffServerNode(Node):
     def _publish(self, output):
         if output.state is not self._published_state:
             self._published_state = output.state
-            self._log.note(output.state, self._cause)
+            # The filter logs its own reasons.
+            reason = "" if self._cause == self._filter.reason else self._cause
+            self._log.note(output.state, reason)
             self._flight_state.publish(String(output.state.value))
             self._announce_flight(output.state is not FlightState.ON_GROUND)
             self._publish_status()

@@ -39,7 +39,7 @@ class Descent:
         """Return whether a vehicle that follows has been on the ground for `DESCENT_MARGIN`."""
         return time > self._end
 
-    def reference(self, time: float) -> tuple[float, ...]:
+    def reference(self, time: float) -> tuple[float, float, float, float, float, float]:
         """Return x, y, z in m and x_dot, y_dot, z_dot in m/s."""
         z = self._z - self._speed * (time - self._begin)
         if z <= self._lowest:

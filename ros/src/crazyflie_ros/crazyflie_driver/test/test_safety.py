@@ -230,3 +230,20 @@ def test_the_status_says_what_state_a_vehicle_is_in(server):
     wait_for_words(server, "flying: on setpoints")
     is_(vehicle, 1 << 6)
     wait_for_words(server, "cannot fly: locked; restart the vehicle")
+
+
+def test_a_callback_that_takes_its_time_loses_no_link(server, vehicle):
+    """What comes over the link is heard all the same, replies to commands included."""
+    vehicle.wait_for_packets(15, 0)
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    written = []
+
+    def block():
+        # Ten pings are a second.
+        vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 10)
+        written.append(crazyflie.parameters.write("ring.effect", 9))
+
+    server.process.executor.submit(block)
+    vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)
+    assert written == [9]
+    assert server.process.logged("error") == []

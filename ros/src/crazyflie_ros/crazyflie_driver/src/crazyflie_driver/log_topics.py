@@ -6,6 +6,7 @@ import genpy
 from std_msgs.msg import Float32, Header
 
 from crazyflie_driver import telemetry
+from crazyflie_driver.delivery import Delivery
 from crazyflie_driver.msg import GenericLogData, crtpPacket
 from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_model.supervisor import SupervisorState
@@ -34,6 +35,8 @@ class LogTopics:
     handle : NodeHandle
     parameters : VehicleParameters
     crazyflie : crazyflie_py.Crazyflie
+    delivery : Delivery
+        Has the messages published in their turn.
     fixed_frame : str
         Frame of the pose.
     on_status : callable
@@ -52,6 +55,7 @@ class LogTopics:
         handle: NodeHandle,
         parameters: VehicleParameters,
         crazyflie: Crazyflie,
+        delivery: Delivery,
         fixed_frame: str,
         on_status: Callable[[], None],
     ):
@@ -61,6 +65,7 @@ class LogTopics:
         self._handle = handle
         self._parameters = parameters
         self._crazyflie = crazyflie
+        self._delivery = delivery
         self._fixed_frame = fixed_frame
         self._on_status = on_status
         self._packets: Publisher | None = None
@@ -100,7 +105,7 @@ class LogTopics:
             header=port << 4 | _LINK | channel,
             data=data[:_MOST_DATA].ljust(_MOST_DATA, b"\0"),
         )
-        self._handle.submit(publisher.publish, message)
+        self._delivery.submit_data(publisher.publish, message)
 
     def _start_status(self, known, rssi_publisher):
         wanted = ("pm.vbat", "radio.rssi", "supervisor.info")
@@ -152,10 +157,8 @@ class LogTopics:
         self._add(block.topic_name, block.frequency, tuple(block.variables), publish)
 
     def _add(self, name, period_ms, variables, receive):
-        handle = self._handle
-
         def hand_over(time_ms, values):
-            handle.submit(receive, self._stamp(time_ms), values)
+            self._delivery.submit_data(receive, self._stamp(time_ms), values)
 
         self._crazyflie.add_log_block(LogBlock(name, period_ms, variables, hand_over))
 

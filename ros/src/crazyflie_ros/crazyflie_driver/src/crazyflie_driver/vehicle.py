@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from std_msgs.msg import String
 
 from crazyflie_driver.battery import Battery
+from crazyflie_driver.delivery import Delivery
 from crazyflie_driver.farewell import take_leave
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.log_topics import LogTopics
@@ -88,12 +89,18 @@ class DriverVehicle:
         )
         self._links = 0
         self._worker = Worker(parameters.name)
+        self._delivery = Delivery(self._handle, parameters.name)
         self._announcing = threading.Lock()
         self._battery = Battery(
             server.battery_low, server.battery_critical, server.battery_critical_time
         )
         self._log = LogTopics(
-            self._handle, parameters, self.crazyflie, server.fixed_frame, self._on_status
+            self._handle,
+            parameters,
+            self.crazyflie,
+            self._delivery,
+            server.fixed_frame,
+            self._on_status,
         )
         self.setpoints = SetpointTopics(self._handle, parameters, self.crazyflie, self._log)
         self.commands = FlightCommands(self._handle, self, self.setpoints, self._battery, server)
@@ -217,6 +224,7 @@ class DriverVehicle:
         self.crazyflie.close()
         with self._announcing:
             self._handle.close()
+        self._delivery.close()
         self._worker.close()
 
     def _open_thrust_lock(self, is_new):
@@ -328,7 +336,7 @@ class DriverVehicle:
         elif state is LinkState.CONNECTED:
             self.setpoints.gate.link_back()
         if not self.is_leaving:
-            self._handle.submit(self._report_state, state, text)
+            self._delivery.submit(self._report_state, state, text)
 
     def _report_state(self, state, text):
         self._publish_status()

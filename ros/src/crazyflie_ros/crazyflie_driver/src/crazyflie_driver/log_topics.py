@@ -1,5 +1,6 @@
 """Publish what a vehicle sends by itself."""
 
+import threading
 from collections.abc import Callable
 
 import genpy
@@ -47,7 +48,7 @@ class LogTopics:
     voltage, rssi : float or None
         Latest values of the battery (V) and the vehicle's reception (-dBm).
     supervisor : SupervisorState or None
-        Latest state.
+        Latest state; None until it has come on the present link.
     """
 
     def __init__(
@@ -69,6 +70,9 @@ class LogTopics:
         self._fixed_frame = fixed_frame
         self._on_status = on_status
         self._packets: Publisher | None = None
+        self._logs_state = False
+        self._states = 0
+        self._state_came = threading.Condition()
 
     def start(self) -> None:
         """Announce the topics and start the log blocks; blocks.
@@ -95,6 +99,21 @@ class LogTopics:
             for block in parameters.log_blocks:
                 self._start_custom(block)
 
+    def next_state(self, limit: float) -> SupervisorState | None:
+        """Return the state that comes next; None if none comes; blocks.
+
+        Parameters
+        ----------
+        limit : float
+            How long to wait, s; not at all if the vehicle has no log variable of its state.
+        """
+        if not self._logs_state:
+            return None
+        with self._state_came:
+            before = self._states
+            is_there = self._state_came.wait_for(lambda: self._states != before, limit)
+            return self.supervisor if is_there else None
+
     def publish_packet(self, port: int, channel: int, data: bytes) -> None:
         """Publish a packet from the vehicle, if it is not one of the driver's own."""
         publisher = self._packets
@@ -110,6 +129,7 @@ class LogTopics:
     def _start_status(self, known, rssi_publisher):
         wanted = ("pm.vbat", "radio.rssi", "supervisor.info")
         variables = tuple(variable for variable in wanted if variable in known)
+        self._logs_state = "supervisor.info" in known
         if variables:
             self._add(
                 "status",
@@ -118,12 +138,19 @@ class LogTopics:
                 lambda _, values: self._note_status(
                     dict(zip(variables, values, strict=True)), rssi_publisher
                 ),
+                lambda values: self._note_state(dict(zip(variables, values, strict=True))),
             )
+
+    def _note_state(self, latest):
+        # In the link's thread: the state is waited for where no callback has its turn.
+        if "supervisor.info" in latest:
+            with self._state_came:
+                self.supervisor = SupervisorState(latest["supervisor.info"])
+                self._states += 1
+                self._state_came.notify_all()
 
     def _note_status(self, latest, rssi_publisher):
         self.voltage = latest.get("pm.vbat")
-        if "supervisor.info" in latest:
-            self.supervisor = SupervisorState(latest["supervisor.info"])
         # The Crazyradio's figure is the same, and comes without the firmware's help.
         self.rssi = self._crazyflie.rssi
         if self.rssi is None:
@@ -156,8 +183,9 @@ class LogTopics:
         # The field is called frequency, and is a period.
         self._add(block.topic_name, block.frequency, tuple(block.variables), publish)
 
-    def _add(self, name, period_ms, variables, receive):
+    def _add(self, name, period_ms, variables, receive, note=lambda values: None):
         def hand_over(time_ms, values):
+            note(values)
             self._delivery.submit_data(receive, self._stamp(time_ms), values)
 
         self._crazyflie.add_log_block(LogBlock(name, period_ms, variables, hand_over))

@@ -22,7 +22,7 @@ from crazyflie_driver.vehicle_parameters import STATUS_TOPIC, VehicleParameters
 from crazyflie_driver.worker import Job, Worker
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
-from crazyflie_py.errors import CrazyflieError, NoAnswerError
+from crazyflie_py.errors import CrazyflieError, NoAnswerError, NoReplyError
 from crazyflie_utils import NodeHandle, ServiceError
 
 Result = TypeVar("Result")
@@ -33,6 +33,9 @@ switched on or launched together with the driver needs a while."""
 
 CONNECT_PAUSE = 0.2
 """Between two attempts, s."""
+
+_LOGGED_STATE_LIMIT = 1.0
+"""How long log data with the state are waited for, s; they come every 0.1 s."""
 
 
 class DriverVehicle:
@@ -187,7 +190,7 @@ class DriverVehicle:
                 if self.is_emergency:
                     self.crazyflie.supervisor.emergency_stop()
                 else:
-                    self._open_thrust_lock(is_new=True)
+                    self._open_thrust_lock()
                 self._links = self.crazyflie.links
                 self._services.advertise()
                 self.setpoints.subscribe()
@@ -212,7 +215,11 @@ class DriverVehicle:
         problem = ""
         try:
             if self.crazyflie.links and not self.is_emergency:
-                take_leave(self, self._safety.landing_duration, limit)
+                if not take_leave(self, self._safety.landing_duration, limit):
+                    self._server.warn(
+                        f"{self.parameters.name}: nothing tells whether the vehicle flies: it is "
+                        "left as it is"
+                    )
         except CrazyflieError as error:
             problem = f"its motors could not be stopped: {error}"
             self._server.warn(f"{self.parameters.name}: {problem}")
@@ -227,12 +234,11 @@ class DriverVehicle:
         self._delivery.close()
         self._worker.close()
 
-    def _open_thrust_lock(self, is_new):
+    def _open_thrust_lock(self):
         # Zero thrust would take a vehicle out of the air that flies by itself,
         # or that was flying when the link was lost.
-        state = self.crazyflie.supervisor.read()
-        is_flying = not is_new if state is None else SupervisorState.FLYING in state
-        if is_flying:
+        state = self.read_state()
+        if state is None or SupervisorState.FLYING in state:
             self._server.warn(
                 f"{self.parameters.name}: the vehicle may be flying: its thrust stays locked "
                 "until a setpoint of zero thrust comes"
@@ -247,6 +253,21 @@ class DriverVehicle:
         """Whether the vehicle says that it flies; so it does for 2 s after a landing."""
         state = self._log.supervisor
         return state is not None and SupervisorState.FLYING in state
+
+    def read_state(self) -> SupervisorState | None:
+        """Return the state, from supervisor or log; None if nothing tells it; blocks.
+
+        Before protocol 12 the supervisor cannot be asked; very old firmware does not log it either.
+
+        Raises
+        ------
+        LinkLostError
+        """
+        try:
+            state = self.crazyflie.supervisor.read()
+        except NoReplyError:
+            state = None
+        return self._log.next_state(_LOGGED_STATE_LIMIT) if state is None else state
 
     def now(self) -> float:
         """Return the time, s."""
@@ -357,7 +378,7 @@ class DriverVehicle:
         self._mirror.write_again()
         if self.parameters.enable_parameters:
             self._mirror.publish()
-        self._open_thrust_lock(is_new=False)
+        self._open_thrust_lock()
 
     def _on_packet(self, port, channel, data):
         if not self.is_leaving:

@@ -1,0 +1,141 @@
+"""A new link to a vehicle that flies, and the end of one: nothing that is sent stops its motors."""
+
+import threading
+
+import pytest
+from safety_helpers import (
+    FLYING,
+    HIGH_LEVEL,
+    READY,
+    commands,
+    is_,
+    position,
+    thrust,
+    wait_for_words,
+)
+
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.crazyflie import Crazyflie
+from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_virtual.testing import virtual_vehicle
+
+LIMIT = 60.0
+
+pytestmark = pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWarning")
+
+OLD = 11
+"""The last protocol version in which the supervisor cannot be asked for its state."""
+
+UNLOCKED = [(3, 0)] * 100 + [(7, 1)]
+
+
+def make_old_vehicle(server, state=None):
+    """Return a vehicle that only its log tells the state of, or nothing."""
+    vehicle = server.make_vehicle(protocol=OLD)
+    if state is None:
+        del vehicle.log["supervisor.info"]
+    else:
+        is_(vehicle, state)
+    return vehicle
+
+
+def warnings(server):
+    return " ".join(server.process.logged("warn"))
+
+
+@pytest.mark.parametrize("state", [FLYING, None])
+def test_a_vehicle_that_may_fly_is_added_and_removed_without_zeros(server, state):
+    vehicle = make_old_vehicle(server, state)
+    server.add(vehicle.uri)
+    assert "may be flying: its thrust stays locked until" in warnings(server)
+    if state is None:
+        server.remove(vehicle.uri)
+        assert "nothing tells whether the vehicle flies: it is left as it is" in warnings(server)
+    assert commands(vehicle) == []
+
+
+def test_the_log_tells_that_an_old_vehicle_is_on_the_ground(server):
+    vehicle = make_old_vehicle(server, READY)
+    server.add(vehicle.uri)
+    vehicle.wait_for_packets(7, 1)
+    assert commands(vehicle) == UNLOCKED
+    server.remove(vehicle.uri)
+    assert commands(vehicle) == 2 * UNLOCKED
+
+
+def test_an_old_vehicle_that_flies_lands_before_its_motors_are_stopped(server):
+    vehicle = make_old_vehicle(server, FLYING)
+    server.add(vehicle.uri)
+    wait_for_words(server, "flying")
+    position(server)
+    vehicle.wait_for_packets(7, 0)
+    vehicle.received.clear()
+    removing = threading.Thread(target=server.remove, args=(vehicle.uri,))
+    removing.start()
+    assert vehicle.wait_for_packets(8, 0)[0][0] == 8
+    is_(vehicle, HIGH_LEVEL)
+    # The landing takes its time, in which the state is looked up again and again.
+    count = len(vehicle.packets(15, 0))
+    vehicle.wait_for_packets(15, 0, count + 10)
+    assert commands(vehicle) == [(7, 1), (8, 0)]
+    is_(vehicle, READY)
+    removing.join(LIMIT)
+    assert commands(vehicle) == [(7, 1), (8, 0), *UNLOCKED]
+
+
+def test_a_link_that_is_set_up_anew_sends_an_old_vehicle_in_the_air_nothing(server):
+    vehicle = make_old_vehicle(server, READY)
+    server.add(vehicle.uri)
+    vehicle.wait_for_packets(7, 1)
+    wait_for_words(server, "ready")
+    vehicle.is_frozen = True
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
+    # Somebody else has it fly.
+    is_(vehicle, FLYING)
+    vehicle.received.clear()
+    vehicle.is_frozen = False
+    wait_for_words(server, "flying")
+    wait_until(lambda: "may be flying" in warnings(server), "the warning")
+    assert vehicle.packets(3, 0) == []
+
+
+@pytest.mark.parametrize("protocol", [OLD, 12])
+def test_a_vehicle_in_the_air_flies_on_when_it_is_added(server, protocol):
+    with virtual_vehicle(protocol=protocol) as (virtual, uri):
+        height = lambda: virtual.observe().position[2]  # noqa: E731
+        with Crazyflie(uri) as other:
+            other.high_level.take_off(0.5, 1.0)
+            wait_until(lambda: height() > 0.45, "the takeoff")
+        server.add(uri)
+        end = virtual.vehicle.time + 2.5
+        wait_until(lambda: virtual.vehicle.time >= end, "2.5 s of the vehicle's time")
+        assert height() > 0.45
+        assert SupervisorState.LOCKED not in virtual.vehicle.board.firmware.supervisor.flags
+
+
+def test_the_first_zero_of_a_user_unlocks_what_nothing_is_known_of(server):
+    """The driver passes it on as it comes, and the firmware opens its thrust lock at it."""
+    vehicle = make_old_vehicle(server)
+    server.add(vehicle.uri)
+    thrust(server, 0.0)
+    # Roll, pitch, yaw rate, then thrust.
+    assert [data[12:] for data in vehicle.wait_for_packets(3, 0)] == [b"\0\0"]
+
+
+def test_the_end_of_the_server_is_a_landing_for_an_old_vehicle(server):
+    """No callback has its turn then; log data that are old would have the motors stopped."""
+    vehicle = make_old_vehicle(server, FLYING)
+    server.add(vehicle.uri)
+    wait_for_words(server, "flying")
+    position(server)
+    vehicle.wait_for_packets(7, 0)
+    vehicle.received.clear()
+
+    def obey():
+        vehicle.wait_for_packets(8, 0)
+        is_(vehicle, HIGH_LEVEL)
+
+    threading.Thread(target=obey, daemon=True).start()
+    server.process.executor.submit(server.node.shutdown)
+    assert commands(vehicle) == [(7, 1), (8, 0)]

@@ -11,7 +11,7 @@ from crazyflie_utils.testing.peer import wait_until
 
 ZERO = struct.pack("<fffH", 0, 0, 0, 0)
 SETPOINTS_STOP = struct.pack("<BI", 0, 0)
-READY, FLYING, HIGH_LEVEL = 0b1010, 0b11010, 0b100011010
+READY, FLYING, HIGH_LEVEL, LOCKED = 0b1010, 0b11010, 0b100011010, 0b1000010
 LAND = LandRequest(0, 0.0, Duration(2))
 TAKEOFF = TakeoffRequest(0, 1.0, Duration(2))
 

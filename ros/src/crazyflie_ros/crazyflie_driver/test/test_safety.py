@@ -145,7 +145,7 @@ def test_one_emergency_stops_all(server):
         server.add(vehicle.uri, f"cf{k}")
     server.process.publish("/all/emergency", Empty())
     for k, vehicle in enumerate(vehicles):
-        assert vehicle.wait_for_packets(9, 1, 5) == [b"\x03"] * 5
+        assert vehicle.wait_for_packets(9, 1, 5)[:5] == [b"\x03"] * 5
         with pytest.raises(ServiceError, match="emergency stop: remove"):
             server.call(f"/cf{k}/takeoff", TAKEOFF)
 

@@ -292,12 +292,6 @@ def test_arming_before_protocol_12(make_vehicle, make_link):
     assert set(vehicle.wait_for_packets(6, 1, 5)) == {b"\x03"}
 
 
-def test_emergency_stop_is_sent_five_times_with_the_stop_setpoint(vehicle, flying):
-    flying.supervisor.emergency_stop()
-    assert vehicle.wait_for_packets(9, 1, 5) == [b"\x03"] * 5
-    assert vehicle.wait_for_packets(7, 0, 5) == [b"\x00"] * 5
-
-
 def test_parameters_are_written_in_their_type(vehicle, flying):
     parameters = flying.parameters
     assert parameters.values() == {

@@ -34,6 +34,9 @@ switched on or launched together with the driver needs a while."""
 CONNECT_PAUSE = 0.2
 """Between two attempts, s."""
 
+_EMERGENCY_LIMIT = 1.0
+"""How long a removal waits until the vehicle has obeyed an emergency stop, s."""
+
 _LOGGED_STATE_LIMIT = 1.0
 """How long log data with the state are waited for, s; they come every 0.1 s."""
 
@@ -187,9 +190,7 @@ class DriverVehicle:
                 self._log.start()
                 if self.parameters.enable_parameters:
                     self._mirror.publish()
-                if self.is_emergency:
-                    self.crazyflie.supervisor.emergency_stop()
-                else:
+                if not self.is_emergency:
                     self._open_thrust_lock()
                 self._links = self.crazyflie.links
                 self._services.advertise()
@@ -214,14 +215,20 @@ class DriverVehicle:
     def _leave(self, limit):
         problem = ""
         try:
-            if self.crazyflie.links and not self.is_emergency:
-                if not take_leave(self, self._safety.landing_duration, limit):
-                    self._server.warn(
-                        f"{self.parameters.name}: nothing tells whether the vehicle flies: it is "
-                        "left as it is"
-                    )
+            if self.is_emergency:
+                wait = self.crazyflie.supervisor.wait_for_emergency_stop
+                if not wait(min(limit, _EMERGENCY_LIMIT)):
+                    problem = "the emergency stop is not confirmed"
+            elif self.crazyflie.links and not take_leave(
+                self, self._safety.landing_duration, limit
+            ):
+                self._server.warn(
+                    f"{self.parameters.name}: nothing tells whether the vehicle flies: it is left "
+                    "as it is"
+                )
         except CrazyflieError as error:
             problem = f"its motors could not be stopped: {error}"
+        if problem:
             self._server.warn(f"{self.parameters.name}: {problem}")
         self._end()
         return problem
@@ -279,8 +286,8 @@ class DriverVehicle:
         Raises
         ------
         LinkLostError
-            Nothing can be sent now, or nobody knows whether it arrives; it will be sent again
-            when the link is back.
+            The vehicle is not heard; the stop is sent again and again, and arrives as soon as
+            anything does.
         """
         self.is_emergency = True
         self.setpoints.gate.stop_for_good()
@@ -368,11 +375,8 @@ class DriverVehicle:
             self.do("taking up the link again", lambda _: self._resume())
 
     def _resume(self):
-        if self.is_emergency:
-            self.crazyflie.supervisor.emergency_stop()
-            return
-        if self._links == self.crazyflie.links:
-            # It is the link of before.
+        # Without a set-up it is the link of before.
+        if self.is_emergency or self._links == self.crazyflie.links:
             return
         self._links = self.crazyflie.links
         self._mirror.write_again()

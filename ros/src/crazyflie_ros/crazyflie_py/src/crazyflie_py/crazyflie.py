@@ -10,6 +10,7 @@ from cflib.crtp.crtpstack import CRTPPort
 from crazyflie_py.address import Address
 from crazyflie_py.backend import CLOSE_LIMIT, table_cache
 from crazyflie_py.console import Console
+from crazyflie_py.emergency import EmergencyStop
 from crazyflie_py.errors import CrazyflieError, LinkLostError
 from crazyflie_py.high_level import HighLevel
 from crazyflie_py.link import LOG_DATA, Limits, Link, OnPacket
@@ -109,7 +110,8 @@ class Crazyflie:
         self.localization = Localization(self.link)
         self.parameters = FirmwareParameters(self.link)
         self.log = Log(self.link)
-        self.supervisor = Supervisor(self.link, self.any_link)
+        self._emergency = EmergencyStop(lambda: self._link or self._opening)
+        self.supervisor = Supervisor(self.link, self._emergency)
         self.links = 0
         self.restarts = 0
         self._uptime = Uptime()
@@ -179,16 +181,6 @@ class Crazyflie:
             raise LinkLostError(f"no link to the vehicle: {self._reason}")
         return link
 
-    def any_link(self) -> Link:
-        """Return the link, even if nothing comes on it: for what has to be tried all the same.
-
-        Raises
-        ------
-        LinkLostError
-            There is none.
-        """
-        return self._link or self.link()
-
     def add_log_block(self, block: LogBlock) -> None:
         """Have the vehicle send a block, now and after every reconnection; blocks.
 
@@ -246,6 +238,7 @@ class Crazyflie:
     def close(self) -> None:
         """End the connection; safe to call twice and while connecting."""
         self._closed.set()
+        self._emergency.close()
         opening = self._opening
         if opening is not None:
             opening.close()
@@ -318,7 +311,7 @@ class Crazyflie:
 
     def _try_again(self):
         pause = 0.0
-        while not self._closed.wait(pause):
+        while not self._has_closed_within(pause):
             pause = min(max(2.0 * pause, FIRST_PAUSE), LONGEST_PAUSE)
             try:
                 self._open_link()
@@ -334,6 +327,16 @@ class Crazyflie:
                 return True
         return False
 
+    def _has_closed_within(self, pause):
+        # An emergency stop does not wait for the next attempt.
+        end = time.monotonic() + pause
+        while time.monotonic() < end:
+            if self._closed.wait(CHECK_PERIOD):
+                return True
+            if self._emergency.is_requested:
+                break
+        return self._closed.is_set()
+
     def _set_state(self, state, text):
         self._state = state
         self._reason = text
@@ -346,6 +349,7 @@ class Crazyflie:
     # What arrives, in cflib's thread.
 
     def _on_received(self, port, channel, data):
+        self._emergency.receive(port, channel, data)
         if (port, channel) == LOG_DATA and len(data) > _STAMP_END:
             if self._uptime.has_restarted(int.from_bytes(data[1:_STAMP_END], "little")):
                 self.restarts += 1

@@ -5,18 +5,14 @@ from collections.abc import Callable
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.emergency import ANSWER, SUPERVISOR_PROTOCOL, EmergencyStop
 from crazyflie_py.errors import RefusedError
 from crazyflie_py.exchange import Request
 from crazyflie_py.link import Link
 from crazyflie_py.subsystem import Subsystem
 
-SUPERVISOR_PROTOCOL = 12
-"""The first protocol version in which the supervisor has a port of its own."""
-
-_EMERGENCY_REPEATS = 5
 _INFO_CHANNEL, _COMMAND_CHANNEL = 0, 1
 _GET_STATE, _ARM, _RECOVER = 0x0C, 0x01, 0x02
-_ANSWER = 0x80
 _WATCHDOG = "watchdog"
 
 
@@ -27,13 +23,12 @@ class Supervisor(Subsystem):
     ----------
     current_link : callable
         Returns the living `Link`, or raises `LinkLostError`.
-    any_link : callable
-        The same, but also one on which nothing comes at the moment.
+    emergency : EmergencyStop
     """
 
-    def __init__(self, current_link: Callable[[], Link], any_link: Callable[[], Link]):
+    def __init__(self, current_link: Callable[[], Link], emergency: EmergencyStop):
         super().__init__(current_link)
-        self._any_link = any_link
+        self._emergency = emergency
 
     def read(self) -> SupervisorState | None:
         """Ask for the state; blocks. None when the firmware is too old to report it.
@@ -85,22 +80,24 @@ class Supervisor(Subsystem):
     def emergency_stop(self) -> None:
         """Stop the motors at once, before anything else that waits to be sent; does not block.
 
-        Sent several times, since a packet may be lost, and also when nothing has come from the
-        vehicle of late. The vehicle has to be restarted before it can fly again.
-
-        Raises
-        ------
-        LinkLostError
-            Nothing can be sent.
+        Sent again and again until the vehicle is seen to be locked, also on a link that is silent
+        or being opened, and on every later one. The vehicle has to be restarted before it can fly
+        again.
         """
-        link = self._any_link()
+        self._emergency.begin()
 
-        def send():
-            link.cflib.supervisor.send_emergency_stop()
-            link.cflib.commander.send_stop_setpoint()
+    def wait_for_emergency_stop(self, limit: float) -> bool:
+        """Wait until the vehicle has obeyed an emergency stop; return whether it has.
 
-        for _ in range(_EMERGENCY_REPEATS):
-            link.command(send, urgent=True)
+        Firmware before protocol 12 does not tell: there it means that the stop has been sent
+        several times while the vehicle was heard.
+
+        Parameters
+        ----------
+        limit : float
+            How long to wait, s.
+        """
+        return self._emergency.wait(limit)
 
     def feed_watchdog(self) -> None:
         """Feed the emergency-stop watchdog; does not block.
@@ -125,5 +122,5 @@ class Supervisor(Subsystem):
 
     @staticmethod
     def _ask(link: Link, channel: int, data: bytes, what: str) -> bytes:
-        prefix = bytes([_ANSWER | data[0]])
+        prefix = bytes([ANSWER | data[0]])
         return link.ask(data, Request(CRTPPort.SUPERVISOR, channel, prefix, what))

@@ -128,7 +128,7 @@ class EmergencyStop:
             self._changed.notify_all()
 
     @staticmethod
-    def _send(link, urgent):
+    def _send(link: Link, urgent: bool) -> None:
         def send():
             packets = [_STOP_SETPOINT]
             if link.protocol < SUPERVISOR_PROTOCOL:

@@ -1,11 +1,13 @@
 """Requests to the vehicle and its answers, with a time limit.
 
 CRTP has no request numbers: an answer is known by its port, its channel and its
-first bytes.
+first bytes, and by what it repeats of the request. A late answer to an earlier, equal request
+cannot be told from the one that is waited for.
 """
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from crazyflie_py.errors import LinkLostError, NoReplyError
@@ -35,6 +37,9 @@ class Request:
         doing it twice is different from doing it once.
     limit : float
         How long to wait for the answer, s.
+    accepts : callable
+        ``accepts(data)`` tells whether data that begin so are the answer, not that to an earlier
+        request.
     """
 
     port: int
@@ -43,6 +48,7 @@ class Request:
     what: str
     resend: bool = True
     limit: float = REPLY_LIMIT
+    accepts: Callable[[bytes], bool] = lambda data: True
 
 
 class _Waiter:
@@ -54,7 +60,7 @@ class _Waiter:
     def takes(self, port: int, channel: int, data: bytes) -> bool:
         expected = self.request
         is_same = (port, channel) == (expected.port, expected.channel)
-        return is_same and data.startswith(expected.prefix)
+        return is_same and data.startswith(expected.prefix) and expected.accepts(data)
 
 
 class Exchange:

@@ -5,7 +5,7 @@ import struct
 from cflib.crazyflie.param import ParamTocElement
 from cflib.crtp.crtpstack import CRTPPort
 
-from crazyflie_py.errors import RefusedError, ValueRangeError, unknown_name
+from crazyflie_py.errors import NoReplyError, RefusedError, ValueRangeError, unknown_name
 from crazyflie_py.exchange import Request
 from crazyflie_py.link import Link
 from crazyflie_py.subsystem import Subsystem, elements
@@ -58,7 +58,7 @@ class FirmwareParameters(Subsystem):
         ------
         CrazyflieError
             There is no such parameter, it cannot be written, the value does not
-            fit its type, or no reply.
+            fit its type, the vehicle keeps another, or no reply.
         """
         link = self._current_link()
         element = self._find(link, name)
@@ -66,11 +66,34 @@ class FirmwareParameters(Subsystem):
             raise RefusedError(f"parameter {name} can only be read")
         ident = struct.pack("<H", element.ident)
         data = ident + self._pack(element, name, value)
-        request = Request(CRTPPort.PARAM, _WRITE_CHANNEL, ident, f"writing {name}")
-        answer = link.ask(data, request)
-        if len(answer) != len(data):
-            raise RefusedError(f"writing {name}: the vehicle says {answer[2:].hex() or 'nothing'}")
+
+        def accepts(answer: bytes) -> bool:
+            # The reply to an earlier write has another value.
+            return answer == data or len(answer) != len(data)
+
+        what = f"writing {name}"
+        request = Request(CRTPPort.PARAM, _WRITE_CHANNEL, ident, what, accepts=accepts)
+        try:
+            answer = link.ask(data, request)
+        except NoReplyError as error:
+            return self._look_up(name, data[2:], error)
+        if answer != data:
+            raise RefusedError(f"{what}: the vehicle says {answer[2:].hex() or 'nothing'}")
         return self._keep(link, element, answer[2:])
+
+    def _look_up(self, name: str, expected: bytes, error: NoReplyError) -> int | float:
+        # Only the reply may have been lost; or the vehicle has kept another value.
+        element = self._find(self._current_link(), name)
+        try:
+            kept = self.read(name)
+        except NoReplyError:
+            raise error from None
+        if struct.pack(element.pytype, kept) != expected:
+            (value,) = struct.unpack(element.pytype, expected)
+            raise RefusedError(
+                f"writing {name}: the vehicle keeps {kept:g} in the place of {value:g}"
+            )
+        return kept
 
     @staticmethod
     def _find(link: Link, name: str) -> ParamTocElement:

@@ -114,13 +114,23 @@ class Supervisor(Subsystem):
         link.stream(_WATCHDOG, link.cflib.supervisor.send_emergency_stop_watchdog)
 
     def _command(self, link: Link, data: bytes, what: str) -> None:
-        answer = self._ask(link, _COMMAND_CHANNEL, data, what)
+        def accepts(answer: bytes) -> bool:
+            # Success, and the state of what was commanded: armed is not the answer to disarming.
+            return len(answer) < 3 or len(data) < 2 or not answer[1] or answer[2] == data[1]
+
+        answer = self._ask(link, _COMMAND_CHANNEL, data, what, accepts)
         if len(answer) > 1 and not answer[1]:
             state = self.read()
             words = "unknown" if state is None else state.words()
             raise RefusedError(f"{what}: the vehicle refuses it; its state is: {words}")
 
     @staticmethod
-    def _ask(link: Link, channel: int, data: bytes, what: str) -> bytes:
+    def _ask(
+        link: Link,
+        channel: int,
+        data: bytes,
+        what: str,
+        accepts: Callable[[bytes], bool] = lambda answer: True,
+    ) -> bytes:
         prefix = bytes([ANSWER | data[0]])
-        return link.ask(data, Request(CRTPPort.SUPERVISOR, channel, prefix, what))
+        return link.ask(data, Request(CRTPPort.SUPERVISOR, channel, prefix, what, accepts=accepts))

@@ -77,6 +77,16 @@ class _Guarded(Caller):
                 _log.warning("a packet could not be understood", exc_info=True)
 
 
+class _LogErrors(dict[int, str]):
+    """cflib's texts of the errors of log blocks, and one for those that it does not know.
+
+    Without a text its thread that receives drops the refusal.
+    """
+
+    def __missing__(self, code: int) -> str:
+        return f"error {code}"
+
+
 class Backend(CflibCrazyflie):
     """cflib's Crazyflie for a single connection; a new one is made for the next.
 
@@ -102,11 +112,16 @@ class Backend(CflibCrazyflie):
         guarded = _Guarded()
         guarded.callbacks = self.packet_received.callbacks
         self.packet_received = guarded
+        self.log._err_codes = _LogErrors(self.log._err_codes)
         self.link_established.add_callback(self._tune_udp)
 
     def ask_for_source(self) -> None:
         """Send the first request of the set-up again: cflib does not."""
         self.send_packet(packet(CRTPPort.LINKCTRL, _LINK_SOURCE_CHANNEL, b"\0"))
+
+    def log_error(self, code: int) -> str:
+        """Return the text of an error of a log block."""
+        return self.log._err_codes[code]
 
     def send_packet(
         self,

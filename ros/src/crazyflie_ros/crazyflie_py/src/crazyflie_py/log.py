@@ -117,11 +117,17 @@ class Log(Subsystem):
             refusals.append(text)
             decided.set()
 
+        def note_start(_, is_started):
+            # cflib reports a start that is refused here, too, and not as an error.
+            if not is_started:
+                refusals.append(backend.log_error(config.err_no))
+            decided.set()
+
         def deliver(time_ms, values, _):
             block.callback(time_ms, tuple(values[variable] for variable in block.variables))
 
         config.error_cb.add_callback(refuse)
-        config.started_cb.add_callback(lambda *_: decided.set())
+        config.started_cb.add_callback(note_start)
         config.data_received_cb.add_callback(deliver)
         try:
             backend.log.add_config(config)

@@ -1,5 +1,7 @@
 """Log blocks that the vehicle refuses, at first or when it is connected again."""
 
+import queue
+
 import pytest
 
 from crazyflie_py.crazyflie import LinkState
@@ -28,3 +30,23 @@ def test_an_error_code_that_nobody_knows_is_a_refusal(vehicle, link):
     vehicle.answers[5, 1, 3] = b"\3\1\x63"
     with pytest.raises(RefusedError, match="'odd': the vehicle says: error 99"):
         link.add_log_block(log_block("odd"))
+
+
+def test_a_block_that_is_refused_later_does_not_end_connecting(vehicle, make_link, states):
+    """Firmware without one of its variables may have been installed meanwhile."""
+    received = queue.Queue()
+    link = make_link(vehicle.uri, reconnect=True, on_state=states)
+    link.connect()
+    link.add_log_block(log_block("gone", variables=("pm.state",)))
+    link.add_log_block(log_block("kept", lambda *data: received.put(data)))
+    vehicle.is_frozen = True
+    states.wait_for(LinkState.LOST)
+    del vehicle.log["pm.state"]
+    vehicle.forget_logs()
+    vehicle.is_frozen = False
+    text = states.wait_for(LinkState.CONNECTED)
+    assert "again, without log block 'gone'" in text
+    assert "no log variable 'pm.state'" in text
+    while not received.empty():
+        received.get()
+    assert received.get(timeout=LIMIT)[1] == (3.75,)

@@ -11,7 +11,13 @@ from crazyflie_py.address import Address
 from crazyflie_py.backend import CLOSE_LIMIT, table_cache
 from crazyflie_py.console import Console
 from crazyflie_py.emergency import EmergencyStop
-from crazyflie_py.errors import CrazyflieError, LinkLostError
+from crazyflie_py.errors import (
+    CrazyflieError,
+    LinkLostError,
+    RefusedError,
+    UnknownNameError,
+    ValueRangeError,
+)
 from crazyflie_py.high_level import HighLevel
 from crazyflie_py.link import LOG_DATA, Limits, Link, OnPacket
 from crazyflie_py.liveness import Life, Uptime
@@ -56,7 +62,8 @@ class Crazyflie:
     The first `connect` succeeds or raises. After that the link is watched: when
     no sign of life has come for 0.45 s, or no log data, it is lost. If the vehicle is
     heard again soon, the link is taken up as it was; otherwise, with ``reconnect``, a new one
-    is tried at once and then with growing pauses until `close`, and log blocks are started anew.
+    is tried at once and then with growing pauses until `close`, and log blocks are started anew;
+    those that the vehicle then refuses are named in the text of the state.
 
     All callbacks come from threads of this object or of cflib, and must be quick.
 
@@ -315,17 +322,27 @@ class Crazyflie:
             pause = min(max(2.0 * pause, FIRST_PAUSE), LONGEST_PAUSE)
             try:
                 self._open_link()
-                with self._blocks_lock:
-                    for block in self._blocks:
-                        self.log.start(block)
+                refused = self._start_blocks()
             except CrazyflieError as error:
                 self._drop(str(error))
                 if not self._closed.is_set():
                     self._set_state(LinkState.LOST, str(error))
             else:
-                self._set_state(LinkState.CONNECTED, f"connected to {self.address.uri} again")
+                text = f"connected to {self.address.uri} again{refused}"
+                self._set_state(LinkState.CONNECTED, text)
                 return True
         return False
+
+    def _start_blocks(self):
+        # Other firmware may have been installed; its pilot needs a link all the same.
+        refused = ""
+        with self._blocks_lock:
+            for block in self._blocks:
+                try:
+                    self.log.start(block)
+                except (RefusedError, UnknownNameError, ValueRangeError) as error:
+                    refused += f", without log block {block.name!r}: {error}"
+        return refused
 
     def _has_closed_within(self, pause):
         # An emergency stop does not wait for the next attempt.

@@ -84,6 +84,16 @@ def test_the_frequency_of_a_custom_block_is_a_period_in_ms(server, log_block):
     assert published(server, "/cf1/slow")[0].values == [0.5]
 
 
+def test_a_period_between_two_steps_is_the_shorter_one_and_said(server, log_block):
+    """Launch files of the C++ driver, which cuts it silently, go on working."""
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, enable_logging=True, log_blocks=[log_block("motors", 25, "motor.m1")])
+    assert sorted(data[2] for data in vehicle.packets(5, 1) if data[0] == 3) == [2, 10]
+    (warning,) = server.process.logged("warn")
+    assert "log block motors: its period is 25 ms" in warning
+    assert "it comes every 20 ms" in warning
+
+
 def test_stamps_of_the_vehicle(server, log_block):
     vehicle = server.make_vehicle()
     server.add(

@@ -5,7 +5,7 @@ import queue
 import pytest
 
 from crazyflie_py.crazyflie import LinkState
-from crazyflie_py.errors import RefusedError
+from crazyflie_py.errors import RefusedError, ValueRangeError
 from crazyflie_py.log import LogBlock
 
 LIMIT = 60.0
@@ -50,3 +50,11 @@ def test_a_block_that_is_refused_later_does_not_end_connecting(vehicle, make_lin
     while not received.empty():
         received.get()
     assert received.get(timeout=LIMIT)[1] == (3.75,)
+
+
+@pytest.mark.parametrize("period_ms", [15, 99, 2539])
+def test_periods_between_the_steps_are_not_cut(link, period_ms):
+    with pytest.raises(
+        ValueRangeError, match=f"{period_ms} ms; expected 10 to 2540 ms, in steps of 10"
+    ):
+        link.add_log_block(log_block("odd", period_ms=period_ms))

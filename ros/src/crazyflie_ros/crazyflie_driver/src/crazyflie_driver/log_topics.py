@@ -12,7 +12,7 @@ from crazyflie_driver.msg import GenericLogData, crtpPacket
 from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie
-from crazyflie_py.log import LogBlock
+from crazyflie_py.log import PERIOD_STEP_MS, LogBlock
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.runtime.topics import Publisher
 
@@ -181,7 +181,14 @@ class LogTopics:
             publisher.publish(telemetry.generic(self._header(stamp, False), values))
 
         # The field is called frequency, and is a period.
-        self._add(block.topic_name, block.frequency, tuple(block.variables), publish)
+        period = block.frequency - block.frequency % PERIOD_STEP_MS
+        if period != block.frequency:
+            self._handle.warn(
+                f"{self._parameters.name}: log block {block.topic_name}: its period is "
+                f"{block.frequency} ms; the firmware counts in steps of {PERIOD_STEP_MS} ms: it "
+                f"comes every {period} ms"
+            )
+        self._add(block.topic_name, period, tuple(block.variables), publish)
 
     def _add(self, name, period_ms, variables, receive, note=lambda values: None):
         def hand_over(time_ms, values):

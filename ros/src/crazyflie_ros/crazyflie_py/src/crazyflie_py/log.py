@@ -17,7 +17,7 @@ from crazyflie_py.errors import (
 from crazyflie_py.exchange import REPLY_LIMIT
 from crazyflie_py.subsystem import Subsystem, elements
 
-SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS = 10, 2540
+SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS, PERIOD_STEP_MS = 10, 2540, 10
 """The firmware counts periods in 10 ms, in one byte of which 255 is not allowed."""
 
 MOST_BYTES = 26
@@ -74,10 +74,12 @@ class Log(Subsystem):
         ValueRangeError
             The period, the number or the size of the variables is out of range.
         """
-        if not SHORTEST_PERIOD_MS <= block.period_ms <= LONGEST_PERIOD_MS:
+        is_in_range = SHORTEST_PERIOD_MS <= block.period_ms <= LONGEST_PERIOD_MS
+        if not is_in_range or block.period_ms % PERIOD_STEP_MS:
             raise ValueRangeError(
                 f"log block {block.name!r}: its period is {block.period_ms} ms; expected "
-                f"{SHORTEST_PERIOD_MS} to {LONGEST_PERIOD_MS} ms (a frequency is not meant)"
+                f"{SHORTEST_PERIOD_MS} to {LONGEST_PERIOD_MS} ms, in steps of {PERIOD_STEP_MS} (a "
+                "frequency is not meant)"
             )
         if not block.variables:
             raise ValueRangeError(f"log block {block.name!r} has no variables")

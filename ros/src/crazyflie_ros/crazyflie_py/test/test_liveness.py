@@ -1,7 +1,7 @@
 """The watchdog of a link, with time by hand."""
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from crazyflie_py.liveness import LOST_AFTER, Life, Liveness, Uptime
@@ -136,17 +136,55 @@ def test_half_of_the_packets_lost_is_a_poor_link_at_once():
     assert liveness.is_poor()
 
 
+HOUR_MS = 3_600_000
+WRAP_MS = 1 << 24
+"""The clock has 24 bits, which are 4.66 h."""
+
+
+def restarts(*packets):
+    """Return whether a restart is seen; packets are (clock in ms, arrival in s)."""
+    uptime = Uptime()
+    return any([uptime.has_restarted(clock % WRAP_MS, arrival) for clock, arrival in packets])
+
+
 @pytest.mark.parametrize(
-    ("times", "restarted"),
+    ("packets", "restarted"),
     [
-        ([100, 200, 300], False),
-        ([0xF00000, 0xF00010], False),
-        ([100, 200, 190, 300], False),
-        ([0xFFFFF0, 5, 100], False),
-        ([60_000, 60_100, 900], True),
-        ([60_000, 90_000], False),
+        ([(100, 0.0), (200, 0.1), (300, 0.2)], False),
+        # Two blocks may overtake each other.
+        ([(100, 0.0), (200, 0.1), (190, 0.1), (300, 0.2)], False),
+        # The clock begins anew every 4.66 h by itself.
+        ([(WRAP_MS - 16, 0.0), (WRAP_MS + 5, 0.02), (WRAP_MS + 100, 0.1)], False),
+        ([(60_000, 0.0), (60_100, 0.1), (900, 2.0)], True),
+        ([(60_000, 0.0), (90_000, 30.0)], False),
+        # A radio that was off for an hour.
+        ([(60_000, 0.0), (60_000 + HOUR_MS, 3600.0)], False),
+        # Packets that waited for this machine: late, and then all at once.
+        ([(1000, 0.0), (1100, 10.0), (6000, 10.0), (11_000, 10.0), (11_100, 10.1)], False),
+        ([(1000, 0.0), (1100, 10.0), (11_100, 10.1), (1000, 12.0)], True),
     ],
 )
-def test_a_clock_that_begins_anew_is_a_restart(times, restarted):
-    uptime = Uptime()
-    assert any([uptime.has_restarted(time) for time in times]) is restarted
+def test_a_clock_that_begins_anew_is_a_restart(packets, restarted):
+    assert restarts(*packets) is restarted
+
+
+@given(st.floats(0.1, 100.0), st.floats(1.5, 600.0))
+def test_a_restart_is_noticed_however_long_the_vehicle_was_on(hours, silence):
+    before = round(hours * HOUR_MS)
+    # Shortly before the clock wraps by itself, silence or a late packet may be the reason.
+    assume(before % WRAP_MS < WRAP_MS - 1000.0 * (silence + 60.0))
+    packets = [(before - 100, 0.0), (before, 0.1), (1200, 0.1 + silence)]
+    assert restarts(*packets)
+
+
+@given(
+    st.integers(0, WRAP_MS),
+    st.lists(st.tuples(st.integers(1, 5000), st.floats(0.0, 20.0)), min_size=2, max_size=50),
+)
+def test_late_packets_and_slow_clocks_are_no_restart(clock, steps):
+    """The arrivals are in order, and none comes before it was sent."""
+    uptime, sent, arrived = Uptime(), 0.0, 0.0
+    for step_ms, late in steps:
+        clock, sent = clock + step_ms, sent + step_ms / 1000.0
+        arrived = max(arrived, sent + late)
+        assert not uptime.has_restarted(clock % WRAP_MS, arrived)

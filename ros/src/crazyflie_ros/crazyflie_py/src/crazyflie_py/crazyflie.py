@@ -368,7 +368,8 @@ class Crazyflie:
     def _on_received(self, port, channel, data):
         self._emergency.receive(port, channel, data)
         if (port, channel) == LOG_DATA and len(data) > _STAMP_END:
-            if self._uptime.has_restarted(int.from_bytes(data[1:_STAMP_END], "little")):
+            time_ms = int.from_bytes(data[1:_STAMP_END], "little")
+            if self._uptime.has_restarted(time_ms, time.monotonic()):
                 self.restarts += 1
                 self.high_level.forget_trajectories()
         if port == CRTPPort.CONSOLE and channel == 0 and self._console is not None:

@@ -31,6 +31,9 @@ _TICKS = 1 << 24
 
 _REORDERED_MS = 100
 
+_LATEST_FIRST_MS = 60_000.0
+"""How late the quickest packet may have come, ms: this machine may have been busy."""
+
 
 class Life(enum.Enum):
     """What the packets show."""
@@ -41,18 +44,37 @@ class Life(enum.Enum):
 
 
 class Uptime:
-    """The vehicle's clock, in log packets, which begins anew when the firmware restarts."""
+    """The vehicle's clock, in log packets, which begins anew when the firmware restarts.
+
+    Its 24 bits begin anew by themselves, too, every 4.66 h. It has restarted when it is ahead of
+    this machine's, if it is taken to have gone on: packets come late, but never early.
+    """
 
     def __init__(self) -> None:
-        self._latest: int | None = None
+        self._latest: tuple[int, float] | None = None
+        self._late_ms = 0.0
 
-    def has_restarted(self, time_ms: int) -> bool:
-        """Return whether the clock (ms, 24 bits) is behind what it was at the last call."""
-        before, self._latest = self._latest, time_ms
-        if before is None:
+    def has_restarted(self, time_ms: int, now: float) -> bool:
+        """Return whether the clock has begun anew since the last call.
+
+        Parameters
+        ----------
+        time_ms : int
+            The vehicle's, in 24 bits.
+        now : float
+            s.
+        """
+        if self._latest is None:
+            self._latest = time_ms, now
             return False
-        behind = (before - time_ms) % _TICKS
-        return _REORDERED_MS < behind < _TICKS // 2
+        before_ms, before = self._latest
+        if (before_ms - time_ms) % _TICKS <= _REORDERED_MS:
+            return False
+        self._latest = time_ms, now
+        # How much later than the quickest packet this one came.
+        late = self._late_ms + 1000.0 * (now - before) - (time_ms - before_ms) % _TICKS
+        self._late_ms = max(0.0, late)
+        return late < -_LATEST_FIRST_MS
 
 
 class Liveness:

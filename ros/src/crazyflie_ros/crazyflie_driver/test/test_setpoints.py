@@ -109,6 +109,20 @@ def test_what_is_not_finite_is_not_sent(flying):
         assert sum(f"cf1: ignoring {topic}:" in text for text in warnings) == 1
 
 
+def test_what_does_not_fit_in_single_precision_is_not_sent(server, vehicle, caplog):
+    """Messages have float64, the link float32."""
+    publish = server.process.publish
+    publish("/cf1/cmd_vel", cmd_vel(x=1e39))
+    publish("/cf1/cmd_velocity_world", VelocityWorld(vel=Vector3(0.0, -1e300, 0.0)))
+    publish("/cf1/external_position", PointStamped(point=Point(1e39, 0.0, 0.0)))
+    publish("/cf1/cmd_position", Position(z=1.0))
+    assert len(vehicle.wait_for_packets(7, 0)) == 1
+    assert vehicle.packets(3, 0) == vehicle.packets(6, 0) == []
+    warnings = server.process.logged("warn")
+    assert any("ignoring cmd_vel: attitude setpoint: 1e+39 is beyond" in text for text in warnings)
+    assert "a packet could not be sent" not in caplog.text
+
+
 def test_nothing_is_repeated(flying):
     server, vehicle = flying
     server.process.publish("/cf1/cmd_vel", cmd_vel(z=1.0))

@@ -136,6 +136,13 @@ IMPOSSIBLE_SETPOINTS = [
     lambda s: s.full_state((NAN, 0, 0), (0,) * 3, (0,) * 3, (0, 0, 0, 1), (0,) * 3),
     lambda s: s.full_state((0,) * 3, (0,) * 3, (0,) * 3, (0, 0, 0, 0), (0,) * 3),
     lambda s: s.hand_over(-1),
+    # Beyond single precision.
+    lambda s: s.attitude(1e39, 0, 0, 0),
+    lambda s: s.attitude(0, -1e300, 0, 0),
+    lambda s: s.velocity_world(0, 0, 3.5e38, 0),
+    lambda s: s.hover(0, 0, 0, 1e39),
+    lambda s: s.position(0, 0, 0, -1e39),
+    lambda s: s.full_state((0,) * 3, (0,) * 3, (0,) * 3, (1e300, 0, 0, 1e300), (0,) * 3),
 ]
 
 
@@ -196,6 +203,10 @@ IMPOSSIBLE_COMMANDS = [
     lambda h: h.start_trajectory(256),
     lambda h: h.start_trajectory(0, 0.0),
     lambda h: h.define_trajectory(0, 0, 256),
+    lambda h: h.take_off(1e39, 1.0),
+    lambda h: h.land(0.0, 1e39),
+    lambda h: h.land(0.0, 1e-50),
+    lambda h: h.go_to((0, 0, 0), 1e39, 1),
 ]
 
 
@@ -237,6 +248,7 @@ IMPOSSIBLE_TRAJECTORIES = [
     (0, [PolynomialPiece(0.0, (), (), (), ())]),
     (0, [PolynomialPiece(1.0, (0.0,) * 9, (), (), ())]),
     (0, [PolynomialPiece(1.0, (NAN,), (), (), ())]),
+    (0, [PolynomialPiece(1.0, (1e39,), (), (), ())]),
 ]
 
 
@@ -264,8 +276,9 @@ def test_external_pose(vehicle, flying):
     for quaternion in ((0, 0, 0, 0), (0, 0, NAN, 1)):
         with pytest.raises(ValueRangeError):
             flying.localization.pose((0, 0, 0), quaternion)
-    with pytest.raises(ValueRangeError):
-        flying.localization.position(NAN, 0, 0)
+    for x in (NAN, 1e39):
+        with pytest.raises(ValueRangeError):
+            flying.localization.position(x, 0, 0)
 
 
 def test_arming_and_the_supervisor(vehicle, flying):

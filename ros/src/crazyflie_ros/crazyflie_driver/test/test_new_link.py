@@ -14,6 +14,8 @@ from safety_helpers import (
     wait_for_words,
 )
 
+from crazyflie_dev.fake_vehicle import READ_ONLY
+from crazyflie_driver.srv import UpdateParamsRequest
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_utils.testing.waiting import wait_until
@@ -139,3 +141,21 @@ def test_the_end_of_the_server_is_a_landing_for_an_old_vehicle(server):
     threading.Thread(target=obey, daemon=True).start()
     server.process.executor.submit(server.node.shutdown)
     assert commands(vehicle) == [(7, 1), (8, 0)]
+
+
+def test_a_parameter_that_is_refused_later_does_not_keep_the_thrust_locked(server):
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri, enable_parameters=True)
+    server.process.transport.parameters["/cf1/ring/effect"] = 9
+    server.call("/cf1/update_params", UpdateParamsRequest(["ring/effect"]))
+    wait_for_words(server, "ready")
+    vehicle.is_frozen = True
+    crazyflie = server.node._vehicles[vehicle.uri].crazyflie
+    wait_until(lambda: crazyflie._opening is not None, "a new attempt to connect")
+    code, value, _ = vehicle.parameters["ring.effect"]
+    vehicle.parameters["ring.effect"] = (code, value, READ_ONLY)
+    vehicle.received.clear()
+    vehicle.is_frozen = False
+    vehicle.wait_for_packets(3, 0, 100)
+    text = "parameter ring.effect can only be read"
+    assert any(text in line for line in server.process.logged("warn"))

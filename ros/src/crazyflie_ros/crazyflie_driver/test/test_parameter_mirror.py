@@ -2,17 +2,23 @@
 
 from types import SimpleNamespace
 
+import pytest
+
 from crazyflie_driver.parameter_mirror import ParameterMirror
+from crazyflie_py.errors import LinkLostError, NoReplyError, RefusedError
 from crazyflie_utils.testing import FakeProcess
 
 
 class Firmware:
-    """Parameters that remember what is written to them."""
+    """Parameters that remember what is written to them, or raise their error."""
 
     def __init__(self):
         self.written = []
+        self.errors = {}
 
     def write(self, name, value):
+        if name in self.errors:
+            raise self.errors[name]
         self.written.append((name, value))
         return value
 
@@ -30,3 +36,31 @@ def test_settings_are_written_again_and_commands_are_not():
     process.transport.set_param("/cf1/ring/effect", 8)
     mirror.write_again()
     assert firmware.written == [("ring.effect", 7)]
+
+
+@pytest.fixture
+def mirror():
+    """Return a mirror that has written three parameters, and the firmware."""
+    names = ["ring/effect", "motor/trim", "sound/freq"]
+    process = FakeProcess({f"/cf1/{name}": 7 for name in names})
+    firmware = Firmware()
+    crazyflie = SimpleNamespace(parameters=firmware)
+    mirror = ParameterMirror(process.handle("/server"), "/cf1", crazyflie)
+    mirror.write(names)
+    firmware.written.clear()
+    return mirror, firmware
+
+
+@pytest.mark.parametrize("error", [RefusedError("writing ring.effect: no"), NoReplyError("none")])
+def test_one_that_cannot_be_written_again_does_not_stop_the_others(mirror, error):
+    mirror, firmware = mirror
+    firmware.errors["ring.effect"] = error
+    assert mirror.write_again() == [str(error)]
+    assert firmware.written == [("motor.trim", 7), ("sound.freq", 7)]
+
+
+def test_a_link_that_is_lost_meanwhile_stops_them(mirror):
+    mirror, firmware = mirror
+    firmware.errors["motor.trim"] = LinkLostError("gone")
+    with pytest.raises(LinkLostError):
+        mirror.write_again()

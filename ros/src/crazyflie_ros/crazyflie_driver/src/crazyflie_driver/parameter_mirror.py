@@ -3,7 +3,7 @@
 from typing_extensions import override
 
 from crazyflie_py.crazyflie import Crazyflie
-from crazyflie_py.errors import CrazyflieError
+from crazyflie_py.errors import CrazyflieError, LinkLostError
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.parameter_types import ParameterType
 
@@ -30,16 +30,29 @@ class ParameterMirror:
         self._crazyflie = crazyflie
         self._written: dict[str, int | float] = {}
 
-    def write_again(self) -> None:
+    def write_again(self) -> list[str]:
         """Write what `write` has written since the start: a vehicle that was off has forgotten it.
+
+        Returns
+        -------
+        list of str
+            Why a parameter could not be written; all are tried.
 
         Raises
         ------
-        CrazyflieError
+        LinkLostError
         """
+        problems = []
         for name, value in self._written.items():
-            if name not in _COMMANDS:
+            if name in _COMMANDS:
+                continue
+            try:
                 self._crazyflie.parameters.write(name, value)
+            except LinkLostError:
+                raise
+            except CrazyflieError as error:
+                problems.append(str(error))
+        return problems
 
     def publish(self) -> int:
         """Set the ROS parameters to the firmware's values; return how many there are."""

@@ -379,7 +379,8 @@ class DriverVehicle:
         if self.is_emergency or self._links == self.crazyflie.links:
             return
         self._links = self.crazyflie.links
-        self._mirror.write_again()
+        for problem in self._mirror.write_again():
+            self._server.warn(f"{self.parameters.name}: not written again: {problem}")
         if self.parameters.enable_parameters:
             self._mirror.publish()
         self._open_thrust_lock()

@@ -24,7 +24,7 @@ _LINK_SOURCE_CHANNEL = 1
 _UDP_RECEIVE_LIMIT = 0.1
 
 _JOIN_LIMIT = 0.3
-"""How long, in s, the end of a link waits for a callback that is at work."""
+"""How long, in s, the end of a link waits for a callback that is at work, or for other dongles."""
 
 CLOSE_LIMIT = 1.0
 """How long, in s, the end of a link waits for a driver."""
@@ -146,7 +146,7 @@ class Backend(CflibCrazyflie):
                 self._on_error(f"cannot send: {error}")
 
     def drop(self) -> None:
-        """End the connection without another packet.
+        """End the connection without another packet; blocks for 2 s at most.
 
         cflib's own ``close_link`` sends a setpoint of zero thrust first, which would
         take a vehicle out of the air that flies by itself.
@@ -159,11 +159,10 @@ class Backend(CflibCrazyflie):
             if self.incoming.is_alive() and not self.is_called_by_incoming_handler_thread():
                 self.incoming.join(timeout=_JOIN_LIMIT)
             self.link = None
-            # A driver joins its threads, and cflib its own, without a limit.
-            closing = threading.Thread(target=self._close, args=(link,), daemon=True)
-            closing.start()
-            closing.join(CLOSE_LIMIT)
-            radios.forget_dead_radios()
+            # A driver joins its threads, and cflib its own, without a limit; and cflib's lock of
+            # the dongles is held for as long as one of them hangs.
+            _run(lambda: self._close(link), CLOSE_LIMIT)
+            _run(radios.forget_dead_radios, _JOIN_LIMIT)
 
     def _close(self, link):
         if link is not None:
@@ -190,6 +189,13 @@ class Backend(CflibCrazyflie):
             link.needs_resending = True
             # Its receiver looks up once in this time, and `drop` waits for it.
             link.socket.settimeout(_UDP_RECEIVE_LIMIT)
+
+
+def _run(work, limit):
+    # Waits for it for a while only.
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    thread.join(limit)
 
 
 def _wake_receiver(link):

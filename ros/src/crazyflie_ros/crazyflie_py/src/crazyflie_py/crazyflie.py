@@ -265,13 +265,19 @@ class Crazyflie:
         link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._on_rssi)
         self._opening = link
         try:
+            # `close` looks for it here; if it was called before, it has found nothing.
+            self._end_if_closed(link)
             link.open()
         finally:
             self._opening = None
         self._link = link
         self.links += 1
+        self._end_if_closed(link)
+
+    def _end_if_closed(self, link):
         if self._closed.is_set():
-            self._drop("the link was closed")
+            self._link = None
+            link.close("the link was closed")
             raise LinkLostError("the link was closed while connecting")
 
     def _drop(self, reason):
@@ -293,6 +299,9 @@ class Crazyflie:
             self._link = None
             self._silent_since = None
             if self._closed.is_set():
+                # `close` may have looked for it just now, and found nothing.
+                if link is not None:
+                    link.close("the link was closed")
                 return
             self._set_state(LinkState.LOST, why)
             if link is not None:

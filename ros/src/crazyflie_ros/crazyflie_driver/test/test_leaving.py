@@ -102,6 +102,12 @@ def test_a_removal_without_a_link_says_what_it_could_not_do(server, vehicle):
     server.add(vehicle.uri)
 
 
+def test_a_link_that_is_lost_during_a_removal_is_a_removal_without_one(server, vehicle):
+    vehicle.is_frozen = True
+    with pytest.raises(ServiceError, match="is removed, but its motors could not be stopped"):
+        server.remove(vehicle.uri)
+
+
 def test_a_stream_that_ends_at_rest_is_handed_over(server, vehicle):
     for pwm, ends in ((1000.0, 0), (0.0, 1)):
         vehicle.received.clear()

@@ -222,6 +222,8 @@ class DriverVehicle:
             elif self.crazyflie.links and not take_leave(
                 self, self._safety.landing_duration, limit
             ):
+                # Unless it is the link that has been lost meanwhile.
+                self.crazyflie.link()
                 self._server.warn(
                     f"{self.parameters.name}: nothing tells whether the vehicle flies: it is left "
                     "as it is"

@@ -71,5 +71,5 @@ def test_a_state_that_is_not_finite_is_ignored(process):
 def test_a_bad_parameter_is_named():
     process = FakeProcess()
     assert not process.launch(OdometerNode(), "/odometer", {**PARAMETERS, "time_step": -0.1})
-    expected = "parameter /odometer/time_step is -0.1; expected a finite number > 0 (s)"
+    expected = "parameter /odometer/time_step is -0.1; expected a finite number >= 0.0001 (s)"
     assert process.logged("error") == [f"/odometer: {expected}"]

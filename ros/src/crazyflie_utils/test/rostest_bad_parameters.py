@@ -7,7 +7,7 @@ import rospy
 from processes import composed, small_node
 
 GOOD = "_time_step:=0.01"
-EXPECTED = "expected a finite number > 0 (s)"
+EXPECTED = "expected a finite number >= 0.0001 (s)"
 BAD = {
     "missing": [],
     "of the wrong type": ["_time_step:=fast"],

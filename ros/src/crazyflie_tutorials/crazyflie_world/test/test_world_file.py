@@ -87,7 +87,7 @@ def test_the_lab():
         ("type: waypoints", "type: spiral", 9, "'spiral'; expected one of circle, waypoints"),
         ("[2, 2, 0, 1]", "[5, 2, 0, 1]", 9, "expected each larger than the last, from 0 (s)"),
         ("[4, 1, 0, 1]", "[4, 1, 0, 2]", 9, "expected the first, [1.0, 0.0, 1.0] (m)"),
-        ("period: 9", "period: 0", 13, "is 0; expected a finite number > 0 (s)"),
+        ("period: 9", "period: 0", 13, "is 0; expected a finite number >= 0.0001 (s)"),
         ("centre: [1, 0, 0.5], ", "", 3, "a centre and a path, or none"),
         ("name: other", "name: other\n    centre: [0, 0, 1]", 10, "a centre and a path, or none"),
         ("size: [4, 3]", "size: [4, 0]", 1, "floor/size"),

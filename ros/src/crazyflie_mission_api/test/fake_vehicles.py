@@ -8,6 +8,7 @@ from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import ServiceError
+from crazyflie_utils.runtime.poses import StampedPose
 
 
 class Stack:
@@ -56,14 +57,20 @@ class Stack:
 
 
 class Driven:
-    """A vehicle that is at once where it was told to be, behind the driver's services."""
+    """A vehicle that is at once where it was told to be, behind the driver's services.
 
-    def __init__(self, process, name, position):
+    With a ``frame`` its position is that of tf's frame ``name`` in it, else it comes as a pose.
+    """
+
+    def __init__(self, process, name, position, frame=None):
         self.position = list(position)
         self.requests = []
         self.setpoints = []
-        handle = process.handle(f"/{name}/driver")
+        self.is_tracked = True
+        self._frames = (frame, name)
+        self._handle = handle = process.handle(f"/{name}/driver")
         self._pose = handle.publisher("pose", PoseStamped)
+        self._broadcast = handle.broadcast_poses()
         self._status = handle.publisher("status", String, latch=True)
         for service, service_type in (
             ("takeoff", srv.Takeoff),
@@ -92,6 +99,8 @@ class Driven:
             self.requests.append((name, request))
             if name in ("takeoff", "land"):
                 self.position[2] = request.height
+                flies = name == "takeoff"
+                self.tell("flying: on high-level commands" if flies else "ready: armed")
             elif name == "go_to":
                 goal = request.goal
                 self.position = [goal.x, goal.y, goal.z]
@@ -112,6 +121,13 @@ class Driven:
         self.position = [p.x, p.y, p.z]
 
     def _on_timer(self):
+        if not self.is_tracked:
+            return
+        if self._frames[0] is not None:
+            stamp = self._handle.nanoseconds()
+            pose = StampedPose(*self._frames, stamp, tuple(self.position), (0.0, 0.0, 0.0, 1.0))
+            self._broadcast([pose])
+            return
         message = PoseStamped()
         p = message.pose.position
         p.x, p.y, p.z = self.position

@@ -132,6 +132,37 @@ def test_who_does_not_arrive_is_named(process, stack, driven):
         fleet.arrive()
 
 
+@pytest.mark.parametrize("frame", [None, "world"])
+def test_who_is_not_tracked_any_more_does_not_arrive(process, stack, frame):
+    driven = Driven(process, "cf2", (1.0, 0.0, 0.0), frame)
+    fleet = Fleet(NAMES, process=process, limit=0.5)
+    with pytest.raises(MissionError, match="^cf2: nobody says where it is"), fleet:
+        fleet.takeoff(1.0)
+        fleet["cf2"].go_to((1, 0.5, 1), wait=False)
+        # It was at its goal when it was seen last.
+        fleet.wait(0.2)
+        driven.is_tracked = False
+        fleet.arrive()
+    # That it has landed is known by its supervisor.
+    assert driven.called()[-2:] == ["land", "stop"]
+    assert fleet.flying == []
+
+
+def test_a_landing_without_motion_capture_is_no_landing_before_the_supervisor_says_so(fleet, driven):
+    with pytest.raises(MissionError, match="cf2: land: not on the ground 15 s after"), fleet:
+        fleet.takeoff(1.0)
+        driven.is_tracked = False
+        driven.tell = lambda status: None
+    assert driven.called()[-1] == "land"
+
+
+def test_the_fixed_frame_is_the_drivers(process):
+    process.transport.parameters["/this_process/frames/fixed"] = "hall"
+    Driven(process, "cf2", (1.0, 0.0, 0.0), "hall")
+    fleet = Fleet(["cf2"], process=process, limit=0.5)
+    assert fleet.position("cf2") == (1.0, 0.0, 0.0)
+
+
 def test_a_fence_counts(process, stack, driven):
     for side, value in (("min", -0.5), ("max", 0.5)):
         for axis in "xyz":

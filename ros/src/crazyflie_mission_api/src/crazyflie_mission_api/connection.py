@@ -1,5 +1,6 @@
 """Vehicles as a team needs them, by ROS."""
 
+import math
 from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
@@ -28,11 +29,14 @@ CALL_LIMIT = 60.0
 MEMORY = 31
 """Pieces that the memory of a vehicle holds."""
 
-_FRESH = 1.0
-"""A position older than this is not known, s."""
+MAX_POSITION_AGE = 0.5
+"""A position older than this is not known, s; as `high_level_node.STATE_LIMIT`."""
 
 _ON_GROUND = 0.1
 """Height above where it stood at which a vehicle has landed, m."""
+
+_READY = "ready"
+"""How the status of the driver begins when the vehicle's supervisor says that it does not fly."""
 
 _SETTLING = 0.5
 """After a landing should be at its end, s."""
@@ -56,8 +60,8 @@ class RosVehicle:
     starter : Starter, optional
         Of those that a controller flies, and not the driver.
     frames : tuple of str, optional
-        The fixed frame and its own, if tf says where it is; with the driver this is how it is
-        unless poses come.
+        The fixed frame and its own, if tf says where it is; with the driver only as long as
+        there are no poses.
     """
 
     def __init__(
@@ -75,7 +79,7 @@ class RosVehicle:
         self._starter = starter
         self._is_driven = is_driven = starter is None
         self._position: Triple | None = None
-        self._seen_at = 0.0
+        self._seen_at = -math.inf
         self._ground = 0.0
         self._landing_end = 0.0
         self._status = ""
@@ -83,7 +87,6 @@ class RosVehicle:
         self._stream: Course | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
-        frames = ("world", name) if is_driven else frames
         self._lookup = None if frames is None else partial(handle.listen_to_poses(), *frames)
         if is_driven:
             handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
@@ -105,16 +108,18 @@ class RosVehicle:
     # Where it is, and how it is.
 
     def position(self) -> Triple | None:
-        """Return where it is, m; None when nobody has said so for a second."""
-        if self._lookup is not None and not self._is_fresh():
-            try:
-                return self._lookup().position
-            except TransformError:
-                return None
-        return self._position if self._is_fresh() else None
-
-    def _is_fresh(self):
-        return self._position is not None and self._handle.time() - self._seen_at < _FRESH
+        """Return where it is, m; None when that is not known for `MAX_POSITION_AGE`."""
+        if self._handle.time() - self._seen_at < MAX_POSITION_AGE:
+            return self._position
+        if self._lookup is None:
+            return None
+        try:
+            pose = self._lookup()
+        except TransformError:
+            return None
+        # tf keeps the last pose of a vehicle that is not tracked any more.
+        age = (self._handle.nanoseconds() - pose.stamp) * 1e-9
+        return pose.position if age < MAX_POSITION_AGE else None
 
     def trouble(self) -> str:
         """Return why it cannot fly on; an empty text when it can."""
@@ -130,7 +135,10 @@ class RosVehicle:
         if not self._is_driven:
             return self._flight_state == "on_ground"
         place = self.position()
-        is_down = place is not None and place[2] < self._ground + _ON_GROUND
+        if place is None:
+            is_down = self._status.startswith(_READY)
+        else:
+            is_down = place[2] < self._ground + _ON_GROUND
         # Whoever is told then stops the motors: not on the last centimetres.
         return is_down and self._handle.time() >= self._landing_end
 

@@ -194,7 +194,8 @@ def _vehicle(process, handle, name, services, starter):
         return RosVehicle(name, handle, _below(commander), starter, _frames(handle, commander))
     driver = services.get(f"{top}/upload_trajectory")
     if driver is not None and services.get(f"{top}/takeoff") == driver:
-        return RosVehicle(name, handle, _below(top))
+        fixed = handle.get_param(f"{driver}/frames/fixed", FRAME, "world")
+        return RosVehicle(name, handle, _below(top), frames=(fixed, name))
     if {f"{top}/takeoff", f"{top}/land"} <= services.keys():
         has_yaw = topic_types(handle).get(f"{top}/ref") == _YAW_STATE
         handle.set_param(f"{commander}/reference/yaw", has_yaw)

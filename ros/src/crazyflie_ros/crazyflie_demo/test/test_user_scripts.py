@@ -4,7 +4,9 @@ import inspect
 import subprocess
 import sys
 
+import crazyflie
 import pytest
+import rospy
 import tf2_ros
 from crazyflie import Crazyflie
 from geometry_msgs.msg import Transform, TransformStamped, Vector3
@@ -55,8 +57,21 @@ def vehicle(tf):
     return made
 
 
+@pytest.fixture(autouse=True)
+def now(monkeypatch):
+    """It is 100 s, and 10 s pass at once."""
+    monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(100.0))
+    monkeypatch.setattr(crazyflie, "_TF_LIMIT", 0.05)
+
+
 class Listener:
     """A tf.TransformListener that knows one transform."""
+
+    def __init__(self, stamp=0.0):
+        self._stamp = rospy.Time(stamp)
+
+    def getLatestCommonTime(self, target, source):  # noqa: N802
+        return self._stamp
 
     def waitForTransform(self, target, source, time, limit):  # noqa: N802
         self.asked = (target, source)
@@ -73,13 +88,15 @@ class Buffer(tf2_ros.BufferCore):
         return self.lookup_transform_core(target, source, time)
 
 
-def buffer_with(frame):
-    """Return a buffer that knows one transform."""
-    transform = TransformStamped(Header(frame_id="world"), frame, Transform())
+def buffer_with(frame, stamp=0.0, world="world"):
+    """Return a buffer that knows one transform, a static one if it has no stamp."""
+    header = Header(frame_id=world, stamp=rospy.Time(stamp))
+    transform = TransformStamped(header, frame, Transform())
     transform.transform.translation = Vector3(1.0, 2.0, 3.0)
     transform.transform.rotation.w = 1.0
     buffer = Buffer()
-    buffer.set_transform_static(transform, "test")
+    add = buffer.set_transform if stamp else buffer.set_transform_static
+    add(transform, "test")
     return buffer
 
 
@@ -91,6 +108,20 @@ def test_the_position_comes_from_who_listens_to_tf():
 def test_the_position_is_that_of_the_frame_that_is_named():
     made = vehicle("/vicon/cf/cf")
     made._buffer = buffer_with("vicon/cf/cf")
+    assert made.position().tolist() == [1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize("tf", [Listener, lambda stamp: buffer_with("cf", stamp)])
+def test_a_position_of_long_ago_is_none(tf):
+    assert vehicle(tf(99.9)).position().tolist() == [1.0, 2.0, 3.0]
+    text = "/cf in world: the last position is 1.5 s old; expected at most 0.5 s"
+    with pytest.raises(tf2_ros.TransformException, match=text):
+        vehicle(tf(98.5)).position()
+
+
+def test_the_world_has_the_name_that_the_script_was_given():
+    made = vehicle(buffer_with("cf", 99.9, "hall"))
+    made._world = "hall"
     assert made.position().tolist() == [1.0, 2.0, 3.0]
 
 

@@ -6,6 +6,7 @@ calls rospy.init_node first; so this is plain rospy, and its methods block.
 
 import contextlib
 import math
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -23,7 +24,13 @@ from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece,
 from crazyflie_model.angles import quaternion_from_rpy
 
 _WORLD = "world"
+"""The fixed frame, unless the script's parameter ~frames/fixed says otherwise."""
+
 _TF_LIMIT = 10.0
+"""How long a position, or a voltage, is waited for, s."""
+
+_MAX_POSITION_AGE = 0.5
+"""Of a position, s: tf keeps the last one of a vehicle that is not tracked any more."""
 
 _COMMANDER = "high_level"
 """Below a vehicle's name: who offers the driver's services for one that a controller of this
@@ -70,9 +77,12 @@ class Crazyflie:
 
     # The names of arguments, here and below, are those of scripts that exist.
 
+    _world = _WORLD
+
     def __init__(self, prefix: str, tf: Any):
         self.prefix = prefix.rstrip("/")
         self.tf = tf
+        self._world = rospy.get_param("~frames/fixed", _WORLD)
         self._buffer: tf2_ros.Buffer | None = None
         self._services = {}
         top = _commander(self.prefix)
@@ -161,23 +171,41 @@ class Crazyflie:
         self._call("start_trajectory", groupMask, trajectoryId, timescale, reverse, relative)
 
     def position(self) -> NDArray[np.float64]:
-        """Return where tf has the vehicle, shape (3,), m in the frame world.
+        """Return where tf has the vehicle, shape (3,), m in the fixed frame.
 
         Raises
         ------
         tf2_ros.TransformException, tf.Exception
             It has not been seen for 10 s.
         """
-        now, limit = rospy.Time(), rospy.Duration(_TF_LIMIT)
+        deadline = time.monotonic() + _TF_LIMIT
+        while True:
+            stamp, position = self._latest_position()
+            age = (rospy.Time.now() - stamp).to_sec()
+            # What has no stamp is static.
+            if stamp.is_zero() or age < _MAX_POSITION_AGE:
+                return np.array(position)
+            if time.monotonic() > deadline:
+                raise tf2_ros.TransformException(
+                    f"{self._frame()} in {self._world}: the last position is {age:.1f} s old; "
+                    f"expected at most {_MAX_POSITION_AGE:g} s"
+                )
+            time.sleep(0.01)
+
+    def _latest_position(self):
+        latest, limit = rospy.Time(), rospy.Duration(_TF_LIMIT)
         if hasattr(self.tf, "lookupTransform"):
-            self.tf.waitForTransform(_WORLD, self.prefix, now, limit)
-            return np.array(self.tf.lookupTransform(_WORLD, self.prefix, now)[0])
-        frame, buffer = self.prefix, self.tf
-        if isinstance(self.tf, str):
-            frame, buffer = self.tf, self._listening_buffer()
-        transform = buffer.lookup_transform(_WORLD, frame.strip("/"), now, limit)
-        p = transform.transform.translation
-        return np.array([p.x, p.y, p.z])
+            frames = (self._world, self.prefix)
+            self.tf.waitForTransform(*frames, latest, limit)
+            stamp = self.tf.getLatestCommonTime(*frames)
+            return stamp, self.tf.lookupTransform(*frames, latest)[0]
+        buffer = self._listening_buffer() if isinstance(self.tf, str) else self.tf
+        found = buffer.lookup_transform(self._world, self._frame().strip("/"), latest, limit)
+        p = found.transform.translation
+        return found.header.stamp, (p.x, p.y, p.z)
+
+    def _frame(self):
+        return self.tf if isinstance(self.tf, str) else self.prefix
 
     def _listening_buffer(self):
         if self._buffer is None:
@@ -227,7 +255,7 @@ class Crazyflie:
 
     def _send(self, name, message):
         message.header.stamp = rospy.Time.now()
-        message.header.frame_id = _WORLD
+        message.header.frame_id = self._world
         self._setpoints[name].publish(message)
 
     def getParam(self, name: str) -> Any:  # noqa: N802

@@ -67,6 +67,7 @@ class Driven:
         self.requests = []
         self.setpoints = []
         self.is_tracked = True
+        self.refusals = {}
         self._frames = (frame, name)
         self._handle = handle = process.handle(f"/{name}/driver")
         self._pose = handle.publisher("pose", PoseStamped)
@@ -97,6 +98,8 @@ class Driven:
     def _answer(self, name, service_type):
         def answer(request):
             self.requests.append((name, request))
+            if name in self.refusals:
+                raise ServiceError(self.refusals[name])
             if name in ("takeoff", "land"):
                 self.position[2] = request.height
                 flies = name == "takeoff"

@@ -87,7 +87,19 @@ def test_a_trajectory_is_streamed_if_wanted(fleet, driven):
         # The firmware would stop the motors after the last setpoint.
         fleet.wait(0.2)
         assert driven.called()[-1] == "go_to"
+        last = driven.setpoints[-1].twist.linear
+        assert (last.x, last.y, last.z) == (0.0, 0.0, 0.0)
         assert driven.position == pytest.approx([1.0, 1.0, 1.0])
+
+
+def test_the_end_of_a_stream_that_fails_ends_the_mission_and_lands(fleet, driven):
+    text = "^cf2: the trajectory has ended, and go_to has failed: no reply; setpoints go on"
+    with pytest.raises(MissionError, match=text), fleet:
+        fleet["cf2"].takeoff(1.0)
+        driven.refusals["go_to"] = "no reply"
+        fleet["cf2"].follow(plan([(1, 0, 1), (1, 1, 1)]), stream=True)
+        fleet.wait(1.0)
+    assert driven.called()[-3:] == ["go_to", "land", "stop"]
 
 
 def test_a_trajectory_that_is_too_long_for_a_memory_is_refused(fleet):
@@ -148,7 +160,7 @@ def test_who_is_not_tracked_any_more_does_not_arrive(process, stack, frame):
     assert fleet.flying == []
 
 
-def test_a_landing_without_motion_capture_is_no_landing_before_the_supervisor_says_so(fleet, driven):
+def test_a_landing_that_nobody_sees_is_told_by_the_supervisor(fleet, driven):
     with pytest.raises(MissionError, match="cf2: land: not on the ground 15 s after"), fleet:
         fleet.takeoff(1.0)
         driven.is_tracked = False

@@ -12,11 +12,10 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_driver import srv
-from crazyflie_driver.msg import FullState
-from crazyflie_mission_api.conversions import full_state_message, to_message
-from crazyflie_mission_api.course import Course
+from crazyflie_mission_api.conversions import to_message
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.starter import Starter
+from crazyflie_mission_api.stream import SetpointStream, done
 from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
@@ -44,8 +43,15 @@ _SETTLING = 0.5
 _HIGH_LEVEL = "commander/enHighLevel"
 """The parameter of a vehicle that has it take high-level commands."""
 
-_STREAM_STEP = 0.02
-"""From one setpoint of a stream to the next, s."""
+_HOLD_DURATION = 0.5
+"""Of the go_to at the end of a stream, to where the vehicle is, s."""
+
+_HOLD_LIMIT = 3.0
+"""How long it may take to be answered, s of the machine's clock; the driver's own limit is 1 s."""
+
+_LANDING_RETRY_TIME = 10.0
+"""How long a vehicle that is streamed to is told to land, s: without an answer setpoints would end
+with the mission, and the vehicle would fall."""
 
 
 class RosVehicle:
@@ -84,15 +90,15 @@ class RosVehicle:
         self._landing_end = 0.0
         self._status = ""
         self._flight_state = ""
-        self._stream: Course | None = None
+        self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
         self._lookup = None if frames is None else partial(handle.listen_to_poses(), *frames)
         if is_driven:
             handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
             handle.subscribe(f"{top}/status", String, self._on_status)
-            self._setpoints = handle.publisher(f"{top}/cmd_full_state", FullState)
-            handle.timer(_STREAM_STEP, self._send_setpoint)
+            frame = "" if frames is None else frames[0]
+            self._stream = SetpointStream(handle, f"{top}/cmd_full_state", frame, self._hold)
         else:
             if frames is None:
                 state = PositionVelocityYawStateStamped
@@ -123,9 +129,9 @@ class RosVehicle:
 
     def trouble(self) -> str:
         """Return why it cannot fly on; an empty text when it can."""
-        if self._is_driven:
+        if self._stream is not None:
             bad = ("lost", "cannot fly", "emergency", "disconnected")
-            return self._status if self._status.startswith(bad) else ""
+            return self._status if self._status.startswith(bad) else self._stream.fault()
         if self._flight_state in ("on_ground", "landing", "descending"):
             return f"it does not fly any more: {self._status or self._flight_state}"
         return ""
@@ -178,9 +184,11 @@ class RosVehicle:
 
     def land(self, duration: float) -> "Future[Any]":
         """Sink straight down."""
-        self._stream = None
         self._landing_end = self._handle.time() + duration + _SETTLING
-        return self._call("land", srv.Land, 0, self._ground, _seconds(duration))
+        return self._hand_over(
+            lambda: self._call("land", srv.Land, 0, self._ground, _seconds(duration)),
+            _LANDING_RETRY_TIME,
+        )
 
     def rest(self) -> None:
         """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
@@ -189,16 +197,16 @@ class RosVehicle:
 
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
         """Fly to a point."""
-        self._stream = None
-        return self._call("go_to", srv.GoTo, 0, False, Point(*goal), yaw, _seconds(duration))
+        request = (0, False, Point(*goal), yaw, _seconds(duration))
+        return self._hand_over(lambda: self._call("go_to", srv.GoTo, *request))
 
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
         """Take a trajectory, to be uploaded or streamed."""
         self._prepared = pieces if stream and self._is_driven else None
         if self._prepared is not None:
-            return _done(None)
+            return done(None)
         if self._is_driven and len(pieces) > MEMORY:
-            return _done(
+            return done(
                 ServiceError(
                     f"the trajectory has {len(pieces)} pieces; expected at most {MEMORY}, which is "
                     "what the vehicle's memory holds, or stream=True"
@@ -209,48 +217,45 @@ class RosVehicle:
 
     def start(self) -> "Future[Any]":
         """Fly the trajectory that was prepared last."""
-        if self._prepared is not None:
-            self._stream = Course(self._prepared, self._handle.time())
-            return _done(None)
+        if self._prepared is not None and self._stream is not None:
+            return self._stream.start(self._prepared)
         if self._starter is not None:
             self._starter.start(self._services["start_trajectory"].rpartition("/")[0])
-            return _done(None)
-        return self._call("start_trajectory", srv.StartTrajectory, 0, 0, 1.0, False, False)
+            return done(None)
+        request = (0, 0, 1.0, False, False)
+        return self._hand_over(
+            lambda: self._call("start_trajectory", srv.StartTrajectory, *request)
+        )
 
     def emergency(self) -> "Future[Any]":
         """Stop the motors."""
-        self._stream = None
+        if self._stream is not None:
+            self._stream.stop()
         return self._handle.call_service(
             self._services["emergency"], Empty, EmptyRequest(), CALL_LIMIT
         )
 
-    def _call(self, name, service_type, *arguments):
+    def _call(self, name, service_type, *arguments, limit=CALL_LIMIT):
         request = service_type._request_class(*arguments)
-        return self._handle.call_service(self._services[name], service_type, request, CALL_LIMIT)
+        return self._handle.call_service(self._services[name], service_type, request, limit)
 
-    def _send_setpoint(self):
-        stream, now = self._stream, self._handle.time()
-        if stream is None:
-            return
-        goal = stream.goal(now)
-        if now < stream.end:
-            message = full_state_message(goal)
-            message.header.stamp = self._handle.stamp()
-            self._setpoints.publish(message)
-            return
-        # The driver says "setpoints stop" before a command; from there on the vehicle stays.
-        self.go_to(goal.position, goal.yaw, 0.5)
+    def _hand_over(self, send, retry_time=0.0):
+        return send() if self._stream is None else self._stream.hand_over(send, retry_time)
+
+    def _hold(self, goal):
+        request = (0, False, Point(*goal.position), goal.yaw, _seconds(_HOLD_DURATION))
+        return self._call("go_to", srv.GoTo, *request, limit=_HOLD_LIMIT)
 
 
 def in_turn(*calls: Callable[[], "Future[Any]"]) -> "Future[Any]":
     """Make calls one after the other; return the outcome of the last one, or of one that fails."""
     outcome: Future[Any] = Future()
 
-    def go_on(done, left):
-        if done.exception() is not None:
-            outcome.set_exception(done.exception())
+    def go_on(answer, left):
+        if answer.exception() is not None:
+            outcome.set_exception(answer.exception())
         elif not left:
-            outcome.set_result(done.result())
+            outcome.set_result(answer.result())
         else:
             left[0]().add_done_callback(lambda next_one: go_on(next_one, left[1:]))
 
@@ -276,12 +281,3 @@ def fence(handle: NodeHandle, top: str) -> Bounds:
 
 def _seconds(duration):
     return genpy.Duration.from_sec(duration)
-
-
-def _done(error):
-    future: Future[Any] = Future()
-    if error is None:
-        future.set_result(None)
-    else:
-        future.set_exception(error)
-    return future

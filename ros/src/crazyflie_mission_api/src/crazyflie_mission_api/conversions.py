@@ -39,14 +39,14 @@ def reference_message(
     return PositionVelocityStateStamped(state=PositionVelocityState(*goal.position, *goal.velocity))
 
 
-def full_state_message(goal: Goal[float]) -> FullState:
-    """Return the driver's setpoint, without a stamp."""
+def full_state_message(goal: Goal[float], frame: str = "world") -> FullState:
+    """Return the driver's setpoint in the fixed frame, without a stamp."""
     message = FullState(
         pose=Pose(Point(*goal.position), Quaternion(*quaternion_from_rpy(0.0, 0.0, goal.yaw))),
         twist=Twist(Vector3(*goal.velocity), Vector3(0.0, 0.0, goal.yaw_rate)),
         acc=Vector3(*goal.acceleration),
     )
-    message.header.frame_id = "world"
+    message.header.frame_id = frame
     return message
 
 

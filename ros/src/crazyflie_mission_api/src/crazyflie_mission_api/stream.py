@@ -1,0 +1,179 @@
+"""Setpoints along a trajectory, and the command that takes over from them."""
+
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from crazyflie_driver.msg import FullState
+from crazyflie_driver.setpoint_gate import OVERLAP
+from crazyflie_mission_api.conversions import full_state_message
+from crazyflie_mission_api.course import Course
+from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_model.polynomials import Goal
+from crazyflie_utils import NodeHandle
+
+STEP = 0.02
+"""From one setpoint to the next, s."""
+
+MAX_ANSWER_TIME = OVERLAP / 2.0
+"""Of a command, s. From `OVERLAP` after it the driver passes setpoints on again, which take the
+vehicle back from the command: one that is accepted later than this is sent again."""
+
+RETRY_PERIOD = 1.0
+"""From a command that has failed to the next try, s."""
+
+Send = Callable[[], "Future[Any]"]
+
+
+@dataclass
+class _Command:
+    """A command that waits for its turn, or for its answer; times are in s."""
+
+    send: Send
+    retry_end: float
+    course: Course | None = None
+    sent_time: float = 0.0
+    outcome: "Future[Any]" = field(default_factory=Future)
+
+
+class SetpointStream:
+    """Full-state setpoints along a trajectory, then of rest at its end.
+
+    Setpoints have priority over the firmware's high-level commander, which they stop; without any,
+    the firmware levels out after 0.5 s and stops the motors after 2 s. So they go on until the
+    driver has accepted a command; at the end of the trajectory that is ``hold``'s.
+
+    Commands are sent one after the other. All methods may be called from any thread.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    topic : str
+        The driver's, of crazyflie_driver/FullState.
+    frame : str
+        Of the setpoints.
+    hold : callable
+        ``hold(goal)`` has the vehicle stay at a `Goal`; it returns the future of the answer.
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        topic: str,
+        frame: str,
+        hold: Callable[[Goal[float]], "Future[Any]"],
+    ):
+        self._handle = handle
+        self._frame = frame
+        self._hold = hold
+        self._course: Course | None = None
+        self._commands: deque[_Command] = deque()
+        self._next_hold = 0.0
+        self._fault = ""
+        self._publisher = handle.publisher(topic, FullState)
+        handle.timer(STEP, self._on_timer)
+
+    def start(self, pieces: Pieces) -> "Future[Any]":
+        """Stream a trajectory from now on, in the place of the present one."""
+
+        def begin():
+            self._course = Course(pieces, self._handle.time())
+            return done(None)
+
+        return self.hand_over(begin)
+
+    def hand_over(self, send: Send, retry_time: float = 0.0) -> "Future[Any]":
+        """Send a command; setpoints end when it has been accepted.
+
+        Parameters
+        ----------
+        send : callable
+            ``send()`` returns the future of the answer.
+        retry_time : float
+            A command that fails while there are setpoints is sent again for so long, s.
+
+        Returns
+        -------
+        Future
+            Of the last answer.
+        """
+        command = _Command(send, self._handle.time() + retry_time)
+        self._handle.submit(self._enqueue, command)
+        return command.outcome
+
+    def stop(self) -> None:
+        """End the setpoints at once, whatever becomes of the vehicle."""
+        self._course = None
+
+    def fault(self) -> str:
+        """Return why the end of a trajectory has not been handed over; empty if it has."""
+        return self._fault
+
+    def _enqueue(self, command):
+        self._commands.append(command)
+        if len(self._commands) == 1:
+            self._send()
+
+    def _send(self):
+        command = self._commands[0]
+        command.course, command.sent_time = self._course, self._handle.time()
+        command.send().add_done_callback(partial(self._handle.submit, self._on_answer))
+
+    def _on_answer(self, answer):
+        command, error, now = self._commands[0], answer.exception(), self._handle.time()
+        is_streaming = self._course is not None and self._course is command.course
+        if is_streaming and error is not None and now < command.retry_end:
+            self._send_later()
+            return
+        if is_streaming and error is None:
+            if now - command.sent_time > MAX_ANSWER_TIME:
+                self._send()
+                return
+            self._course = None
+        self._commands.popleft()
+        if self._commands:
+            self._send()
+        if error is None:
+            self._fault = ""
+            command.outcome.set_result(answer.result())
+        else:
+            command.outcome.set_exception(error)
+
+    def _send_later(self):
+        def send():
+            timer.stop()
+            self._send()
+
+        timer = self._handle.timer(RETRY_PERIOD, send)
+
+    def _on_timer(self):
+        course, now = self._course, self._handle.time()
+        if course is None:
+            return
+        message = full_state_message(course.goal(now), self._frame)
+        message.header.stamp = self._handle.stamp()
+        self._publisher.publish(message)
+        if now >= max(course.end, self._next_hold) and not self._commands:
+            self._next_hold = now + RETRY_PERIOD
+            held = self.hand_over(partial(self._hold, course.destination))
+            held.add_done_callback(self._note_hold)
+
+    def _note_hold(self, held):
+        if held.exception() is not None and self._course is not None:
+            self._fault = (
+                f"the trajectory has ended, and go_to has failed: {held.exception()}; setpoints "
+                "go on at its end"
+            )
+
+
+def done(error: Exception | None) -> "Future[Any]":
+    """Return the future of what has been done already, or has failed."""
+    future: Future[Any] = Future()
+    if error is None:
+        future.set_result(None)
+    else:
+        future.set_exception(error)
+    return future

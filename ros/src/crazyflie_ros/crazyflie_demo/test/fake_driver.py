@@ -1,5 +1,7 @@
 """The services of a driver, which only record their calls."""
 
+from concurrent.futures import Future
+
 from std_srvs.srv import Empty
 
 from crazyflie_driver import srv
@@ -25,12 +27,13 @@ class FakeDriver(Node):
     calls : list of tuple
         Time (s), name and request of every call.
     refused : dict
-        Name -> why it is refused.
+        Name -> why it is refused; None for a service that does not answer before `answer`.
     """
 
     def __init__(self):
         self.calls = []
         self.refused = {}
+        self._late = []
 
     def load_parameters(self, handle):
         pass
@@ -46,8 +49,19 @@ class FakeDriver(Node):
     def _answer(self, name, service_type):
         def answer(request):
             self.calls.append((self._handle.time(), name, request))
-            if name in self.refused:
+            response = service_type._response_class()
+            if name not in self.refused:
+                return response
+            if self.refused[name] is not None:
                 raise ServiceError(self.refused[name])
-            return service_type._response_class()
+            later = Future()
+            self._late.append((later, response))
+            return later
 
         return answer
+
+    def answer(self):
+        """Answer what waits for it."""
+        for later, response in self._late:
+            later.set_result(response)
+        self._late.clear()

@@ -21,10 +21,11 @@ def launch(node, **parameters):
 
 
 def test_a_trajectory_is_streamed_as_it_is():
-    process = launch(TrajectoryStreamNode(str(FIGURE8)))
+    process = launch(TrajectoryStreamNode(str(FIGURE8)), topic="/cf/cmd_full_state")
+    assert process.launch(FakeDriver(), "/driver")
     process.advance(12.0)
     assert process.exit_status == 0
-    setpoints = process.published("/crazyflie/cmd_full_state")
+    setpoints = process.published("/cf/cmd_full_state")
     assert len(setpoints) == pytest.approx(1001, abs=1)
     trajectory = Trajectory()
     trajectory.loadcsv(FIGURE8)
@@ -79,6 +80,67 @@ def test_a_trajectory_ends_with_a_landing():
     assert process.launch(driver, "/driver")
     process.advance(12.0)
     assert driver.names() == ["land"]
+    assert process.exit_status == 0
+
+
+def flown(refused):
+    """Return a process at the end of a trajectory, and its driver."""
+    process = launch(TrajectoryStreamNode(str(FIGURE8)), topic="/cf/cmd_full_state")
+    driver = FakeDriver()
+    driver.refused = refused
+    assert process.launch(driver, "/driver")
+    process.advance(10.1)
+    return process, driver
+
+
+def test_the_end_is_at_rest_whatever_the_file_says(tmp_path):
+    file = tmp_path / "straight.csv"
+    header = FIGURE8.read_text().splitlines()[0]
+    file.write_text(f"{header}\n1.0,0,0.5{',0' * 30}\n")
+    process = launch(TrajectoryStreamNode(str(file)))
+    process.advance(2.0)
+    setpoints = process.published("/crazyflie/cmd_full_state")
+    last = setpoints[-1]
+    assert [setpoints[50].twist.linear.x, last.twist.linear.x] == [0.5, 0.0]
+    assert last.pose.position.x == pytest.approx(0.5)
+
+
+def test_setpoints_go_on_until_the_landing_is_accepted():
+    process, driver = flown({"land": "no reply"})
+    before = len(process.published("/cf/cmd_full_state"))
+    process.advance(0.9)
+    at_the_end = process.published("/cf/cmd_full_state")[before:]
+    assert len(at_the_end) == pytest.approx(90, abs=1)
+    assert {each.twist.linear.x for each in at_the_end} == {0.0}
+    assert process.exit_status is None
+    driver.refused = {}
+    process.advance(0.2)
+    assert driver.names() == ["land", "land"]
+    assert process.exit_status == 0
+    count = len(process.published("/cf/cmd_full_state"))
+    process.advance(1.0)
+    assert len(process.published("/cf/cmd_full_state")) == count
+
+
+def test_a_landing_that_nobody_carries_out_is_an_error():
+    process, _ = flown({"land": "no reply"})
+    process.advance(9.0)
+    assert process.exit_status is None
+    process.advance(3.0)
+    assert process.exit_status == 1
+    assert process.logged("error") == [
+        "/cf/flight: MAY STILL FLY: the landing has failed for 10 s: no reply"
+    ]
+
+
+def test_a_landing_that_was_accepted_late_is_repeated():
+    process, driver = flown({"land": None})
+    # The driver passes setpoints on again 0.5 s after a command.
+    process.advance(0.5)
+    driver.refused = {}
+    driver.answer()
+    process.advance(0.1)
+    assert driver.names() == ["land", "land"]
     assert process.exit_status == 0
 
 

@@ -59,7 +59,7 @@ def vehicle(tf):
 
 @pytest.fixture(autouse=True)
 def now(monkeypatch):
-    """It is 100 s, and 10 s pass at once."""
+    """Set the time to 100 s, and have limits pass at once."""
     monkeypatch.setattr(rospy.Time, "now", lambda: rospy.Time(100.0))
     monkeypatch.setattr(crazyflie, "_TF_LIMIT", 0.05)
 

@@ -1,12 +1,14 @@
 """What flights by a stream of setpoints have in common: a clock that starts with a listener."""
 
 from concurrent.futures import Future
+from functools import partial
 from typing import Any
 
 import genpy
 from typing_extensions import override
 
 from crazyflie_demo.flight_plan_node import seconds
+from crazyflie_driver.setpoint_gate import OVERLAP
 from crazyflie_driver.srv import Land, LandRequest
 from crazyflie_utils import Node, NodeHandle
 
@@ -16,11 +18,23 @@ _LANDING = 2.0
 _LIMIT = 15.0
 """How long the driver may take to answer, s."""
 
+_FINISH_LIMIT = 10.0
+"""How long a landing that fails is asked for again, s."""
+
+_RETRY_PERIOD = 1.0
+"""From one that has failed to the next, s."""
+
+_MAX_ANSWER_TIME = OVERLAP / 2.0
+"""Of a landing, s. From `OVERLAP` after it the driver passes setpoints on again, which take the
+vehicle back from it: one that is accepted later than this is asked for again."""
+
 
 class StreamNode(Node):
     """Stream the setpoints of a flight, from when the driver listens; then end the process.
 
-    If it is ended in flight, the vehicle is landed.
+    The last one is repeated until the driver has accepted what follows: without setpoints the
+    firmware levels out after 0.5 s, and stops the motors after 2 s. If the node is ended in
+    flight, the vehicle is landed.
 
     Attributes
     ----------
@@ -40,13 +54,14 @@ class StreamNode(Node):
     def __init__(self) -> None:
         self._start: float | None = None
         self._is_flying = False
+        self._next_finish: float | None = 0.0
 
     def setpoint(self, time: float) -> genpy.Message:
         """Return the setpoint of a time (s), 0 to `duration`."""
         raise NotImplementedError
 
     def finish(self) -> Future[Any] | None:
-        """Do what follows the last setpoint; return what the process waits for before it ends."""
+        """Do what follows the last setpoint; return the answer that the process waits for."""
         return None
 
     def land(self) -> Future[Any]:
@@ -75,22 +90,37 @@ class StreamNode(Node):
             if not self._publisher.has_subscribers():
                 return
             self._start = now
+            self._finish_end = now + self.duration + _FINISH_LIMIT
             self._is_flying = True
             self._handle.info(f"flying, {self.duration:g} s")
         elapsed = now - self._start
         message = self.setpoint(min(elapsed, self.duration))
         message.header.stamp = self._handle.stamp()
         self._publisher.publish(message)
-        if elapsed >= self.duration:
-            self._is_flying = False
-            self._timer.stop()
+        if elapsed >= self.duration and self._next_finish is not None and now >= self._next_finish:
+            self._next_finish = None
             answer = self.finish()
             if answer is None:
-                self._handle.end(0)
+                self._end()
             else:
-                answer.add_done_callback(self._on_answer)
+                answer.add_done_callback(partial(self._on_answer, now))
 
-    def _on_answer(self, done):
-        if (error := done.exception()) is not None:
-            self._handle.warn(f"no landing: {error}")
+    def _on_answer(self, asked, done):
+        now, error = self._handle.time(), done.exception()
+        if error is None and now - asked <= _MAX_ANSWER_TIME:
+            self._end()
+        elif error is None:
+            self._next_finish = now
+        elif now < self._finish_end:
+            self._handle.warn(f"the landing has failed, and is tried again: {error}")
+            self._next_finish = now + _RETRY_PERIOD
+        else:
+            self._handle.error(
+                f"MAY STILL FLY: the landing has failed for {_FINISH_LIMIT:g} s: {error}"
+            )
+            self._handle.end(1)
+
+    def _end(self):
+        self._is_flying = False
+        self._timer.stop()
         self._handle.end(0)

@@ -3,6 +3,7 @@
 from concurrent.futures import Future
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 from typing_extensions import override
 
@@ -14,6 +15,8 @@ from crazyflie_driver.msg import FullState
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_utils import NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameter_types import TOPIC
+
+_REST = np.zeros(3)
 
 
 class TrajectoryStreamParameters(Parameters):
@@ -52,6 +55,9 @@ class TrajectoryStreamNode(StreamNode):
     @override
     def setpoint(self, time: float) -> FullState:
         goal = self._trajectory.eval(time)
+        if time >= self.duration:
+            # It is repeated until the vehicle lands.
+            goal = goal._replace(vel=_REST, acc=_REST, omega=_REST)
         message = FullState(
             pose=Pose(Point(*goal.pos), Quaternion(*quaternion_from_rpy(0.0, 0.0, goal.yaw))),
             twist=Twist(Vector3(*goal.vel), Vector3(*goal.omega)),

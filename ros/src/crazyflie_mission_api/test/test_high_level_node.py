@@ -45,9 +45,9 @@ class Bench:
         self.see(position)
         self.process.publish("/cf1/in_flight_state", String(state))
 
-    def see(self, position):
+    def see(self, position, velocity=(0.0, 0.0, 0.0)):
         """Tell where the vehicle is."""
-        state = PositionVelocityYawState(*position, 0.0, 0.0, 0.0, 0.0)
+        state = PositionVelocityYawState(*position, *velocity, 0.0)
         self.process.publish("/cf1/state", PositionVelocityYawStateStamped(state=state))
 
     def call(self, service, service_type, *arguments):
@@ -109,6 +109,27 @@ def test_somebody_else_has_moved_it(bench):
     assert bench.references()[-1][0] == pytest.approx(-1.0)
 
 
+def test_a_move_of_a_vehicle_that_was_moved_elsewhere_begins_with_its_velocity(bench):
+    bench.go_to((1.0, 0.0, 1.0))
+    bench.fly(2.2)
+    bench.see((-1.0, 0.0, 1.0), (0.0, 0.5, 0.0))
+    bench.go_to((-1.0, 1.0, 1.0))
+    bench.process.advance(0.02)
+    assert bench.references()[-1][4] == pytest.approx(0.5, abs=0.02)
+
+
+def test_a_move_after_setpoints_begins_where_they_were(bench):
+    # What was flown before them does not count, near as it is.
+    bench.go_to((0.0, 0.0, 1.0), duration=0.1)
+    bench.fly(0.2)
+    goal = Goal((0.3, 0.0, 1.0), (0.5, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0, 0.0)
+    bench.process.publish(f"{TOP}/cmd_full_state", full_state_message(goal))
+    bench.see((0.25, 0.0, 1.0))
+    bench.go_to((1.0, 0.0, 1.0))
+    bench.process.advance(0.02)
+    assert bench.references()[-1] == pytest.approx([0.31, 0.0, 1.0, 0.5, 0.0, 0.0], abs=0.005)
+
+
 def test_trajectories_are_uploaded_and_flown(bench):
     pieces = plan([(0, 0, 1), (1, 0, 1), (1, 1, 1)])
     bench.call("upload_trajectory", srv.UploadTrajectory, 3, 0, [to_message(p) for p in pieces])
@@ -141,6 +162,31 @@ def test_what_is_told_during_a_takeoff_counts_after_it():
     assert bench.fly(2.1)[-1][:3] == pytest.approx([1.0, 0.0, 1.0])
 
 
+@pytest.mark.parametrize("how", ["by this node", "by the takeoff server"])
+def test_a_command_does_not_survive_an_aborted_takeoff(how):
+    bench = Bench()
+    bench.be("on_ground", (0.0, 0.0, 0.0))
+    if how == "by this node":
+        bench.call("takeoff", srv.Takeoff, 0, 0.6, SECONDS(2.0))
+    bench.be("taking_off", (0.0, 0.0, 0.1))
+    bench.go_to((1.0, 0.0, 1.0))
+    bench.be("landing", (0.0, 0.0, 0.1))
+    bench.be("on_ground", (0.0, 0.0, 0.0))
+    bench.be("taking_off", (0.0, 0.0, 0.1))
+    bench.be("flying")
+    assert bench.fly(2.1).size == 0
+
+
+def test_the_height_of_a_takeoff_outlives_what_was_said_of_the_ground():
+    bench = Bench()
+    bench.be("on_ground", (0.0, 0.0, 0.0))
+    bench.call("takeoff", srv.Takeoff, 0, 0.6, SECONDS(2.0))
+    bench.be("on_ground", (0.0, 0.0, 0.0))
+    bench.be("taking_off", (0.0, 0.0, 0.1))
+    bench.be("flying")
+    assert bench.fly(2.1)[-1][:3] == pytest.approx([0.0, 0.0, 0.6])
+
+
 def test_is_silent_while_the_vehicle_lands(bench):
     bench.go_to((1.0, 0.0, 1.0))
     bench.fly(1.0)
@@ -162,6 +208,13 @@ def test_setpoints_are_followed_until_they_stop(bench):
     for x in (0.4, math.nan):
         bench.process.publish(f"{TOP}/cmd_position", Position(x=x, z=1.0))
     assert bench.references()[-1] == pytest.approx([0.4, 0.0, 1.0, 0.0, 0.0, 0.0], abs=1e-6)
+
+
+def test_setpoints_that_stop_together_with_the_states_leave_a_reference_at_rest(bench):
+    goal = Goal((0.5, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 0.0), 0.3, 0.0)
+    bench.process.publish(f"{TOP}/cmd_full_state", full_state_message(goal))
+    bench.process.advance(1.2)
+    assert bench.references()[-1] == pytest.approx([0.5, 0.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def test_a_setpoint_ends_a_way(bench):

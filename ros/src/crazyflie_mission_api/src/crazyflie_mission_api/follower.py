@@ -30,11 +30,16 @@ class Follower:
     def __init__(self) -> None:
         self._uploads: dict[int, Pieces] = {}
         self._trajectory: Trajectory | None = None
+        self._setpoint: Goal[float] | None = None
         self._begin = 0.0
 
     def forget(self) -> None:
         """Have no goal; trajectories that were uploaded stay."""
-        self._trajectory = None
+        self._trajectory = self._setpoint = None
+
+    def take_setpoint(self, goal: Goal[float]) -> None:
+        """Have a goal that a stream of setpoints has, in the place of any command."""
+        self._trajectory, self._setpoint = None, goal
 
     def is_moving(self, time: float) -> bool:
         """Return whether a way or a trajectory is not at its end yet."""
@@ -42,7 +47,9 @@ class Follower:
 
     def goal(self, time: float) -> Goal[float] | None:
         """Return the goal at ``time`` (s), at rest after the end; None before any command."""
-        return None if self._trajectory is None else self._trajectory.evaluate(time - self._begin)
+        if self._trajectory is None:
+            return self._setpoint
+        return self._trajectory.evaluate(time - self._begin)
 
     def go_to(
         self,
@@ -55,7 +62,8 @@ class Follower:
     ) -> None:
         """Fly to a position (m) and heading (rad), or by them, in ``duration`` (s).
 
-        ``measured`` is where the vehicle is.
+        It begins with the position, velocity and acceleration of the present goal; with those of
+        ``measured``, which is where the vehicle is, when that is further away than `NEAR`.
         """
         _check(*position, yaw)
         if not (math.isfinite(duration) and duration > 0.0):
@@ -96,11 +104,6 @@ class Follower:
             trajectory = trajectory.moved_to(self._start(time, measured).position, None)
         self._fly(time, trajectory)
 
-    def stay(self, time: float, measured: Goal[float]) -> None:
-        """Stay where the present goal is."""
-        start = self._start(time, measured)
-        self._fly(time, Trajectory((smooth_piece(start, start.position, start.yaw, 0.5),)))
-
     def _start(self, time, measured):
         present = self.goal(time)
         if present is None or math.dist(present.position, measured.position) > NEAR:
@@ -108,7 +111,7 @@ class Follower:
         return present
 
     def _fly(self, time, trajectory):
-        self._trajectory = trajectory
+        self._trajectory, self._setpoint = trajectory, None
         self._begin = time
 
 

@@ -12,49 +12,22 @@ from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Position
 from crazyflie_mission_api.conversions import from_message, reference_message, setpoint_goal
 from crazyflie_mission_api.follower import Follower, at_rest
+from crazyflie_mission_api.high_level_parameters import HighLevelParameters
 from crazyflie_model.polynomials import Goal
 from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, SERVICE, TIME_STEP, TOPIC
+from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 
 STATE_LIMIT = 0.5
 """A state older than this says nothing, and nor does a setpoint, s."""
 
-START_TOPIC = "/all/start_trajectory"
-"""Nodes, one space between two, that begin what was uploaded to them as trajectory 0: vehicles that
-are called one after the other do not begin together."""
-
 _CALL_LIMIT = 58.0
 """How long a takeoff or landing of the takeoff server may take, s of the machine's clock."""
 
 _FLYING, _TAKING_OFF, _DESCENDING, _LANDING = "flying", "taking_off", "descending", "landing"
-
-
-class HighLevelParameters(Parameters):
-    """Parameters of `HighLevelNode`."""
-
-    reference_topic: str = parameter(TOPIC, "references of the controller", "ref", "topics/ref")
-    has_yaw: bool = parameter(
-        BOOLEAN,
-        "references are PositionVelocityYawStateStamped, and not PositionVelocityStateStamped",
-        default=False,
-        name="reference/yaw",
-    )
-    state_topic: str = parameter(TOPIC, "where the vehicle is", "state", "topics/state")
-    flight_state_topic: str = parameter(
-        TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
-    )
-    takeoff: str = parameter(SERVICE, "the takeoff server's", "takeoff", "srv/takeoff")
-    land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
-    emergency: str = parameter(SERVICE, "stops the motors", "emergency", "srv/emergency")
-    start_topic: str = parameter(
-        TOPIC, "names those that begin trajectory 0 at once", START_TOPIC, "topics/start"
-    )
-    time_step: float = parameter(TIME_STEP, "from one reference to the next", 0.02)
 
 
 class HighLevelNode(Node):
@@ -73,8 +46,8 @@ class HighLevelNode(Node):
         self._measured: Goal[float] | None = None
         self._measured_at = 0.0
         self._is_moving = False
-        self._streamed: Goal[float] | None = None
-        self._streamed_at = 0.0
+        # When the last setpoint came; None without a stream.
+        self._setpoint_time: float | None = None
         # What was told during a takeoff, for its end.
         self._next: tuple[Any, ...] | None = None
         self._landings: list[Future[Any]] = []
@@ -119,32 +92,38 @@ class HighLevelNode(Node):
     @override
     def make_safe(self) -> None:
         """Leave the controller a reference at rest."""
-        goal = self._streamed
-        if self._is_moving:
-            goal = self._follower.goal(self._handle.time())
-        if self._flight_state == _FLYING and goal is not None:
+        goal = self._follower.goal(self._handle.time())
+        moves = self._is_moving or self._setpoint_time is not None
+        if self._flight_state == _FLYING and moves and goal is not None:
             self._publish(at_rest(goal.position, goal.yaw))
+        self._forget_goal()
+
+    def _forget_goal(self):
         self._follower.forget()
         self._is_moving = False
-        self._streamed = None
+        self._setpoint_time = None
 
     # What the vehicle does.
 
     def _on_state(self, message):
         s = message.state
-        self._measured = at_rest((s.x, s.y, s.z), s.yaw if self._parameters.has_yaw else 0.0)
+        yaw = s.yaw if self._parameters.has_yaw else 0.0
+        velocity = (s.x_dot, s.y_dot, s.z_dot)
+        self._measured = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
         self._measured_at = self._handle.time()
 
     def _on_flight_state(self, message):
+        aborted = self._flight_state == _TAKING_OFF and message.data not in (_TAKING_OFF, _FLYING)
         self._flight_state = message.data
+        if aborted:
+            # What was told during this takeoff must not be done after the next one.
+            self._next = None
         if message.data == _FLYING:
             command, self._next = self._next, None
             if command is not None:
                 self._begin_unasked(*command)
         else:
-            self._follower.forget()
-            self._is_moving = False
-            self._streamed = None
+            self._forget_goal()
         if message.data in (_DESCENDING, _LANDING):
             landings, self._landings = self._landings, []
             for answer in landings:
@@ -266,7 +245,7 @@ class HighLevelNode(Node):
             command(self._follower, self._handle.time(), self._where(), *arguments)
         except RefusalError as reason:
             raise ServiceError(str(reason)) from None
-        self._streamed = None
+        self._setpoint_time = None
         self._is_moving = True
 
     def _begin_unasked(self, command, *arguments):
@@ -283,20 +262,26 @@ class HighLevelNode(Node):
             self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
         elif self._flight_state == _FLYING:
             self._is_moving = False
-            self._streamed = goal
-            self._streamed_at = self._handle.time()
-            self._publish(self._streamed)
+            self._setpoint_time = self._handle.time()
+            self._follower.take_setpoint(goal)
+            self._publish(goal)
 
     def _end_stream(self):
-        if self._streamed is not None:
-            last = at_rest(self._streamed.position, self._streamed.yaw)
-            self._streamed = None
-            self._follower.forget()
-            self._begin_unasked(Follower.go_to, last.position, last.yaw, 0.5)
+        last = self._follower.goal(self._handle.time())
+        if self._setpoint_time is None or last is None:
+            return
+        self._forget_goal()
+        try:
+            self._begin(Follower.go_to, last.position, last.yaw, 0.5)
+        except ServiceError as reason:
+            # The last reference has a velocity, and the controller goes on with it.
+            self._handle.warn(f"setpoints have stopped, and {reason}: stays at the last one")
+            self._publish(at_rest(last.position, last.yaw))
 
     def _on_timer(self):
         now = self._handle.time()
-        if self._streamed is not None and not 0.0 <= now - self._streamed_at < STATE_LIMIT:
+        streams = self._setpoint_time is not None
+        if streams and not 0.0 <= now - self._setpoint_time < STATE_LIMIT:
             self._end_stream()
         if not self._is_moving:
             return

@@ -1,0 +1,31 @@
+"""Parameters of the node that offers the driver's high-level services."""
+
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameter_types import BOOLEAN, SERVICE, TIME_STEP, TOPIC
+
+START_TOPIC = "/all/start_trajectory"
+"""Nodes, one space between two, that begin what was uploaded to them as trajectory 0: vehicles that
+are called one after the other do not begin together."""
+
+
+class HighLevelParameters(Parameters):
+    """Parameters of `HighLevelNode`."""
+
+    reference_topic: str = parameter(TOPIC, "references of the controller", "ref", "topics/ref")
+    has_yaw: bool = parameter(
+        BOOLEAN,
+        "references are PositionVelocityYawStateStamped, and not PositionVelocityStateStamped",
+        default=False,
+        name="reference/yaw",
+    )
+    state_topic: str = parameter(TOPIC, "where the vehicle is", "state", "topics/state")
+    flight_state_topic: str = parameter(
+        TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
+    )
+    takeoff: str = parameter(SERVICE, "the takeoff server's", "takeoff", "srv/takeoff")
+    land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
+    emergency: str = parameter(SERVICE, "stops the motors", "emergency", "srv/emergency")
+    start_topic: str = parameter(
+        TOPIC, "names those that begin trajectory 0 at once", START_TOPIC, "topics/start"
+    )
+    time_step: float = parameter(TIME_STEP, "from one reference to the next", 0.02)

@@ -1,11 +1,12 @@
 """Vehicles on a fake process: what a takeoff server and a controller do, and what a driver does."""
 
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, Quaternion
 from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyResponse
 
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState
+from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import ServiceError
 from crazyflie_utils.runtime.poses import StampedPose
@@ -16,6 +17,7 @@ class Stack:
 
     def __init__(self, process, name, position):
         self.position = list(position)
+        self.yaw = 0.0
         self.refusal = ""
         handle = process.handle(f"/{name}/stack")
         self._state = handle.publisher("state", PositionVelocityYawStateStamped)
@@ -53,6 +55,7 @@ class Stack:
     def _on_timer(self):
         message = PositionVelocityYawStateStamped()
         message.state.x, message.state.y, message.state.z = self.position
+        message.state.yaw = self.yaw
         self._state.publish(message)
 
 
@@ -64,6 +67,7 @@ class Driven:
 
     def __init__(self, process, name, position, frame=None):
         self.position = list(position)
+        self.yaw = 0.0
         self.requests = []
         self.setpoints = []
         self.is_tracked = True
@@ -126,12 +130,13 @@ class Driven:
     def _on_timer(self):
         if not self.is_tracked:
             return
+        rotation = quaternion_from_rpy(0.0, 0.0, self.yaw)
         if self._frames[0] is not None:
             stamp = self._handle.nanoseconds()
-            pose = StampedPose(*self._frames, stamp, tuple(self.position), (0.0, 0.0, 0.0, 1.0))
-            self._broadcast([pose])
+            self._broadcast([StampedPose(*self._frames, stamp, tuple(self.position), rotation)])
             return
         message = PoseStamped()
+        message.pose.orientation = Quaternion(*rotation)
         p = message.pose.position
         p.x, p.y, p.z = self.position
         self._pose.publish(message)

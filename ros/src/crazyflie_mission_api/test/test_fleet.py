@@ -77,6 +77,22 @@ def test_one_script_for_both(fleet, stack, driven):
     ]
 
 
+@pytest.mark.parametrize("frame", [None, "world"])
+def test_headings_are_kept(process, stack, frame):
+    driven = Driven(process, "cf2", (1.0, 0.0, 0.0), frame)
+    # The controller of the other one keeps the heading 0, whatever it is.
+    driven.yaw, stack.yaw = 2.0, 0.3
+    fleet = Fleet(NAMES, process=process, limit=0.5)
+    with fleet:
+        fleet.takeoff(1.0)
+        fleet.go_to((0.0, 0.5, 0.0), relative=True)
+        fleet.formation([(1.0, 0.0, 1.0), (0.0, 0.0, 1.0)])
+        fleet["cf2"].go_to((1.0, 0.0, 1.0), yaw=0.5, relative=False)
+        fleet["cf2"].go_to((0.0, 0.0, 0.1), yaw=0.5, relative=True)
+    yaws = [request.yaw for name, request in driven.requests if name == "go_to"]
+    assert yaws == pytest.approx([2.0, 2.0, 0.5, 1.0])
+
+
 def test_a_trajectory_is_streamed_if_wanted(fleet, driven):
     with fleet:
         fleet["cf2"].takeoff(1.0)

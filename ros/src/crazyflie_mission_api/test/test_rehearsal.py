@@ -45,6 +45,46 @@ def test_a_mission_from_takeoff_to_landing(team):
     assert team.position("cf1") == pytest.approx((-1.5, 0.0, 0.0))
 
 
+def test_going_nowhere_is_no_error(flying):
+    flying.go_to((0.0, 0.0, 0.0), relative=True)
+    flying.formation([(1.0, 0.0, 1.0), (0.0, 0.0, 1.0)])
+    flying["cf1"].go_to((1e-60, 0.0, 0.0), relative=True)
+    assert flying.position("cf2") == pytest.approx((1.0, 0.0, 1.0))
+
+
+def test_a_takeoff_to_where_the_vehicle_is_is_no_error():
+    table = Rehearsal({"cf1": (0.0, 0.0, 1.0)})
+    table.takeoff(1.0)
+    assert table.position("cf1") == pytest.approx((0.0, 0.0, 1.0))
+
+
+def yaws(team):
+    """Return where the vehicles are told to head, rad."""
+    return [team._courses[name].destination.yaw for name in team.names]
+
+
+def test_a_heading_is_kept_unless_another_is_told():
+    team = Rehearsal(STARTS, headings={"cf1": 1.0, "cf2": -0.5})
+    team.takeoff(1.0)
+    assert yaws(team) == [1.0, -0.5]
+    team.go_to({"cf1": (0.0, 1.0, 1.0)})
+    team.formation([(1.0, 1.0, 1.0), (0.0, 1.0, 1.0)])
+    assert yaws(team) == [1.0, -0.5]
+    team["cf1"].go_to((0.0, 1.0, 1.2), yaw=0.0)
+    assert yaws(team) == pytest.approx([0.0, -0.5])
+
+
+def test_a_relative_heading_is_relative():
+    team = Rehearsal(STARTS, headings={"cf1": 1.0, "cf2": -0.5})
+    team.takeoff(1.0)
+    team.go_to((0.0, 0.0, 0.2), yaw=0.25, relative=True)
+    assert yaws(team) == pytest.approx([1.25, -0.25])
+    # Its yaw rate counts, of the vehicle as it heads.
+    begin = team.time()
+    team["cf1"].go_to((0.0, 0.0, 1.2), yaw=1.25 - math.pi)
+    assert team.time() - begin == pytest.approx(math.pi * 35.0 / 16.0 / 1.5, abs=0.06)
+
+
 def test_the_way_takes_as_long_as_the_limits_demand(flying):
     begin = flying.time()
     flying["cf1"].go_to((-1.0, 0.0, 1.0))
@@ -98,6 +138,16 @@ def test_a_mission_is_rehearsed_where_the_vehicles_are(team):
         rehearse(team, mission)
     assert team.flying == []
     assert rehearse(team, lambda fleet: fleet.takeoff(1.0)) > 4.0
+
+
+def test_a_mission_is_rehearsed_as_the_vehicles_head():
+    team = Rehearsal(STARTS, headings={"cf1": math.pi / 2})
+
+    def mission(fleet):
+        fleet.takeoff(1.0)
+        assert yaws(fleet) == [math.pi / 2, 0.0]
+
+    rehearse(team, mission)
 
 
 BAD = {

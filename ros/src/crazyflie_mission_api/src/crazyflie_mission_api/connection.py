@@ -12,7 +12,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_driver import srv
-from crazyflie_mission_api.conversions import to_message
+from crazyflie_mission_api.conversions import heading, to_message
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.starter import Starter
 from crazyflie_mission_api.stream import SetpointStream, done
@@ -68,6 +68,8 @@ class RosVehicle:
     frames : tuple of str, optional
         The fixed frame and its own, if tf says where it is; with the driver only as long as
         there are no poses.
+    has_yaw : bool
+        Whether it can have another heading than 0.
     """
 
     def __init__(
@@ -77,6 +79,7 @@ class RosVehicle:
         services: dict[str, str],
         starter: Starter | None = None,
         frames: tuple[str, str] | None = None,
+        has_yaw: bool = True,
     ):
         self.name = name
         self.bounds = fence(handle, prefix(name))
@@ -84,7 +87,9 @@ class RosVehicle:
         self._services = services
         self._starter = starter
         self._is_driven = is_driven = starter is None
-        self._position: Triple | None = None
+        self._has_yaw = has_yaw
+        # Position and heading.
+        self._pose: tuple[Triple, float] | None = None
         self._seen_at = -math.inf
         self._ground = 0.0
         self._landing_end = 0.0
@@ -115,8 +120,17 @@ class RosVehicle:
 
     def position(self) -> Triple | None:
         """Return where it is, m; None when that is not known for `MAX_POSITION_AGE`."""
+        pose = self._latest_pose()
+        return None if pose is None else pose[0]
+
+    def heading(self) -> float:
+        """Return its heading, rad; 0 when that is not known, or never another."""
+        pose = self._latest_pose() if self._has_yaw else None
+        return 0.0 if pose is None else pose[1]
+
+    def _latest_pose(self):
         if self._handle.time() - self._seen_at < MAX_POSITION_AGE:
-            return self._position
+            return self._pose
         if self._lookup is None:
             return None
         try:
@@ -125,7 +139,9 @@ class RosVehicle:
             return None
         # tf keeps the last pose of a vehicle that is not tracked any more.
         age = (self._handle.nanoseconds() - pose.stamp) * 1e-9
-        return pose.position if age < MAX_POSITION_AGE else None
+        if age >= MAX_POSITION_AGE:
+            return None
+        return pose.position, heading(*pose.rotation)
 
     def trouble(self) -> str:
         """Return why it cannot fly on; an empty text when it can."""
@@ -149,12 +165,13 @@ class RosVehicle:
         return is_down and self._handle.time() >= self._landing_end
 
     def _on_pose(self, message):
-        p = message.pose.position
-        self._position, self._seen_at = (p.x, p.y, p.z), self._handle.time()
+        p, q = message.pose.position, message.pose.orientation
+        self._pose = ((p.x, p.y, p.z), heading(q.x, q.y, q.z, q.w))
+        self._seen_at = self._handle.time()
 
     def _on_state(self, message):
         s = message.state
-        self._position, self._seen_at = (s.x, s.y, s.z), self._handle.time()
+        self._pose, self._seen_at = ((s.x, s.y, s.z), s.yaw), self._handle.time()
 
     def _on_status(self, message):
         self._status = message.data

@@ -50,6 +50,11 @@ def full_state_message(goal: Goal[float], frame: str = "world") -> FullState:
     return message
 
 
+def heading(x: float, y: float, z: float, w: float) -> float:
+    """Return the turn about the vertical of a quaternion, rad: the yaw of a level vehicle."""
+    return math.remainder(2.0 * math.atan2(z, w), 2.0 * math.pi)
+
+
 def setpoint_goal(message: FullState | Position) -> Goal[float]:
     """Return the goal that a setpoint of position means."""
     if isinstance(message, Position):
@@ -64,6 +69,6 @@ def setpoint_goal(message: FullState | Position) -> Goal[float]:
         (p.x, p.y, p.z),
         (v.x, v.y, v.z),
         (a.x, a.y, a.z),
-        2.0 * math.atan2(q.z, q.w),
+        heading(q.x, q.y, q.z, q.w),
         message.twist.angular.z,
     )

@@ -21,7 +21,7 @@ from crazyflie_mission_api.roster import Rules
 from crazyflie_mission_api.starter import Starter
 from crazyflie_mission_api.team import Team
 from crazyflie_utils import NodeHandle, ParameterError
-from crazyflie_utils.parameter_types import FRAME
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.runner import begin_script
 
@@ -191,7 +191,9 @@ def _vehicle(process, handle, name, services, starter):
     top = prefix(name)
     commander = f"{top}/high_level"
     if f"{commander}/go_to" in services:
-        return RosVehicle(name, handle, _below(commander), starter, _frames(handle, commander))
+        has_yaw = handle.get_param(f"{commander}/reference/yaw", BOOLEAN, False)
+        frames = _frames(handle, commander)
+        return RosVehicle(name, handle, _below(commander), starter, frames, has_yaw)
     driver = services.get(f"{top}/upload_trajectory")
     if driver is not None and services.get(f"{top}/takeoff") == driver:
         fixed = handle.get_param(f"{driver}/frames/fixed", FRAME, "world")
@@ -201,7 +203,7 @@ def _vehicle(process, handle, name, services, starter):
         handle.set_param(f"{commander}/reference/yaw", has_yaw)
         if not HighLevelNode().initialize(process.handle(commander)):
             raise MissionError(f"{commander} could not be started; its reason is in the log")
-        return RosVehicle(name, handle, _below(commander), starter)
+        return RosVehicle(name, handle, _below(commander), starter, has_yaw=has_yaw)
     return None
 
 

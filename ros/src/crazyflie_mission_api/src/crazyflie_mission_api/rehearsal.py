@@ -42,23 +42,34 @@ class RehearsedVehicle:
     position : tuple, 3 components
         Where it stands, m.
     bounds : Bounds
+    heading : float
+        rad.
     """
 
     starts_together = False
 
     def __init__(
-        self, name: str, clock: RehearsalClock, position: Triple, bounds: Bounds = EVERYWHERE
+        self,
+        name: str,
+        clock: RehearsalClock,
+        position: Triple,
+        bounds: Bounds = EVERYWHERE,
+        heading: float = 0.0,
     ):
         self.name = name
         self.bounds = bounds
         self._clock = clock
-        self._course = Course.rest(position)
+        self._course = Course.rest(position, heading)
         self._prepared: Pieces = ()
         self._flies = False
 
     def position(self) -> Triple:
         """Return where it is, m."""
         return self._course.goal(self._clock.time()).position
+
+    def heading(self) -> float:
+        """Return its heading, rad."""
+        return self._course.goal(self._clock.time()).yaw
 
     def trouble(self) -> str:
         """Return an empty text."""
@@ -72,13 +83,13 @@ class RehearsedVehicle:
         """Climb straight up."""
         self._flies = True
         x, y, _ = self.position()
-        return self.go_to((x, y, height), 0.0, duration)
+        return self.go_to((x, y, height), self.heading(), duration)
 
     def land(self, duration: float) -> "Future[Any]":
         """Sink straight down."""
         x, y, _ = self.position()
         self._flies = False
-        return self.go_to((x, y, 0.0), 0.0, duration)
+        return self.go_to((x, y, 0.0), self.heading(), duration)
 
     def rest(self) -> None:
         """Do nothing."""
@@ -125,6 +136,8 @@ class Rehearsal(Team):
     rules : Rules, optional
     bounds : mapping of str to Bounds, optional
         The fences that vehicles have of their own.
+    headings : mapping of str to float, optional
+        rad; 0 by default.
     """
 
     def __init__(
@@ -132,11 +145,14 @@ class Rehearsal(Team):
         starts: Mapping[str, Triple],
         rules: Rules | None = None,
         bounds: Mapping[str, Bounds] | None = None,
+        headings: Mapping[str, float] | None = None,
     ):
         clock = RehearsalClock()
         fences = bounds or {}
         vehicles = [
-            RehearsedVehicle(name, clock, position, fences.get(name, EVERYWHERE))
+            RehearsedVehicle(
+                name, clock, position, fences.get(name, EVERYWHERE), (headings or {}).get(name, 0.0)
+            )
             for name, position in starts.items()
         ]
         super().__init__(vehicles, clock, rules)
@@ -160,7 +176,9 @@ def rehearse(team: Team, mission: Callable[[Team], Any]) -> float:
     if team.flying:
         raise MissionError(f"{', '.join(team.flying)}: in flight; expected to be on the ground")
     starts = {name: team.position(name) for name in team.names}
-    rehearsal = Rehearsal(starts, team.rules, {name: team.fence(name) for name in team.names})
+    headings = {name: vehicle.heading() for name, vehicle in team._vehicles.items()}
+    fences = {name: team.fence(name) for name in team.names}
+    rehearsal = Rehearsal(starts, team.rules, fences, headings)
     with rehearsal:
         mission(rehearsal)
     return rehearsal.time()

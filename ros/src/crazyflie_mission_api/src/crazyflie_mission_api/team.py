@@ -39,7 +39,8 @@ class Team(Roster):
             x, y, z = self.position(name)
             goal = (x, y, height)
             self.fence(name).check(np.array(goal), f"{name}: takeoff to {text(goal)}")
-            way = trajectories.straight((x, y, z), goal)
+            heading = self._vehicles[name].heading()
+            way = trajectories.straight((x, y, z), goal, heading, heading)
             climb = max(_SHORTEST_CLIMB, self._quickest(way))
             ways[name] = trajectories.stretched(way, climb)
         self._check_apart({name: Course(way, self.time()) for name, way in ways.items()})
@@ -62,7 +63,7 @@ class Team(Roster):
     def go_to(
         self,
         goals: Point | Mapping[str, Point],
-        yaw: float = 0.0,
+        yaw: float | None = None,
         duration: float | None = None,
         relative: bool = False,
         wait: bool = True,
@@ -73,19 +74,22 @@ class Team(Roster):
         ----------
         goals : x, y, z, or mapping of str to x, y, z
             m; for several vehicles by name. One point for several of them only if relative.
-        yaw : float
-            rad.
+        yaw : float, optional
+            rad; by default each vehicle keeps its own.
         duration : float, optional
             s; by default as short as the limits allow.
         relative : bool
-            Goals count from where each vehicle was told to be.
+            Goals and ``yaw`` count from where each vehicle was told to be.
         wait : bool
         """
         places = self._goals(goals, relative)
-        yaw = number(yaw, "go_to: yaw")
         starts = {name: self._rest_of(name, "go_to") for name in places}
+        yaws = {name: start.yaw for name, start in starts.items()}
+        if yaw is not None:
+            told = number(yaw, "go_to: yaw")
+            yaws = {name: told + relative * kept for name, kept in yaws.items()}
         ways = {
-            name: trajectories.straight(starts[name].position, goal, starts[name].yaw, yaw)
+            name: trajectories.straight(starts[name].position, goal, starts[name].yaw, yaws[name])
             for name, goal in places.items()
         }
         if duration is None:
@@ -103,7 +107,7 @@ class Team(Roster):
         def command(name):
             if name in together:
                 return self._vehicles[name].start()
-            return self._vehicles[name].go_to(places[name], yaw, seconds)
+            return self._vehicles[name].go_to(places[name], yaws[name], seconds)
 
         self._fly(ways, "go_to", command, wait)
 

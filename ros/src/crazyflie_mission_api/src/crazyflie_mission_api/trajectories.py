@@ -187,6 +187,10 @@ def duration(pieces: Pieces) -> float:
     return sum(piece.duration for piece in pieces)
 
 
+_SHORTEST = 1e-3
+"""No trajectory is made shorter than this, s: one that goes nowhere asks for nothing."""
+
+
 def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:
     """Return the trajectory on the same path, as slow as the limits demand.
 
@@ -199,6 +203,7 @@ def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:
         peaks["speed"] / limits.speed,
         peaks["yaw_rate"] / limits.yaw_rate,
         math.sqrt(peaks["acceleration"] / limits.acceleration),
+        _SHORTEST / duration(pieces),
     )
     slow = stretched(pieces, factor)
     while excess(slow, limits):

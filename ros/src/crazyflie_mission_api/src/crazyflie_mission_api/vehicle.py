@@ -31,6 +31,9 @@ class Vehicle(Protocol):
     def position(self) -> Triple | None:
         """Return where it is, m; None when that is not known."""
 
+    def heading(self) -> float:
+        """Return its heading, rad; 0 when that is not known, or never another."""
+
     def trouble(self) -> str:
         """Return why it cannot fly on; an empty text when it can."""
 

@@ -1,6 +1,8 @@
 """How long the caller of a service waits, and how connections come about."""
 
+import contextlib
 import itertools
+import socket
 import subprocess
 import sys
 import threading
@@ -8,7 +10,7 @@ from concurrent.futures import Future
 from types import SimpleNamespace
 
 import pytest
-from rospy.impl import registration
+from rospy.impl import registration, tcpros_base
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from crazyflie_utils import ServiceError
@@ -103,6 +105,25 @@ def test_a_publisher_is_connected_to_by_one_thread_at_a_time():
     for thread in threads:
         thread.join(60.0)
     assert entered.acquire(blocking=False)
+
+
+def test_connections_that_come_at_once_are_not_put_off(monkeypatch):
+    for owner, name in (
+        (tcpros_base.TCPROSServer, "_tcp_server_callback"),
+        (tcpros_base, "read_ros_handshake_header"),
+        (tcpros_base, "logwarn"),
+    ):
+        monkeypatch.setattr(owner, name, getattr(owner, name))
+    with contextlib.ExitStack() as stack:
+        # It is never asked for one: all have to find a place in its queue.
+        server = stack.enter_context(socket.create_server(("127.0.0.1", 0), backlog=5))
+        rospys = SimpleNamespace(server_sock=server, inbound_handler=None)
+        node = SimpleNamespace(tcp_ros_server=rospys, _tcp_server_callback=None)
+        monkeypatch.setattr(tcpros_base, "_tcpros_server", node)
+        rospy_internals.bear_hostile_newcomers.__wrapped__(lambda text, key: None)
+        for _ in range(32):
+            # Beyond the queue, the second try comes after 1 s.
+            stack.enter_context(socket.create_connection(server.getsockname(), timeout=0.9))
 
 
 def test_a_process_may_have_more_topics_than_a_shell_lets_it_have_files():

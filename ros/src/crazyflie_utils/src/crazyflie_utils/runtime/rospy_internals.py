@@ -239,5 +239,7 @@ def bear_hostile_newcomers(report: Report) -> None:
     if server is not None and server.tcp_ros_server is not None:
         # It holds the method that it was started with.
         server.tcp_ros_server.inbound_handler = server._tcp_server_callback
+        # rospy keeps five waiting. Those beyond them try again a second later, or two.
+        server.tcp_ros_server.server_sock.listen(_MOST_NEWCOMERS)
     tcpros_base.read_ros_handshake_header = read_header_in_time
     tcpros_base.logwarn = warn

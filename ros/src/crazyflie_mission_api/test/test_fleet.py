@@ -191,6 +191,22 @@ def test_the_fixed_frame_is_the_drivers(process):
     assert fleet.position("cf2") == (1.0, 0.0, 0.0)
 
 
+def test_vehicles_behind_the_driver_do_not_begin_at_the_same_moment(process):
+    for number in (1, 2):
+        Driven(process, f"cf{number}", (number - 1.0, 0.0, 0.0))
+    fleet = Fleet(NAMES, separation=0.95, process=process, limit=0.5)
+
+    def mission(team):
+        team.takeoff(1.0)
+        team.go_to((1.0, 0.0, 0.0), relative=True)
+
+    text = "expected at least 0.95 m; that is if cf2 begins 0.15 s after the others"
+    with pytest.raises(MissionError, match=text):
+        fleet.rehearse(mission)
+    with pytest.raises(MissionError, match=text), fleet:
+        mission(fleet)
+
+
 def test_a_fence_counts(process, stack, driven):
     for side, value in (("min", -0.5), ("max", 0.5)):
         for axis in "xyz":

@@ -110,6 +110,35 @@ def test_a_trajectory_can_be_slower_and_elsewhere(flying):
     assert flying.position("cf1") == pytest.approx((-1.0, 0.0, 1.0))
 
 
+def one_behind_the_other(fleet):
+    """Fly in a row, 1 m apart, at 0.5 m/s in the middle of the way."""
+    fleet.takeoff(1.0)
+    fleet.go_to((1.0, 0.0, 0.0), relative=True)
+
+
+def test_vehicles_that_do_not_begin_together_are_checked_as_if_each_were_late():
+    rules = Rules(separation=0.95)
+    one_behind_the_other(Rehearsal(STARTS, rules))
+    late = Rehearsal(STARTS, rules, start_skews={"cf1": 0.15, "cf2": 0.15})
+    text = (
+        r"cf1 and cf2 would be 0.949 m apart, \d.\d s from now; expected at least 0.95 m; "
+        r"that is if cf2 begins 0.15 s after the others"
+    )
+    with pytest.raises(MissionError, match=text):
+        one_behind_the_other(late)
+    # The other one is earlier then.
+    mixed = Rehearsal(STARTS, rules, start_skews={"cf1": 0.15})
+    with pytest.raises(MissionError, match="if cf2 begins 0.15 s after the others"):
+        one_behind_the_other(mixed)
+    # What is on its way already may have begun late, too.
+    late = Rehearsal(STARTS, Rules(separation=0.96), start_skews={"cf1": 0.15, "cf2": 0.15})
+    late.takeoff(1.0)
+    late["cf2"].go_to((2.0, 0.0, 1.0), wait=False)
+    late.wait(0.05)
+    with pytest.raises(MissionError, match="if cf2 begins"):
+        late["cf1"].go_to((1.0, 0.0, 1.0))
+
+
 def test_a_formation_sends_everybody_to_the_place_that_suits(flying):
     gone = flying.formation([(1.0, 1.0, 1.0), (0.0, 1.0, 1.0)])
     assert gone == {"cf1": (0.0, 1.0, 1.0), "cf2": (1.0, 1.0, 1.0)}

@@ -1,7 +1,6 @@
 """Vehicles as a team needs them, by ROS."""
 
 import math
-from collections.abc import Callable
 from concurrent.futures import Future
 from functools import partial
 from typing import Any
@@ -13,9 +12,11 @@ from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_driver import srv
 from crazyflie_mission_api.conversions import heading, to_message
+from crazyflie_mission_api.course import START_SKEW
+from crazyflie_mission_api.futures import done, in_turn
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.starter import Starter
-from crazyflie_mission_api.stream import SetpointStream, done
+from crazyflie_mission_api.stream import SetpointStream
 from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
@@ -112,9 +113,9 @@ class RosVehicle:
             handle.subscribe(f"{top}/in_flight_status", String, self._on_status)
 
     @property
-    def starts_together(self) -> bool:
-        """Whether those that are told to `start` in a row begin at the same moment."""
-        return self._starter is not None
+    def start_skew(self) -> float:
+        """How much later than others that are told to `start` in a row it may begin, s."""
+        return 0.0 if self._starter is not None else START_SKEW
 
     # Where it is, and how it is.
 
@@ -262,22 +263,6 @@ class RosVehicle:
     def _hold(self, goal):
         request = (0, False, Point(*goal.position), goal.yaw, _seconds(_HOLD_DURATION))
         return self._call("go_to", srv.GoTo, *request, limit=_HOLD_LIMIT)
-
-
-def in_turn(*calls: Callable[[], "Future[Any]"]) -> "Future[Any]":
-    """Make calls one after the other; return the outcome of the last one, or of one that fails."""
-    outcome: Future[Any] = Future()
-
-    def go_on(answer, left):
-        if answer.exception() is not None:
-            outcome.set_exception(answer.exception())
-        elif not left:
-            outcome.set_result(answer.result())
-        else:
-            left[0]().add_done_callback(lambda next_one: go_on(next_one, left[1:]))
-
-    calls[0]().add_done_callback(lambda first: go_on(first, calls[1:]))
-    return outcome
 
 
 def prefix(name: str) -> str:

@@ -280,8 +280,8 @@ class HighLevelNode(Node):
 
     def _on_timer(self):
         now = self._handle.time()
-        streams = self._setpoint_time is not None
-        if streams and not 0.0 <= now - self._setpoint_time < STATE_LIMIT:
+        last = self._setpoint_time
+        if last is not None and not 0.0 <= now - last < STATE_LIMIT:
             self._end_stream()
         if not self._is_moving:
             return

@@ -44,9 +44,9 @@ class RehearsedVehicle:
     bounds : Bounds
     heading : float
         rad.
+    start_skew : float
+        Of the vehicle whose flight is rehearsed, s.
     """
-
-    starts_together = False
 
     def __init__(
         self,
@@ -55,9 +55,11 @@ class RehearsedVehicle:
         position: Triple,
         bounds: Bounds = EVERYWHERE,
         heading: float = 0.0,
+        start_skew: float = 0.0,
     ):
         self.name = name
         self.bounds = bounds
+        self.start_skew = start_skew
         self._clock = clock
         self._course = Course.rest(position, heading)
         self._prepared: Pieces = ()
@@ -138,6 +140,8 @@ class Rehearsal(Team):
         The fences that vehicles have of their own.
     headings : mapping of str to float, optional
         rad; 0 by default.
+    start_skews : mapping of str to float, optional
+        s; 0 by default: vehicles begin together.
     """
 
     def __init__(
@@ -146,12 +150,18 @@ class Rehearsal(Team):
         rules: Rules | None = None,
         bounds: Mapping[str, Bounds] | None = None,
         headings: Mapping[str, float] | None = None,
+        start_skews: Mapping[str, float] | None = None,
     ):
         clock = RehearsalClock()
-        fences = bounds or {}
+        fences, yaws, skews = bounds or {}, headings or {}, start_skews or {}
         vehicles = [
             RehearsedVehicle(
-                name, clock, position, fences.get(name, EVERYWHERE), (headings or {}).get(name, 0.0)
+                name,
+                clock,
+                position,
+                fences.get(name, EVERYWHERE),
+                yaws.get(name, 0.0),
+                skews.get(name, 0.0),
             )
             for name, position in starts.items()
         ]
@@ -177,8 +187,9 @@ def rehearse(team: Team, mission: Callable[[Team], Any]) -> float:
         raise MissionError(f"{', '.join(team.flying)}: in flight; expected to be on the ground")
     starts = {name: team.position(name) for name in team.names}
     headings = {name: vehicle.heading() for name, vehicle in team._vehicles.items()}
+    skews = {name: vehicle.start_skew for name, vehicle in team._vehicles.items()}
     fences = {name: team.fence(name) for name in team.names}
-    rehearsal = Rehearsal(starts, team.rules, fences, headings)
+    rehearsal = Rehearsal(starts, team.rules, fences, headings, skews)
     with rehearsal:
         mission(rehearsal)
     return rehearsal.time()

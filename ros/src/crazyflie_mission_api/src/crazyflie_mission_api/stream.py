@@ -11,6 +11,7 @@ from crazyflie_driver.msg import FullState
 from crazyflie_driver.setpoint_gate import OVERLAP
 from crazyflie_mission_api.conversions import full_state_message
 from crazyflie_mission_api.course import Course
+from crazyflie_mission_api.futures import done
 from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.polynomials import Goal
 from crazyflie_utils import NodeHandle
@@ -167,13 +168,3 @@ class SetpointStream:
                 f"the trajectory has ended, and go_to has failed: {held.exception()}; setpoints "
                 "go on at its end"
             )
-
-
-def done(error: Exception | None) -> "Future[Any]":
-    """Return the future of what has been done already, or has failed."""
-    future: Future[Any] = Future()
-    if error is None:
-        future.set_result(None)
-    else:
-        future.set_exception(error)
-    return future

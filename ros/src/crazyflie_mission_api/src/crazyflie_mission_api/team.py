@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from crazyflie_mission_api import formations, trajectories
-from crazyflie_mission_api.course import Course, check_apart
+from crazyflie_mission_api.course import Course, check_apart, check_starts
 from crazyflie_mission_api.limits import Array, MissionError, number, point
 from crazyflie_mission_api.roster import Roster, refuse, text
 from crazyflie_mission_api.trajectories import Pieces
@@ -100,7 +100,8 @@ class Team(Roster):
         self._check(ways, "go_to", "a longer duration")
 
         # Calls take their time, and who begins later meets others.
-        together = [name for name in ways if len(ways) > 1 and self._vehicles[name].starts_together]
+        prompt = [name for name in ways if self._vehicles[name].start_skew == 0.0]
+        together = prompt if len(ways) > 1 else []
         chosen = self._some(together)
         chosen._tell("go_to", lambda name: self._vehicles[name].prepare(ways[name], False))
 
@@ -220,7 +221,11 @@ class Team(Roster):
         for name, way in ways.items():
             trajectories.check(way, self.rules.limits, self.fence(name), f"{name}: {what}", slower)
         now = self.time()
-        self._check_apart({name: Course(way, now) for name, way in ways.items()})
+        begun = {name: self._course(name, way, now) for name, way in ways.items()}
+        check_starts({**self._courses, **begun}, now, self._check_apart)
+
+    def _course(self, name, way, begin):
+        return Course(way, begin, self._vehicles[name].start_skew)
 
     def _check_apart(self, courses):
         check_apart({**self._courses, **courses}, self.time(), self.rules.separation)
@@ -229,8 +234,9 @@ class Team(Roster):
         team = self._some(ways)
         begin = self.time()
         failures = team._answers(command)
-        begun = {name: Course(way, begin) for name, way in ways.items() if name not in failures}
-        self._courses.update(begun)
+        for name, way in ways.items():
+            if name not in failures:
+                self._courses[name] = self._course(name, way, begin)
         refuse(what, failures)
         if wait:
             team.arrive()

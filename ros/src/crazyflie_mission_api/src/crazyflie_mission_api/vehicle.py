@@ -25,8 +25,8 @@ class Vehicle(Protocol):
         """The box that it is fenced in."""
 
     @property
-    def starts_together(self) -> bool:
-        """Whether those that are told to `start` in a row begin at the same moment."""
+    def start_skew(self) -> float:
+        """How much later than others that are told to `start` in a row it may begin, s."""
 
     def position(self) -> Triple | None:
         """Return where it is, m; None when that is not known."""

@@ -1,0 +1,93 @@
+#!/usr/bin/env python
+"""How far apart vehicles behind the driver begin what they are told together.
+
+Run it in a shell that has sourced the workspace:
+
+    python3 ros/src/crazyflie_mission_api/bench/start_skew.py 2 5 10
+
+The vehicles are stand-ins behind the radio's protocol, by UDP; between them and this script is the
+driver, in a process of its own. The script commands all of them as a mission does, and each notes
+when its packet comes: the time from the first to the last is the skew. Prints a line for each
+number of vehicles, ms. A Crazyradio sends one packet after the other, which is not in it. Nothing
+is asserted.
+"""
+
+import argparse
+import contextlib
+import os
+import socket
+import statistics
+import time
+
+from crazyflie_dev.fake_vehicle import FakeVehicle
+from crazyflie_dev.programs import free_port, running
+from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest
+from crazyflie_mission_api.connection import RosVehicle
+from crazyflie_utils.runtime.runner import begin_script
+from crazyflie_utils.testing.waiting import wait_until
+
+COMMANDS = (8, 0, b"\x0c")
+"""Port, channel and first byte of a go_to."""
+
+SERVICES = ("go_to", "emergency")
+PAUSE = 0.2
+"""From one command to all to the next, s."""
+
+
+class Vehicle(FakeVehicle):
+    """A stand-in that notes when commands come, s of the machine's clock."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+        super().__init__()
+
+    def _reply(self, port, channel, data):
+        if (port, channel, data[:1]) == COMMANDS:
+            self.times.append(time.monotonic())
+        super()._reply(port, channel, data)
+
+
+def main() -> None:
+    """Measure as the command line asks, and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("n", nargs="+", type=int, help="of vehicles")
+    parser.add_argument("--commands", type=int, default=100, help="to all of them (100)")
+    options = parser.parse_args()
+    most = max(options.n)
+    port = free_port(socket.SOCK_STREAM)
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    launch = ("roslaunch", "-p", port, "crazyflie_driver", "crazyflie_server.launch")
+    with contextlib.ExitStack() as stack:
+        stand_ins = [stack.enter_context(Vehicle()) for _ in range(most)]
+        stack.enter_context(running(*launch))
+        process, end = begin_script("start_skew")
+        stack.callback(end)
+        handle = process.handle("/start_skew")
+        process.start()
+        wait_until(lambda: "/add_crazyflie" in handle.service_nodes(), "the driver")
+        vehicles = []
+        for k, stand_in in enumerate(stand_ins, start=1):
+            request = AddCrazyflieRequest(uri=stand_in.uri, tf_prefix=f"cf{k}")
+            handle.call_service("/add_crazyflie", AddCrazyflie, request, 60.0).result(60.0)
+            services = {service: f"/cf{k}/{service}" for service in SERVICES}
+            vehicles.append(RosVehicle(f"cf{k}", handle, services))
+        print("  n  median    95 %     max", flush=True)
+        for n in options.n:
+            skews = [_skew(vehicles[:n], stand_ins[:n]) for _ in range(options.commands)]
+            figures = statistics.median(skews), statistics.quantiles(skews, n=20)[-1], max(skews)
+            print(f"{n:3d}", *(f"{1e3 * figure:7.1f}" for figure in figures), flush=True)
+
+
+def _skew(vehicles, stand_ins):
+    for stand_in in stand_ins:
+        stand_in.times.clear()
+    answers = [vehicle.go_to((0.0, 0.0, 1.0), 0.0, 1.0) for vehicle in vehicles]
+    for answer in answers:
+        answer.result(60.0)
+    times = [stand_in.times[0] for stand_in in stand_ins]
+    time.sleep(PAUSE)
+    return max(times) - min(times)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,31 @@
+"""Futures of commands."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Any
+
+
+def done(error: Exception | None) -> "Future[Any]":
+    """Return the future of what has been done already, or has failed."""
+    future: Future[Any] = Future()
+    if error is None:
+        future.set_result(None)
+    else:
+        future.set_exception(error)
+    return future
+
+
+def in_turn(*calls: Callable[[], "Future[Any]"]) -> "Future[Any]":
+    """Make calls one after the other; return the outcome of the last one, or of one that fails."""
+    outcome: Future[Any] = Future()
+
+    def go_on(answer, left):
+        if answer.exception() is not None:
+            outcome.set_exception(answer.exception())
+        elif not left:
+            outcome.set_result(answer.result())
+        else:
+            left[0]().add_done_callback(lambda next_one: go_on(next_one, left[1:]))
+
+    calls[0]().add_done_callback(lambda first: go_on(first, calls[1:]))
+    return outcome

@@ -170,7 +170,11 @@ def test_simulated_vehicles_need_no_address(load):
         ),
         (
             TWO + "all: {battery: {voltage_critical: 3.5}}\n",
-            ":8: all: battery/voltage_critical is 3.5; expected not more than ",
+            ":8: battery/voltage_critical is 3.5; expected not more than voltage_warning, 3.2 (V)",
+        ),
+        (
+            TWO + "    battery: {voltage_warning: 2.9}\n",
+            ":8: battery/voltage_warning is 2.9; expected not less than voltage_critical, 3 (V)",
         ),
         (TWO + "    machine: far\n", ":8: robots/cf2/machine is 'far'; expected one of local"),
         ("cf1: {}\n", ":1: the file has no robots; it has cf1"),
@@ -206,6 +210,27 @@ def test_aliases_within_themselves_are_refused(load):
 
 def test_what_is_inherited_is_wrong_once(load):
     assert len(complaints_of(load, TWO + "all: {buffer: -1, model: box}\n")) == 2
+
+
+@pytest.mark.parametrize(
+    "types",
+    [
+        "    type: big\nrobot_types: {big: {battery: {voltage_warning: 3.6}}}\n",
+        "    type: big\nrobot_types: {big: {}}\nall: {battery: {voltage_warning: 3.6}}\n",
+    ],
+)
+def test_voltages_are_compared_as_they_count_together(load, types):
+    fleet = load(TWO + "    battery: {voltage_critical: 3.4}\n" + types)
+    settings = fleet["cf2"].settings
+    assert (settings.voltage_warning, settings.voltage_critical) == (3.6, 3.4)
+
+
+def test_voltages_of_a_type_and_of_its_vehicle_do_not_fit(load):
+    text = TWO + "    type: big\n    battery: {voltage_warning: 3.3}\n"
+    text += "robot_types: {big: {battery: {voltage_critical: 3.4, voltage_warning: 3.6}}}\n"
+    assert complaints_of(load, text) == [
+        ":10: battery/voltage_critical is 3.4; expected not more than voltage_warning, 3.3 (V)"
+    ]
 
 
 def test_disabled_vehicles_may_be_anywhere(load):

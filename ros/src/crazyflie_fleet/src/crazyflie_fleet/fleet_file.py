@@ -208,7 +208,24 @@ class _Reading:
         settings = self._read(merged, RobotSettings, *_FIRMWARE, "broadcasts")
         if settings is None:
             return None
+        self._check_voltages(merged, settings)
         return Vehicle(name, settings.position, settings, *self._firmware(merged))
+
+    def _check_voltages(self, merged, settings):
+        # Only here it is known which of the robot, its type and all has said what.
+        critical, warning = settings.voltage_critical, settings.voltage_warning
+        if critical <= warning:
+            return
+        said = merged["battery"].entries()
+        if "voltage_critical" in said:
+            entry, text = said["voltage_critical"], f"is {critical:g}; expected not more than"
+            other = f"voltage_warning, {warning:g} (V)"
+        else:
+            entry, text = said["voltage_warning"], f"is {warning:g}; expected not less than"
+            other = f"voltage_critical, {critical:g} (V)"
+        # Without the robot's name: what several inherit is wrong once.
+        name = entry.name.removeprefix(f"{merged.name}/")
+        self._complain(Entry(entry.file, name, entry.node), f"{text} {other}")
 
     def _firmware(self, entry):
         parts = entry.entries()

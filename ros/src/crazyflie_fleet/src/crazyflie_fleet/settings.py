@@ -1,7 +1,6 @@
 """What a fleet file may say: the declared settings of vehicles, and what their values may be."""
 
 import re
-from collections.abc import Iterable
 from typing import Any
 
 from typing_extensions import override
@@ -175,14 +174,6 @@ class Settings(Parameters):
     )
     big_quad: bool = parameter(BOOLEAN, "crazyswarm2's; has no effect here", False)
     reference_frame: str = parameter(TEXT, "crazyswarm2's; has no effect here", "world")
-
-    @override
-    def complaints(self) -> Iterable[str]:
-        if self.voltage_critical > self.voltage_warning:
-            yield (
-                f"battery/voltage_critical is {self.voltage_critical:g}; expected not more than "
-                f"voltage_warning, {self.voltage_warning:g} (V)"
-            )
 
 
 class RobotSettings(Settings):

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.way import MAX_SPEED, Way, along
+from crazyflie_fleet.way import MAX_ACCELERATION, MAX_SPEED, Way, along, shortest
 from crazyflie_utils.refusal import RefusalError
 
 STILL = np.zeros((2, 3))
@@ -79,7 +79,7 @@ def test_nobody_is_led_nearer_to_one_who_is_too_close(rows):
 @given(PLACE, PLACE, st.floats(0.0, 1.0))
 def test_a_way_is_smooth_and_not_too_fast(start, goal, share):
     start, goal = np.array(start), np.array(goal)
-    duration = 15.0 / 8.0 * float(np.linalg.norm(goal - start)) / MAX_SPEED + 0.1
+    duration = shortest(float(np.linalg.norm(goal - start))) + 0.1
     way = Way(start, goal, duration)
     assert along([way], [0.0])[0][0] == pytest.approx(start)
     assert along([way], [2.0 * duration])[0][0] == pytest.approx(goal)
@@ -88,13 +88,31 @@ def test_a_way_is_smooth_and_not_too_fast(start, goal, share):
     time = share * duration
     (position,), (velocity,) = along([way], [time])
     assert np.linalg.norm(velocity) <= MAX_SPEED
+    wide = 1e-3
+    later = along([way], [min(time + wide, duration)])[1][0]
+    assert np.linalg.norm(later - velocity) / wide <= MAX_ACCELERATION + 0.05
     step = 1e-6
     assert (along([way], [time + step])[0][0] - position) / step == pytest.approx(
         velocity, abs=1e-3
     )
 
 
-@pytest.mark.parametrize("duration", [0.0, -1.0, 0.9, float("nan")])
+@pytest.mark.parametrize(
+    ("distance", "seconds"),
+    # Calculated by hand: 15/8 d / 2 m/s, and sqrt(10/sqrt(3) d / 2 m/s^2).
+    [(0.5, 1.2014), (1.0, 1.6990), (10.0, 9.375)],
+)
+def test_the_shortest_way_keeps_speed_and_acceleration(distance, seconds):
+    assert shortest(distance) == pytest.approx(seconds, abs=1e-4)
+    way = Way(np.zeros(3), np.array([distance, 0.0, 0.0]), shortest(distance))
+    times = np.linspace(0.0, way.duration, 2001)
+    speeds = along([way] * len(times), times)[1][:, 0]
+    accelerations = np.gradient(speeds, times)
+    assert speeds.max() <= MAX_SPEED + 1e-9
+    assert np.abs(accelerations).max() <= MAX_ACCELERATION + 1e-2
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, 1.6, float("nan")])
 def test_no_way(duration):
-    with pytest.raises(RefusalError, match="expected a duration of at least 0.94 s"):
+    with pytest.raises(RefusalError, match=r"expected a duration of at least 1.70 s \(at most 2 m"):
         Way(np.zeros(3), np.array([1.0, 0.0, 0.0]), duration)

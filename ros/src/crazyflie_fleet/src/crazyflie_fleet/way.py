@@ -1,5 +1,6 @@
 """The way from one point of rest to another."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -11,8 +12,21 @@ from crazyflie_utils.refusal import RefusalError
 MAX_SPEED = 2.0
 """Fastest that a way may be, m/s: controllers with the default gains follow it."""
 
+MAX_ACCELERATION = 2.0
+"""Largest acceleration of a way, m/s^2: controllers tilt by 15 degrees at most, which is
+2.6 m/s^2."""
+
 _PEAK = 15.0 / 8.0
 """Peak speed of a minimum-jerk way, in distances per duration."""
+
+_PEAK_ACCELERATION = 10.0 / math.sqrt(3.0)
+"""Its peak acceleration, in distances per square of the duration."""
+
+
+def shortest(distance: float) -> float:
+    """Return the shortest duration of a way of a length (m), s."""
+    by_acceleration = math.sqrt(_PEAK_ACCELERATION * distance / MAX_ACCELERATION)
+    return max(_PEAK * distance / MAX_SPEED, by_acceleration)
 
 
 @dataclass(frozen=True)
@@ -35,13 +49,13 @@ class Way:
     duration: float
 
     def __post_init__(self) -> None:
-        """Raise `RefusalError` if it would be too fast."""
+        """Raise `RefusalError` if it asks for too much speed or acceleration."""
         distance = float(np.linalg.norm(self.goal - self.start))
-        needed = _PEAK * distance / MAX_SPEED
+        needed = shortest(distance)
         if not 0.0 < self.duration or needed > self.duration:
             raise RefusalError(
                 f"{distance:.2f} m in {self.duration:g} s; expected a duration of at least "
-                f"{needed:.2f} s (at most {MAX_SPEED:g} m/s)"
+                f"{needed:.2f} s (at most {MAX_SPEED:g} m/s and {MAX_ACCELERATION:g} m/s^2)"
             )
 
 

@@ -29,14 +29,23 @@ class Flight:
             fleet_file.grid(2).vehicles[:own], fleet_file.grid(2).vehicles[own:], "world", swarms
         )
         assert self.process.launch(node, "/fleet/references")
+        self.states = {}
         for name, y in (("cf1", 0.0), ("cf2", 1.0)):
             self.process.publish(f"/{name}/in_flight_state", String("flying"))
             if f"/{name}/state" in self.process.transport.subscribers:
                 self.see(name, y)
+        self.process.add_timer(0.05, self.repeat_states)
 
-    def see(self, name, y):
-        state = PositionVelocityYawState(y=y, z=1.0)
-        self.process.publish(f"/{name}/state", PositionVelocityYawStateStamped(state=state))
+    def see(self, name, y, y_dot=0.0):
+        self.states[name] = PositionVelocityYawState(y=y, z=1.0, y_dot=y_dot)
+        self.repeat_states()
+
+    def repeat_states(self):
+        for name, state in self.states.items():
+            self.process.publish(f"/{name}/state", PositionVelocityYawStateStamped(state=state))
+
+    def silence(self, name):
+        del self.states[name]
 
     def want(self, name, y):
         state = PositionVelocityState(y=y, z=1.0)
@@ -91,6 +100,64 @@ def test_who_is_flown_elsewhere_is_kept_apart_from():
     assert flight.followed("cf1")[-1].state.y == 0.8
     assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
     assert "/cf2/go_to" not in flight.process.transport.services
+
+
+def test_a_vehicle_in_flight_that_is_not_seen_any_more_is_said(flight):
+    flight.see("cf2", 1.0, y_dot=-1.0)
+    flight.want("cf1", 0.3)
+    flight.silence("cf2")
+    flight.process.advance(0.4)
+    assert flight.process.logged("warn") == []
+    flight.process.advance(1.0)
+    assert flight.process.logged("warn") == [
+        "/fleet/references: cf2 is flying, and no state of it has come for 0.5 s: where it is, is "
+        "not known; the others keep apart from where it was last, (0.00, 1.00, 1.00)"
+    ]
+    # They do, and do not take it for one that goes on with its last speed.
+    flight.see("cf1", 0.4)
+    flight.process.advance(0.1)
+    assert flight.followed("cf1")[-1].state.y == 0.3
+    flight.want("cf1", 0.95)
+    flight.see("cf1", 0.75)
+    flight.process.advance(0.1)
+    assert flight.followed("cf1")[-1].state.y == 0.75
+
+
+def test_a_vehicle_on_the_ground_may_be_silent(flight):
+    flight.process.publish("/cf2/in_flight_state", String("on_ground"))
+    flight.silence("cf2")
+    flight.process.advance(2.0)
+    assert flight.process.logged("warn") == []
+
+
+def test_a_way_begins_where_the_vehicle_was(flight):
+    flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
+    flight.process.advance(1.0)
+    flight.see("cf1", 0.1)
+    flight.process.advance(0.02)
+    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.25, abs=0.02)
+
+
+def test_a_vehicle_that_was_never_seen_is_said():
+    process = FakeProcess()
+    assert process.launch(ReferencesNode(fleet_file.grid(1).vehicles, (), "world"), "/references")
+    process.publish("/cf1/in_flight_state", String("taking_off"))
+    process.advance(0.1)
+    (text,) = process.logged("warn")
+    assert text.startswith("/references: cf1 is taking off, and no state of it has come for")
+    assert text.endswith("the others cannot keep apart from it")
+
+
+def test_a_way_stands_still_while_its_vehicle_is_not_seen(flight):
+    flight.go_to(goal=(0.0, 0.5, 1.0), seconds=3.0)
+    flight.process.advance(0.5)
+    flight.silence("cf1")
+    flight.process.advance(3.0)
+    before = flight.followed("cf1")[-1].state.y
+    assert before < 0.3
+    flight.see("cf1", before)
+    flight.process.advance(0.02)
+    assert flight.followed("cf1")[-1].state.y == pytest.approx(before, abs=0.02)
 
 
 def test_states_of_many_come_in_one_message():
@@ -165,6 +232,7 @@ def test_go_to_is_refused(flight):
         flight.go_to(goal=(math.nan, 0.0, 1.0))
     with pytest.raises(ServiceError, match="the yaw is 1; expected 0"):
         flight.go_to(yaw=1.0)
+    flight.silence("cf1")
     flight.process.advance(0.6)
     with pytest.raises(ServiceError, match="/cf1/go_to refused: the vehicle is not in flight"):
         flight.go_to()

@@ -6,31 +6,25 @@ from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
-from std_msgs.msg import Float64MultiArray, Header, String
+from std_msgs.msg import Header, String
 from tf2_msgs.msg import TFMessage
 from typing_extensions import override
 
 from crazyflie_driver.srv import GoTo, GoToResponse
 from crazyflie_fleet.fleet import Vehicle
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.stack import FLIGHT_STATE, REFERENCE, SAFE_REFERENCE, STATE
+from crazyflie_fleet.sightings import FLYING, STATE_LIMIT, Sightings
+from crazyflie_fleet.stack import REFERENCE, SAFE_REFERENCE
 from crazyflie_fleet.way import Way, along
-from crazyflie_msgs.msg import (
-    PositionVelocityState,
-    PositionVelocityStateStamped,
-    PositionVelocityYawStateStamped,
-)
+from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameter_types import TIME_STEP, TOPIC
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.runtime.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
 
-STATE_LIMIT = 0.5
-"""A vehicle whose state is older than this is not led anywhere, s."""
-
-FLYING = "flying"
-_WATCHED = ("taking_off", FLYING, "descending")
+SILENCE_PERIOD = 5.0
+"""From one warning about a vehicle whose states do not come to the next, s."""
 
 
 class ReferencesParameters(Parameters):
@@ -43,12 +37,11 @@ class ReferencesParameters(Parameters):
 
 @dataclass
 class _Led:
-    """A vehicle that is led or, without a publisher, only seen; times are in s."""
+    """A vehicle that is led; times are in s."""
 
     number: int
     vehicle: Vehicle
-    publisher: Publisher | None = None
-    flight_state: str = ""
+    publisher: Publisher
     wanted: PositionVelocityStateStamped | None = None
     way: Way | None = None
     way_time: float = 0.0
@@ -67,6 +60,11 @@ class ReferencesNode(Node):
     fixed_frame : str
     swarms : mapping of str to sequence of Vehicle, optional
         Topics that have the states of some of them in one message.
+
+    Attributes
+    ----------
+    sightings : Sightings
+        Of all of them.
     """
 
     needed_in_flight = True
@@ -79,16 +77,12 @@ class ReferencesNode(Node):
         swarms: Mapping[str, tuple[Vehicle, ...]] | None = None,
     ):
         self._vehicles = vehicles
-        self._others = others
         self._fixed_frame = fixed_frame
-        self._swarms = swarms or {}
-        everybody = (*vehicles, *others)
-        self._separation = Separation([vehicle.buffer for vehicle in everybody])
         # Own ones first.
-        self._seen: list[_Led] = []
-        # Of each: x, y, z, x_dot, y_dot, z_dot, and since when it is known.
-        self._states = np.full((len(everybody), 6), np.nan)
-        self._state_times = np.full(len(everybody), -np.inf)
+        everybody = (*vehicles, *others)
+        self.sightings = Sightings(everybody, swarms or {})
+        self._separation = Separation([vehicle.buffer for vehicle in everybody])
+        self._led: list[_Led] = []
         self._told = ""
 
     @override
@@ -102,35 +96,19 @@ class ReferencesNode(Node):
         self._publish_mocap_frames(handle)
         for vehicle in self._vehicles:
             self._lead(handle, vehicle)
-        for vehicle in self._others:
-            self._see(handle, _Led(len(self._seen), vehicle))
-        self._see_states(handle)
+        self.sightings.subscribe(handle)
         handle.timer(parameters.way_period, self._on_way_timer)
         handle.timer(parameters.watch_period, self._on_watch_timer)
 
     def _lead(self, handle, vehicle):
         below = f"/{vehicle.name}/"
         publisher = handle.publisher(below + SAFE_REFERENCE, PositionVelocityStateStamped)
-        led = _Led(len(self._seen), vehicle, publisher)
+        led = _Led(len(self._led), vehicle, publisher)
+        self._led.append(led)
         handle.advertise_service(below + "go_to", GoTo, partial(self._on_go_to, led))
         handle.subscribe(
             below + REFERENCE, PositionVelocityStateStamped, partial(self._on_reference, led)
         )
-        self._see(handle, led)
-
-    def _see(self, handle, led):
-        topic = f"/{led.vehicle.name}/{FLIGHT_STATE}"
-        handle.subscribe(topic, String, partial(self._on_flight_state, led))
-        self._seen.append(led)
-
-    def _see_states(self, handle):
-        alone = {led.vehicle.name: led.number for led in self._seen}
-        for topic, swarm in self._swarms.items():
-            numbers = np.array([alone.pop(vehicle.name) for vehicle in swarm])
-            handle.subscribe(topic, Float64MultiArray, partial(self._on_states, numbers))
-        for name, number in alone.items():
-            on_state = partial(self._on_state, number)
-            handle.subscribe(f"/{name}/{STATE}", PositionVelocityYawStateStamped, on_state)
 
     def _publish_mocap_frames(self, handle):
         # What motion capture calls a vehicle is the vehicle.
@@ -144,27 +122,7 @@ class ReferencesNode(Node):
             static = handle.publisher("/tf_static", TFMessage, latch=True)
             static.publish(TFMessage(transforms))
 
-    # What it hears.
-
-    def _on_state(self, number, message):
-        self._states[number] = to_tuple(message.state)[:6]
-        self._state_times[number] = self._handle.time()
-
-    def _on_states(self, numbers, message):
-        if len(message.data) != 7 * len(numbers):
-            self._handle.warn(
-                f"ignoring {len(message.data)} numbers as states of {len(numbers)} vehicles",
-                throttle=1.0,
-                key="states",
-            )
-            return
-        self._states[numbers] = np.reshape(message.data, (-1, 7))[:, :6]
-        self._state_times[numbers] = self._handle.time()
-
-    def _on_flight_state(self, led, message):
-        led.flight_state = message.data
-        if message.data != FLYING:
-            led.way = None
+    # References.
 
     def _on_reference(self, led, message):
         if not is_finite(message.state):
@@ -185,7 +143,7 @@ class ReferencesNode(Node):
         goal = (request.goal.x, request.goal.y, request.goal.z)
         duration = request.duration.to_sec()
         name = f"/{led.vehicle.name}/go_to refused"
-        if led.flight_state != FLYING or not self._knows(led):
+        if not (self._is_flying(led) and self.sightings.are_fresh()[led.number]):
             raise ServiceError(f"{name}: the vehicle is not in flight")
         if not np.isfinite(goal).all():
             raise ServiceError(f"{name}: the goal is {goal}; expected finite numbers (m)")
@@ -202,15 +160,26 @@ class ReferencesNode(Node):
 
     def _place(self, led):
         # Where it is told to be, if it is about there: otherwise every way would begin with a jerk.
-        place = self._states[led.number, :3]
+        place = self.sightings.positions[led.number].copy()
         told = place if led.wanted is None else _position(led.wanted)
-        return told if np.linalg.norm(told - place) < led.vehicle.buffer else place.copy()
+        return told if np.linalg.norm(told - place) < led.vehicle.buffer else place
+
+    def _is_flying(self, led):
+        return self.sightings.flight_states[led.number] == FLYING
 
     def _on_way_timer(self):
-        ways = {led.number: led.way for led in self._seen if led.way is not None and not led.waits}
+        for led in self._led:
+            if not self._is_flying(led):
+                led.way = None
+        ways = {led.number: led.way for led in self._led if led.way is not None and not led.waits}
         if not ways:
             return
-        going = [self._seen[number] for number in ways]
+        fresh = self.sightings.are_fresh()
+        # A vehicle that nobody sees is not led on.
+        ways = {number: way for number, way in ways.items() if fresh[number]}
+        if not ways:
+            return
+        going = [self._led[number] for number in ways]
         for led in going:
             led.way_time += self._parameters.way_period
         places = along([*ways.values()], [led.way_time for led in going])
@@ -228,33 +197,34 @@ class ReferencesNode(Node):
 
     # Distances.
 
-    def _knows(self, led):
-        age = self._handle.time() - self._state_times[led.number]
-        return 0.0 <= age < STATE_LIMIT and bool(np.isfinite(self._states[led.number, :3]).all())
-
     def _on_watch_timer(self):
-        positions, velocities = self._states[:, :3].copy(), self._states[:, 3:]
-        positions[[led.flight_state not in _WATCHED for led in self._seen]] = np.nan
+        in_flight, fresh = self.sightings.are_in_flight(), self.sightings.are_fresh()
+        positions = np.where(in_flight[:, None], self.sightings.positions, np.nan)
+        # A speed of long ago does not say where a vehicle will be.
+        velocities = np.where(fresh[:, None], self.sightings.velocities, 0.0)
+        for number in np.flatnonzero(in_flight & ~fresh).tolist():
+            self._warn_of_silence(number)
         goals = positions.copy()
-        told = [led for led in self._seen if led.wanted is not None and led.way is None]
+        told = [led for led in self._led if led.wanted is not None and led.way is None]
         if told:
             goals[[led.number for led in told]] = [_position(led.wanted) for led in told]
-        ways = {led.number: led.way for led in self._seen if led.way is not None}
+        ways = {led.number: led.way for led in self._led if led.way is not None}
         if ways:
-            soon = [self._seen[number].way_time + LOOK_AHEAD for number in ways]
+            soon = [self._led[number].way_time + LOOK_AHEAD for number in ways]
             goals[[*ways]] = along([*ways.values()], soon)[0]
         waiting, close = self._separation.waiting(positions, velocities, goals)
         for pair in close:
             self._warn(pair)
-        for led, waits in zip(self._seen, waiting.tolist(), strict=True):
-            if waits != led.waits and led.publisher is not None:
+        for led in self._led:
+            waits = bool(waiting[led.number])
+            if waits != led.waits:
                 self._turn(led, waits)
         self._tell()
 
     def _turn(self, led, waits):
         led.waits = waits
         if waits:
-            place = self._states[led.number, :3]
+            place = self.sightings.positions[led.number]
             led.publisher.publish(self._reference(place, np.zeros(3)))
         elif led.wanted is not None and led.way is None:
             # Anew, since a controller does not go back to what is older than the place to wait.
@@ -262,7 +232,7 @@ class ReferencesNode(Node):
             led.publisher.publish(self._reference(wanted[:3], wanted[3:]))
 
     def _warn(self, pair):
-        first, second = (self._seen[k].vehicle.name for k in (pair.first, pair.second))
+        first, second = (self.sightings.names[k] for k in (pair.first, pair.second))
         self._handle.warn(
             f"{first} and {second} are {pair.distance:.2f} m apart and must not come closer than "
             f"{pair.limit:.2f} m: whom its reference leads nearer waits",
@@ -270,8 +240,22 @@ class ReferencesNode(Node):
             key=(pair.first, pair.second),
         )
 
+    def _warn_of_silence(self, number):
+        name = self.sightings.names[number]
+        place = self.sightings.positions[number]
+        keep = "the others cannot keep apart from it"
+        if np.isfinite(place).all():
+            x, y, z = place.tolist()
+            keep = f"the others keep apart from where it was last, ({x:.2f}, {y:.2f}, {z:.2f})"
+        self._handle.warn(
+            f"{name} is {self.sightings.flight_states[number].replace('_', ' ')}, and no state of "
+            f"it has come for {STATE_LIMIT:g} s: where it is, is not known; {keep}",
+            throttle=SILENCE_PERIOD,
+            key=("silence", name),
+        )
+
     def _tell(self):
-        told = " ".join(led.vehicle.name for led in self._seen if led.waits)
+        told = " ".join(led.vehicle.name for led in self._led if led.waits)
         if told != self._told:
             self._told = told
             self._waiting.publish(String(told))

@@ -207,6 +207,55 @@ def test_go_to(flight):
     assert len(flight.followed("cf1")) == pytest.approx(101, abs=1)
 
 
+def test_a_way_in_a_move_begins_as_the_move_is(flight):
+    flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
+    flight.process.advance(1.0)
+    before = flight.followed("cf1")[-1].state
+    flight.see("cf1", before.y)
+    flight.go_to(goal=(0.3, 0.25, 1.0), seconds=3.0)
+    flight.process.advance(0.02)
+    after = flight.followed("cf1")[-1].state
+    assert before.y_dot == pytest.approx(0.469, abs=0.01)
+    assert after.y_dot == pytest.approx(before.y_dot, abs=0.01)
+    assert after.y == pytest.approx(before.y + 0.02 * before.y_dot, abs=1e-3)
+    for _ in range(10):
+        flight.process.advance(0.3)
+        flight.see("cf1", flight.followed("cf1")[-1].state.y)
+    end = flight.followed("cf1")[-1].state
+    assert (end.x, end.y) == (pytest.approx(0.3), pytest.approx(0.25))
+    assert (end.x_dot, end.y_dot) == (0.0, 0.0)
+
+
+def test_a_way_after_a_hold_begins_at_rest(flight):
+    flight.go_to(goal=(0.0, 0.9, 1.0), seconds=4.0)
+    flight.process.advance(2.6)
+    assert flight.followed("cf1")[-1].state.y_dot > 0.3
+    # Too near: it waits where it is.
+    flight.see("cf1", 0.8)
+    flight.process.advance(0.06)
+    assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
+    flight.go_to(goal=(0.0, 0.0, 1.0), seconds=2.0)
+    flight.process.advance(0.12)
+    assert flight.process.published("/fleet/waiting")[-1].data == ""
+    assert abs(flight.followed("cf1")[-1].state.y_dot) < 0.05
+
+
+def test_a_way_of_a_vehicle_that_is_elsewhere_begins_with_its_velocity(flight):
+    flight.want("cf1", 0.0)
+    flight.see("cf1", -0.5, y_dot=0.4)
+    flight.go_to(goal=(0.0, -0.5, 1.0), seconds=3.0)
+    flight.process.advance(0.02)
+    assert flight.followed("cf1")[-1].state.y_dot == pytest.approx(0.4, abs=0.01)
+
+
+def test_a_way_that_cannot_be_braked_for_is_refused(flight):
+    flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
+    flight.process.advance(1.0)
+    flight.see("cf1", 0.25)
+    with pytest.raises(ServiceError, match=r"0.25 m in 0.5 s; expected a duration of at least 1\."):
+        flight.go_to(goal=(0.0, 0.0, 1.0), seconds=0.5)
+
+
 def test_go_to_relative_and_another_reference_ends_it(flight):
     flight.go_to("cf2", goal=(0.0, 0.5, 0.0), relative=True)
     flight.process.advance(0.5)

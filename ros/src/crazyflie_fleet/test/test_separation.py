@@ -76,6 +76,32 @@ def test_nobody_is_led_nearer_to_one_who_is_too_close(rows):
                 assert waits[i]
 
 
+SPEED = st.floats(-1.0, 1.0)
+
+
+@given(PLACE, PLACE, st.tuples(SPEED, SPEED, SPEED))
+def test_a_way_that_begins_in_a_move_is_smooth_and_not_too_fast(start, goal, velocity):
+    start, goal, velocity = (np.array(each) for each in (start, goal, velocity))
+    duration = shortest(float(np.linalg.norm(goal - start)), float(np.linalg.norm(velocity)))
+    way = Way(start, goal, duration + 1e-9, velocity)
+    times = np.linspace(0.0, way.duration, 2001)
+    positions, velocities = along([way] * len(times), times)
+    assert positions[0] == pytest.approx(start)
+    assert velocities[0] == pytest.approx(velocity)
+    assert positions[-1] == pytest.approx(goal, abs=1e-6)
+    assert velocities[-1] == pytest.approx(np.zeros(3), abs=1e-6)
+    accelerations = np.linalg.norm(np.gradient(velocities, times, axis=0), axis=1)
+    assert accelerations.max() <= MAX_ACCELERATION + 0.05
+    assert np.linalg.norm(velocities, axis=1).max() <= MAX_SPEED + 1e-6
+    assert np.gradient(positions, times, axis=0)[1:-1] == pytest.approx(velocities[1:-1], abs=1e-3)
+
+
+def test_braking_does_not_take_longer_because_the_way_does():
+    way = Way(np.zeros(3), np.zeros(3), 60.0, np.array([1.0, 0.0, 0.0]))
+    positions, _ = along([way] * 600, np.linspace(0.0, 60.0, 600))
+    assert 0.25 < positions[:, 0].max() < 1.0
+
+
 @given(PLACE, PLACE, st.floats(0.0, 1.0))
 def test_a_way_is_smooth_and_not_too_fast(start, goal, share):
     start, goal = np.array(start), np.array(goal)

@@ -152,7 +152,7 @@ class ReferencesNode(Node):
         start = self._place(led)
         end = start + goal if request.relative else np.array(goal)
         try:
-            led.way = Way(start, end, duration)
+            led.way = Way(start, end, duration, self._velocity(led, start))
         except RefusalError as reason:
             raise ServiceError(f"{name}: {reason}") from None
         led.way_time = 0.0
@@ -163,6 +163,13 @@ class ReferencesNode(Node):
         place = self.sightings.positions[led.number].copy()
         told = place if led.wanted is None else _position(led.wanted)
         return told if np.linalg.norm(told - place) < led.vehicle.buffer else place
+
+    def _velocity(self, led, place):
+        if led.waits:
+            return np.zeros(3)
+        if led.wanted is not None and np.array_equal(place, _position(led.wanted)):
+            return np.array(to_tuple(led.wanted.state)[3:])
+        return np.nan_to_num(self.sightings.velocities[led.number])
 
     def _is_flying(self, led):
         return self.sightings.flight_states[led.number] == FLYING

@@ -122,6 +122,16 @@ def test_all_cannot_go_to_one_place():
         swarm.call("/all/go_to", go_to(1.0, relative=False))
 
 
+def test_missions_are_told_the_buffers(tmp_path):
+    file = tmp_path / "fleet.yaml"
+    file.write_text(
+        "robots:\n  a: {initial_position: [0, 0, 0], buffer: 0.3}\n"
+        "  b: {initial_position: [0, 1, 0]}\n"
+    )
+    parameters = Swarm(fleet={"file": str(file)}).process.transport.parameters
+    assert (parameters["/a/buffer"], parameters["/b/buffer"]) == (0.3, 0.15)
+
+
 def test_emergency_stops_all():
     swarm = Swarm(fleet={"n": 2})
     swarm.call("/all/takeoff")

@@ -219,6 +219,26 @@ def test_a_fence_counts(process, stack, driven):
         fleet["cf2"].go_to((1.0, 1.8, 1.0))
 
 
+def test_the_buffers_of_the_fleet_process_count(process, stack, driven):
+    process.transport.parameters |= {"/cf1/buffer": 0.3, "/cf2/buffer": 0.35}
+    fleet = Fleet(NAMES, process=process, limit=0.5)
+    with fleet:
+        fleet.takeoff(1.0)
+        with pytest.raises(MissionError, match=r"at least 0.715 m \(the mission's separation is 0.3"):
+            fleet["cf1"].go_to((0.4, 0.0, 1.0))
+        fleet["cf1"].go_to((0.2, 0.0, 1.0), duration=6.0)
+
+
+def test_the_buffers_of_a_fleet_file_count(process, stack, driven, tmp_path):
+    path = tmp_path / "two.yaml"
+    path.write_text(
+        "robots:\n  cf1: {initial_position: [0, 0, 0]}\n  cf2: {initial_position: [1, 0, 0]}\n"
+        "all: {buffer: 0.4}\n"
+    )
+    fleet = Fleet(path, process=process, limit=0.5)
+    assert fleet.rules.buffers == {"cf1": 0.4, "cf2": 0.4}
+
+
 def test_names_of_a_fleet_file(process, stack, driven, tmp_path):
     path = tmp_path / "two.yaml"
     robots = "robots:\n  cf1: {initial_position: [0, 0, 0]}\n  cf2: {initial_position: [1, 0, 0]}\n"

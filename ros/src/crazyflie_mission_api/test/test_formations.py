@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
 from crazyflie_mission_api import Rehearsal
-from crazyflie_mission_api.formations import assign, circle, lattice, nearest
+from crazyflie_mission_api.formations import assign, circle, lattice
 from crazyflie_mission_api.roster import Rules
 
 PACKAGES = rospkg.RosPack()
@@ -27,11 +27,6 @@ def test_places():
     ring = circle(8, 1.0)
     np.testing.assert_allclose(np.hypot(ring[:, 0], ring[:, 1]), 1.0)
     assert len({tuple(place) for place in ring.round(6).tolist()}) == 8
-
-
-def test_who_is_nearest():
-    places = np.array([(0.0, 0, 0), (3.0, 0, 0), (3.0, 0.4, 0)])
-    assert nearest(["a", "b", "c"], places) == (pytest.approx(0.4), "b", "c")
 
 
 @settings(max_examples=30, deadline=None)

@@ -7,7 +7,7 @@ from crazyflie_fleet.fleet import Fleet, Vehicle
 from crazyflie_fleet.fleet_node import FleetNode
 from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.references_node import ReferencesNode
-from crazyflie_fleet.stack import Tree, merged, node_classes, parameters
+from crazyflie_fleet.stack import BUFFER, Tree, merged, node_classes, parameters
 from crazyflie_fleet.swarm_node import ALL_STATES, MODELS, SwarmNode, SwarmParameters
 from crazyflie_takeoff.all_emergency_node import AllEmergencyNode
 from crazyflie_utils import Node, NodeHandle, ParameterError
@@ -85,6 +85,7 @@ class _Plan:
         if f"{self._handle.name}/{vehicle.settings.model}" in self.nodes:
             for name in ("simulator", "state_estimator", "lqr_controller"):
                 del classes[name]
+        self._handle.set_param(f"/{vehicle.name}/{BUFFER}", vehicle.buffer)
         frames = {"fixed": self._told.fixed_frame, "robot": vehicle.name}
         tree = parameters(vehicle, frames, self._common(vehicle.settings.model))
         for name, node_class in (self._told.further or {}).items():

@@ -28,6 +28,9 @@ IN_FLIGHT = "in_flight"
 FLIGHT_STATE = f"{IN_FLIGHT}_state"
 """Topics and services of a vehicle, below its name."""
 
+BUFFER = "buffer"
+"""Parameter below a vehicle's name with its collision buffer, m, for those who plan its flights."""
+
 SIMULATORS: dict[str, type[Node]] = {
     "near_hover": NearHoverSimulatorNode,
     "coupled_7d": NearHoverSimulatorCoupled7DNode,

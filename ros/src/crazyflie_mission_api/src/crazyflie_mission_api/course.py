@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.polynomial import polynomial
 
-from crazyflie_mission_api.formations import nearest
+from crazyflie_mission_api.clearance import Clearance
 from crazyflie_mission_api.limits import Array, MissionError
 from crazyflie_mission_api.trajectories import Pieces, straight
 from crazyflie_model.angles import Triple
@@ -111,8 +111,8 @@ def check_starts(
             ) from None
 
 
-def check_apart(courses: Mapping[str, Course], now: float, separation: float) -> None:
-    """Refuse courses on which two vehicles come nearer than ``separation`` (m).
+def check_apart(courses: Mapping[str, Course], now: float, clearance: Clearance) -> None:
+    """Refuse courses on which two vehicles come too near.
 
     Raises
     ------
@@ -121,13 +121,7 @@ def check_apart(courses: Mapping[str, Course], now: float, separation: float) ->
     if len(courses) < 2:
         return
     end = max(now, *(course.end for course in courses.values()))
-    times = np.append(np.arange(now, end, _STEP), end)
+    times = np.linspace(now, end, math.ceil((end - now) / _STEP) + 1)
     names = [*courses]
     places = np.stack([course.positions(times) for course in courses.values()])
-    for k, time in enumerate(times):
-        distance, one, two = nearest(names, places[:, k])
-        if distance < separation:
-            raise MissionError(
-                f"{one} and {two} would be {distance:.3g} m apart, {time - now:.1f} s from now; "
-                f"expected at least {separation:g} m"
-            )
+    clearance.check(names, times - now, places)

@@ -12,6 +12,7 @@ import rosgraph
 from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
+from crazyflie_fleet.stack import BUFFER
 from crazyflie_mission_api.connection import RosVehicle, prefix
 from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
@@ -21,7 +22,7 @@ from crazyflie_mission_api.roster import Rules
 from crazyflie_mission_api.starter import Starter
 from crazyflie_mission_api.team import Team
 from crazyflie_utils import NodeHandle, ParameterError
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME
+from crazyflie_utils.parameter_types import BOOLEAN, FRAME, Number
 from crazyflie_utils.runtime.process import Process
 from crazyflie_utils.runtime.runner import begin_script
 
@@ -82,8 +83,7 @@ class Fleet(Team):
         limit: float = 30.0,
         process: Process | None = None,
     ):
-        chosen = names_of(names)
-        rules = Rules(limits or Limits(), bounds, separation, tolerance, patience)
+        chosen, buffers = vehicles_of(names)
         self._end: Callable[[], None] = lambda: None
         if process is None:
             process, self._end = begin_script("mission")
@@ -92,6 +92,10 @@ class Fleet(Team):
         try:
             vehicles = _connect(process, self._handle, chosen, limit)
             clock = RosClock(self._handle, lambda: process.exit_status is not None)
+            # Of the fleet process that flies them, if one does.
+            watched = {name: _buffer(self._handle, name) for name in chosen}
+            buffers |= {name: max(b, buffers.get(name, b)) for name, b in watched.items() if b}
+            rules = Rules(limits or Limits(), bounds, separation, tolerance, patience, buffers)
             super().__init__(vehicles, clock, rules)
             process.start()
             self._await_positions(limit)
@@ -139,8 +143,8 @@ class Fleet(Team):
             time.sleep(0.01)
 
 
-def names_of(names: str | Path | Sequence[str]) -> list[str]:
-    """Return the names of vehicles, which may be those in a fleet file.
+def vehicles_of(names: str | Path | Sequence[str]) -> tuple[list[str], dict[str, float]]:
+    """Return the names of vehicles, and the collision buffers (m) of those in a fleet file.
 
     Raises
     ------
@@ -149,7 +153,8 @@ def names_of(names: str | Path | Sequence[str]) -> list[str]:
     """
     if isinstance(names, Path) or (isinstance(names, str) and names.endswith((".yaml", ".yml"))):
         try:
-            return list(fleet_file.load(names).names)
+            vehicles = fleet_file.load(names).vehicles
+            return [v.name for v in vehicles], {v.name: v.buffer for v in vehicles}
         except ParameterError as error:
             raise MissionError(str(error)) from None
     chosen = [names] if isinstance(names, str) else list(names)
@@ -158,7 +163,11 @@ def names_of(names: str | Path | Sequence[str]) -> list[str]:
     for name in chosen:
         if chosen.count(name) > 1:
             raise MissionError(f"there are two vehicles {name!r}; expected different names")
-    return chosen
+    return chosen, {}
+
+
+def _buffer(handle, name):
+    return handle.get_param(f"{prefix(name)}/{BUFFER}", Number("m", above=0.0), None)
 
 
 def _connect(process, handle, names, limit):

@@ -1,16 +1,17 @@
-"""Formations: where their places are, who flies to which, and how near vehicles come."""
+"""Formations: where their places are, and who flies to which."""
 
 import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
-from scipy.spatial.distance import cdist, pdist
+from scipy.spatial.distance import cdist
 
 from crazyflie_fleet.fleet import DOWNWASH
 from crazyflie_mission_api.limits import Array
 
-_SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
+SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
+"""By which positions are multiplied before distances are taken."""
 
 Point = tuple[float, float, float]
 
@@ -55,7 +56,7 @@ def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Poi
     """Return which vehicle flies to which goal, such that the sum of squared ways is least.
 
     Vehicles that then fly straight there in the same time, in the same rhythm, come no nearer than
-    min(start distance, goal distance) / sqrt(2), distances as in `nearest`: Turpin, Michael and
+    min(start distance, goal distance) / sqrt(2), distances as in `Clearance`: Turpin, Michael and
     Kumar, CAPT: Concurrent Assignment and Planning of Trajectories for Multiple Robots (IJRR 2014).
 
     Parameters
@@ -66,25 +67,7 @@ def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Poi
         As many as vehicles, m.
     """
     starts = np.array([*places.values()], dtype=float)
-    squares = cdist(starts * _SCALE, goals * _SCALE, "sqeuclidean")
+    squares = cdist(starts * SCALE, goals * SCALE, "sqeuclidean")
     rows, columns = linear_sum_assignment(squares)
     names = [*places]
     return {names[row]: tuple(goals[column]) for row, column in zip(rows, columns, strict=True)}
-
-
-def nearest(names: Sequence[str], positions: Array) -> tuple[float, str, str]:
-    """Return the least distance of two vehicles, m, and who they are.
-
-    A metre of height counts for `crazyflie_fleet.fleet.DOWNWASH` metres less.
-
-    Parameters
-    ----------
-    names : sequence of str
-        At least two.
-    positions : ndarray, shape (n, 3)
-        m.
-    """
-    distances = pdist(positions * _SCALE)
-    least = int(distances.argmin())
-    one, two = np.triu_indices(len(names), 1)
-    return float(distances[least]), names[one[least]], names[two[least]]

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Self
 
+from crazyflie_mission_api.clearance import Clearance
 from crazyflie_mission_api.course import Course
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError, number
 from crazyflie_mission_api.vehicle import Clock, Vehicle, never
@@ -32,6 +33,8 @@ class Rules:
         How near to its goal a vehicle has arrived, m.
     patience : float
         How long a vehicle may take beyond what was planned, s.
+    buffers : mapping of str to float
+        Collision buffers of those whom a fleet process holds apart, m; see `Clearance`.
     """
 
     limits: Limits = field(default_factory=Limits)
@@ -39,6 +42,12 @@ class Rules:
     separation: float = 0.3
     tolerance: float = 0.15
     patience: float = 15.0
+    buffers: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def clearance(self) -> Clearance:
+        """How far apart vehicles have to be."""
+        return Clearance(self.separation, self.buffers)
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -59,6 +68,8 @@ class Roster:
 
     def __init__(self, vehicles: Iterable[Vehicle], clock: Clock, rules: Rules | None = None):
         self._vehicles = {vehicle.name: vehicle for vehicle in vehicles}
+        # The teams of some, too, have to keep apart from the others.
+        self._everybody = self._vehicles
         self._clock = clock
         self.rules = rules or Rules()
         # Of all vehicles that fly; shared with the teams of some.
@@ -148,6 +159,15 @@ class Roster:
         refuse("emergency", failures)
 
     # What commands have in common.
+
+    def _standing(self):
+        """Return the courses of the vehicles on the ground, as far as they are seen."""
+        places = {
+            name: vehicle.position()
+            for name, vehicle in self._everybody.items()
+            if name not in self._courses
+        }
+        return {name: Course.rest(place) for name, place in places.items() if place is not None}
 
     def _some(self, names):
         return self[tuple(names)]

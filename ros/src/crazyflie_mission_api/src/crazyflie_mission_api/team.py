@@ -228,7 +228,7 @@ class Team(Roster):
         return Course(way, begin, self._vehicles[name].start_skew)
 
     def _check_apart(self, courses):
-        check_apart({**self._courses, **courses}, self.time(), self.rules.separation)
+        check_apart({**self._standing(), **self._courses, **courses}, self.time(), self.rules.clearance)
 
     def _fly(self, ways, what, command, wait):
         team = self._some(ways)

@@ -1,0 +1,93 @@
+"""How far apart vehicles have to be: for the mission, and for the fleet that watches them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.spatial.distance import pdist
+
+from crazyflie_fleet.separation import LOOK_AHEAD, RELEASE, Separation
+from crazyflie_mission_api.formations import SCALE
+from crazyflie_mission_api.limits import Array, MissionError
+
+
+@dataclass(frozen=True)
+class Clearance:
+    """Distances that the vehicles of a mission keep.
+
+    Attributes
+    ----------
+    separation : float
+        Between any two vehicles, m; one above the other `crazyflie_fleet.fleet.DOWNWASH` times.
+    buffers : mapping of str to float
+        Collision buffers of vehicles that a fleet process watches, m. It holds a vehicle that
+        comes nearer to another than both their buffers, and lets it go when it is
+        `crazyflie_fleet.separation.RELEASE` times as far away: a mission keeps that distance.
+    """
+
+    separation: float = 0.3
+    buffers: Mapping[str, float] = field(default_factory=dict)
+
+    def limits(self, names: Sequence[str]) -> Array:
+        """Return how far apart each two of n vehicles have to be, shape (n, n), m."""
+        radii = np.array([self.buffers.get(name, -np.inf) for name in names])
+        return np.maximum(self.separation, RELEASE * (radii[:, None] + radii))
+
+    def check(self, names: Sequence[str], times: Array, places: Array) -> None:
+        """Refuse ways on which vehicles come too near, or so fast that the fleet holds them.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Of n vehicles, two at least.
+        times : ndarray, shape (m,)
+            From now, s.
+        places : ndarray, shape (n, m, 3)
+            Where each is then, m.
+
+        Raises
+        ------
+        MissionError
+        """
+        first, second = np.triu_indices(len(names), 1)
+        limits = self.limits(names)[first, second]
+        for k, time in enumerate(times):
+            distances = pdist(places[:, k] * SCALE)
+            worst = int((distances - limits).argmin())
+            if distances[worst] < limits[worst] - 1e-9:
+                one, two = names[first[worst]], names[second[worst]]
+                raise MissionError(
+                    f"{one} and {two} would be {distances[worst]:.3g} m apart, {time:.1f} s from "
+                    f"now; expected at least {limits[worst]:.3g} m{self._reasons(one, two)}"
+                )
+        self._check_speeds(names, times, places)
+
+    def _check_speeds(self, names, times, places):
+        """Refuse what the fleet's watch would hold, which looks ahead."""
+        watched = [k for k, name in enumerate(names) if name in self.buffers]
+        if len(watched) < 2 or len(times) < 3:
+            return
+        separation = Separation([RELEASE * self.buffers[names[k]] for k in watched])
+        seen = places[watched]
+        velocities = np.gradient(seen, times, axis=1)
+        for k, time in enumerate(times[:-1]):
+            # A reference is a little ahead of the vehicle that follows it.
+            waits, pairs = separation.waiting(seen[:, k], velocities[:, k], seen[:, k + 1])
+            for pair in pairs:
+                if waits[pair.first] or waits[pair.second]:
+                    one, two = names[watched[pair.first]], names[watched[pair.second]]
+                    raise MissionError(
+                        f"{one} and {two} would come near each other too fast, {time:.1f} s from "
+                        f"now: at {pair.distance:.3g} m, and in {LOOK_AHEAD:g} s at their speeds "
+                        f"less than {pair.limit:.3g} m; expected slower ways, or others"
+                        f"{self._reasons(one, two)}"
+                    )
+
+    def _reasons(self, one, two):
+        if one not in self.buffers or two not in self.buffers:
+            return ""
+        return (
+            f" (the mission's separation is {self.separation:g} m; the collision buffers, with "
+            f"which the fleet holds vehicles apart, are {self.buffers[one]:g} and "
+            f"{self.buffers[two]:g} m, and {RELEASE:g} times as much lets them go on)"
+        )

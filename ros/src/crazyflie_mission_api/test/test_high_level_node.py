@@ -15,7 +15,12 @@ from crazyflie_mission_api.conversions import full_state_message, setpoint_goal,
 from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.minimum_snap import plan
 from crazyflie_model.polynomials import Goal
-from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
@@ -285,3 +290,30 @@ def test_who_does_not_fly_does_not_begin(bench):
     bench.process.publish("/all/start_trajectory", String(TOP))
     assert len(bench.fly(0.5)) == 0
     assert bench.process.logged("error") == [f"{TOP}: not started: the vehicle is on_ground"]
+
+
+def test_the_servers_hover_point_is_replaced_by_one_above_the_vehicle(bench):
+    bench.be("on_ground", (2.0, 0.0, 0.1))
+    bench.call("takeoff", srv.Takeoff, 0, 0.5, SECONDS(2.0))
+    bench.be("taking_off", (2.0, 0.0, 0.1))
+    bench.process.advance(1.0)
+    # Nothing before the server has handed over: the controller takes it for the takeoff.
+    assert bench.references() == []
+    hover = PositionVelocityStateStamped(state=PositionVelocityState(x=0.0, y=0.0, z=1.0))
+    bench.process.publish("/cf1/ref", hover)
+    assert bench.references() == [pytest.approx([2.0, 0.0, 0.5, 0.0, 0.0, 0.0])]
+    bench.process.publish("/cf1/ref", bench.process.published("/cf1/ref")[-1])
+    assert len(bench.references()) == 1
+
+
+def test_takeoffs_of_others_go_where_their_server_says(bench):
+    bench.be("taking_off", (2.0, 0.0, 0.1))
+    hover = PositionVelocityStateStamped(state=PositionVelocityState(x=0.0, y=0.0, z=1.0))
+    bench.process.publish("/cf1/ref", hover)
+    assert bench.references() == []
+
+
+def test_a_takeoff_to_below_the_vehicle_is_refused(bench):
+    bench.be("on_ground", (0.0, 0.0, 0.7))
+    with pytest.raises(ServiceError, match="height is 0.5 m, and the vehicle is at 0.70 m; expected"):
+        bench.call("takeoff", srv.Takeoff, 0, 0.5, SECONDS(2.0))

@@ -217,6 +217,25 @@ def test_bad_commands_are_named_and_move_nobody(flying, text):
     assert [flying.position(name) for name in flying.names] == before
 
 
+def test_a_takeoff_needs_all_of_its_way(team):
+    team["cf2"].takeoff(1.0)
+    team["cf2"].go_to((0.0, 0.0, 1.0))
+    # Right below the other vehicle, and far enough from it at its end only.
+    with pytest.raises(MissionError, match=r"cf1 and cf2 would be 0.25 m apart, 0.0 s from now"):
+        team["cf1"].takeoff(1.8)
+    with pytest.raises(MissionError, match=r"cf1 and cf2 would be"):
+        team["cf1"].takeoff(0.5)
+    team["cf1"].takeoff(0.4)
+    assert team.flying == ["cf1", "cf2"]
+
+
+def test_a_takeoff_goes_up():
+    team = Rehearsal({"cf1": (0.0, 0.0, 0.7)})
+    with pytest.raises(MissionError, match="the height is 0.75 m, and it is at 0.70 m; expected at"):
+        team.takeoff(0.75)
+    team.takeoff(0.8)
+
+
 def test_commands_on_the_ground_are_refused(team):
     with pytest.raises(MissionError, match="cf1: go_to: it is on the ground; expected takeoff"):
         team["cf1"].go_to((0, 0, 1))

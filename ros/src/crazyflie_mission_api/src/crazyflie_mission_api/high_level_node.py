@@ -27,6 +27,9 @@ STATE_LIMIT = 0.5
 _CALL_LIMIT = 58.0
 """How long a takeoff or landing of the takeoff server may take, s of the machine's clock."""
 
+FIRST_CLIMB = 1.0
+"""How high the takeoff server's takeoff goes at most, m; what is higher follows in flight."""
+
 _FLYING, _TAKING_OFF, _DESCENDING, _LANDING = "flying", "taking_off", "descending", "landing"
 
 
@@ -48,6 +51,8 @@ class HighLevelNode(Node):
         self._is_moving = False
         # When the last setpoint came; None without a stream.
         self._setpoint_time: float | None = None
+        # Where a takeoff that was asked for here goes, in place of the server's hover point.
+        self._hover: Goal[float] | None = None
         # What was told during a takeoff, for its end.
         self._next: tuple[Any, ...] | None = None
         self._landings: list[Future[Any]] = []
@@ -84,6 +89,7 @@ class HighLevelNode(Node):
             self._on_state,
             finite="state",
         )
+        handle.subscribe(parameters.reference_topic, message_type, self._on_reference)
         handle.subscribe(parameters.start_topic, String, self._on_start_all)
         handle.subscribe("~cmd_full_state", FullState, self._on_setpoint)
         handle.subscribe("~cmd_position", Position, self._on_setpoint)
@@ -115,6 +121,8 @@ class HighLevelNode(Node):
     def _on_flight_state(self, message):
         aborted = self._flight_state == _TAKING_OFF and message.data not in (_TAKING_OFF, _FLYING)
         self._flight_state = message.data
+        if message.data != _TAKING_OFF:
+            self._hover = None
         if aborted:
             # What was told during this takeoff must not be done after the next one.
             self._next = None
@@ -129,6 +137,14 @@ class HighLevelNode(Node):
             for answer in landings:
                 if not answer.done():
                     answer.set_result(srv.LandResponse())
+
+    def _on_reference(self, message):
+        # With its hover point the server leaves the vehicle to the controller, until it flies.
+        if self._flight_state != _TAKING_OFF or self._hover is None:
+            return
+        s = message.state
+        if (s.x, s.y, s.z) != self._hover.position:
+            self._publish(self._hover)
 
     def _where(self):
         age = self._handle.time() - self._measured_at
@@ -147,7 +163,12 @@ class HighLevelNode(Node):
                 "more than 0"
             )
         start = self._where()
-        x, y, _ = start.position
+        x, y, ground = start.position
+        if request.height <= ground:
+            raise ServiceError(
+                f"height is {request.height:g} m, and the vehicle is at {ground:.2f} m; expected more"
+            )
+        self._hover = at_rest((x, y, min(request.height, ground + FIRST_CLIMB)), start.yaw)
         self._next = (Follower.go_to, (x, y, request.height), start.yaw, duration)
         call = self._call(self._parameters.takeoff, srv.TakeoffResponse)
         call.add_done_callback(self._handle.guard(self._forget_refused))
@@ -155,7 +176,7 @@ class HighLevelNode(Node):
 
     def _forget_refused(self, call):
         if call.exception() is not None:
-            self._next = None
+            self._hover = self._next = None
 
     def _on_land(self, _):
         answer = self._call(self._parameters.land, srv.LandResponse)

@@ -18,6 +18,12 @@ Point = Sequence[float]
 _SHORTEST_CLIMB = 2.0
 """s."""
 
+_LEAST_CLIMB = 0.1
+"""How high a takeoff goes at least, m."""
+
+_CLIMB_STEP = 0.1
+"""From one height of a climb at which distances are looked at to the next, m."""
+
 
 class Team(Roster):
     """Vehicles that fly a mission; each command is for all of them.
@@ -31,19 +37,24 @@ class Team(Roster):
 
     def takeoff(self, height: float = 1.0, wait: bool = True) -> None:
         """Climb straight up to a height, m."""
-        height = number(height, "takeoff: height", 0.1)
+        height = number(height, "takeoff: height", _LEAST_CLIMB)
         ways = {}
         for name in self._vehicles:
             if name in self._courses:
                 raise MissionError(f"{name}: takeoff: it flies already; expected it on the ground")
             x, y, z = self.position(name)
+            if height < z + _LEAST_CLIMB:
+                raise MissionError(
+                    f"{name}: takeoff: the height is {height:g} m, and it is at {z:.2f} m; expected "
+                    f"at least {_LEAST_CLIMB:g} m more"
+                )
             goal = (x, y, height)
             self.fence(name).check(np.array(goal), f"{name}: takeoff to {text(goal)}")
             heading = self._vehicles[name].heading()
             way = trajectories.straight((x, y, z), goal, heading, heading)
             climb = max(_SHORTEST_CLIMB, self._quickest(way))
             ways[name] = trajectories.stretched(way, climb)
-        self._check_apart({name: Course(way, self.time()) for name, way in ways.items()})
+        self._check_climbs(height)
         # Noted first: what has begun to take off must be landed whatever happens.
         self._courses.update({name: Course(way, self.time()) for name, way in ways.items()})
 
@@ -184,6 +195,18 @@ class Team(Roster):
         return chosen
 
     # What commands have in common.
+
+    def _check_climbs(self, height):
+        # How long a takeoff takes, servers and vehicles decide: all of the way has to be free.
+        starts = {name: self.position(name) for name in self._vehicles}
+        highest = max(height - z for _, _, z in starts.values())
+        for climb in np.linspace(0.0, highest, math.ceil(highest / _CLIMB_STEP) + 1).tolist():
+            self._check_apart(
+                {
+                    name: Course.rest((x, y, min(z + climb, height)))
+                    for name, (x, y, z) in starts.items()
+                }
+            )
 
     def _goals(self, goals, relative):
         if not isinstance(goals, Mapping):

@@ -7,6 +7,7 @@ from crazyflie_fleet.fleet import Fleet, Vehicle
 from crazyflie_fleet.fleet_node import FleetNode
 from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.references_node import ReferencesNode
+from crazyflie_fleet.sightings import Sightings
 from crazyflie_fleet.stack import BUFFER, Tree, merged, node_classes, parameters
 from crazyflie_fleet.swarm_node import ALL_STATES, MODELS, SwarmNode, SwarmParameters
 from crazyflie_takeoff.all_emergency_node import AllEmergencyNode
@@ -43,11 +44,10 @@ class _Plan:
                 swarms[self._add_swarm(model, of_model)] = of_model
         for vehicle in vehicles:
             self._add_vehicle(vehicle)
-        self.nodes[f"{handle.name}/references"] = ReferencesNode(
-            vehicles, others, told.fixed_frame, swarms
-        )
+        references = ReferencesNode(vehicles, others, told.fixed_frame, swarms)
+        self.nodes[f"{handle.name}/references"] = references
         if vehicles[0] is fleet.vehicles[0]:
-            self._add_services(fleet)
+            self._add_services(fleet, references.sightings)
 
     def _add(self, name: str, node: Node, tree: Mapping[str, Any]) -> None:
         self._handle.set_param(name, dict(tree))
@@ -95,9 +95,9 @@ class _Plan:
             self._add(f"/{vehicle.name}/{name}", node_class(), tree[name])
         self._has_clock = True
 
-    def _add_services(self, fleet: Fleet) -> None:
+    def _add_services(self, fleet: Fleet, sightings: Sightings) -> None:
         # One process serves them all, also those of other machines.
-        self.nodes[self._handle.name] = FleetNode(fleet)
+        self.nodes[self._handle.name] = FleetNode(fleet, sightings)
         self.nodes["/all_emergency"] = AllEmergencyNode()
 
 

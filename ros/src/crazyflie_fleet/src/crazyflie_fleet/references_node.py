@@ -12,6 +12,7 @@ from typing_extensions import override
 
 from crazyflie_driver.srv import GoTo, GoToResponse
 from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.lander import LANDING_TOPIC
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
 from crazyflie_fleet.sightings import FLYING, STATE_LIMIT, Sightings
 from crazyflie_fleet.stack import REFERENCE, SAFE_REFERENCE
@@ -46,6 +47,7 @@ class _Led:
     way: Way | None = None
     way_time: float = 0.0
     waits: bool = False
+    is_landed: bool = False
 
 
 class ReferencesNode(Node):
@@ -97,6 +99,7 @@ class ReferencesNode(Node):
         for vehicle in self._vehicles:
             self._lead(handle, vehicle)
         self.sightings.subscribe(handle)
+        handle.subscribe(LANDING_TOPIC, String, self._on_landing)
         handle.timer(parameters.way_period, self._on_way_timer)
         handle.timer(parameters.watch_period, self._on_watch_timer)
 
@@ -124,7 +127,19 @@ class ReferencesNode(Node):
 
     # References.
 
+    def _on_landing(self, message):
+        names = message.data.split()
+        for led in self._led:
+            is_landed = led.vehicle.name in names
+            if is_landed and not led.is_landed and self._is_flying(led):
+                # Until its turn it stays; the fleet moves it if something is beneath it.
+                led.way = None
+                self._want(led, self._reference(self._place(led), np.zeros(3)))
+            led.is_landed = is_landed
+
     def _on_reference(self, led, message):
+        if led.is_landed and self._is_flying(led):
+            return
         if not is_finite(message.state):
             # What is to be done about it is the controller's business.
             led.publisher.publish(message)

@@ -77,6 +77,14 @@ class Sightings:
         """Return which vehicles fly, by their flight states, shape (n,)."""
         return np.array([state in IN_FLIGHT for state in self.flight_states])
 
+    def flying(self) -> set[str]:
+        """Return the names of those in flight."""
+        return {
+            name
+            for name, flies in zip(self.names, self.are_in_flight(), strict=True)
+            if flies
+        }
+
     def _on_state(self, number, message):
         self._states[number] = to_tuple(message.state)[:6]
         self._times[number] = self._handle.time()

@@ -224,7 +224,9 @@ def test_the_buffers_of_the_fleet_process_count(process, stack, driven):
     fleet = Fleet(NAMES, process=process, limit=0.5)
     with fleet:
         fleet.takeoff(1.0)
-        with pytest.raises(MissionError, match=r"at least 0.715 m \(the mission's separation is 0.3"):
+        with pytest.raises(
+            MissionError, match=r"at least 0.715 m \(the mission's separation is 0.3"
+        ):
             fleet["cf1"].go_to((0.4, 0.0, 1.0))
         fleet["cf1"].go_to((0.2, 0.0, 1.0), duration=6.0)
 

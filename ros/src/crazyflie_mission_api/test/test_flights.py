@@ -1,4 +1,4 @@
-"""Missions of simulated vehicles with takeoff servers, filters and controllers, by hand-moved time."""
+"""Missions of simulated vehicles with all their nodes, by hand-moved time."""
 
 import numpy as np
 import pytest

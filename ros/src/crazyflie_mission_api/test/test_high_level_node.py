@@ -315,5 +315,7 @@ def test_takeoffs_of_others_go_where_their_server_says(bench):
 
 def test_a_takeoff_to_below_the_vehicle_is_refused(bench):
     bench.be("on_ground", (0.0, 0.0, 0.7))
-    with pytest.raises(ServiceError, match="height is 0.5 m, and the vehicle is at 0.70 m; expected"):
+    with pytest.raises(
+        ServiceError, match="height is 0.5 m, and the vehicle is at 0.70 m; expected"
+    ):
         bench.call("takeoff", srv.Takeoff, 0, 0.5, SECONDS(2.0))

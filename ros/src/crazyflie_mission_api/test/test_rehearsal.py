@@ -231,7 +231,9 @@ def test_a_takeoff_needs_all_of_its_way(team):
 
 def test_a_takeoff_goes_up():
     team = Rehearsal({"cf1": (0.0, 0.0, 0.7)})
-    with pytest.raises(MissionError, match="the height is 0.75 m, and it is at 0.70 m; expected at"):
+    with pytest.raises(
+        MissionError, match="the height is 0.75 m, and it is at 0.70 m; expected at"
+    ):
         team.takeoff(0.75)
     team.takeoff(0.8)
 

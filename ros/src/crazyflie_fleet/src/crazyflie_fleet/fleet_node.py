@@ -55,9 +55,7 @@ class FleetNode(Node):
     def _on_land(self, _):
         answer: Future[Any] = Future()
         landing = self._lander.land(self._fleet.names)
-        landing.add_done_callback(
-            lambda done: self._reply(answer, done.result(), EmptyResponse())
-        )
+        landing.add_done_callback(lambda done: self._reply(answer, done.result(), EmptyResponse()))
         return answer
 
     def _on_lost_mission(self, names):
@@ -66,8 +64,8 @@ class FleetNode(Node):
             return
         chosen = [name for name in self._fleet.names if name in flying]
         self._handle.error(
-            f"a mission that flew {', '.join(chosen)} has said nothing for {MISSION_LIMIT:g} s and is "
-            "taken for dead: landing them"
+            f"a mission that flew {', '.join(chosen)} has said nothing for {MISSION_LIMIT:g} s and "
+            "is taken for dead: landing them"
         )
         self._lander.land(chosen).add_done_callback(self._note_landing)
 

@@ -53,8 +53,8 @@ def next_round(
     Returns
     -------
     dict of int to tuple
-        Number to x, y in m: where the vehicle is, or a free place, to which all of the round can fly
-        straight and at the same time. At least one vehicle, if any is to land. Where no way is
+        Number to x, y in m: where the vehicle is, or a free place, to which all of the round can
+        fly straight and at the same time. At least one vehicle, if any is to land. Where no way is
         free, one vehicle has a place that is; where there is none, its own.
     """
     picture = _Picture(places, lands, stands, np.array(limits, dtype=float), lower, upper)
@@ -77,7 +77,15 @@ def next_round(
 class _Picture:
     """The vehicles at one moment; see `next_round`."""
 
-    def __init__(self, places, lands, stands, limits, lower, upper):
+    def __init__(
+        self,
+        places: Array,
+        lands: Flags,
+        stands: Flags,
+        limits: Array,
+        lower: Array,
+        upper: Array,
+    ) -> None:
         self._xy, self._z = places[:, :2], places[:, 2]
         self._stands = stands
         self._limits = limits

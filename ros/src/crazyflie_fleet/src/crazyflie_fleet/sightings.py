@@ -79,11 +79,7 @@ class Sightings:
 
     def flying(self) -> set[str]:
         """Return the names of those in flight."""
-        return {
-            name
-            for name, flies in zip(self.names, self.are_in_flight(), strict=True)
-            if flies
-        }
+        return {name for name, flies in zip(self.names, self.are_in_flight(), strict=True) if flies}
 
     def _on_state(self, number, message):
         self._states[number] = to_tuple(message.state)[:6]

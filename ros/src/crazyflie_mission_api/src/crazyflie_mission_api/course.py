@@ -121,7 +121,7 @@ def check_apart(courses: Mapping[str, Course], now: float, clearance: Clearance)
     if len(courses) < 2:
         return
     end = max(now, *(course.end for course in courses.values()))
-    times = np.linspace(now, end, math.ceil((end - now) / _STEP) + 1)
+    times = np.linspace(now, end, math.ceil((end - now) / _STEP) + 1, dtype=np.float64)
     names = [*courses]
     places = np.stack([course.positions(times) for course in courses.values()])
     clearance.check(names, times - now, places)

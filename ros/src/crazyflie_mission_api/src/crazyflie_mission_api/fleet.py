@@ -4,14 +4,17 @@ import signal
 import sys
 import threading
 import time
+import uuid
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import rosgraph
+from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
+from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC
 from crazyflie_fleet.stack import BUFFER
 from crazyflie_mission_api.connection import RosVehicle, prefix
 from crazyflie_mission_api.high_level_node import HighLevelNode
@@ -97,6 +100,9 @@ class Fleet(Team):
             buffers |= {name: max(b, buffers.get(name, b)) for name, b in watched.items() if b}
             rules = Rules(limits or Limits(), bounds, separation, tolerance, patience, buffers)
             super().__init__(vehicles, clock, rules)
+            self._mission = f"mission_{uuid.uuid4().hex[:8]}"
+            self._in_flight = self._handle.publisher(MISSION_TOPIC, String)
+            self._handle.timer(MISSION_PERIOD, self._say_who_flies, steady=True)
             process.start()
             self._await_positions(limit)
         except BaseException:
@@ -126,11 +132,17 @@ class Fleet(Team):
             if self.flying:
                 why = f" after {error!r}" if error is not None else ""
                 self._handle.warn(f"landing {', '.join(self.flying)}{why}")
-                self.land()
+            super().__exit__(kind, error, traceback)
         finally:
             if self.flying:
                 self._handle.error(f"MAY STILL FLY: {', '.join(self.flying)}")
+            else:
+                self._say_who_flies()
             self._end()
+
+    def _say_who_flies(self):
+        # A fleet process lands them when this ends.
+        self._in_flight.publish(String(" ".join([self._mission, *self.flying])))
 
     def _await_positions(self, limit):
         end = time.monotonic() + limit

@@ -166,7 +166,8 @@ class HighLevelNode(Node):
         x, y, ground = start.position
         if request.height <= ground:
             raise ServiceError(
-                f"height is {request.height:g} m, and the vehicle is at {ground:.2f} m; expected more"
+                f"height is {request.height:g} m, and the vehicle is at {ground:.2f} m; expected "
+                "more"
             )
         self._hover = at_rest((x, y, min(request.height, ground + FIRST_CLIMB)), start.yaw)
         self._next = (Follower.go_to, (x, y, request.height), start.yaw, duration)

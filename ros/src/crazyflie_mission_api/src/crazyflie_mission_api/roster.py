@@ -1,4 +1,4 @@
-"""A team's vehicles: who flies where, and how they come down again."""
+"""A team's vehicles, and where they were told to be."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ import copy
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Self
+from typing import Self
 
+from crazyflie_mission_api import trajectories
 from crazyflie_mission_api.clearance import Clearance
-from crazyflie_mission_api.course import Course
+from crazyflie_mission_api.course import Course, check_apart
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError, number
 from crazyflie_mission_api.vehicle import Clock, Vehicle, never
-
-_SINK = 0.3
-"""Mean speed of landings, m/s."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class Rules:
 
 
 class Roster:
-    """The vehicles of a team, where they were told to be, and the way to the ground.
+    """The vehicles of a team, and where they were told to be.
 
     Parameters
     ----------
@@ -129,27 +127,6 @@ class Roster:
                 f"expected {self.rules.tolerance:g} m at most"
             )
 
-    def land(self) -> None:
-        """Land where they are, and wait until all stand with their motors off."""
-        flying = self.flying
-        team = self._some(flying)
-        places = [self._vehicles[name].position() for name in flying]
-        duration = max([2.0, *(place[2] / _SINK for place in places if place is not None)])
-        failures = team._answers(lambda name: self._vehicles[name].land(duration))
-        # One that does not land must not keep the others up.
-        landing = [name for name in flying if name not in failures]
-        limit = self.time() + duration + self.rules.patience
-        self._clock.wait_until(
-            lambda: all(self._vehicles[name].has_landed() for name in landing), limit
-        )
-        for name in landing:
-            if self._vehicles[name].has_landed():
-                self._vehicles[name].rest()
-                del self._courses[name]
-            else:
-                failures[name] = f"not on the ground {self.rules.patience:g} s after it should be"
-        refuse("land", failures)
-
     def emergency(self) -> None:
         """Stop all motors at once, wherever the vehicles are: they fall."""
         failures = self._answers(lambda name: self._vehicles[name].emergency())
@@ -159,6 +136,16 @@ class Roster:
         refuse("emergency", failures)
 
     # What commands have in common.
+
+    def _quickest(self, way):
+        return trajectories.duration(trajectories.within_limits(way, self.rules.limits))
+
+    def _course(self, name, way, begin):
+        return Course(way, begin, self._vehicles[name].start_skew)
+
+    def _check_apart(self, courses):
+        everybody = {**self._standing(), **self._courses, **courses}
+        check_apart(everybody, self.time(), self.rules.clearance)
 
     def _standing(self):
         """Return the courses of the vehicles on the ground, as far as they are seen."""
@@ -214,11 +201,6 @@ class Roster:
     def __enter__(self) -> Self:
         """Begin a mission."""
         return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: Any, _: Any) -> None:
-        """Land who still flies, whatever has happened."""
-        if self.flying:
-            self.land()
 
 
 def text(position: Iterable[float]) -> str:

@@ -8,9 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from crazyflie_mission_api import formations, trajectories
-from crazyflie_mission_api.course import Course, check_apart, check_starts
+from crazyflie_mission_api.course import Course, check_starts
+from crazyflie_mission_api.landing import LandingTeam
 from crazyflie_mission_api.limits import Array, MissionError, number, point
-from crazyflie_mission_api.roster import Roster, refuse, text
+from crazyflie_mission_api.roster import refuse, text
 from crazyflie_mission_api.trajectories import Pieces
 
 Point = Sequence[float]
@@ -25,7 +26,7 @@ _CLIMB_STEP = 0.1
 """From one height of a climb at which distances are looked at to the next, m."""
 
 
-class Team(Roster):
+class Team(LandingTeam):
     """Vehicles that fly a mission; each command is for all of them.
 
     ``team["cf1"]`` and ``team["cf1", "cf2"]`` are teams of some, with the same commands. A
@@ -45,8 +46,8 @@ class Team(Roster):
             x, y, z = self.position(name)
             if height < z + _LEAST_CLIMB:
                 raise MissionError(
-                    f"{name}: takeoff: the height is {height:g} m, and it is at {z:.2f} m; expected "
-                    f"at least {_LEAST_CLIMB:g} m more"
+                    f"{name}: takeoff: the height is {height:g} m, and it is at {z:.2f} m; "
+                    f"expected at least {_LEAST_CLIMB:g} m more"
                 )
             goal = (x, y, height)
             self.fence(name).check(np.array(goal), f"{name}: takeoff to {text(goal)}")
@@ -237,21 +238,12 @@ class Team(Roster):
             )
         return self._courses[name].destination
 
-    def _quickest(self, way):
-        return trajectories.duration(trajectories.within_limits(way, self.rules.limits))
-
     def _check(self, ways, what, slower):
         for name, way in ways.items():
             trajectories.check(way, self.rules.limits, self.fence(name), f"{name}: {what}", slower)
         now = self.time()
         begun = {name: self._course(name, way, now) for name, way in ways.items()}
         check_starts({**self._courses, **begun}, now, self._check_apart)
-
-    def _course(self, name, way, begin):
-        return Course(way, begin, self._vehicles[name].start_skew)
-
-    def _check_apart(self, courses):
-        check_apart({**self._standing(), **self._courses, **courses}, self.time(), self.rules.clearance)
 
     def _fly(self, ways, what, command, wait):
         team = self._some(ways)

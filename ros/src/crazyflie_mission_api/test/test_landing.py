@@ -1,0 +1,170 @@
+"""Missions land vehicles that are above each other, whatever ends the mission."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import pdist
+from simulated import Swarm
+
+from crazyflie_mission_api import Bounds, MissionError, Rehearsal
+from crazyflie_mission_api.rehearsal import rehearse
+from crazyflie_mission_api.roster import Rules
+
+ROW = {f"cf{k}": (float(k), 0.0, 0.0) for k in range(4)}
+TOWER = {"cf0": (0.0, 0.0, 1.0), "cf1": (0.0, 0.0, 2.0), "cf2": (0.0, 0.0, 3.0), "cf3": (3.0, 0, 1)}
+
+
+def to_the_tower(team):
+    """Fly three vehicles above each other, one stays beside them."""
+    team.takeoff(1.0)
+    for height in (2.0, 3.0):
+        name = f"cf{height - 1:.0f}"
+        x, y, _ = team.position(name)
+        team[name].go_to((x, y, height))
+        team[name].go_to((0.0, 0.0, height))
+
+
+@pytest.fixture
+def tower():
+    """Return a rehearsal of vehicles above each other."""
+    team = Rehearsal(ROW)
+    to_the_tower(team)
+    return team
+
+
+def places(team):
+    return np.array([team.position(name) for name in team.names])
+
+
+def watch(team):
+    """Return a list of the least distances of vehicles, m, from now on."""
+    found, clock = [], team._clock
+    wait_until = clock.wait_until
+
+    def look(condition, deadline):
+        def watched():
+            at = places(team)
+            if at[:, 2].max() > 0.0:
+                found.append(pdist(at * (1.0, 1.0, 0.5)).min())
+            return condition()
+
+        return wait_until(watched, deadline)
+
+    clock.wait_until = look
+    return found
+
+
+def test_vehicles_above_each_other_land_beside_each_other(tower):
+    found = watch(tower)
+    tower.land()
+    assert tower.flying == []
+    assert places(tower)[:, 2] == pytest.approx(0.0)
+    assert min(found) >= 0.3
+    # The lowest one, and who has nobody beneath it, come straight down.
+    assert tower.position("cf0") == pytest.approx((0.0, 0.0, 0.0))
+    assert tower.position("cf3") == pytest.approx((3.0, 0.0, 0.0))
+
+
+def test_after_an_error_likewise():
+    team = Rehearsal(ROW)
+    with pytest.raises(ZeroDivisionError), team:
+        to_the_tower(team)
+        found = watch(team)
+        team.wait(1 / 0)
+    assert team.flying == []
+    assert min(found) >= 0.3
+
+
+def test_some_land_while_others_are_beneath_them(tower):
+    found = watch(tower)
+    tower["cf2"].land()
+    x, y, z = tower.position("cf2")
+    assert z == pytest.approx(0.0)
+    assert 0.3 <= math.hypot(x, y) < 0.6
+    assert tower.flying == ["cf0", "cf1", "cf3"]
+    assert min(found) >= 0.3
+
+
+def test_who_is_on_the_ground_is_not_landed_on(tower):
+    tower["cf0"].land()
+    found = watch(tower)
+    tower["cf1"].land()
+    assert math.hypot(*tower.position("cf1")[:2]) >= 0.3
+    assert min(found) >= 0.3
+
+
+def test_vehicles_on_their_way_stop_before_they_land(tower):
+    tower["cf3"].go_to((1.5, 0.0, 1.0), wait=False)
+    tower.wait(1.0)
+    begin, _, _ = tower.position("cf3")
+    tower.land()
+    x, _, z = tower.position("cf3")
+    assert begin - 0.8 < x < begin
+    assert z == pytest.approx(0.0)
+
+
+def test_without_a_free_place_a_mission_is_refused_before_it_flies():
+    corridor = Rules(bounds=Bounds((-0.05, -0.01, 0.0), (0.75, 0.01, 4.0)), separation=0.7)
+    team = Rehearsal({"cf0": (0.0, 0.0, 0.0), "cf1": (0.7, 0.0, 0.0)}, corridor)
+
+    def mission(fleet):
+        fleet.takeoff(1.0)
+        fleet["cf1"].go_to((0.7, 0.0, 2.8))
+        fleet["cf1"].go_to((0.3, 0.0, 2.8))
+
+    with pytest.raises(
+        MissionError, match=r"cf0 and cf1 would be 0\.\d+ m apart, .* at least 0.7 m"
+    ):
+        rehearse(team, mission)
+
+
+def test_a_lattice_lands_where_it_is():
+    names = [f"cf{k}" for k in range(27)]
+    axis = np.arange(3)
+    floor = np.stack(np.meshgrid(np.arange(9), axis, indexing="ij"), axis=-1).reshape(-1, 2)
+    team = Rehearsal(
+        {name: (*map(float, place), 0.0) for name, place in zip(names, floor, strict=True)}
+    )
+    cube = np.stack(np.meshgrid(0.7 * axis, 0.7 * axis, 1.4 * axis + 1.0), axis=-1).reshape(-1, 3)
+    team.takeoff(1.0)
+    team.formation(cube)
+    found = watch(team)
+    team.land()
+    assert team.flying == []
+    assert min(found) >= 0.3
+    assert pdist(places(team)).min() >= 0.3
+
+
+def test_a_flight_ends_so_too(monkeypatch, tmp_path):
+    swarm = Swarm(monkeypatch, tmp_path, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    with pytest.raises(ZeroDivisionError), swarm.fleet() as fleet:
+        one_above_the_other(fleet)
+        fleet.wait(1 / 0)
+    assert swarm.track("cf1")[-1, 2] == swarm.track("cf2")[-1, 2] == 0.0
+    # Buffers are 0.15 m.
+    assert swarm.nearest() > 0.3
+    # Nothing is left to be landed for it.
+    swarm.process.advance(8.0)
+    assert swarm.process.logged("error") == []
+
+
+def test_when_a_script_is_killed_the_fleet_lands_its_vehicles(monkeypatch, tmp_path):
+    swarm = Swarm(monkeypatch, tmp_path, [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)])
+    fleet = swarm.fleet()
+    one_above_the_other(fleet)
+    fleet.wait(20.0)
+    assert swarm.track("cf2")[-1, 2] > 1.7
+    # All that it had goes with its process.
+    fleet._handle.close()
+    swarm.process.advance(40.0)
+    assert swarm.track("cf1")[-1, 2] == swarm.track("cf2")[-1, 2] == 0.0
+    assert swarm.nearest() > 0.3
+    (text,) = swarm.process.logged("error")
+    assert text.startswith("/fleet: a mission that flew cf1, cf2 has said nothing for 5 s")
+
+
+def one_above_the_other(fleet):
+    fleet.takeoff(0.8)
+    fleet["cf2"].go_to((1.0, 0.0, 1.8))
+    fleet["cf2"].go_to((0.0, 0.0, 1.8))

@@ -1,5 +1,6 @@
 """Missions of two simulated vehicles, as fast as it goes; they stand at y = -0.5 and 0.5 m."""
 
+import math
 import re
 import signal
 from pathlib import Path
@@ -101,3 +102,32 @@ def test_a_script_for_the_sdk_flies_a_simulated_vehicle(tmp_path):
         assert (status, errors) == (0, "")
         assert landed(tracks)
     assert tracks["cf1"][-1] == pytest.approx([x + 0.5, y - 0.5, 0.0], abs=0.16)
+
+
+KILLED = """
+from crazyflie_mission_api import Fleet
+
+with Fleet(["cf1", "cf2"]) as fleet:
+    fleet.takeoff(0.8)
+    fleet["cf2"].go_to((0.0, 0.0, 1.0), relative=True)
+    x, y, _ = fleet.position("cf1")
+    fleet["cf2"].go_to((x, y, 1.8))
+    fleet.wait(1e6)
+"""
+
+
+def test_the_fleet_lands_the_vehicles_of_a_script_that_is_killed(tmp_path):
+    with recorded(["cf1", "cf2"]) as tracks, script(written(tmp_path, KILLED)) as process:
+        try:
+            peer.wait_until(
+                lambda: (
+                    abs(tracks["cf2"][-1][2] - 1.8) < 0.1
+                    and math.dist(tracks["cf1"][-1][:2], tracks["cf2"][-1][:2]) < 0.1
+                ),
+                "one above the other",
+                LIMIT,
+            )
+        finally:
+            process.kill()
+        peer.wait_until(lambda: landed(tracks), "landing", LIMIT)
+    assert math.dist(tracks["cf1"][-1], tracks["cf2"][-1]) > 0.25

@@ -12,6 +12,7 @@ from std_msgs.msg import String
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver.srv import GoToRequest
+from crazyflie_fleet import lander
 from crazyflie_fleet.process import make_nodes
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, ParameterError, ServiceError
@@ -236,6 +237,19 @@ def test_a_vehicle_that_cannot_leave_stays_in_the_air_and_is_named():
     with pytest.raises(ServiceError, match="3 of 4 vehicles: cf1: /cf1/land refused"):
         tower.call("/all/land", seconds=10.0)
     assert tower.position("cf2")[2] == pytest.approx(0.0, abs=0.02)
+
+
+def test_a_landing_that_fails_is_answered(monkeypatch):
+    swarm = Swarm(fleet={"n": 2})
+    swarm.call("/all/takeoff")
+    monkeypatch.setattr(lander, "next_round", lambda *_: {}["a bug"])
+    with pytest.raises(
+        ServiceError, match="2 of 2 vehicles: cf1: the landing of the fleet has fail"
+    ):
+        swarm.call("/all/land")
+    monkeypatch.undo()
+    swarm.call("/all/land", seconds=6.0)
+    assert swarm.position("cf2")[2] == pytest.approx(0.0, abs=0.02)
 
 
 def test_all_cannot_go_to_one_place():

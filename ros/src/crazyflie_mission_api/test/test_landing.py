@@ -104,6 +104,21 @@ def test_vehicles_on_their_way_stop_before_they_land(tower):
     assert z == pytest.approx(0.0)
 
 
+def test_who_does_not_reach_a_free_place_stays_in_the_air_and_is_named(tower):
+    def stay(goal, yaw, duration):
+        x, y, z = tower.position("cf1")
+        return go_to((x, y, z), yaw, duration)
+
+    go_to = tower._vehicles["cf1"].go_to
+    tower._vehicles["cf1"].go_to = stay
+    text = "cf1: land: stays in the air: its distance from a free place to land is 0.3"
+    with pytest.raises(MissionError, match=text):
+        tower.land()
+    assert tower.flying == ["cf1"]
+    assert tower.position("cf1") == pytest.approx((0.0, 0.0, 2.0))
+    assert tower.position("cf2")[2] == pytest.approx(0.0)
+
+
 def test_without_a_free_place_a_mission_is_refused_before_it_flies():
     corridor = Rules(bounds=Bounds((-0.05, -0.01, 0.0), (0.75, 0.01, 4.0)), separation=0.7)
     team = Rehearsal({"cf0": (0.0, 0.0, 0.0), "cf1": (0.7, 0.0, 0.0)}, corridor)

@@ -49,6 +49,11 @@ class FleetNode(Node):
         handle.advertise_service("/all/go_to", GoTo, self._on_go_to)
         self._missions = MissionWatch(handle, self._on_lost_mission)
 
+    @override
+    def make_safe(self) -> None:
+        """Tell those that wait for a landing; each vehicle has services of its own."""
+        self._lander.give_up()
+
     def _on_takeoff(self, request):
         return self._call_all("takeoff", Empty, request, EmptyResponse())
 

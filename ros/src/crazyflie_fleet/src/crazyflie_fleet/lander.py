@@ -83,8 +83,15 @@ class Lander:
                 # Its server knows better what there is to do.
                 self._call_land(name)
         self._tell()
-        self._on_timer()
         return answer
+
+    def give_up(self) -> None:
+        """End all landings that are under way; vehicles that were not told to land stay."""
+        waiting = {*self._left, *self._calls}
+        self._refusals |= dict.fromkeys(waiting, "the landing of the fleet has failed; see the log")
+        self._left, self._goals = [], {}
+        self._calls.clear()
+        self._finish()
 
     def _is_up(self, name):
         return self._sightings.flight_states[self._numbers[name]] in _UP

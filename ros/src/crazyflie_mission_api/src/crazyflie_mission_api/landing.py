@@ -124,7 +124,10 @@ class LandingTeam(Roster):
         end = self.time() + duration
         self._clock.wait_until(never, end)
         self._clock.wait_until(lambda: not self._away(told, _ARRIVED), end + self.rules.patience)
-        return failures | self._away(told, _LATE)
+        away = self._away(told, _LATE)
+        places = self._places()
+        self._courses.update({name: Course.rest(places[name]) for name in away})
+        return failures | away
 
     def _away(self, goals, limit):
         """Return which vehicles are not within a limit (m) of goals (m): name to how far."""

@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 from concurrent.futures import Future
 from functools import partial
 
+import genpy
 import numpy as np
-import rospy
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest
@@ -165,7 +165,7 @@ class Lander:
         self._goals = goals
         self._deadline = self._handle.time() + duration + _ARRIVAL_LIMIT
         for name, goal in goals.items():
-            request = GoToRequest(0, False, Point(*goal), 0.0, rospy.Duration.from_sec(duration))
+            request = GoToRequest(0, False, Point(*goal), 0.0, genpy.Duration.from_sec(duration))
             self._call(name, "go_to", GoTo, request, self._note_refusal)
 
     def _go_on_sideways(self):

@@ -52,10 +52,11 @@ def test_going_nowhere_is_no_error(flying):
     assert flying.position("cf2") == pytest.approx((1.0, 0.0, 1.0))
 
 
-def test_a_takeoff_to_where_the_vehicle_is_is_no_error():
+def test_a_takeoff_to_where_the_vehicle_is_is_refused():
     table = Rehearsal({"cf1": (0.0, 0.0, 1.0)})
-    table.takeoff(1.0)
-    assert table.position("cf1") == pytest.approx((0.0, 0.0, 1.0))
+    with pytest.raises(MissionError, match="the height is 1 m, and it is at 1.00 m; expected at"):
+        table.takeoff(1.0)
+    assert table.flying == []
 
 
 def yaws(team):

@@ -117,6 +117,13 @@ class Subscriber:
         """Tell whether anyone, here or outside, is connected and may publish."""
         return bool(self._topic.publishers) or self._external.has_publishers()
 
+    def caller(self, message: genpy.Message) -> str:
+        """Return the name of the node of another process that sent a message; else ""."""
+        header = getattr(message, "_connection_header", None) or {}
+        # A node of this process may have passed on what it received on another topic.
+        is_here = header.get("topic", self._topic.name) == self._topic.name
+        return header.get("callerid", "") if is_here else ""
+
     def read_lazily(self, is_lazy: bool, remind: Callable[[], None] | None = None) -> None:
         """Let messages from outside wait for `collect`; see `ExternalSubscriber.read_lazily`."""
         self._external.read_lazily(is_lazy, remind)

@@ -97,9 +97,9 @@ class FakeGraph:
         """Return the ROS time of now."""
         return genpy.Time.from_sec(self.time)
 
-    def publish(self, topic: str, message: genpy.Message) -> None:
-        """Publish from outside."""
-        self._route("", topic, message)
+    def publish(self, topic: str, message: genpy.Message, caller: str = "") -> None:
+        """Publish from outside, as the node ``caller``."""
+        self._route(caller, topic, message)
 
     def listen(self, topic: str, callback: Deliver) -> None:
         """Have ``callback(message)`` called with what is published on a topic, faults aside."""
@@ -168,6 +168,7 @@ class FakeGraph:
             listener(message)
         fault = self.faults.get(topic)
         for arriving in [message] if fault is None else fault(message):
+            arriving._connection_header = {"callerid": sender, "topic": topic}
             for name, process in list(self._processes.items()):
                 if name != sender:
                     for deliver in tuple(process.transport.subscribers.get(topic, ())):

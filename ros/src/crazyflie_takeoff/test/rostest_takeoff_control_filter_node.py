@@ -66,7 +66,7 @@ def test_passes_the_right_control(say, final):
         say("/in_flight", Empty())
         memory.next(lambda message: message.data == "flying")
     # In flight every control is passed on, whatever the age of the other kind.
-    for value in range(10, 20):
+    for value in range(5, 15):
         say("/control/takeoff", control(value))
         final.next(has_thrust(value))
         say("/control/lqr", control(value + 0.5))

@@ -237,6 +237,8 @@ class Network:
                         self._deliver(process, topic, message)
 
     def _deliver(self, sender, topic, message):
+        names = {id(process): name for name, process in self._processes.items()}
+        message._connection_header = {"callerid": f"/{names[id(sender)]}", "topic": topic}
         for name, other in self._processes.items():
             if other is not sender and topic in other.transport.subscribers:
                 if (name, topic) not in self.unheard:
@@ -250,11 +252,14 @@ class HoverNetwork(Network):
     ----------
     server : dict
         Parameters of the server.
+    filter_parameters : dict
+        Those of the filter that are not `FILTER`'s.
     """
 
-    def __init__(self, server=None):
+    def __init__(self, server=None, filter_parameters=None):
         super().__init__()
         self.server_parameters = server or SERVER
+        self.filter_parameters = {**FILTER, "topics/state": "/state", **(filter_parameters or {})}
         self.vehicle_node = self.start("vehicle", VehicleNode())
         self.vehicle = self.vehicle_node.vehicle
         self.start("controller", ControllerNode())
@@ -263,7 +268,7 @@ class HoverNetwork(Network):
 
     def start_filter(self):
         """Start a filter."""
-        self.start("filter", TakeoffControlFilterNode(), {**FILTER, "topics/state": "/state"})
+        self.start("filter", TakeoffControlFilterNode(), self.filter_parameters)
 
     def start_server(self):
         """Start a server."""

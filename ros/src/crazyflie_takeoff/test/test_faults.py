@@ -4,7 +4,7 @@ import pytest
 from flight_words import states, thrusts, until_on_ground, word
 from std_msgs.msg import String
 from std_srvs.srv import EmptyRequest
-from takeoff_helpers import SERVER, HoverNetwork, control, state
+from takeoff_helpers import SERVER, ControllerNode, HoverNetwork, control, state
 
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.runtime.transport import ServiceError
@@ -58,6 +58,52 @@ def test_the_controller_dies(network):
     assert "takeoff refused: no commanded controls come" in status
     with pytest.raises(ServiceError, match="no commanded controls come"):
         network.call("/takeoff")
+
+
+def test_a_controller_that_comes_back_within_three_seconds_goes_on(network):
+    network.kill("controller")
+    network.advance(2.8)
+    assert network.last("/in_flight_state") == "flying"
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.02)
+    network.start("controller", ControllerNode())
+    network.advance(2.0)
+    assert network.last("/in_flight_status") == "flying"
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.02)
+
+
+def test_an_estimator_that_comes_back_in_time_goes_on(network):
+    network.vehicle_node.sees = False
+    network.advance(1.5)
+    network.vehicle_node.sees = True
+    network.advance(2.0)
+    assert network.last("/in_flight_state") == "flying"
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_backlog_of_states_is_no_touchdown(network):
+    """A state near the ground that was measured long ago does not stop the motors."""
+    network.kill("controller")
+    network.advance_until(lambda: "sinking" in network.last("/in_flight_filter"))
+    network.vehicle_node.sees = False
+    for _ in range(20):
+        old = state(0.0)
+        old.header.stamp = network.process("filter").clock.stamp(network.time - 2.0)
+        network.process("filter").publish("/state", old)
+        network.advance(0.05)
+    assert thrusts(network)[-1] > 5.0
+    assert network.vehicle.z > 0.3
+    until_on_ground(network)
+    assert network.vehicle.touchdown_speed < 1.2
+
+
+def test_a_filter_that_is_to_hold_at_once_flies_all_the_same():
+    network = HoverNetwork(SERVER, {"loss/hold_after": 0.0})
+    network.take_off()
+    network.advance(5.0)
+    assert network.last("/in_flight_state") == "flying"
+    assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
+    figures = network.process("filter").published("/diagnostics")[-1].status[0].values
+    assert {each.key: each.value for each in figures}["takeovers"] == "0"
 
 
 def test_a_frozen_controller_keeps_takeoff_refused_until_it_speaks(network):
@@ -114,7 +160,7 @@ def test_a_server_that_starts_during_the_descent_leaves_it_alone(network):
 
 def test_a_filter_that_dies_in_its_descent_leaves_a_landing(network):
     network.kill("controller")
-    network.advance(1.0)
+    network.advance(4.0)
     assert network.last("/in_flight_state") == "landing"
     network.kill("filter")
     network.advance(0.3)

@@ -56,6 +56,11 @@ def test_contract_with_toggles(process):
     process.publish("/control/lqr", control(2.0))
     assert thrusts(process) == [1.0, 10.0, 10.0]
     process.advance(0.505)
+    # A takeoff control that is late is not kept above hover.
+    faded = thrusts(process)[3:]
+    assert faded == sorted(faded, reverse=True)
+    assert faded[-1] == pytest.approx(9.81)
+    del process.published("/control/final")[3:]
     process.publish("/control/lqr", control(3.0))
     process.publish("/in_flight", Empty())
     process.publish("/control/takeoff", control(11.0))
@@ -92,7 +97,7 @@ def test_a_takeoff_control_that_is_not_finite_does_not_keep_the_controller_out(p
     process.publish("/control/takeoff", control(math.nan))
     process.advance(0.105)
     process.publish("/control/lqr", control(2.0))
-    assert thrusts(process) == [10.0, 2.0]
+    assert (thrusts(process)[0], thrusts(process)[-1]) == (10.0, 2.0)
 
 
 def test_listens_at_first():
@@ -119,8 +124,8 @@ def test_a_word_that_is_no_flight_state_is_ignored(process):
     process.publish("/in_flight_state", String("flying"))
     process.publish("/in_flight_state", String("asleep"))
     process.publish("/control/takeoff", control(1.0))
-    process.publish("/control/lqr", control(2.0))
-    assert thrusts(process) == [1.0, 2.0]
+    process.publish("/control/lqr", control(5.0))
+    assert thrusts(process) == [1.0, 5.0]
     assert "asleep" in process.logged("warn")[0]
     assert memory(process) == ["unknown", "flying"]
 

@@ -10,6 +10,10 @@ leave the rest to the attitude loops (MAX_THRUST of crtp_commander_rpyt.c)."""
 MAX_TILT = 0.2618
 """Largest roll and pitch that controllers ask for, rad (15 degrees)."""
 
+MAX_YAW_RATE = 3.4907
+"""Most yaw rate of a control, rad/s (200 degrees/s), as of crazyflie_controller and of
+teleoperation."""
+
 CRASH_TILT = 1.0472
 """A vehicle that is tilted more than this, rad (60 degrees), has crashed or is about to."""
 

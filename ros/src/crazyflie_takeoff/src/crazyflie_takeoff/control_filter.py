@@ -60,6 +60,10 @@ class ControlFilter(Generic[Control]):
             return age > tolerance
         return not self.is_on_ground and age > TAKEOFF_CONTROL_LIMIT
 
+    def takeoff_age(self, time: float) -> float:
+        """Return how old the last takeoff control is at ``time``, s; infinite without one."""
+        return math.inf if self._takeoff_control is None else time - self._takeoff_time
+
     @property
     def is_on_ground(self) -> bool:
         """Whether nothing says that the vehicle is off the ground."""

@@ -2,7 +2,7 @@
 
 import math
 
-from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.limits import NO_BOX, Box
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameter_types import METRES, TOPIC
 from crazyflie_utils.parameters import group
@@ -36,12 +36,21 @@ class FlightTopicParameters(Parameters):
         TOPIC, "by default the name of in_flight + `_controller`", None, "topics/controller"
     )
 
+    box_topic: str | None = parameter(
+        TOPIC,
+        "the geofence's live parameters, of which the box counts in the place of box/min and "
+        "box/max: the name of its node + `/parameter_updates`",
+        None,
+        "topics/box",
+    )
     lower: CornerParameters = group(CornerParameters, "box/min")
     upper: CornerParameters = group(CornerParameters, "box/max")
 
     @property
     def box(self) -> Box:
-        """The geofence."""
+        """The geofence's box at the start; with `box_topic` there is none until that tells."""
+        if self.box_topic is not None:
+            return NO_BOX
         return Box(self.lower.vector(-math.inf), self.upper.vector(math.inf))
 
     @property

@@ -3,11 +3,10 @@
 import math
 from dataclasses import dataclass
 
+from crazyflie_takeoff.motion import FRESHNESS
+
 PERSISTENCE = 0.1
 """How long a limit has to be exceeded, s: a single measurement that is wrong is no crash."""
-
-FRESHNESS = 0.2
-"""A measurement that is older does not count, s."""
 
 
 @dataclass(frozen=True)
@@ -28,6 +27,13 @@ class Box:
         axes = zip(position, self.lower, self.upper, strict=True)
         return max(max(low - x, x - high) for x, low, high in axes)
 
+    def without_floor(self) -> "Box":
+        """Return the box open below: a takeoff begins below many a fence."""
+        return Box((*self.lower[:2], -math.inf), self.upper)
+
+
+NO_BOX = Box((-math.inf,) * 3, (math.inf,) * 3)
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -36,22 +42,61 @@ class Limits:
     Attributes
     ----------
     box : Box
+        At the beginning.
     outside : float
         How far outside the box is too far, m.
     floor : float
         Lowest z, m, fixed frame.
+    climb : float
+        Most z_dot that controls are obeyed for, m/s.
+    height : float
+        The same for the height above the ground, m.
     """
 
     box: Box
     outside: float
     floor: float
+    climb: float = 3.0
+    height: float = 10.0
 
-    def of_position(self, position: tuple[float, ...]) -> str:
-        """Return in words what is wrong with a position (m); nothing if nothing is."""
-        if position[2] < self.floor:
+
+class Walls:
+    """The box, which may change in flight, and what lies outside of it.
+
+    A vehicle that new walls leave outside may come back: as far outside as it was is not too far.
+
+    Parameters
+    ----------
+    limits : Limits
+    """
+
+    def __init__(self, limits: Limits):
+        self._limits = limits
+        self._box = limits.box
+        self._granted = 0.0
+        self._position: tuple[float, ...] | None = None
+
+    def change(self, box: Box) -> None:
+        """Take another box."""
+        self._box = box
+        if self._position is not None:
+            self._granted = max(box.excess(self._position), 0.0)
+
+    def complaint(self, position: tuple[float, ...]) -> str:
+        """Return in words what is wrong with a measured position (m); nothing if nothing is."""
+        self._position = position
+        if position[2] < self._limits.floor:
             return f"{-position[2]:.2f} m below the ground"
-        excess = self.box.excess(position)
-        return f"{excess:.2f} m outside the geofence" if excess > self.outside else ""
+        excess = self._box.excess(position)
+        self._granted = max(min(self._granted, excess), 0.0)
+        too_far = excess > self._limits.outside + self._granted
+        return f"{excess:.2f} m outside the geofence" if too_far else ""
+
+    def highest(self, ground: float) -> float:
+        """Return the z that controls may climb to, m, above a ground at z = ``ground`` (m)."""
+        # The fence, which leaves the vehicle a little room above the wall, comes first.
+        ceiling = self._box.upper[2] + 0.5 * self._limits.outside
+        return min(ground + self._limits.height, ceiling)
 
 
 class Persistence:
@@ -67,10 +112,10 @@ class Persistence:
         """Whether the latest measurement was wrong."""
         return bool(self._text)
 
-    def measure(self, text: str) -> None:
-        """Take what is wrong by the latest measurement, or an empty text."""
+    def measure(self, text: str, age: float = 0.0) -> None:
+        """Take what is wrong by the latest measurement, ``age`` s old, or an empty text."""
         self._text = text
-        self._age = 0.0
+        self._age = age
 
     def advance(self, step: float) -> str:
         """Let time pass (s); return what has been wrong for `PERSISTENCE`, or an empty text."""

@@ -1,17 +1,24 @@
 """What the control filter flies by itself when no control comes.
 
-The attitude is level and the yaw rate zero. The thrust is that of hover, as learned in flight,
-corrected such that the vertical speed follows a target: zero while the filter waits for the
-controller, then slowly more and more downwards. The speed is measured, or, when no state comes
-either, dead-reckoned from the last one by z'' = thrust - hover thrust. So a vehicle that was
-climbing when its pose was lost is stopped first; and one whose hover thrust is off by
+The thrust is that of hover, as learned in flight, corrected such that the vertical speed follows a
+target: what leads back to the height at which the filter took over while it waits for the
+controller, then slowly more and more downwards. Roll and pitch keep the vehicle at its place; the
+yaw rate is zero. When no state comes, either, the velocity is dead-reckoned from the last one, by
+z'' = thrust - hover thrust and by the tilt, and led to zero; the tilt then ends level. So a vehicle
+that was moving when its pose was lost is stopped first; and one whose hover thrust is off by
 less than `SINK_RATE` comes down all the same.
 """
 
 import math
 from typing import NamedTuple
 
+from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.motion import Motion
+
+LONGEST_STEP = 0.05
+"""More time than this never passes between two ticks, s: after a clock was set, or the process
+was stopped for a while, nobody has been silent for as long as it seems."""
 
 HOVER_RANGE = 0.25
 """How far the hover thrust may be from g, as a fraction."""
@@ -30,7 +37,33 @@ SETTLING = 0.3
 """Time constant at which the speed follows its target, s."""
 
 MAX_CORRECTION = 0.2 * GRAVITY
-"""Most that the thrust differs from hover, m/s^2."""
+"""Most that the thrust exceeds hover, m/s^2."""
+
+MAX_BRAKING = 0.4 * GRAVITY
+"""The same below hover, which ends a climb, m/s^2."""
+
+POSITION_GAIN = 0.25 * GRAVITY
+"""Of the place, 1/s^2: 0.25 rad/m, as the softer gains (K_manual.txt) have it."""
+
+VELOCITY_GAIN = 0.3 * GRAVITY
+"""Of the velocity, 1/s: 0.3 rad/(m/s), which damps `POSITION_GAIN` critically. The softer gains
+have more, which a noisy velocity would turn into tilt."""
+
+MAX_DISTANCE = 0.5
+"""The place is no further away than this for the purpose of the control, m: so the vehicle moves
+towards it at 0.4 m/s at most."""
+
+MAX_SAFE_TILT = 0.15
+"""Most roll and pitch of the filter's own, rad."""
+
+STOPPING_TIME = 0.5
+"""The place to keep is where a vehicle gets in this time with the speed that it has, s."""
+
+HEIGHT_GAIN = 1.0
+"""Target speed over height error, 1/s,"""
+
+MAX_HEIGHT_SPEED = 0.3
+"""which is at most this, m/s."""
 
 MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY
 """Most thrust that the filter gives by itself, m/s^2."""
@@ -71,7 +104,7 @@ class HoverThrust:
     @property
     def value(self) -> float:
         """m/s^2, within `HOVER_RANGE` of g."""
-        return _limited(self._thrust - self._acceleration, HOVER_RANGE * GRAVITY, GRAVITY)
+        return limited(self._thrust - self._acceleration, HOVER_RANGE * GRAVITY, GRAVITY)
 
     def update(self, step: float, control: Setpoint, speed: float | None) -> None:
         """Take a control that flies the vehicle.
@@ -95,42 +128,103 @@ class HoverThrust:
 
 
 class SafeControl:
-    """Hover and descent without a controller.
+    """Hover at a place, and descent, without a controller.
 
     Parameters
     ----------
     hover : float
         Thrust of hover, m/s^2.
-    speed : float
-        z_dot at the beginning, m/s; 0 if it is not known.
+    motion : Motion or None
+        Before the beginning; None if it is not known.
+    age : float
+        How long before, s.
+    control : Setpoint
+        What was flown since.
     """
 
-    def __init__(self, hover: float, speed: float):
+    def __init__(
+        self,
+        hover: float,
+        motion: Motion | None,
+        age: float = 0.0,
+        control: Setpoint = MOTORS_OFF,
+    ):
         self._hover = hover
-        self._speed = speed
+        self._control = control
+        self._velocity = (0.0, 0.0, 0.0) if motion is None else motion.velocity
+        self._yaw = 0.0 if motion is None else motion.yaw
+        self._place: tuple[float, float, float] | None = None
         self._target = 0.0
+        if motion is not None:
+            self._reckon(age)
 
-    def advance(self, step: float, measured: float | None, sinks: bool) -> Setpoint:
-        """Return the control of the next ``step`` (s).
+    @property
+    def climb(self) -> float:
+        """z_dot, measured or reckoned, m/s."""
+        return self._velocity[2]
+
+    def advance(self, step: float, measured: Motion | None, sinks: bool) -> Setpoint:
+        """Return the next control.
 
         Parameters
         ----------
         step : float
-        measured : float or None
-            z_dot, m/s.
+            Since the last one, s.
+        measured : Motion or None
         sinks : bool
             Whether the vehicle is to come down.
         """
-        if measured is not None:
-            self._speed = measured
+        self._reckon(step)
+        offset = self._offset(measured)
         if sinks:
             lowest = -math.inf if measured is None else -SINK_SPEED
-            self._target = max(self._target - SINK_RATE * step, lowest)
-        correction = _limited((self._target - self._speed) / SETTLING, MAX_CORRECTION)
+            self._target = max(self._target - SINK_RATE * min(step, LONGEST_STEP), lowest)
+        else:
+            self._target = limited(HEIGHT_GAIN * offset[2], MAX_HEIGHT_SPEED)
+        x, y = (
+            POSITION_GAIN * limited(distance, MAX_DISTANCE) - VELOCITY_GAIN * speed
+            for distance, speed in zip(offset[:2], self._velocity[:2], strict=True)
+        )
+        forward, left = rotate_by_yaw(x, y, -self._yaw)
+        pitch = limited(math.atan(forward / GRAVITY), MAX_SAFE_TILT)
+        roll = limited(-math.atan(left / GRAVITY), MAX_SAFE_TILT)
+        correction = (self._target - self._velocity[2]) / SETTLING
+        correction = min(max(correction, -MAX_BRAKING), MAX_CORRECTION)
         thrust = min(self._hover + correction, MAX_SUBSTITUTE)
-        self._speed += (thrust - self._hover) * step
-        return Setpoint(0.0, 0.0, 0.0, thrust)
+        self._control = Setpoint(roll, pitch, 0.0, thrust)
+        return self._control
+
+    def _offset(self, measured):
+        """Return where the place is, seen from the vehicle, m; zero while that is not known."""
+        if measured is None:
+            self._place = None
+            return 0.0, 0.0, 0.0
+        self._velocity, self._yaw = measured.velocity, measured.yaw
+        if self._place is None:
+            self._place = tuple(
+                x + STOPPING_TIME * v
+                for x, v in zip(measured.position, measured.velocity, strict=True)
+            )
+        return tuple(to - at for to, at in zip(self._place, measured.position, strict=True))
+
+    def _reckon(self, step):
+        if step <= 0.0:
+            return
+        roll, pitch, _, thrust = self._control
+        x, y = rotate_by_yaw(GRAVITY * math.tan(pitch), -GRAVITY * math.tan(roll), self._yaw)
+        acceleration = (x, y, thrust - self._hover)
+        self._velocity = tuple(
+            v + step * a for v, a in zip(self._velocity, acceleration, strict=True)
+        )
 
 
-def _limited(value, limit, centre=0.0):
+def descent_time(motion: Motion, ground: float) -> float:
+    """Return how long a descent to z = ``ground`` (m) takes, s; a climb is ended first."""
+    climb = max(motion.velocity[2], 0.0)
+    height = motion.position[2] - ground + 0.5 * climb**2 / MAX_BRAKING
+    return climb / MAX_BRAKING + max(height, 0.0) / SINK_SPEED
+
+
+def limited(value: float, limit: float, centre: float = 0.0) -> float:
+    """Return a value within ``limit`` of ``centre``."""
     return min(max(value, centre - limit), centre + limit)

@@ -1,28 +1,28 @@
 """The control filter with what makes it safe: it is the last one before the vehicle."""
 
-import enum
 import math
-from dataclasses import dataclass
 from typing import Generic
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.control_filter import Control, ControlFilter
+from crazyflie_takeoff.control_filter import Control
+from crazyflie_takeoff.filter_mode import SHORTEST_HOLD, Mode, Patience
 from crazyflie_takeoff.flight import TOUCHDOWN_HEIGHT
 from crazyflie_takeoff.flight_state import SEPARATOR, FlightState, Takeover
-from crazyflie_takeoff.limits import FRESHNESS, Limits, Persistence
+from crazyflie_takeoff.limits import Box, Limits
+from crazyflie_takeoff.motion import Motion
+from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import (
+    LONGEST_STEP,
     MOTORS_OFF,
     RETURN_TIME,
-    SINK_SPEED,
-    HoverThrust,
     SafeControl,
     Setpoint,
+    descent_time,
 )
 from crazyflie_utils.refusal import RefusalError
 
-LONGEST_STEP = 0.05
-"""More time than this never passes between two ticks, s: after a clock was set, or the process
-was stopped for a while, nobody has been silent for as long as it seems."""
+LAST_STATE = 0.7
+"""A state that is older, s, does not tell how the vehicle moves when the filter takes over."""
 
 STANDING_SPEED = 0.1
 """A vehicle near the ground that sinks slower than this has met it, m/s."""
@@ -33,52 +33,11 @@ LYING_HEIGHT = 0.1
 RESET_DELAY = 2.0
 """How long after the motors were stopped they cannot be released, s: the vehicle may still fall."""
 
-
-class Mode(enum.Enum):
-    """Who has the vehicle.
-
-    PASSING: who publishes controls. HOLDING and SINKING: the filter, until
-    the controller comes back or for good. DOWN: nobody until the next takeoff. EMERGENCY: nobody
-    until the filter is reset.
-    """
-
-    PASSING = enum.auto()
-    HOLDING = enum.auto()
-    SINKING = enum.auto()
-    DOWN = enum.auto()
-    EMERGENCY = enum.auto()
-
-    @property
-    def is_final(self) -> bool:
-        """Whether controls are not passed on any more."""
-        return self in (Mode.SINKING, Mode.DOWN, Mode.EMERGENCY)
-
-
 _TAKEOVERS = {
     Mode.SINKING: Takeover.SINKING,
     Mode.DOWN: Takeover.DOWN,
     Mode.EMERGENCY: Takeover.EMERGENCY,
 }
-
-
-@dataclass(frozen=True)
-class Patience:
-    """How long a filter waits.
-
-    Attributes
-    ----------
-    hold : float
-        For a control in flight, before it takes over, s.
-    recovery : float
-        For the control to come back, before the descent begins, s.
-    descent : float
-        For the touchdown, before it stops the motors, s; and while the height is known, as
-        much longer as the way down takes.
-    """
-
-    hold: float
-    recovery: float
-    descent: float
 
 
 class SafeFilter(Generic[Control]):
@@ -100,23 +59,19 @@ class SafeFilter(Generic[Control]):
         self.takeovers = 0
         self._has_to_look = sees
         self._patience = patience
-        self._limits = limits
-        self._choice: ControlFilter[Control] = ControlFilter()
+        self._hold = max(patience.hold, SHORTEST_HOLD)
+        self._relay: Relay[Control] = Relay(limits, self._hold)
+        self._choice, self._watch = self._relay.choice, self._relay.watch
+        self._measured = self._relay.measured
         self._reason = ""
         self._ticked = math.nan
         self._in_mode = 0.0
         # As if one had just come: a filter that starts in flight is not connected at once.
         self._silence = 0.0
         self._lacks_control = False
-        self._position_limit = Persistence()
-        self._is_tilted = False
-        self._height = self._speed = 0.0
-        self._state_age = math.inf
-        self._ground = 0.0
-        self._hover = HoverThrust()
-        self._commanded_time = math.nan
-        self._safe = SafeControl(self._hover.value, 0.0)
+        self._safe = SafeControl(self._relay.hover, None)
         self._descent_limit = 0.0
+        self._cause = ""
         self._own = MOTORS_OFF
         self._return_age = math.inf
 
@@ -125,12 +80,17 @@ class SafeFilter(Generic[Control]):
     @property
     def hover_thrust(self) -> float:
         """What it has learned about the vehicle, m/s^2."""
-        return self._hover.value
+        return self._relay.hover
 
     @property
     def control_age(self) -> float:
         """How long no commanded control has come, s."""
         return max(self._silence, 0.0)
+
+    @property
+    def longest_gap(self) -> float:
+        """The longest time in which it has lately not run, s."""
+        return self._watch.gaps.longest
 
     @property
     def lacks_control(self) -> bool:
@@ -150,20 +110,26 @@ class SafeFilter(Generic[Control]):
     @property
     def takeover(self) -> Takeover | None:
         """What the server has to know; None while controls are passed on, or will be again."""
-        return _TAKEOVERS.get(self.mode)
+        return Takeover.REFUSING if self._refusal else _TAKEOVERS.get(self.mode)
 
     @property
     def is_calm(self) -> bool:
         """Whether nothing can happen within half the time for which it holds on."""
-        is_heard = self._silence < 0.5 * self._patience.hold or self._is_on_ground
+        is_heard = self._silence < 0.5 * self._hold or self._is_on_ground
         is_settled = self.mode is Mode.PASSING and self._return_age >= RETURN_TIME
-        is_well = not (self._has_to_look or self._is_tilted or self._position_limit.is_wrong)
-        return is_settled and is_heard and is_well
+        return is_settled and is_heard and self._watch.is_calm and not self._has_to_look
 
     @property
     def explanation(self) -> str:
         """Why it is so, to be published behind a word; empty if all is well."""
-        return SEPARATOR + self._reason if self.mode is not Mode.PASSING and self._reason else ""
+        reason = self._refusal or ("" if self.mode is Mode.PASSING else self._reason)
+        return SEPARATOR + reason if reason else ""
+
+    @property
+    def _refusal(self):
+        """Why the vehicle must not take off; empty in flight."""
+        stays = self.mode is Mode.DOWN or (self.mode is Mode.PASSING and self._is_on_ground)
+        return self._watch.contention if stays else ""
 
     # What it is told.
 
@@ -176,17 +142,17 @@ class SafeFilter(Generic[Control]):
         """Take note of the server's flight state."""
         self._choice.set_state(state)
 
-    def set_height(self, position: tuple[float, float, float], speed: float) -> None:
-        """Take a measured position (m) and z_dot (m/s)."""
-        self._height, self._speed = position[2], speed
-        self._state_age = 0.0
-        self._position_limit.measure(self._limits.of_position(position))
-        if self._choice.stands:
-            self._ground = position[2]
+    def set_box(self, box: Box) -> None:
+        """Take another box of the geofence."""
+        self._watch.walls.change(box)
+
+    def measure(self, motion: Motion, age: float = 0.0) -> None:
+        """Take a state that was measured ``age`` s ago."""
+        self._relay.measure(motion, age)
 
     def set_tilted(self, is_tilted: bool) -> None:
         """Take note of whether the vehicle is tilted as only one that crashes is."""
-        self._is_tilted = is_tilted
+        self._watch.is_tilted = is_tilted
 
     def controller_left(self) -> None:
         """Take note that nobody publishes commanded controls: whoever comes next is new."""
@@ -194,24 +160,10 @@ class SafeFilter(Generic[Control]):
 
     # Controls.
 
-    def takeoff(self, time: float, control: Control, thrust: float) -> Control | None:
-        """Return what to pass on when a takeoff control has come; see `ControlFilter.takeoff`."""
-        if self.mode in (Mode.SINKING, Mode.EMERGENCY):
-            return None
-        if self.mode is Mode.DOWN:
-            # That of a landing lifts nothing.
-            if thrust <= GRAVITY:
-                return None
-            self._choice.end_flight()
-        self._enter(Mode.PASSING, "")
-        self._has_to_look = False
-        self._return_age = math.inf
-        return self._choice.takeoff(time, control, thrust)
-
-    def commanded(
-        self, time: float, control: Control, setpoint: Setpoint
+    def takeoff(
+        self, time: float, control: Control, setpoint: Setpoint, caller: str = ""
     ) -> Control | Setpoint | None:
-        """Return what to pass on when a commanded control has come.
+        """Return what to pass on when a takeoff control has come.
 
         Parameters
         ----------
@@ -220,59 +172,106 @@ class SafeFilter(Generic[Control]):
         control : object
         setpoint : Setpoint
             Its numbers.
+        caller : str
+            Name of the node that sent it.
         """
+        self._watch.gaps.run(time)
+        self._watch.hear_takeoff(time, caller, self._is_on_ground)
+        self._land_if_contended()
+        if self.mode in (Mode.SINKING, Mode.EMERGENCY):
+            return None
+        if self._refusal and setpoint.thrust > 0.0:
+            return MOTORS_OFF
+        if self.mode is Mode.DOWN:
+            # That of a landing lifts nothing.
+            if setpoint.thrust <= GRAVITY:
+                return None
+            self._choice.end_flight()
+        self._enter(Mode.PASSING, "")
+        self._has_to_look = False
+        self._return_age = math.inf
+        return self._relay.takeoff(time, control, setpoint)
+
+    def commanded(
+        self,
+        time: float,
+        control: Control,
+        setpoint: Setpoint,
+        caller: str = "",
+        age: float = 0.0,
+    ) -> Control | Setpoint | None:
+        """Return what to pass on when a commanded control has come; see `takeoff`.
+
+        One that is made from data that were measured ``age`` s earlier than usual is as one that
+        came so much earlier.
+        """
+        self._watch.gaps.run(time)
+        self._watch.hear_commanded(time, caller)
         # The next tick adds all of its step.
-        self._silence = -self._step_until(time)
+        self._silence = min(self._silence, age - self._step_until(time))
         self._lacks_control = False
-        chosen = self._choice.commanded(time, control)
+        chosen = self._relay.choose(time, control, setpoint)
         if self._has_to_look and self._choice.in_flight:
             self._look()
-        if self.mode.is_final or (self._has_to_look and self._choice.in_flight):
+        if self.mode.is_final or (self._has_to_look and self._choice.in_flight) or chosen is None:
             return None
         if chosen is not control:
-            return chosen
+            return self._relay.repeated(chosen, time)
+        return self._pass_on(time, control, age) if age < self._hold else None
+
+    def _pass_on(self, time, control, age=0.0):
         if self.mode is Mode.HOLDING:
             self._enter(Mode.PASSING, "")
             self._return_age = 0.0
-        step = time - self._commanded_time
-        if 0.0 < step < 2.0 * self._patience.hold and not self._is_on_ground:
-            self._hover.update(step, setpoint, self._fresh_speed())
-        self._commanded_time = time
+        passed = self._relay.commanded(time, control, age, self._is_on_ground)
         if self._return_age >= RETURN_TIME:
-            return control
-        return self._own.mixed(setpoint, self._return_age / RETURN_TIME)
+            return passed
+        return self._relay.mixed(self._own, self._return_age / RETURN_TIME)
 
-    def stop_listening(self, time: float) -> Control | None:
+    def stop_listening(self, time: float) -> Control | Setpoint | None:
         """Return what to pass on; see `ControlFilter.stop_listening`."""
         self._has_to_look = False
         waiting = self._choice.stop_listening(time)
-        return None if self.mode.is_final else waiting
+        return None if waiting is None or self.mode.is_final else self._pass_on(time, waiting)
 
     def tick(self, time: float) -> Setpoint | None:
         """Let time pass until ``time`` (s); return what to publish, or None."""
         step = self._step_until(time)
+        # Unlike a silence, a state is as old as it seems.
+        elapsed = max(time - self._ticked, 0.0) if self._ticked < math.inf else 0.0
+        self._measured.advance(elapsed)
         self._ticked = time
         self._in_mode += step
         self._silence += step
-        self._state_age += step
         self._return_age += step
-        self._watch_limits(step)
-        is_needed = self._choice.is_controllers(time, self._patience.hold)
-        if self.mode is Mode.PASSING and is_needed and self._silence > self._patience.hold:
+        self._look_after_flight(time, step)
+        is_needed = self._choice.is_controllers(time, self._hold)
+        if self.mode is Mode.PASSING and is_needed and self._silence > self._hold:
             self.takeovers += 1
-            self._safe = SafeControl(self._hover.value, self._speed if self._knows_speed else 0.0)
-            self._enter(Mode.HOLDING, "no control comes, the filter keeps the vehicle level")
+            self._take_over(Mode.HOLDING, "no control comes, the filter keeps the vehicle in place")
         elif self.mode is Mode.HOLDING and not is_needed:
             self._enter(Mode.PASSING, "")
-        elif self.mode is Mode.HOLDING and self._in_mode > self._patience.recovery:
-            self._begin_descent()
+        elif self.mode is Mode.HOLDING and self._has_waited():
+            self._lacks_control = True
+            waited = self._hold + self._in_mode
+            self._sink("no control came", f"no control came for {waited:.1f} s")
         elif self.mode is Mode.SINKING and (reason := self._end_of_descent()):
             self._stop_motors(Mode.DOWN, reason)
         if self.mode in (Mode.HOLDING, Mode.SINKING):
-            sinks = self.mode is Mode.SINKING
-            self._own = self._safe.advance(step, self._fresh_speed(), sinks)
-            return self._own
-        return MOTORS_OFF if self.mode in (Mode.DOWN, Mode.EMERGENCY) else None
+            return self._fly(elapsed)
+        if self.mode is Mode.PASSING:
+            if self._return_age < RETURN_TIME and is_needed and self.longest_gap > self._hold:
+                # The control that has come back may stay the last one for a while.
+                return self._relay.mixed(self._fly(elapsed), self._return_age / RETURN_TIME)
+            return self._relay.late(time, self._silence, is_needed)
+        return MOTORS_OFF
+
+    def _fly(self, elapsed):
+        # The step before it took over is reckoned then; after a longest one the clock was set.
+        step = min(elapsed, LAST_STATE) if self._in_mode > 0.0 else 0.0
+        own = self._safe.advance(step, self._measured.fresh, self.mode is Mode.SINKING)
+        self._own = self._watch.gaps.apply(own, self._relay.hover, self._safe.climb)
+        return self._own
 
     def _step_until(self, time):
         elapsed = time - self._ticked
@@ -280,9 +279,9 @@ class SafeFilter(Generic[Control]):
 
     def _look(self):
         # The filter before this one was gone for too long, if the vehicle lies on the ground.
-        if self._state_age < FRESHNESS:
+        if (motion := self._measured.fresh) is not None:
             self._has_to_look = False
-            if self._height < LYING_HEIGHT:
+            if motion.position[2] < LYING_HEIGHT:
                 self._stop_motors(Mode.DOWN, "the vehicle was on the ground when the filter began")
 
     # The end.
@@ -314,35 +313,52 @@ class SafeFilter(Generic[Control]):
         is_off = self.mode in (Mode.DOWN, Mode.EMERGENCY)
         return is_off or (self.mode is Mode.PASSING and self._choice.is_on_ground)
 
-    @property
-    def _knows_speed(self):
-        # The state stops before the control does: the last one is what there is.
-        return self._state_age < FRESHNESS + self._patience.hold
+    def _look_after_flight(self, time, step):
+        height = self._relay.landing_height if self.mode is Mode.PASSING else None
+        crash, objection = self._watch.advance(time, step, height)
+        if crash and not self._is_on_ground:
+            self.stop(crash)
+        if objection and not self._is_on_ground:
+            self._land(objection)
+        self._land_if_contended()
 
-    def _fresh_speed(self):
-        return self._speed if self._state_age < self._patience.hold else None
+    def _land_if_contended(self):
+        if self._watch.contention and not self._is_on_ground:
+            self._land(self._watch.contention)
 
-    def _watch_limits(self, step):
-        complaint = self._position_limit.advance(step)
-        if self._is_tilted:
-            complaint = "the vehicle has tilted over"
-        if complaint and not self._is_on_ground:
-            self.stop(complaint)
+    def _land(self, reason):
+        if not self.mode.is_final:
+            self._sink(reason, f"{reason}; the filter lands")
 
-    def _begin_descent(self):
-        self._lacks_control = True
+    def _has_waited(self):
+        is_flying = self._choice.remembered is FlightState.FLYING
+        longest = self._patience.place if is_flying else self._patience.recovery
+        blind = min(self._in_mode, self._measured.age)
+        return self._in_mode > longest or blind > self._patience.recovery
+
+    def _sink(self, cause, reason):
+        self._cause = cause
         self._descent_limit = self._patience.descent
-        if self._state_age < FRESHNESS:
-            self._descent_limit += max(self._height - self._ground, 0.0) / SINK_SPEED
-        waited = self._patience.hold + self._patience.recovery
-        self._enter(Mode.SINKING, f"no control came for {waited:g} s")
+        if (motion := self._measured.fresh) is not None:
+            self._descent_limit += descent_time(motion, self._relay.ground)
+        if self.mode is Mode.PASSING:
+            self._take_over(Mode.SINKING, reason)
+        self._enter(Mode.SINKING, reason)
+
+    def _take_over(self, mode, reason):
+        # The state stops before the control does: the last one is what there is.
+        motion, age = self._measured.within(LAST_STATE), self._measured.age
+        self._safe = SafeControl(self._relay.hover, motion, age, self._relay.passed)
+        self._enter(mode, reason)
 
     def _end_of_descent(self):
-        is_low = self._height - self._ground < TOUCHDOWN_HEIGHT
-        if self._state_age < FRESHNESS and is_low and self._speed > -STANDING_SPEED:
-            return "brought down by the filter because no control came"
+        motion = self._measured.fresh
+        if motion is not None:
+            is_low = motion.position[2] - self._relay.ground < TOUCHDOWN_HEIGHT
+            if is_low and motion.velocity[2] > -STANDING_SPEED:
+                return f"brought down by the filter because {self._cause}"
         if self._in_mode > self._descent_limit:
-            return f"motors stopped {self._descent_limit:.1f} s after the controller was lost"
+            return f"motors stopped after {self._descent_limit:.1f} s of descent: {self._cause}"
         return ""
 
     def _stop_motors(self, mode, reason):

@@ -1,7 +1,5 @@
 """ROS interface of the choice between takeoff control and commanded control."""
 
-import math
-
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import Empty as EmptyService
@@ -10,11 +8,14 @@ from typing_extensions import override
 
 from crazyflie_msgs.msg import Control, ControlStamped, PositionVelocityYawStateStamped
 from crazyflie_takeoff import diagnostics
+from crazyflie_takeoff.fence_box import follow_box
+from crazyflie_takeoff.filter_mode import Mode, Patience
 from crazyflie_takeoff.flight_state import COMMANDED, ORIGIN, UNKNOWN, FlightState
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
-from crazyflie_takeoff.limits import Box, Limits
+from crazyflie_takeoff.limits import Limits
+from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import Setpoint
-from crazyflie_takeoff.safe_filter import Mode, Patience, SafeFilter
+from crazyflie_takeoff.safe_filter import SafeFilter
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
 from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
 from crazyflie_utils.refusal import RefusalError
@@ -39,6 +40,13 @@ FRESH_TIME = 5.0
 
 CONTROLLER_POLL_PERIOD = 0.1
 """How often it is looked whether there is a controller, s."""
+
+
+BUSY_GAP = 0.1
+"""A filter that does not run for this long, s, is on a computer that is too busy."""
+
+REPETITION = 10.0
+"""The same warning comes again after this, s, at the earliest."""
 
 
 class TakeoffControlFilterParameters(FlightTopicParameters):
@@ -70,7 +78,13 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         DURATION, "control that is older in flight is replaced", 0.1, "loss/hold_after"
     )
     recovery: float = parameter(
-        DURATION, "how long it may then stay away before the descent", 0.5, "loss/return_limit"
+        DURATION,
+        "how long it may then stay away before the descent, while no state comes, either",
+        1.5,
+        "loss/return_limit",
+    )
+    place: float = parameter(
+        DURATION, "the same in flight while states come", 3.0, "loss/place_limit"
     )
     descent: float = parameter(
         DURATION,
@@ -83,6 +97,15 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
     outside: float = parameter(
         Number("m", minimum=0.0), "further outside the geofence is too far", 0.5, "limits/outside"
     )
+    climb: float = parameter(
+        Number("m/s", above=0.0), "controls do not climb faster", 3.0, "limits/climb"
+    )
+    height: float = parameter(
+        Number("m", above=0.0),
+        "controls do not climb higher above the ground",
+        10.0,
+        "limits/height",
+    )
 
     @property
     def tilted_topic(self) -> str | None:
@@ -92,9 +115,8 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
 
     def limits(self) -> Limits:
         """Return where the motors are stopped."""
-        # A takeoff begins below many a fence; the floor is a limit of its own.
-        lower = (*self.box.lower[:2], -math.inf)
-        return Limits(Box(lower, self.box.upper), self.outside, self.floor)
+        box = self.box.without_floor()
+        return Limits(box, self.outside, self.floor, self.climb, self.height)
 
 
 class TakeoffControlFilterNode(Node):
@@ -107,12 +129,15 @@ class TakeoffControlFilterNode(Node):
         self._logged_explanation = ""
         self._published_controller: bool | None = None
         self._is_fresh = True
+        self._state_delay, self._control_delay = Delay(), Delay()
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = handle.load(TakeoffControlFilterParameters)
         self._parameters = parameters
-        patience = Patience(parameters.hold, parameters.recovery, parameters.descent)
+        patience = Patience(
+            parameters.hold, parameters.recovery, parameters.descent, parameters.place
+        )
         self._filter: SafeFilter[ControlStamped] = SafeFilter(
             patience, parameters.limits(), parameters.state_topic is not None
         )
@@ -133,7 +158,7 @@ class TakeoffControlFilterNode(Node):
         )
         handle.subscribe(parameters.in_flight_topic, Empty, self._on_toggle)
         self._subscribe_measurements(handle)
-        handle.subscribe(
+        self._takeoffs = handle.subscribe(
             parameters.takeoff_control_topic,
             ControlStamped,
             self._on_takeoff_control,
@@ -173,6 +198,8 @@ class TakeoffControlFilterNode(Node):
             )
         if parameters.tilted_topic is not None:
             handle.subscribe(parameters.tilted_topic, Bool, self._on_tilted)
+        if parameters.box_topic is not None:
+            follow_box(handle, parameters.box_topic, self._on_box)
 
     def _register_timers(self, handle):
         self._timer = handle.varying_timer(TIME_STEP, self._on_timer)
@@ -205,21 +232,33 @@ class TakeoffControlFilterNode(Node):
 
     def _on_measured_state(self, message):
         state = message.state
-        self._filter.set_height((state.x, state.y, state.z), state.z_dot)
+        motion = Motion(
+            (state.x, state.y, state.z), (state.x_dot, state.y_dot, state.z_dot), state.yaw
+        )
+        self._filter.measure(motion, self._excess(self._state_delay, message))
+
+    def _excess(self, delay, message):
+        return delay.excess(message.header.stamp.to_sec(), self._handle.nanoseconds() * 1e-9)
+
+    def _on_box(self, box):
+        self._filter.set_box(box.without_floor())
 
     def _on_tilted(self, message):
         self._filter.set_tilted(message.data)
         self._set_pace()
 
     def _on_takeoff_control(self, message):
-        now = self._handle.time()
-        self._publish(self._filter.takeoff(now, message, message.control.thrust))
+        now, caller = self._handle.time(), self._takeoffs.caller(message)
+        chosen = self._filter.takeoff(now, message, _setpoint(message), caller)
+        self._publish(chosen, message.header.stamp)
         self._publish_state()
+        self._set_pace()
 
     def _on_commanded_control(self, message):
-        control = message.control
-        setpoint = Setpoint(control.roll, control.pitch, control.yaw_dot, control.thrust)
-        self._publish(self._filter.commanded(self._handle.time(), message, setpoint))
+        now, caller = self._handle.time(), self._commands.caller(message)
+        age = self._excess(self._control_delay, message)
+        chosen = self._filter.commanded(now, message, _setpoint(message), caller, age)
+        self._publish(chosen, message.header.stamp)
         self._publish_state()
 
     # Emergencies.
@@ -247,7 +286,15 @@ class TakeoffControlFilterNode(Node):
     # What time brings.
 
     def _on_timer(self):
-        self._publish(self._filter.tick(self._handle.time()))
+        self._publish(self._filter.tick(self._handle.time()), self._handle.stamp())
+        gap = self._filter.longest_gap
+        if gap > BUSY_GAP:
+            self._handle.warn(
+                f"this computer is too busy: the filter has not run for {gap:.2f} s; expected "
+                f"every {CALM_TIME_STEP:g} s. Controls are kept near hover meanwhile",
+                throttle=REPETITION,
+                key="busy",
+            )
         self._publish_state()
         self._set_pace()
 
@@ -264,7 +311,7 @@ class TakeoffControlFilterNode(Node):
     def _stop_waiting(self):
         self._listening_timer.stop()
         self._server_timer.stop()
-        self._publish(self._filter.stop_listening(self._handle.time()))
+        self._publish(self._filter.stop_listening(self._handle.time()), self._handle.stamp())
 
     def _end_freshness(self):
         self._fresh_timer.stop()
@@ -273,9 +320,9 @@ class TakeoffControlFilterNode(Node):
 
     # What it says.
 
-    def _publish(self, control):
+    def _publish(self, control, stamp):
         if isinstance(control, Setpoint):
-            control = stamped(ControlStamped, self._handle.stamp(), control=Control(*control))
+            control = stamped(ControlStamped, stamp, control=Control(*control))
         if control is not None:
             self._final.publish(control)
 
@@ -320,3 +367,8 @@ class TakeoffControlFilterNode(Node):
             self._handle, diagnostics.OK if is_good else level, text, figures
         )
         self._diagnostics.publish(report)
+
+
+def _setpoint(message):
+    c = message.control
+    return Setpoint(c.roll, c.pitch, c.yaw_dot, c.thrust)

@@ -18,14 +18,15 @@ from crazyflie_msgs.msg import (
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.battery import Charge
 from crazyflie_takeoff.calls import Calls
+from crazyflie_takeoff.fence_box import follow_box
 from crazyflie_takeoff.filter_report import NO_FILTER, parse
 from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.flight_log import FlightLog
 from crazyflie_takeoff.flight_state import SEPARATOR, FlightState, Takeover
 from crazyflie_takeoff.measured_position import MeasuredPosition
 from crazyflie_takeoff.recovery import recover_state
-from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters
-from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
+from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector, stamped
 
@@ -73,8 +74,11 @@ class TakeoffServerNode(Node):
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(TakeoffServerParameters, self._reconfigure)
         self._battery = self._parameters.battery()
+        self._box = self._parameters.box
 
     def _reconfigure(self, parameters):
+        if complaint := hover_complaint(parameters.hover, self._box):
+            raise ParameterError(complaint)
         self._parameters = parameters
         if self._flight is not None:
             self._flight.plan = parameters.plan()
@@ -96,6 +100,8 @@ class TakeoffServerNode(Node):
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
         handle.subscribe(parameters.filter_state_topic, String, self._on_filter_state)
         handle.subscribe(parameters.controller_topic, Bool, self._on_controller)
+        if parameters.box_topic is not None:
+            follow_box(handle, parameters.box_topic, self._on_box)
         if parameters.battery_topic is not None:
             handle.subscribe(parameters.battery_topic, Float32, self._on_battery)
         if parameters.state_topic is not None:
@@ -189,6 +195,10 @@ class TakeoffServerNode(Node):
         topic = self._parameters.state_topic
         if self._filter.takeover is Takeover.EMERGENCY:
             return f"emergency, {self._filter.reason}; it has to be reset first"
+        if self._filter.takeover is Takeover.REFUSING:
+            return self._filter.reason
+        if complaint := hover_complaint(self._parameters.hover, self._box):
+            return complaint
         if topic is not None:
             name = self._handle.resolve(topic)
             if reason := self._position.explanation(self._handle.time(), name):
@@ -234,9 +244,12 @@ class TakeoffServerNode(Node):
                 self._calls.fail(why)
             flight.lose()
             return
-        if report.takeover is Takeover.EMERGENCY:
+        if report.takeover in (Takeover.EMERGENCY, Takeover.REFUSING):
             self._calls.fail(why)
         flight.end()
+
+    def _on_box(self, box):
+        self._box = box
 
     def _on_controller(self, message):
         self._has_controller = message.data

@@ -8,6 +8,7 @@ from typing_extensions import override
 from crazyflie_takeoff.battery import Battery
 from crazyflie_takeoff.flight import Plan
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
+from crazyflie_takeoff.limits import Box
 from crazyflie_utils import parameter
 from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
 
@@ -110,12 +111,8 @@ class TakeoffServerParameters(FlightTopicParameters):
 
     @override
     def complaints(self) -> Iterator[str]:
-        excess = self.box.excess(self.hover)
-        if excess > 0.0:
-            yield (
-                f"hover/x, y, z is {self.hover}, {excess:.2f} m outside the geofence; expected a "
-                "point in the box"
-            )
+        if complaint := hover_complaint(self.hover, self.box):
+            yield complaint
         if self.battery_critical > self.battery_low:
             yield (
                 f"battery/critical is {self.battery_critical:g}; expected at most battery/low, "
@@ -144,3 +141,14 @@ class TakeoffServerParameters(FlightTopicParameters):
     def battery(self) -> Battery:
         """Return what judges the battery."""
         return Battery(self.battery_low, self.battery_critical, self.battery_duration)
+
+
+def hover_complaint(hover: tuple[float, float, float], box: Box) -> str:
+    """Return in words what is wrong with a hover point (m) in a box; empty if nothing is."""
+    excess = box.excess(hover)
+    if excess <= 0.0:
+        return ""
+    return (
+        f"hover/x, y, z is {hover}, {excess:.2f} m outside the geofence; expected a point in the "
+        "box"
+    )

@@ -1,0 +1,162 @@
+"""Whole flights in a fence whose box changes: every node in a fake process of its own."""
+
+from pathlib import Path
+
+import pytest
+import rospkg
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
+from std_srvs.srv import EmptyRequest
+
+from crazyflie_dev.launch_files import composed_nodes, expand
+from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.testing import FakeGraph
+
+LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/sw_geofence.launch"
+FILTER, FENCE = "/takeoff_control_filter", "/geofence"
+
+
+class FencedFlight:
+    """sw_geofence.launch, without a master."""
+
+    def __init__(self, **arguments):
+        _, parameters = expand(LAUNCH, composed=True, rviz=False, simulator_dt=0.005, **arguments)
+        self.classes = NodeClasses()(composed_nodes(parameters))
+        self.graph = FakeGraph(parameters)
+        self.texts = {}
+        self.position = (0.0, 0.0, 0.0)
+        self.last = None
+        self.graph.listen("/tf", self._on_tf)
+        self.graph.listen("/control/final", lambda message: setattr(self, "last", message.control))
+        for topic in ("/in_flight_state", "/in_flight_filter", "/in_flight_status"):
+            self.graph.listen(topic, lambda message, topic=topic: self._note(topic, message))
+        for name in self.classes:
+            self.start(f"/{name}")
+        self.graph.advance(2.0)
+
+    def _on_tf(self, message):
+        p = message.transforms[0].transform.translation
+        self.position = (p.x, p.y, p.z)
+
+    def _note(self, topic, message):
+        self.texts[topic] = message.data
+
+    def start(self, name):
+        self.graph.start(name, self.classes[name[1:]]())
+
+    def take_off(self):
+        outcome = self.graph.call("/takeoff", EmptyRequest())
+        self.graph.advance(8.0)
+        assert outcome.result(0) is not None
+
+    def refer(self, x, y, z):
+        message = PositionVelocityStateStamped()
+        message.header.stamp = self.graph.stamp()
+        message.state.x, message.state.y, message.state.z = x, y, z
+        self.graph.publish("/ref", message)
+
+    def change(self, node=FENCE, **values):
+        """Change parameters as dynamic_reconfigure does; `box_max_x` is box/max/x."""
+        names = {name.replace("_", "/"): value for name, value in values.items()}
+        request = ReconfigureRequest(encode_config(names))
+        return self.graph.call(f"{node}/set_parameters", request).result(0)
+
+    @property
+    def flies(self):
+        return self.texts["/in_flight_state"] == "flying" and self.last.thrust > 4.0
+
+
+@pytest.fixture
+def flight():
+    flight = FencedFlight()
+    flight.take_off()
+    return flight
+
+
+def test_a_box_that_is_enlarged_in_flight_is_enlarged_for_all(flight):
+    """5 m away the vehicle is outside of the box of the launch, and of half a metre more."""
+    flight.change(box_max_x=8.0)
+    flight.refer(5.0, 0.0, 1.0)
+    flight.graph.advance(15.0)
+    assert flight.position[0] == pytest.approx(5.0, abs=0.1)
+    assert flight.flies
+    # A filter that is started anew there is told of the present box.
+    flight.graph.kill(FILTER)
+    flight.graph.advance(0.3)
+    flight.start(FILTER)
+    flight.graph.advance(3.0)
+    assert flight.flies
+    landing = flight.graph.call("/land", EmptyRequest())
+    flight.graph.advance(10.0)
+    assert landing.result(0) is not None
+    assert flight.texts["/in_flight_state"] == "on_ground"
+
+
+def test_a_fence_that_is_started_anew_has_the_box_that_it_had(flight):
+    flight.change(box_max_x=8.0)
+    flight.refer(5.0, 0.0, 1.0)
+    flight.graph.advance(15.0)
+    flight.graph.kill(FENCE)
+    flight.graph.advance(1.0)
+    flight.start(FENCE)
+    flight.graph.advance(3.0)
+    assert flight.flies
+
+
+def test_a_box_that_leaves_the_vehicle_outside_brings_it_back_in(flight):
+    flight.refer(1.0, 0.0, 1.0)
+    flight.graph.advance(8.0)
+    flight.change(box_min_x=-3.0, box_max_x=-1.0)
+    flight.graph.advance(15.0)
+    assert flight.flies
+    assert -3.0 < flight.position[0] < -1.0
+    # From then on it is a wall as any.
+    flight.graph.kill("/control_merger")
+    flight.graph.kill(FENCE)
+    flight.graph.advance(0.05)
+    flight.graph.faults["/state"] = _shifted(2.0)
+    flight.graph.advance(0.3)
+    assert "outside the geofence" in flight.texts["/in_flight_filter"]
+
+
+def _shifted(x):
+    def change(message):
+        message.state.x += x
+        return [message]
+
+    return change
+
+
+def test_far_outside_the_present_box_the_motors_are_stopped(flight):
+    flight.change(box_max_x=8.0)
+    flight.graph.advance(0.5)
+    flight.graph.faults["/state"] = _shifted(8.4)
+    flight.graph.advance(0.5)
+    assert flight.last.thrust > 4.0
+    flight.graph.faults["/state"] = _shifted(9.5)
+    flight.graph.advance(0.5)
+    assert flight.last.thrust == 0.0
+    assert "m outside the geofence" in flight.texts["/in_flight_filter"]
+
+
+def test_the_hover_point_has_to_be_in_the_present_box():
+    flight = FencedFlight()
+    with pytest.raises(ServiceError, match="outside the geofence"):
+        flight.change("/takeoff_server", hover_x=3.0)
+    flight.change(box_min_x=1.0, box_max_x=5.0)
+    flight.graph.advance(1.0)
+    with pytest.raises(ServiceError, match=r"hover/x, y, z is .* 1.00 m outside the geofence"):
+        flight.graph.call("/takeoff", EmptyRequest()).result(0)
+    assert "outside the geofence" in flight.texts["/in_flight_status"]
+    flight.change("/takeoff_server", hover_x=3.0)
+
+
+def test_a_fence_that_is_switched_off_has_no_box():
+    flight = FencedFlight(merger_mode="LQR")
+    flight.take_off()
+    flight.refer(3.0, 0.0, 1.0)
+    flight.graph.advance(12.0)
+    assert flight.position[0] == pytest.approx(3.0, abs=0.1)
+    assert flight.flies

@@ -1,0 +1,70 @@
+"""Notices when two nodes publish controls on one topic."""
+
+import math
+from collections import deque
+
+OVERLAP = 0.5
+"""A node that takes the place of one that was heard less than this before, s, overlaps with it."""
+
+MEMORY = 5.0
+"""An overlap is forgotten after this, s."""
+
+
+class Callers:
+    """The nodes that publish on one topic.
+
+    A node that ends and another one that takes its place, or the same that is started again, are no
+    two publishers: only changes count at which the former one has been heard a moment before.
+
+    Parameters
+    ----------
+    what : str
+        What they publish, in plural.
+    tolerance : int
+        So many such changes within `MEMORY` are a handover.
+    """
+
+    def __init__(self, what: str, tolerance: int):
+        self._what = what
+        self._tolerance = tolerance
+        self._now = -math.inf
+        self._last: tuple[str, float] | None = None
+        self._former = ""
+        self._changes: deque[float] = deque(maxlen=tolerance + 1)
+
+    def hear(self, time: float, caller: str, overlap: float = OVERLAP) -> None:
+        """Take note of a message.
+
+        Parameters
+        ----------
+        time : float
+            Now, s.
+        caller : str
+            Name of the node; empty for one of this process.
+        overlap : float, optional
+            See `OVERLAP`, s.
+        """
+        self.advance(time)
+        if self._last is not None and caller != self._last[0]:
+            self._former, heard = self._last
+            if time - heard < overlap:
+                self._changes.append(time)
+        self._last = (caller, time)
+
+    def advance(self, time: float) -> None:
+        """Let time pass until ``time`` (s)."""
+        if time < self._now:
+            # The clock was reset.
+            self._changes.clear()
+            self._last = None if self._last is None else (self._last[0], time)
+        self._now = time
+        while self._changes and time - self._changes[0] > MEMORY:
+            self._changes.popleft()
+
+    @property
+    def complaint(self) -> str:
+        """In words, that there are two; empty if there are not."""
+        if self._last is None or len(self._changes) <= self._tolerance:
+            return ""
+        names = sorted(each or "one of this process" for each in (self._former, self._last[0]))
+        return f"two nodes publish {self._what}, {' and '.join(names)}; expected one"

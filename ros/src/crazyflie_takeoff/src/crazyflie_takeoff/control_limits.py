@@ -1,0 +1,163 @@
+"""What a control may ask of the vehicle, whoever has made it."""
+
+import math
+
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
+from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.motion import Motion
+from crazyflie_takeoff.safe_control import Setpoint, limited
+
+CLIMB_RESPONSE = 0.1
+"""Time constant at which a climb approaches its limit, s."""
+
+CLIMB_BRAKING = 4.0
+"""Deceleration below the highest place, m/s^2."""
+
+RETURN_RATE = 0.5
+"""At which a vehicle above the highest place comes back, 1/s."""
+
+LANDING_CLIMB = 0.5
+"""Climb of a vehicle that is to land, m/s."""
+
+CLIMB_PATIENCE = 2.0
+"""Controls that ask for too much climb for longer than this are not obeyed any more, s."""
+
+MAX_SPEED_CHANGE = 0.5
+"""By which a control may change the speed while the filter does not run, m/s."""
+
+LONGEST_GAP = 1.0
+"""Of a filter that runs, s; a clock that steps further was set."""
+
+GAP_MEMORY = 2.0
+"""Time constant with which a gap is forgotten, s."""
+
+
+def in_range(control: Setpoint, lowest: float) -> Setpoint:
+    """Return a control with roll, pitch, yaw rate and thrust within their ranges.
+
+    Parameters
+    ----------
+    control : Setpoint
+        Finite.
+    lowest : float
+        Least thrust, m/s^2: `MIN_THRUST` in flight.
+    """
+    return Setpoint(
+        limited(control.roll, MAX_TILT),
+        limited(control.pitch, MAX_TILT),
+        limited(control.yaw_dot, MAX_YAW_RATE),
+        min(max(control.thrust, lowest), MAX_THRUST),
+    )
+
+
+class ClimbLimit:
+    """Lowers the thrust of a vehicle that would climb too fast, or too high.
+
+    The speed is led to what is allowed at the height, which is at most the limit, and little enough
+    to stop below the highest place with `CLIMB_BRAKING`.
+
+    Parameters
+    ----------
+    climb : float
+        Most z_dot, m/s.
+    """
+
+    def __init__(self, climb: float):
+        self._climb = climb
+        self._complaint = ""
+        self._lasted = 0.0
+
+    def apply(
+        self,
+        thrust: float,
+        hover: float,
+        motion: Motion | None,
+        highest: float,
+        is_landing: bool,
+    ) -> float:
+        """Return the thrust that is passed on, m/s^2.
+
+        Parameters
+        ----------
+        thrust, hover : float
+            What is asked for, and what carries the weight, m/s^2.
+        motion : Motion or None
+            None when it is not known.
+        highest : float
+            z that is not to be exceeded, m.
+        is_landing : bool
+            Whether the vehicle is to come down.
+        """
+        self._complaint = ""
+        if motion is None:
+            return thrust
+        climb = LANDING_CLIMB if is_landing else self._climb
+        left = highest - motion.position[2]
+        allowed = math.sqrt(2.0 * CLIMB_BRAKING * left) if left > 0.0 else RETURN_RATE * left
+        most = hover + (min(climb, allowed) - motion.velocity[2]) / CLIMB_RESPONSE
+        if thrust <= max(most, MIN_THRUST):
+            return thrust
+        if not is_landing:
+            self._complaint = (
+                f"the controls climb beyond {highest:.2f} m"
+                if allowed < climb
+                else f"the controls climb faster than {climb:g} m/s"
+            )
+        return max(most, MIN_THRUST)
+
+    def advance(self, step: float) -> str:
+        """Let time pass (s); return what has been asked for too long, or an empty text."""
+        self._lasted = self._lasted + step if self._complaint else 0.0
+        return self._complaint if self._lasted > CLIMB_PATIENCE else ""
+
+
+class RunGaps:
+    """How long the filter does not run, as on a computer that is too busy.
+
+    The vehicle keeps its last control meanwhile. So the longer the gaps, the less may a control
+    differ from hover: `MAX_SPEED_CHANGE` divided by the longest gap of the last seconds.
+    """
+
+    def __init__(self) -> None:
+        self._time = math.nan
+        self._longest = 0.0
+
+    @property
+    def longest(self) -> float:
+        """Of the last seconds, s."""
+        return self._longest
+
+    def run(self, time: float) -> None:
+        """Take note that the filter runs at ``time`` (s)."""
+        gap = time - self._time
+        self._time = time
+        if gap > 0.0:
+            remembered = self._longest * math.exp(-gap / GAP_MEMORY)
+            self._longest = max(remembered, min(gap, LONGEST_GAP))
+
+    def apply(
+        self, control: Setpoint, hover: float, climb: float = 0.0, is_ramp: bool = False
+    ) -> Setpoint:
+        """Return what is passed on of a control.
+
+        Parameters
+        ----------
+        control : Setpoint
+        hover : float
+            Thrust of hover, m/s^2.
+        climb : float
+            z_dot, m/s, which may be ended within a gap; 0 if it is not known.
+        is_ramp : bool
+            Whether it may be of a landing's ramp: then only what is above hover is limited.
+        """
+        if self._longest <= 0.0:
+            return control
+        tilt = math.atan(MAX_SPEED_CHANGE / self._longest / GRAVITY)
+        most = hover + (MAX_SPEED_CHANGE + max(-climb, 0.0)) / self._longest
+        least = hover - (MAX_SPEED_CHANGE + max(climb, 0.0)) / self._longest
+        return Setpoint(
+            limited(control.roll, tilt),
+            limited(control.pitch, tilt),
+            control.yaw_dot,
+            min(max(control.thrust, -math.inf if is_ramp else least), most),
+        )

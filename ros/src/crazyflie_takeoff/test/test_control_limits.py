@@ -1,0 +1,155 @@
+"""What a filter passes on of a control, and of whose; with a clock moved by hand."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
+from crazyflie_takeoff.callers import MEMORY, Callers
+from crazyflie_takeoff.control_limits import ClimbLimit, RunGaps, in_range
+from crazyflie_takeoff.limits import Box, Limits, Walls
+from crazyflie_takeoff.motion import Delay, Motion
+from crazyflie_takeoff.safe_control import Setpoint
+
+G = 9.81
+ANY = st.floats(allow_nan=False, allow_infinity=False)
+
+
+@given(ANY, ANY, ANY, ANY, st.sampled_from([0.0, MIN_THRUST]))
+def test_any_control_ends_in_range(roll, pitch, yaw_dot, thrust, lowest):
+    result = in_range(Setpoint(roll, pitch, yaw_dot, thrust), lowest)
+    assert max(abs(result.roll), abs(result.pitch)) <= MAX_TILT
+    assert abs(result.yaw_dot) <= MAX_YAW_RATE
+    assert lowest <= result.thrust <= MAX_THRUST
+    assert in_range(result, lowest) == result
+
+
+def test_a_control_within_limits_is_passed_on_by_a_filter_that_runs():
+    gaps = RunGaps()
+    control = Setpoint(MAX_TILT, -MAX_TILT, 3.0, MAX_THRUST)
+    for k in range(1000):
+        # As often as a filter runs that has little to do.
+        gaps.run(0.04 * k)
+        assert gaps.apply(control, G) == control
+
+
+@pytest.mark.parametrize("gap", [0.1, 0.3, 0.6])
+def test_what_is_kept_for_long_changes_the_speed_by_half_a_metre_per_second(gap):
+    gaps = RunGaps()
+    gaps.run(1.0)
+    gaps.run(1.0 + gap)
+    high = gaps.apply(Setpoint(MAX_TILT, 0.0, 0.0, MAX_THRUST), G)
+    low = gaps.apply(Setpoint(-MAX_TILT, 0.0, 0.0, MIN_THRUST), G)
+    assert (high.thrust - G) * gap == pytest.approx(0.5)
+    assert (low.thrust - G) * gap == pytest.approx(-0.5)
+    assert G * math.tan(high.roll) * gap <= 0.5 + 1e-9
+    # The ramp of a landing ends at zero thrust all the same.
+    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, 0.0), G, is_ramp=True).thrust == 0.0
+    for k in range(400):
+        gaps.run(1.0 + gap + 0.01 * (k + 1))
+    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, 14.0), G).thrust == 14.0
+
+
+def climb(limit, z, z_dot, seconds, highest=10.0):
+    """Fly full thrust for a while; return z, z_dot and what is said at last."""
+    said = ""
+    for _ in range(round(seconds * 100)):
+        motion = Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
+        thrust = limit.apply(MAX_THRUST, G, motion, highest, is_landing=False)
+        said = limit.advance(0.01)
+        z_dot += 0.01 * (thrust - G)
+        z += 0.01 * z_dot
+    return z, z_dot, said
+
+
+def test_a_climb_ends_at_its_speed_and_then_at_its_height():
+    limit = ClimbLimit(3.0)
+    z, z_dot, said = climb(limit, 0.0, 0.0, 1.0)
+    assert z_dot == pytest.approx(3.0, abs=0.01)
+    assert said == ""
+    z, z_dot, said = climb(limit, z, z_dot, 5.0)
+    assert (z, z_dot) == (pytest.approx(10.0, abs=0.2), pytest.approx(0.0, abs=0.1))
+    assert said == "the controls climb beyond 10.00 m"
+
+
+def test_a_step_of_three_metres_is_no_climb_to_complain_of():
+    """The steepest that the shipped gains fly: 200 / s^2 and 28.28 / s (K_lqr.txt)."""
+    limit = ClimbLimit(3.0)
+    z = z_dot = 0.0
+    for _ in range(500):
+        thrust = min(max(G + 200.0 * (3.0 - z) - 28.28 * z_dot, MIN_THRUST), MAX_THRUST)
+        motion = Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
+        passed = limit.apply(thrust, G, motion, 10.0, is_landing=False)
+        assert limit.advance(0.01) == ""
+        z_dot += 0.01 * (passed - G)
+        z += 0.01 * z_dot
+    assert z == pytest.approx(3.0, abs=0.01)
+
+
+def test_the_wall_above_counts_before_the_height():
+    walls = Walls(Limits(Box((-1.0,) * 3, (1.0, 1.0, 2.0)), 0.5, -0.5, height=10.0))
+    assert walls.highest(0.0) == 2.25
+    walls.change(Box((-1.0,) * 3, (1.0, 1.0, 30.0)))
+    assert walls.highest(0.5) == 10.5
+
+
+# Callers.
+
+
+@pytest.mark.parametrize("period", [0.01, 0.1, 0.45])
+def test_two_nodes_at_once_are_noticed_and_forgotten(period):
+    callers = Callers("controls", 3)
+    for k in range(10):
+        callers.hear(k * period, "/a")
+        callers.hear(k * period + 0.3 * period, "/b")
+    assert callers.complaint == "two nodes publish controls, /a and /b; expected one"
+    callers.advance(10 * period + MEMORY)
+    assert callers.complaint == ""
+
+
+def test_a_rare_publisher_beside_a_busy_one_is_noticed():
+    callers = Callers("controls", 3)
+    for k in range(300):
+        callers.hear(k / 100, "/busy")
+        if k % 100 == 50:
+            callers.hear(k / 100, "/rare")
+    assert "/busy and /rare" in callers.complaint
+
+
+def test_one_after_the_other_are_not_two():
+    callers = Callers("controls", 3)
+    time = 0.0
+    for name in "abcdefgh":
+        for _ in range(10):
+            callers.hear(time, f"/{name}")
+            time += 0.01
+        time += 0.6
+    assert callers.complaint == ""
+    # Nor is a handover without a gap, or the clock set back.
+    for k, name in enumerate(["/x", "/y", "/x", "/y", "/y"]):
+        callers.hear(time + 0.01 * k, name)
+    assert callers.complaint == ""
+    callers.hear(0.0, "/z")
+    assert callers.complaint == ""
+
+
+# Delays.
+
+
+def test_a_backlog_is_late_and_another_clock_is_not():
+    delay = Delay()
+    for k in range(100):
+        assert delay.excess(1000.0 + 0.01 * k, 0.01 * k) == pytest.approx(0.0, abs=0.01)
+    # 2 s in which nothing is delivered, and then all of it.
+    assert delay.excess(1001.0, 3.0) == pytest.approx(1.8, abs=0.01)
+    assert delay.excess(1002.0, 3.0) == pytest.approx(0.8, abs=0.01)
+    assert delay.excess(1003.0, 3.0) == pytest.approx(0.0, abs=0.01)
+
+
+def test_a_stamp_that_says_nothing_makes_nothing_late():
+    delay = Delay()
+    assert [delay.excess(0.0, time) for time in (1.0, 50.0)] == [0.0, 0.0]
+    assert delay.excess(7.0, 8.0) == 0.0
+    assert delay.excess(7.0, 90.0) == 0.0

@@ -8,7 +8,7 @@ from typing_extensions import override
 
 from crazyflie_lqr.flight_phase import DESCENDING, FLYING, TAKING_OFF, GroundGuess
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
-from crazyflie_lqr.linear_feedback import LinearFeedback
+from crazyflie_lqr.linear_feedback import LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
@@ -104,6 +104,7 @@ class LinearFeedbackNode(Node):
         self._reference = GuardedReference(self.yaw_index, report=self._warn_of_jump)
         self._flight_state: str | None = None
         self._is_flown = False
+        self._clocks_agree = False
         self._ground_guess = GroundGuess()
 
     def complete_reference(self, reference: "NDArray[np.float64]") -> "NDArray[np.float64]":
@@ -215,6 +216,10 @@ class LinearFeedbackNode(Node):
             return
         x = to_tuple(message.state)
         x_ref = self._reference.value(self._handle.time(), x)
+        if x_ref is None and self._flight_state == FLYING:
+            # Started anew in flight; the reference may have been said once, long ago.
+            self._reference.update(at_rest(x, self.yaw_index))
+            x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None:
             return
         if self._flight_state is None:
@@ -232,10 +237,18 @@ class LinearFeedbackNode(Node):
     def _is_old(self, stamp):
         age = self._handle.nanoseconds() * 1e-9 - stamp.to_sec()
         if not self._parameters.max_age < age < _SAME_CLOCK:
+            self._clocks_agree = self._clocks_agree or abs(age) < _SAME_CLOCK
             return False
+        # Clocks that have agreed still do; then a message was late on its way.
+        cause = (
+            "this computer, or the network, is too busy"
+            if self._clocks_agree
+            else "do the machines' clocks agree?"
+        )
         self._handle.warn(
-            f"ignoring a state that is {age:.1f} s old; do the machines' clocks agree?",
-            throttle=1.0,
+            f"ignoring a state that is {age:.1f} s old, expected at most "
+            f"{self._parameters.max_age:g} s; {cause}",
+            throttle=10.0,
             key="old state",
         )
         return True

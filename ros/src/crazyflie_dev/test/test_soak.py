@@ -57,6 +57,44 @@ def test_no_node_that_is_killed_in_hover_makes_the_thrust_jump(name):
     assert run.watch.hardest < 1.0
 
 
+@pytest.mark.parametrize("dynamics", ["near_hover", "quadrotor"])
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_nodes_that_hardly_run_do_not_make_the_vehicle_climb(dynamics, seed):
+    """On a computer that is too busy, nodes run for 20 to 50 ms and stop for 100 to 600 ms."""
+    run = Soak(seed, dynamics=dynamics)
+    graph, random = run.graph, run.random
+    takeoff = graph.call("/takeoff", EmptyRequest())
+    graph.advance(10.0)
+    assert takeoff.done() and takeoff.exception() is None
+    run.watch.highest = -math.inf
+    run.watch.allow(1.0)
+    change = dict.fromkeys(NODES, graph.time)
+    frozen = set()
+    end = graph.time + 10.0
+    while graph.time < end:
+        for name in NODES:
+            if graph.time < change[name]:
+                continue
+            if name in frozen:
+                frozen.remove(name)
+                graph.thaw(name)
+                change[name] = graph.time + random.uniform(0.02, 0.05)
+            else:
+                frozen.add(name)
+                graph.freeze(name)
+                change[name] = graph.time + random.uniform(0.1, 0.6)
+        graph.advance(0.01)
+    assert run.watch.highest < 0.2
+    assert run.watch.hardest < 1.0
+    assert run.watch.distance < 0.5
+    assert any("this computer is too busy" in text for _, text in graph.log)
+    for name in frozen:
+        graph.thaw(name)
+    graph.advance(10.0)
+    assert run.watch.state == "flying"
+    assert run.watch.height == pytest.approx(1.0, abs=0.02)
+
+
 @pytest.fixture
 def watch():
     graph = FakeGraph({})

@@ -22,7 +22,7 @@ from std_srvs.srv import EmptyRequest
 from tqdm import tqdm
 
 from crazyflie_dev.launch_files import composed_nodes, expand
-from crazyflie_dev.soak_faults import EMERGENCY, FAULTS, Fault, Flight, Undo
+from crazyflie_dev.soak_faults import EMERGENCY, FAULTS, STARVATION, Fault, Flight, Undo
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.runtime.runner import NodeClasses
@@ -182,6 +182,7 @@ class _Fault:
             self._watch.may_fall = self._fault.drops
             self._undo = self._fault.begin(self._flight)
             self._watch.is_emergency = self._fault.name == EMERGENCY
+            self._watch.is_starved = self._fault.name == STARVATION
         if self._undo is None or self.is_over:
             return
         self._fault.again(self._flight)

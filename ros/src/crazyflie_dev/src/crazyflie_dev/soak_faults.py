@@ -24,6 +24,7 @@ CONTROLLER, ESTIMATOR, SERVER, FILTER = (
 NODES = (CONTROLLER, ESTIMATOR, SERVER, FILTER)
 
 EMERGENCY = "emergency"
+STARVATION = "this computer is too busy"
 
 _RESPAWN = 1.0
 """From the end of a node until roslaunch has started it anew, s."""
@@ -138,6 +139,39 @@ def _freeze(name: str) -> Callable[[Flight], Undo]:
     return begin
 
 
+class _Starvation:
+    """Nodes that run for 50 ms and then stop for 0.1 to 0.6 s, each at other times than the others.
+
+    So it is on a computer that is too busy.
+    """
+
+    def __init__(self) -> None:
+        self._stopped: dict[str, float] = {}
+
+    def begin(self, flight: Flight) -> Undo:
+        """Begin with all nodes at work."""
+        self._stopped.clear()
+        return lambda: self._thaw(flight, list(self._stopped))
+
+    def again(self, flight: Flight) -> None:
+        """Stop the nodes that have run, and let those go on whose time is up."""
+        now = flight.graph.time
+        over = [name for name, end in self._stopped.items() if now >= end]
+        for name in NODES:
+            if name not in self._stopped and flight.graph.is_alive(name):
+                flight.graph.freeze(name)
+                self._stopped[name] = now + flight.random.uniform(0.1, 0.6)
+        self._thaw(flight, over)
+
+    def _thaw(self, flight, names):
+        for name in names:
+            del self._stopped[name]
+            flight.graph.thaw(name)
+
+
+_starvation = _Starvation()
+
+
 def _nothing(_: Flight) -> Undo:
     return lambda: None
 
@@ -180,6 +214,7 @@ FAULTS = [
         for name in NODES
     ),
     *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER) for name in NODES),
+    Fault(STARVATION, _starvation.begin, 2.0, 12.0, drops=True, again=_starvation.again),
     Fault("references are not finite", _nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
     Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),
     Fault("references are old", _nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),

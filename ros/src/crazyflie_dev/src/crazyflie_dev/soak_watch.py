@@ -21,6 +21,11 @@ DEAF_OVERSHOOT = 0.5
 """The same while nothing passes the last node before the vehicle, which then keeps for 0.5 s
 what it was told last, m."""
 
+STARVED_OVERSHOOT = 2.5
+"""The same while all nodes stop for up to 0.6 s: a first stop in a climb at full thrust, of
+6.2 m/s^2, comes without warning and makes 1.1 m, and ending that climb with 4 m/s^2 1.7 m,
+less what was still to be climbed."""
+
 BLIND_LIMIT = 8.0
 """How long a vehicle may be in the air without a good pose, s: 0.1 s until it is level,
 0.5 s in which the pose may come back, 5 s of descent, and what it falls then."""
@@ -68,6 +73,8 @@ class Watch:
         Whether the vehicle may meet the ground at any speed.
     is_emergency : bool
         Whether motors have to stand still.
+    is_starved : bool
+        Whether all nodes have stopped again and again in this flight.
     height, distance : float
         Of the vehicle now from the ground and from the middle, m.
     state : str
@@ -83,6 +90,7 @@ class Watch:
     may_fly: bool = False
     may_fall: bool = False
     is_emergency: bool = False
+    is_starved: bool = False
     height: float = 0.0
     distance: float = 0.0
     state: str = ""
@@ -106,6 +114,7 @@ class Watch:
         """Begin another flight."""
         self._told.clear()
         self._reference = 0.0
+        self.is_starved = False
 
     def say(self, text: str) -> None:
         """Note a violation; the same one once in a flight."""
@@ -131,7 +140,7 @@ class Watch:
         if height <= 0.001 < before[1][2]:
             self._touch_down(-self._climb)
         self._climb = (height - before[1][2]) / (time - before[0])
-        most = self._reference + (DEAF_OVERSHOOT if self.may_fall else OVERSHOOT)
+        most = self._reference + self._overshoot
         if height > most and self.may_fly:
             self.say(f"too high: {height:.2f} m, reference {self._reference:.2f} m")
         if height > 0.1 and not self.may_fly:
@@ -141,6 +150,12 @@ class Watch:
         if speed > MOST_SPEED and not self.may_fall:
             self.say(f"too fast: {speed:.2f} m/s")
         self._watch_blindness(time, height)
+
+    @property
+    def _overshoot(self):
+        if self.is_starved:
+            return STARVED_OVERSHOOT
+        return DEAF_OVERSHOOT if self.may_fall else OVERSHOOT
 
     def carried(self) -> None:
         """Take note that the vehicle has been put elsewhere."""

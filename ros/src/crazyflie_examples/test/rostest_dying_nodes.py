@@ -10,7 +10,7 @@ import rosgraph
 from crazyflie_dev.flight_operator import ready_operator
 from crazyflie_utils.testing.peer import wait_until
 
-NODES = ("/takeoff_control_filter", "/takeoff_server")
+NODES = ("/takeoff_control_filter", "/takeoff_server", "/lqr_controller", "/state_estimator")
 LOWEST = 0.9
 """The vehicle does not sink below this while a node is missing, m."""
 

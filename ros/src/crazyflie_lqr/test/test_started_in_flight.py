@@ -41,7 +41,10 @@ def test_it_is_silent_without_a_reference_otherwise(process, state):
 
 @pytest.mark.parametrize(
     ("had_fresh_ones", "words"),
-    [(True, "this computer, or the network, is too busy"), (False, "do the machines' clocks agree")],
+    [
+        (True, "this computer, or the network, is too busy"),
+        (False, "do the machines' clocks agree"),
+    ],
 )
 def test_why_states_are_late_is_said_once(process, had_fresh_ones, words):
     refer(process)

@@ -1,0 +1,98 @@
+"""Flies the software example while its nodes get only a share of their time.
+
+Every node is stopped (SIGSTOP) and goes on (SIGCONT) at moments of its own, as on a computer that
+is too busy. The vehicle has to stay near its hover point, or to come down. Run
+``python3 -m crazyflie_dev.starve --share 0.3``.
+"""
+
+import argparse
+import os
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+from random import Random
+from xmlrpc.client import ServerProxy
+
+import rosgraph
+
+from crazyflie_dev.flight_operator import FlightError, FlightOperator
+from crazyflie_dev.launching import roslaunch
+from crazyflie_dev.soak_faults import NODES
+from crazyflie_utils.runtime import runner
+
+HOVER_HEIGHT = 1.0
+"""Of the launch file, m."""
+
+OVERSHOOT = 0.5
+"""How far above it the vehicle may come, m."""
+
+_RUN = 0.035
+"""How long a node runs on average before it is stopped, s."""
+
+
+def process_ids(names: tuple[str, ...]) -> list[int]:
+    """Return the process ids of nodes."""
+    master = rosgraph.Master("/starve")
+    return [ServerProxy(master.lookupNode(name)).getPid("/starve")[2] for name in names]
+
+
+def starve(pids: list[int], share: float, duration: float, seed: int) -> None:
+    """Stop processes at random for ``duration`` (s), such that each has a share of the time."""
+    random = Random(seed)
+    stopped: set[int] = set()
+    changes = dict.fromkeys(pids, 0.0)
+    end = time.monotonic() + duration
+    try:
+        while (now := time.monotonic()) < end:
+            for pid in pids:
+                if now < changes[pid]:
+                    continue
+                if pid in stopped:
+                    stopped.remove(pid)
+                    os.kill(pid, signal.SIGCONT)
+                    pause = _RUN
+                else:
+                    stopped.add(pid)
+                    os.kill(pid, signal.SIGSTOP)
+                    pause = _RUN * (1.0 - share) / share
+                changes[pid] = now + pause * random.uniform(0.5, 1.5)
+            time.sleep(max(min(changes.values()) - time.monotonic(), 0.001))
+    finally:
+        for pid in stopped:
+            os.kill(pid, signal.SIGCONT)
+
+
+def main() -> int:
+    """Fly; print what was seen; exit with 1 when the vehicle was too high."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--share", type=float, default=0.3, help="of the time, for each node")
+    parser.add_argument("--duration", type=float, default=60.0, help="s")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--dynamics", default="quadrotor", help="of sw_hover.launch")
+    options = parser.parse_args()
+    if not 0.05 <= options.share < 1.0:
+        parser.error(f"--share is {options.share:g}; expected 0.05 or more, and less than 1")
+    arguments = ["rviz:=false", f"dynamics:={options.dynamics}"]
+    log = Path(tempfile.mkdtemp()) / "sw_hover.log"
+    with roslaunch(["crazyflie_examples", "sw_hover.launch", *arguments], log):
+        operator = FlightOperator(runner.begin("starve"), limit=60.0)
+        operator.wait_until_ready()
+        operator.takeoff()
+        starve(process_ids(NODES), options.share, options.duration, options.seed)
+        operator.hover(5.0)
+        try:
+            operator.land()
+            outcome = "flown to the end"
+        except FlightError as error:
+            outcome = str(error)
+        record = operator.finish()
+    highest = float(record.state.values[:, 2].max())
+    print(f"highest {highest:.2f} m, last {record.state.last[2]:.2f} m: {outcome}; log: {log}")
+    is_good = highest < HOVER_HEIGHT + OVERSHOOT and record.state.last[2] < 0.05
+    return 0 if is_good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

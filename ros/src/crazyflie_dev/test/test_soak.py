@@ -84,7 +84,7 @@ def test_nodes_that_hardly_run_do_not_make_the_vehicle_climb(dynamics, seed):
                 graph.freeze(name)
                 change[name] = graph.time + random.uniform(0.1, 0.6)
         graph.advance(0.01)
-    assert run.watch.highest < 0.2
+    assert run.watch.highest < 0.5
     assert run.watch.hardest < 1.0
     assert run.watch.distance < 0.5
     assert any("this computer is too busy" in text for _, text in graph.log)

@@ -13,6 +13,7 @@ import tempfile
 import time
 from pathlib import Path
 from random import Random
+from typing import Any
 from xmlrpc.client import ServerProxy
 
 import rosgraph
@@ -35,7 +36,8 @@ _RUN = 0.035
 def process_ids(names: tuple[str, ...]) -> list[int]:
     """Return the process ids of nodes."""
     master = rosgraph.Master("/starve")
-    return [ServerProxy(master.lookupNode(name)).getPid("/starve")[2] for name in names]
+    replies: list[Any] = [ServerProxy(master.lookupNode(name)).getPid("/starve") for name in names]
+    return [pid for _, _, pid in replies]
 
 
 def starve(pids: list[int], share: float, duration: float, seed: int) -> None:

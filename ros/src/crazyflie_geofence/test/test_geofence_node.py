@@ -102,8 +102,8 @@ def test_topics_and_box_are_required(name):
         ("margin", 0.0, "> 0"),
         ("braking/horizontal", 1.9, "<= 1.85"),
         ("braking/vertical", 6.0, "<= 5.81"),
-        ("reaction_time/horizontal", 0.0, "> 0"),
-        ("reaction_time/vertical", -0.1, "> 0"),
+        ("reaction_time/horizontal", 0.0, ">= 0.0001"),
+        ("reaction_time/vertical", -0.1, ">= 0.0001"),
         ("recovery_rate", 0, "> 0"),
     ],
 )

@@ -20,17 +20,29 @@ from crazyflie_msgs.msg import (
     PrioritizedControlStamped,
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import METRES, TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameter_types import TOPIC, Number
 from crazyflie_utils.parameters import group
 from crazyflie_utils.vectors import from_vector, to_vector
+
+# Without these bounds the fence's equations overflow or divide by nothing.
+_COORDINATE = Number("m", minimum=-1e9, maximum=1e9)
+_REACTION_TIME = Number("s", minimum=0.001, maximum=100.0)
+_MIN_BRAKING = 0.01
+"""m/s^2"""
 
 
 class CornerParameters(Parameters):
     """A corner of the box."""
 
-    x: float = parameter(METRES, "lowest and highest corner, in the frame of the state", live=True)
-    y: float = parameter(METRES, "lowest and highest corner, in the frame of the state", live=True)
-    z: float = parameter(METRES, "lowest and highest corner, in the frame of the state", live=True)
+    x: float = parameter(
+        _COORDINATE, "lowest and highest corner, in the frame of the state", live=True
+    )
+    y: float = parameter(
+        _COORDINATE, "lowest and highest corner, in the frame of the state", live=True
+    )
+    z: float = parameter(
+        _COORDINATE, "lowest and highest corner, in the frame of the state", live=True
+    )
 
     def vector(self) -> tuple[float, float, float]:
         """Return x, y, z in m."""
@@ -48,38 +60,38 @@ class GeofenceParameters(Parameters):
     lower: CornerParameters = group(CornerParameters, "box/min")
     upper: CornerParameters = group(CornerParameters, "box/max")
     margin: float = parameter(
-        Number("m", above=0.0),
+        Number("m", minimum=0.001),
         "the fence acts when the stopping point is nearer to a wall than this; at most half "
         "the box's width",
         0.5,
         live=True,
     )
     horizontal_braking: float = parameter(
-        Number("m/s^2", above=0.0, maximum=MAX_HORIZONTAL_BRAKING),
+        Number("m/s^2", minimum=_MIN_BRAKING, maximum=MAX_HORIZONTAL_BRAKING),
         "deceleration b along x and y",
         1.5,
         "braking/horizontal",
         live=True,
     )
     vertical_braking: float = parameter(
-        Number("m/s^2", above=0.0, maximum=MAX_VERTICAL_BRAKING),
+        Number("m/s^2", minimum=_MIN_BRAKING, maximum=MAX_VERTICAL_BRAKING),
         "deceleration b along z; less for a vehicle that is heavy",
         4.0,
         "braking/vertical",
         live=True,
     )
     horizontal_reaction_time: float = parameter(
-        TIME_STEP,
+        _REACTION_TIME,
         "T along x and y: estimator, attitude loop, motors",
         0.4,
         "reaction_time/horizontal",
         live=True,
     )
     vertical_reaction_time: float = parameter(
-        TIME_STEP, "T along z", 0.2, "reaction_time/vertical", live=True
+        _REACTION_TIME, "T along z", 0.2, "reaction_time/vertical", live=True
     )
     recovery_rate: float = parameter(
-        Number("1/s", above=0.0),
+        Number("1/s", above=0.0, maximum=1000.0),
         "how quickly the stopping point is brought back",
         1.0,
         live=True,

@@ -60,6 +60,11 @@ class Climb:
         self._last_z_dot: float | None = None
         self._elapsed = 0.0
 
+    def set_limit(self, limit: float) -> None:
+        """Change the largest disturbance that is believed in, m/s^2, also of the past."""
+        self._limit = limit
+        self.disturbance = _within(self.disturbance, limit)
+
     def advance(self, dt: float, z: float, z_dot: float, goal: float, excess: float) -> None:
         """Go on by ``dt`` (s).
 

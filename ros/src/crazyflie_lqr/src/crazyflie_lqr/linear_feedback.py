@@ -209,7 +209,7 @@ class IntegralStateFeedback(LinearFeedback):
     def take_off(self) -> None:
         self.rest()
         self.fly()
-        limit = abs(self._integrator_k[2]) * self._integrator_limit[2]
+        limit = self._climb_limit()
         self._climb = Climb(limit) if limit > 0.0 or self._height_overshoots() else None
         self._thrust = self._u_ref[THRUST]
 
@@ -239,12 +239,20 @@ class IntegralStateFeedback(LinearFeedback):
         for axis, (before, now) in enumerate(
             zip(previous._integrator_k, self._integrator_k, strict=True)
         ):
-            scale = before / now if now != 0.0 else 1.0
-            self._integral[axis] = self._within_limit(axis, previous._integral[axis] * scale)
+            integral = previous._integral[axis]
+            if now != 0.0:
+                integral = before * integral / now
+            self._integral[axis] = self._within_limit(axis, integral)
         self._time = previous._time
         self._is_resting = previous._is_resting
         self._climb = previous._climb
+        if self._climb is not None:
+            self._climb.set_limit(self._climb_limit())
         self._thrust = previous._thrust
+
+    def _climb_limit(self):
+        """Return the largest disturbance that the integrator can make up for, m/s^2."""
+        return abs(self._integrator_k[2]) * self._integrator_limit[2]
 
     def _height_overshoots(self):
         # The height loop is s^2 + k_d s + k_p, without regard to delays.
@@ -262,8 +270,9 @@ class IntegralStateFeedback(LinearFeedback):
         if climb is None:
             return x_ref, 0.0
         climb.advance(dt, x[2], x[5], x_ref[2], self._thrust - self._u_ref[THRUST])
-        if climb.disturbance != 0.0:
-            self._integral[2] = -climb.disturbance / self._integrator_k[2]
+        k = self._integrator_k[2]
+        if climb.disturbance != 0.0 and k != 0.0:
+            self._integral[2] = self._within_limit(2, -climb.disturbance / k)
         if climb.has_arrived:
             self._climb = None
             return x_ref, 0.0

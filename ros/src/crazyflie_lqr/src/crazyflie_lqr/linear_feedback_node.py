@@ -1,6 +1,8 @@
 """ROS interface of every controller that turns a state and a reference into a control."""
 
 import math
+from collections.abc import Iterator
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 from std_msgs.msg import String
@@ -22,6 +24,10 @@ if TYPE_CHECKING:
 
 _SAME_CLOCK = 60.0
 """A stamp that is older than this, s, is of another clock and says nothing about an age."""
+
+
+MAX_GAIN = 1e6
+"""Largest number of a gain file: more of it makes controls that are not finite."""
 
 
 class LinearFeedbackParameters(Parameters):
@@ -66,6 +72,13 @@ class LinearFeedbackParameters(Parameters):
         HOLD_LIMIT,
         name="state/max_age",
     )
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        for name, numbers in (("K_file", chain(*self.K)), ("u_ref_file", self.u_ref)):
+            largest = max(map(abs, numbers))
+            if largest > MAX_GAIN:
+                yield f"{name} has {largest:g} among its numbers; expected at most {MAX_GAIN:g}"
 
     @property
     def descent_topic(self) -> str:

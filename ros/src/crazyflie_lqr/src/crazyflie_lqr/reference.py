@@ -132,9 +132,10 @@ class GuardedReference:
         if self._near is None or not is_repeated:
             self._far = x_ref
             self._near = at_rest(x_ref, self._yaw_index)
-            # Each factor is at most 1, so that a far one does not overflow.
+            # A mean, so that neither a far one nor a short way overflows.
+            share = self.max_jump / distance
             self._near[:3] = [
-                here + (there / distance - here / distance) * self.max_jump
+                (1.0 - share) * here + share * there
                 for here, there in zip(x[:3], x_ref[:3], strict=True)
             ]
         self._last_valid.update(self._near)

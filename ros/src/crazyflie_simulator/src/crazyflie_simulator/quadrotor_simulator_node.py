@@ -9,11 +9,11 @@ from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
 from crazyflie_simulator.wind import Wind
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import TIME_STEP, Number
+from crazyflie_utils.parameter_types import Number
 from crazyflie_utils.parameters import group
 
 _ERROR = Number(minimum=-0.5, maximum=0.5)
-_SPEED = Number("m/s")
+_SPEED = Number("m/s", minimum=-100.0, maximum=100.0)
 
 
 class WindParameters(Parameters):
@@ -23,10 +23,13 @@ class WindParameters(Parameters):
     y: float = parameter(_SPEED, "mean wind, fixed frame", 0.0, live=True)
     z: float = parameter(_SPEED, "mean wind, fixed frame", 0.0, live=True)
     gust: float = parameter(
-        Number("m/s", minimum=0.0), "standard deviation of the gusts, each axis", 0.0, live=True
+        Number("m/s", minimum=0.0, maximum=100.0),
+        "standard deviation of the gusts, each axis",
+        0.0,
+        live=True,
     )
     gust_time: float = parameter(
-        TIME_STEP, "how long a gust lasts (correlation time)", 1.0, live=True
+        Number("s", minimum=0.001), "how long a gust lasts (correlation time)", 1.0, live=True
     )
 
 

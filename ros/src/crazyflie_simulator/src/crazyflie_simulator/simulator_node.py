@@ -14,7 +14,6 @@ from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, StampedPose, parameter
 from crazyflie_utils.parameter_types import (
     BOOLEAN,
-    DURATION,
     FRAME,
     METRES,
     TIME_STEP,
@@ -40,13 +39,16 @@ class MotionCaptureParameters(Parameters):
     """Errors of the motion capture system."""
 
     position_noise: float = parameter(
-        Number("m", minimum=0.0), "standard deviation, each axis", 0.0, live=True
+        Number("m", minimum=0.0, maximum=100.0), "standard deviation, each axis", 0.0, live=True
     )
     attitude_noise: float = parameter(
-        Number("rad", minimum=0.0), "standard deviation, each axis of the body", 0.0, live=True
+        Number("rad", minimum=0.0, maximum=10.0),
+        "standard deviation, each axis of the body",
+        0.0,
+        live=True,
     )
     latency: float = parameter(
-        DURATION,
+        Number("s", minimum=0.0, maximum=10.0),
         "from a pose to its broadcast, rounded up to whole time steps; the stamp stays the pose's",
         0.0,
         live=True,

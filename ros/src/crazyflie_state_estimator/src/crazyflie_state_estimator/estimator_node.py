@@ -69,7 +69,8 @@ class StateEstimatorParameters(Parameters):
     )
 
 
-_ACCELERATION_WALK = Number("m/s^2/sqrt(s)", above=0.0)
+# Their squares, and quotients of these, are far from the ends of the range of floats.
+_ACCELERATION_WALK = Number("m/s^2/sqrt(s)", minimum=1e-6, maximum=1e6)
 _ACCELERATION_WALK_HELP = (
     "by how much the unknown part of the acceleration changes in a second (standard deviation)"
 )
@@ -79,7 +80,7 @@ class KalmanParameters(Parameters):
     """Parameters of the Kalman filter where the control is not known."""
 
     position_noise: float = parameter(
-        Number("m", above=0.0),
+        Number("m", minimum=1e-6, maximum=100.0),
         "standard deviation of the poses' coordinates",
         kalman.POSITION_NOISE,
         "filter/position_noise",
@@ -93,14 +94,14 @@ class KalmanParameters(Parameters):
         live=True,
     )
     angle_noise: float = parameter(
-        Number("rad", above=0.0),
+        Number("rad", minimum=1e-6, maximum=10.0),
         "standard deviation of the poses' angles",
         kalman.ANGLE_NOISE,
         "filter/angle_noise",
         live=True,
     )
     angular_acceleration_walk: float = parameter(
-        Number("rad/s^2/sqrt(s)", above=0.0),
+        Number("rad/s^2/sqrt(s)", minimum=1e-6, maximum=1e6),
         "as `filter/acceleration_walk`, of roll, pitch and yaw",
         kalman.ANGULAR_ACCELERATION_WALK,
         "filter/angular_acceleration_walk",

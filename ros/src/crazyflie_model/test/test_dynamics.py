@@ -9,8 +9,15 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_model.dynamics import STEP, Coupled7D, NearHover, coupled_acceleration
+from crazyflie_model.dynamics import (
+    GROUND_FRICTION,
+    STEP,
+    Coupled7D,
+    NearHover,
+    coupled_acceleration,
+)
 from crazyflie_model.elementwise import join, split
+from crazyflie_model.limits import MAX_TILT
 from crazyflie_model.units import GRAVITY
 
 MODELS = pytest.mark.parametrize("dynamics", [NearHover(), Coupled7D()], ids=["near", "coupled"])
@@ -114,6 +121,47 @@ def test_never_below_ground(dynamics, x, u):
     state = flown(dynamics, x, u, 0.05)
     assert state[2] >= 0.0
     assert state[2] > 0.0 or state[5] >= 0.0
+
+
+# On the ground it does not slide.
+
+
+@MODELS
+@pytest.mark.parametrize("heading", [0.0, 2.0])
+def test_a_vehicle_that_lands_with_speed_stops_within_its_braking_distance(dynamics, heading):
+    speed = 3.0
+    velocity = speed * np.array([np.cos(heading), np.sin(heading), 0.0])
+    start = [1.0, 2.0, 0.0, *velocity, 0.3]
+    state = flown(dynamics, start, [0.0, 0.0, 0.0, 0.0], 1.0)
+    way = speed**2 / (2.0 * GROUND_FRICTION * GRAVITY)
+    np.testing.assert_allclose(state[:3], start[:3] + velocity / speed * way, atol=2e-3)
+    np.testing.assert_array_equal(state[3:], [0.0, 0.0, 0.0, 0.3])
+
+
+@MODELS
+def test_thrust_takes_weight_off_the_ground(dynamics):
+    start = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]
+    state = flown(dynamics, start, [0.0, 0.0, 0.0, 0.6 * GRAVITY], 0.2)
+    assert state[3] == pytest.approx(1.0 - 0.2 * GROUND_FRICTION * 0.4 * GRAVITY, abs=0.005)
+    state = flown(dynamics, start, [0.0, 0.0, 0.0, GRAVITY], 0.2)
+    assert state[3] == 1.0
+
+
+@MODELS
+@given(
+    roll=st.floats(-MAX_TILT, MAX_TILT),
+    pitch=st.floats(-MAX_TILT, MAX_TILT),
+    thrust=st.floats(0.0, 2.0),
+)
+def test_a_tilt_that_is_commanded_on_the_ground_does_not_move_it(dynamics, roll, pitch, thrust):
+    state = flown(dynamics, [0.0] * 7, [roll, pitch, 0.0, thrust], 0.1)
+    np.testing.assert_allclose(state[:6], np.zeros(6), atol=1e-12)
+
+
+@MODELS
+def test_a_hard_landing_takes_speed_as_it_takes_the_fall(dynamics):
+    state = flown(dynamics, [0.0, 0.0, 0.0005, 2.0, 0.0, -1.0, 0.0], [0.0, 0.0, 0.0, 0.0], STEP)
+    assert state[3] == pytest.approx(2.0 - GROUND_FRICTION, abs=0.01)
 
 
 @MODELS

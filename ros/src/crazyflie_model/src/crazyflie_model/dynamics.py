@@ -11,8 +11,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from typing_extensions import override
-
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
 from crazyflie_model.elementwise import Number, Vector, functions, join, split, where
 from crazyflie_model.integrators import rk4_step
@@ -24,6 +22,10 @@ if TYPE_CHECKING:
 
 STEP = 0.001
 """Integration step of every model, s."""
+
+GROUND_FRICTION = 0.5
+"""Friction coefficient of a 7-dimensional vehicle on the ground: dry plastic on a hard floor, for
+which tables have 0.3 to 0.6."""
 
 
 class Dynamics(ABC):
@@ -102,12 +104,35 @@ class SevenDimensional(Dynamics):
         x, y, z = position
         return [x, y, z, 0.0, 0.0, 0.0, 0.0]
 
-    @override
     def on_ground(self, x: Vector[Number]) -> Vector[Number]:
-        z, z_dot = x[2], x[5]
+        """See `Dynamics.on_ground`; the ground also takes horizontal speed, by friction.
+
+        It takes `GROUND_FRICTION` times the downward speed that it takes (Coulomb's law: the
+        impulse of the friction is at most so many times that of the contact). At rest that is
+        what weight less lift gives in a step, so that speed goes at `GROUND_FRICTION` (g -
+        thrust), m/s^2; where thrust carries the vehicle, nothing is taken.
+        """
+        px, py, z, vx, vy, vz, yaw = x
         below = z <= 0.0
-        z_dot = where(below & (z_dot < 0.0), 0.0, z_dot)
-        return [x[0], x[1], where(below, 0.0, z), x[3], x[4], z_dot, x[6]]
+        if below is False:
+            return x
+        stopped = below & (vz < 0.0)
+        speed = functions(vx).hypot(vx, vy)
+        loss = where(stopped, -GROUND_FRICTION * vz, 0.0)
+        slides = speed > loss
+        share = where(slides, 1.0 - loss / where(slides, speed, 1.0), 0.0)
+        share = where(stopped, share, 1.0)
+        # What was lost in speed was also flown too far, or tilt would creep along.
+        back = (1.0 - share) * (STEP / 2.0)
+        return [
+            px - back * vx,
+            py - back * vy,
+            where(below, 0.0, z),
+            share * vx,
+            share * vy,
+            where(stopped, 0.0, vz),
+            yaw,
+        ]
 
     def pose(self, x: Sequence[float], u: Sequence[float]) -> tuple[Triple, Quaternion]:
         """See `Dynamics.pose`: roll and pitch are those of the control, yaw is the state's."""

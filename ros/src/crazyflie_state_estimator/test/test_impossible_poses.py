@@ -48,6 +48,22 @@ def test_a_vehicle_that_was_carried_is_found_again_after_three_tenths_of_a_secon
     assert {(state.x, state.x_dot) for state in states} == {(2.0, 0.0)}
 
 
+def test_poses_with_nearly_the_same_stamp_are_no_speed():
+    process = launch()
+    hover(process, 0.5)
+    before = len(process.published("/state"))
+    for k in range(50):
+        # Every other one is late, has a stamp 0.1 ms after that of the one before, and is 1 cm off.
+        late = k % 2 == 1
+        pose = transform(process, (0.01 * late, 0.0, 1.0))
+        pose.header.stamp = process.clock.stamp(process.clock.time() - 0.0099 * late)
+        process.publish("/tf", TFMessage([pose]))
+        process.advance(0.01)
+    states = [message.state for message in process.published("/state")[before:]]
+    assert len(states) == 50
+    assert max(abs(state.x_dot) for state in states) <= 2.0
+
+
 def test_poses_that_jump_to_and_fro_are_not_believed():
     process = launch()
     hover(process, 0.5)

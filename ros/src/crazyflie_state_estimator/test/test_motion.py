@@ -83,6 +83,27 @@ def test_many_turns_keep_rate_and_angle():
     assert motion.attitude[2] == pytest.approx(yaw)
 
 
+@given(st.integers(1, 4 * MS), st.floats(-0.02, 0.02))
+def test_two_poses_that_came_together_are_no_speed(gap, error):
+    # A pose every 10 ms at 1 m/s; one is stamped just before its successor, with some noise.
+    subject = MotionEstimator(FiniteDifference(0.005), FiniteDifference(0.005))
+    speeds = []
+    stamps = [0, 10 * MS, 20 * MS, 40 * MS - gap, 40 * MS, 50 * MS, 60 * MS]
+    for number, stamp in enumerate(stamps):
+        moved = error if number == 3 else 0.0
+        motion = subject.update(stamp, (0.01 * number + moved, 0.0, 0.0), LEVEL)
+        speeds.append(0.0 if motion is None else motion.velocity[0])
+        if motion is not None:
+            assert motion.position[0] == 0.01 * number + moved
+    assert max(map(abs, speeds)) < 4.0
+
+
+def test_poses_that_come_too_often_give_the_rate_over_several():
+    subject = MotionEstimator(FiniteDifference(0.005), FiniteDifference(0.005))
+    motions = [subject.update(k * MS, (0.002 * k, 0.0, 0.0), LEVEL) for k in range(20)]
+    assert [motion.velocity[0] for motion in motions[5:]] == pytest.approx([2.0] * 15)
+
+
 def test_a_repeated_stamp_gives_nothing_and_changes_nothing():
     subject = estimator()
     subject.update(0, (0.0, 0.0, 0.0), LEVEL)

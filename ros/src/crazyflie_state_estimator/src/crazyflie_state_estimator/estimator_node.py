@@ -156,7 +156,10 @@ class StateEstimatorNode(Node):
         if self._parameters.filter_type == KALMAN:
             self._estimator = self._load_kalman_filters(handle)
         else:
-            self._estimator = MotionEstimator(FiniteDifference(), FiniteDifference())
+            least_step = self._parameters.time_step / 2.0
+            self._estimator = MotionEstimator(
+                FiniteDifference(least_step), FiniteDifference(least_step)
+            )
 
     def _load_kalman_filters(self, handle):
         knows_control = self._parameters.control_topic is not None

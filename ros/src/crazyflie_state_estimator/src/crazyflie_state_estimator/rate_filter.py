@@ -8,6 +8,9 @@ from typing_extensions import override
 Components = Sequence[float]
 """One number for each axis. Of so few, plain floats are several times quicker than arrays."""
 
+LEAST_STEP = 0.0005
+"""No source of poses is so quick, s: stamps that are nearer to each other are bad ones."""
+
 
 class RateFilter(ABC):
     """Signal and rate of n independent axes, from samples of the signal."""
@@ -43,17 +46,31 @@ class FiniteDifference(RateFilter):
 
     The quotient is exact for linear signals; otherwise it is the rate half a
     period ago, up to second order. Independent noise of standard deviation s on
-    the samples becomes sqrt(2) s / dt on the rate.
+    the samples becomes sqrt(2) s / dt on the rate; so samples that come sooner than
+    ``least_step`` after one another leave the rate as it was, until so much time has passed.
+
+    Parameters
+    ----------
+    least_step : float, optional
+        Shortest time that a change is divided by, s.
     """
+
+    def __init__(self, least_step: float = LEAST_STEP):
+        self._least_step = least_step
 
     @override
     def start(self, value: Components) -> None:
         self._value = value
+        self._elapsed = 0.0
+        self._rate: Components = [0.0] * len(value)
 
     @override
     def step(
         self, dt: float, value: Components, acceleration: Components | None = None
     ) -> tuple[Components, Components]:
-        rate = [(a - b) / dt for a, b in zip(value, self._value, strict=True)]
-        self._value = value
-        return value, rate
+        self._elapsed += dt
+        if self._elapsed >= self._least_step:
+            elapsed = self._elapsed
+            self._rate = [(a - b) / elapsed for a, b in zip(value, self._value, strict=True)]
+            self._value, self._elapsed = value, 0.0
+        return value, self._rate

@@ -253,12 +253,25 @@ def test_a_reference_far_away_is_moved_nearer(process, size, seen):
 def test_states_that_are_old_are_not_answered(process):
     refer(process, z=1.0)
     message = PositionVelocityYawStateStamped()
-    for age, is_answered in ((0.4, True), (0.6, False), (30.0, False), (90.0, True)):
+    for age, is_answered in ((0.4, True), (0.6, False), (30.0, False), (90.0, False)):
         before = len(process.published("/control/lqr"))
         message.header.stamp = process.clock.stamp(process.clock.time() - age)
         process.publish("/state", message)
         assert len(process.published("/control/lqr")) - before == is_answered
     assert "/lqr_controller: ignoring a state that is 0.6 s old" in process.logged("warn")[0]
+
+
+@pytest.mark.parametrize("stamp", [0.0, 12.000000345])
+def test_states_without_stamps_of_this_clock_are_answered(process, stamp):
+    refer(process, z=1.0)
+    process.advance(100.0)
+    message = PositionVelocityYawStateStamped()
+    message.header.stamp = process.clock.stamp(stamp)
+    for count in range(1, 5):
+        process.publish("/state", message)
+        assert len(process.published("/control/lqr")) == count
+        assert process.published("/control/lqr")[-1].header.stamp == message.header.stamp
+        process.advance(1.0)
 
 
 # When it integrates.

@@ -12,6 +12,7 @@ from crazyflie_lqr.flight_phase import DESCENDING, FLYING, TAKING_OFF, GroundGue
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference
+from crazyflie_lqr.state_age import StateAge
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
@@ -21,9 +22,6 @@ from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-_SAME_CLOCK = 60.0
-"""A stamp that is older than this, s, is of another clock and says nothing about an age."""
 
 
 MAX_GAIN = 1e6
@@ -68,7 +66,7 @@ class LinearFeedbackParameters(Parameters):
     )
     max_age: float = parameter(
         Number("s", above=0.0),
-        "older states are not answered; stamps more than a minute off are of another clock",
+        "older states are not answered; of stamps of another clock, a minute off, the delay counts",
         HOLD_LIMIT,
         name="state/max_age",
     )
@@ -119,6 +117,7 @@ class LinearFeedbackNode(Node):
         self._is_flown = False
         self._clocks_agree = False
         self._ground_guess = GroundGuess()
+        self._age = StateAge()
 
     def complete_reference(self, reference: "NDArray[np.float64]") -> "NDArray[np.float64]":
         """Return the reference state, shape (x_dim,), that a reference message means.
@@ -248,9 +247,9 @@ class LinearFeedbackNode(Node):
         self._publisher.publish(stamped(ControlStamped, message.header.stamp, control=control))
 
     def _is_old(self, stamp):
-        age = self._handle.nanoseconds() * 1e-9 - stamp.to_sec()
-        if not self._parameters.max_age < age < _SAME_CLOCK:
-            self._clocks_agree = self._clocks_agree or abs(age) < _SAME_CLOCK
+        age = self._age.update(stamp.to_sec(), self._handle.nanoseconds() * 1e-9)
+        if age <= self._parameters.max_age:
+            self._clocks_agree = True
             return False
         # Clocks that have agreed still do; then a message was late on its way.
         cause = (

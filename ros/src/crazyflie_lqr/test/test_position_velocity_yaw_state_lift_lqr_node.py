@@ -261,6 +261,26 @@ def test_states_that_are_old_are_not_answered(process):
     assert "/lqr_controller: ignoring a state that is 0.6 s old" in process.logged("warn")[0]
 
 
+def test_a_velocity_that_is_too_large_is_followed_at_the_limit_and_for_half_a_second(process):
+    refer(process, x_dot=0.1, y_dot=-0.2)
+    np.testing.assert_allclose(answer(process)[0], [0.2, 0.1, 0.0, 9.81])
+    refer(process, z=0.5, z_dot=5.0)
+    assert answer(process, z=0.5)[0][3] == pytest.approx(9.81 + 2.0)
+    assert "has a velocity of 5.0 m/s; expected <= 2 m/s" in process.logged("warn")[0]
+    process.advance(0.49)
+    assert answer(process, z=0.5)[0][3] == pytest.approx(9.81 + 2.0)
+    process.advance(0.02)
+    assert answer(process, z=0.5)[0][3] == pytest.approx(9.81)
+
+
+def test_the_limit_of_velocities_may_be_changed_but_not_beyond_what_the_estimator_believes(process):
+    reconfigure(process, **{"reference/max_speed": 1.0})
+    refer(process, z_dot=5.0)
+    assert answer(process)[0][3] == pytest.approx(9.81 + 1.0)
+    with pytest.raises(ServiceError, match="reference/max_speed"):
+        reconfigure(process, **{"reference/max_speed": 5.1})
+
+
 @pytest.mark.parametrize("stamp", [0.0, 12.000000345])
 def test_states_without_stamps_of_this_clock_are_answered(process, stamp):
     refer(process, z=1.0)

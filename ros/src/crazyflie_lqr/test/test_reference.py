@@ -4,7 +4,7 @@ import numpy as np
 
 from crazyflie_lqr.reference import GuardedReference
 
-GOAL = np.arange(7.0)
+GOAL = np.array([0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 6.0])
 HERE = np.array([5.0, 6.0, 7.0, 1.0, 1.0, 1.0, 0.5])
 REST_HERE = [5.0, 6.0, 7.0, 0.0, 0.0, 0.0, 0.5]
 
@@ -103,15 +103,16 @@ def test_a_distant_one_is_moved_nearer_once():
     np.testing.assert_allclose(followed(reference, 0.0, x), cut)
     np.testing.assert_allclose(followed(reference, 1.0, x + 1.0), cut)
     assert reports == ["the reference is 10.0 m away; going 3 m in its direction"]
-    reference.update(np.array([1.0, 2.9, 1.0, 1.0, 0.0, 0.0, 0.3]))
+    reference.update(np.array([1.0, 2.9, 1.0, 1.0, 0.0, 0.0, 0.3]), time=2.0)
     assert followed(reference, 2.0, x) == [1.0, 2.9, 1.0, 1.0, 0.0, 0.0, 0.3]
 
 
 def test_one_that_was_near_when_it_came_is_not_moved_when_the_vehicle_drifts():
     reference = GuardedReference(6, 3.0)
-    reference.update(np.ones(7))
-    assert followed(reference, 0.0, np.zeros(7)) == [1.0] * 7
-    assert followed(reference, 1.0, np.full(7, -9.0)) == [1.0] * 7
+    near = [1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    reference.update(near)
+    assert followed(reference, 0.0, np.zeros(7)) == near
+    assert followed(reference, 1.0, np.full(7, -9.0)) == near
 
 
 def test_who_repeats_one_that_is_far_away_does_not_lead_the_vehicle_there():

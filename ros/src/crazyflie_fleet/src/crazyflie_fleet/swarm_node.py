@@ -22,6 +22,7 @@ from crazyflie_lqr.reference import GuardedReference
 from crazyflie_model.angles import quaternion_from_rpy, wrap_to_pi
 from crazyflie_model.dynamics import Coupled7D, NearHover, SevenDimensional
 from crazyflie_model.elementwise import join, split
+from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import (
     ControlStamped,
     PositionVelocityStateStamped,
@@ -104,6 +105,12 @@ class SwarmParameters(Parameters):
         3.0,
         "lqr_controller/reference/max_jump",
     )
+    max_speed: float = parameter(
+        Number("m/s", above=0.0, maximum=MAX_SPEED),
+        "a larger velocity of a reference is made as large as this",
+        2.0,
+        "lqr_controller/reference/max_speed",
+    )
 
 
 class SwarmNode(Node):
@@ -161,7 +168,8 @@ class SwarmNode(Node):
         def warn(text: str) -> None:
             handle.warn(below + SAFE_REFERENCE + ": " + text, throttle=1.0, key=(below, "jump"))
 
-        reference = GuardedReference(YAW, self._parameters.max_jump, warn)
+        parameters = self._parameters
+        reference = GuardedReference(YAW, parameters.max_jump, warn, parameters.max_speed)
         self._references.append(reference)
         self._states.append(handle.publisher(below + STATE, PositionVelocityYawStateStamped))
         self._controls.append(handle.publisher(below + LQR_CONTROL, ControlStamped))
@@ -190,7 +198,8 @@ class SwarmNode(Node):
 
     def _on_reference(self, reference, message):
         x_ref = (*to_tuple(message.state), 0.0)
-        reference.update(x_ref, message.header.stamp.to_sec(), self._handle.stamp().to_sec())
+        stamp, now = message.header.stamp.to_sec(), self._handle.stamp().to_sec()
+        reference.update(x_ref, stamp, now, self._handle.time())
 
     def _on_descent(self, reference, message):
         reference.descend((*to_tuple(message.state), 0.0), self._handle.time())

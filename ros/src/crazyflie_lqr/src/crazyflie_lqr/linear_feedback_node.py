@@ -13,6 +13,7 @@ from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference
 from crazyflie_lqr.state_age import StateAge
+from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
@@ -64,6 +65,13 @@ class LinearFeedbackParameters(Parameters):
         name="reference/max_jump",
         live=True,
     )
+    max_speed: float = parameter(
+        Number("m/s", above=0.0, maximum=MAX_SPEED),
+        "a larger velocity of a reference is made as large as this",
+        2.0,
+        name="reference/max_speed",
+        live=True,
+    )
     max_age: float = parameter(
         Number("s", above=0.0),
         "older states are not answered; of stamps of another clock, a minute off, the delay counts",
@@ -112,7 +120,7 @@ class LinearFeedbackNode(Node):
     reference_tail: tuple[float, ...] = ()
 
     def __init__(self) -> None:
-        self._reference = GuardedReference(self.yaw_index, report=self._warn_of_jump)
+        self._reference = GuardedReference(self.yaw_index, report=self._warn_of_reference)
         self._flight_state: str | None = None
         self._is_flown = False
         self._clocks_agree = False
@@ -146,7 +154,7 @@ class LinearFeedbackNode(Node):
         self._parameters = handle.load(self.parameters_type, self._reconfigure)
         self._completes_itself = _overrides(self, LinearFeedbackNode, "complete_reference")
         self._set_controller(self.make_controller(self._parameters))
-        self._reference.max_jump = self._parameters.max_jump
+        self._limit_reference(self._parameters)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -169,7 +177,11 @@ class LinearFeedbackNode(Node):
         controller = self.make_controller(parameters)
         controller.take_over(self._controller)
         self._set_controller(controller)
+        self._limit_reference(parameters)
+
+    def _limit_reference(self, parameters):
         self._reference.max_jump = parameters.max_jump
+        self._reference.max_speed = parameters.max_speed
 
     def _set_controller(self, controller):
         uses_arrays = _overrides(controller, LinearFeedback, "control")
@@ -186,8 +198,8 @@ class LinearFeedbackNode(Node):
 
     def _on_reference(self, message):
         x_ref = self._completed(message)
-        now = self._handle.stamp().to_sec()
-        if not self._reference.update(x_ref, message.header.stamp.to_sec(), now):
+        now, time = self._handle.stamp().to_sec(), self._handle.time()
+        if not self._reference.update(x_ref, message.header.stamp.to_sec(), now, time):
             self._handle.warn(
                 f"ignoring a reference on {self._parameters.reference_topic}: it is older than "
                 "the present one; are there two publishers?",
@@ -271,8 +283,8 @@ class LinearFeedbackNode(Node):
         else:
             self._controller.rest()
 
-    def _warn_of_jump(self, text):
-        self._handle.warn(text, throttle=1.0, key="jump")
+    def _warn_of_reference(self, text):
+        self._handle.warn(text, throttle=1.0, key="reference")
 
 
 def _overrides(instance, base, name):

@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 
 from crazyflie_lqr.linear_feedback import Components, at_rest
+from crazyflie_lqr.reference_velocity import VELOCITY_LIMIT, VelocityCheck, limited
 from crazyflie_utils.last_valid import LastValid
 
 DESCENT_LIMIT = 0.3
@@ -18,7 +19,9 @@ class GuardedReference:
     reference it stops where it is, and stays there until a valid one comes.
 
     A reference that is older than the present one does not count: a publisher of long ago
-    may have latched it. One that is far away is moved nearer.
+    may have latched it. One that is far away is moved nearer. One with a velocity becomes a
+    place to rest at when no other has followed for `VELOCITY_LIMIT`, and at once when the points
+    of the references do not move with their velocities (see `VelocityCheck`).
 
     Parameters
     ----------
@@ -28,6 +31,8 @@ class GuardedReference:
         How far from the vehicle a new reference may be, m. One that is further away becomes a
         place to rest at so far from the vehicle, in the same direction, and is this as long as
         references come from about there.
+    max_speed : float, optional
+        A larger velocity of a reference is made as large as this, m/s.
     report : callable, optional
         ``report(text)`` is told of that.
     """
@@ -37,21 +42,28 @@ class GuardedReference:
         yaw_index: int,
         max_jump: float = math.inf,
         report: Callable[[str], None] = lambda text: None,
+        max_speed: float = math.inf,
     ):
         self.max_jump = max_jump
+        self.max_speed = max_speed
         self._yaw_index = yaw_index
         self._report = report
         self._last_valid: LastValid[Components] = LastValid()
         self._hold_point: Components | None = None
         self._near: Components | None = None
         self._far: Components | None = None
+        self._rest: Components | None = None
+        self._velocity_check = VelocityCheck()
+        self._time = 0.0
         self._is_new = False
         self._has_arrived = False
         self._stamp = 0.0
         self._descent: Components | None = None
         self._descent_time = 0.0
 
-    def update(self, x_ref: Components, stamp: float = 0.0, now: float = 0.0) -> bool:
+    def update(
+        self, x_ref: Components, stamp: float = 0.0, now: float = 0.0, time: float = 0.0
+    ) -> bool:
         """Take a valid reference.
 
         Parameters
@@ -61,6 +73,8 @@ class GuardedReference:
             When it was made, s; 0 if that is not known.
         now : float
             By the same clock. What has a stamp ahead of it counts as made now.
+        time : float
+            Now, s, by the clock of `value`.
 
         Returns
         -------
@@ -74,8 +88,9 @@ class GuardedReference:
             return False
         if stamp > 0.0:
             self._stamp = min(stamp, now)
-        self._last_valid.update(x_ref)
-        self._hold_point = None
+        self._last_valid.update(self._with_velocity(x_ref, time))
+        self._time = time
+        self._hold_point = self._rest = None
         self._has_arrived = True
         self._is_new = True
         return True
@@ -112,12 +127,40 @@ class GuardedReference:
         if self._is_new:
             self._is_new = False
             x_ref = self._within_reach(x_ref, x)
+        if any(x_ref[3:6]) and not 0.0 <= time - self._time < VELOCITY_LIMIT:
+            return self._resting(x_ref)
         return x_ref
 
     def _hold(self, x):
         if self._hold_point is None:
             self._hold_point = at_rest(x, self._yaw_index)
         return self._hold_point
+
+    def _with_velocity(self, x_ref, time):
+        """Return a reference with the velocity that counts."""
+        velocity = x_ref[3:6]
+        if not self._velocity_check.update(x_ref[:3], velocity, time):
+            self._report(
+                "the velocity of the references does not count, since they do not move with it"
+            )
+            return at_rest(x_ref, self._yaw_index)
+        speed = math.hypot(*velocity)
+        if speed <= self.max_speed:
+            return x_ref
+        self._report(
+            f"the reference has a velocity of {speed:.1f} m/s; expected <= {self.max_speed:g} m/s, "
+            "with which it is followed"
+        )
+        return [*x_ref[:3], *limited(velocity, self.max_speed), *x_ref[6:]]
+
+    def _resting(self, x_ref):
+        if self._rest is None:
+            self._rest = at_rest(x_ref, self._yaw_index)
+            self._report(
+                f"the reference has a velocity and has been the last for {VELOCITY_LIMIT:g} s; "
+                "resting where it is"
+            )
+        return self._rest
 
     def _within_reach(self, x_ref, x):
         distance = math.dist(x_ref[:3], x[:3])

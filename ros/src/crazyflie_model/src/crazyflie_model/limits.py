@@ -21,6 +21,9 @@ MIN_THRUST, MAX_THRUST = 4.0, 16.0
 """Range of the thrust that controllers ask for in flight, m/s^2: with less a vehicle stands on
 the ground or has its motors off, more than that it cannot do."""
 
+MAX_SPEED = 5.0
+"""The fastest that a vehicle is believed to fly, m/s."""
+
 LEVEL_AGE, OFF_AGE = 0.5, 2.0
 """Age of the last setpoint from which the firmware levels a flying vehicle out, and from which it
 stops its motors, s (COMMANDER_WDT_TIMEOUT_STABILIZE and _SHUTDOWN of commander.h)."""

@@ -5,7 +5,7 @@ from std_msgs.msg import Bool, Header
 from typing_extensions import override
 
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_model.limits import CRASH_TILT
+from crazyflie_model.limits import CRASH_TILT, MAX_SPEED
 from crazyflie_msgs.msg import (
     ControlStamped,
     FullStateStamped,
@@ -58,7 +58,7 @@ class StateEstimatorParameters(Parameters):
     max_speed: float = parameter(
         Number("m/s", above=0.0),
         "poses that a vehicle can reach only faster than this are rejected",
-        5.0,
+        MAX_SPEED,
         "pose/max_speed",
     )
     max_tilt: float = parameter(

@@ -1,6 +1,7 @@
 """A short soak, and what its watch complains of."""
 
 import math
+from random import Random
 
 import pytest
 from geometry_msgs.msg import TransformStamped
@@ -9,10 +10,11 @@ from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_dev.soak import Soak, soak
-from crazyflie_dev.soak_faults import FAULTS, NODES
+from crazyflie_dev.soak_faults import FAULTS, FROZEN_CAMERA, NODES, Flight
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_utils.runtime.poses import PoseCodec, StampedPose
 from crazyflie_utils.testing import FakeGraph
 
 
@@ -34,6 +36,36 @@ def test_nothing_makes_the_vehicle_fly_away(result):
 
 def test_nothing_makes_the_quadrotor_fly_away():
     assert soak(100.0, seed=8, dynamics="quadrotor")["violations"] == []
+
+
+@pytest.mark.parametrize("dynamics", ["near_hover", "quadrotor"])
+def test_a_camera_that_freezes_does_not_make_the_vehicle_fly_away(dynamics):
+    run = Soak(seed=5, dynamics=dynamics)
+    for _ in range(8):
+        run.fly(FROZEN_CAMERA)
+    assert run.watch.highest < 0.6
+    assert run.watch.farthest < 4.0
+    assert run.watch.hardest < 1.5
+
+
+def test_faults_of_poses_arrive():
+    names = {
+        "poses are not finite",
+        "quaternions are no rotations",
+        "poses jump",
+        "stamps are 3 s old",
+        "stamps are 8 s ahead",
+    }
+    pose = StampedPose("world", "crazyflie", 100_000_000_000, (0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
+    message = PoseCodec().encode([pose])
+    for fault in FAULTS:
+        if fault.name in names:
+            names.remove(fault.name)
+            graph = FakeGraph({})
+            fault.begin(Flight(graph, Random(1), print))
+            (arrived,) = graph.faults["/tf"](message)
+            assert str(arrived.transforms) != str(message.transforms), fault.name
+    assert not names
 
 
 @pytest.mark.parametrize("name", NODES)

@@ -6,13 +6,16 @@ import copy
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from io import BytesIO
 from random import Random
 from typing import Any
 
 import genpy
 from std_srvs.srv import EmptyRequest
+from tf2_msgs.msg import TFMessage
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_utils.runtime.poses import RawTransforms
 from crazyflie_utils.testing import FakeGraph
 
 CONTROLLER, ESTIMATOR, SERVER, FILTER = (
@@ -28,6 +31,9 @@ STARVATION = "this computer is too busy"
 
 _RESPAWN = 1.0
 """From the end of a node until roslaunch has started it anew, s."""
+
+_FROZEN_ABOVE = 0.02
+"""A vehicle that is no higher, m, cannot be told from one that does not lift off."""
 
 Undo = Callable[[], None]
 
@@ -88,10 +94,13 @@ def _on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Und
 
 def _with_each(edit: Callable[[Any, Flight], None]) -> Callable[[Flight], Undo]:
     def change(message, flight):
-        changed = copy.deepcopy(message)
+        # Transforms are decoded anew whenever they are asked for, and have to be encoded again.
+        changed = TFMessage(copy.deepcopy(message.transforms))
         for transform in changed.transforms:
             edit(transform, flight)
-        return [changed]
+        encoded = BytesIO()
+        changed.serialize(encoded)
+        return [RawTransforms().deserialize(encoded.getvalue())]
 
     return _on_tf(change)
 
@@ -116,6 +125,17 @@ def _shift(offset: float) -> Callable[[Any, Flight], None]:
         transform.header.stamp = genpy.Time.from_sec(stamp)
 
     return edit
+
+
+def _freeze_camera(flight: Flight) -> Undo:
+    """Repeat the first pose in the air, with the stamps of those that follow."""
+    first: dict[str, Any] = {}
+
+    def change(transform, _):
+        if first or transform.transform.translation.z > _FROZEN_ABOVE:
+            transform.transform = first.setdefault(transform.child_frame_id, transform.transform)
+
+    return _with_each(change)(flight)
 
 
 def _dropout(message, flight):
@@ -176,11 +196,14 @@ def _nothing(_: Flight) -> Undo:
     return lambda: None
 
 
-def _refer_to(x: float, y: float, z: float, age: float = 0.0) -> Callable[[Flight], None]:
+def _refer_to(
+    x: float, y: float, z: float, age: float = 0.0, speed: float = 0.0
+) -> Callable[[Flight], None]:
     def publish(flight):
         message = PositionVelocityStateStamped()
         message.header.stamp = genpy.Time.from_sec(flight.graph.time - age)
         message.state.x, message.state.y, message.state.z = x, y, z
+        message.state.x_dot, message.state.y_dot, message.state.z_dot = speed, -speed, speed
         flight.graph.publish("/ref", message)
 
     return publish
@@ -200,6 +223,10 @@ def _stop_motors(flight: Flight) -> Undo:
     return reset
 
 
+FROZEN_CAMERA = Fault("motion capture is frozen", _freeze_camera, 0.3, 9.0, blinds=True)
+"""Not among the others: the first frozen pose shows a slower vehicle, and the thrust that answers
+it is held until the filter notices the silence."""
+
 FAULTS = [
     Fault("poses stop for a moment", _on_tf(lambda *_: []), 0.05, 0.45, blinds=True),
     Fault("poses stop", _on_tf(lambda *_: []), 0.7, 9.0, blinds=True),
@@ -217,6 +244,7 @@ FAULTS = [
     Fault(STARVATION, _starvation.begin, 2.0, 12.0, drops=True, again=_starvation.again),
     Fault("references are not finite", _nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
     Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),
+    Fault("velocities are wrong", _nothing, 0.1, 5.0, again=_refer_to(0.0, 0.0, 1.0, speed=100.0)),
     Fault("references are old", _nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),
     Fault("somebody streams references", _nothing, 3.0, 9.0, again=_refer_to(0.3, 0.2, 1.0)),
     Fault("services are hammered", _nothing, 0.1, 3.0, again=_call_everything),

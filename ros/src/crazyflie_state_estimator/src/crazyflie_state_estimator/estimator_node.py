@@ -5,7 +5,6 @@ from std_msgs.msg import Bool, Header
 from typing_extensions import override
 
 from crazyflie_model.angles import rpy_from_quaternion
-from crazyflie_model.limits import CRASH_TILT, MAX_SPEED
 from crazyflie_msgs.msg import (
     ControlStamped,
     FullStateStamped,
@@ -14,111 +13,26 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_state_estimator import kalman
 from crazyflie_state_estimator.control_input import ControlInput
+from crazyflie_state_estimator.frozen_poses import FrozenPoseMonitor
 from crazyflie_state_estimator.motion import Motion, MotionEstimator
+from crazyflie_state_estimator.parameters import (
+    KALMAN,
+    KalmanParameters,
+    KalmanWithControlParameters,
+    StateEstimatorParameters,
+)
 from crazyflie_state_estimator.pose_gate import PoseGate, TiltMonitor, Verdict
 from crazyflie_state_estimator.rate_filter import FiniteDifference
-from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
+from crazyflie_utils import Node, NodeHandle, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer, Number, Text
+from crazyflie_utils.parameter_types import Integer
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple
-
-FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
 
 REPORT_PERIOD = 1.0
 """Of the diagnostics, s; REP 107 wants one report a second."""
 
 SILENCE_PERIOD = 0.1
 """How often an estimator that acts on arrival looks whether anything has arrived, s."""
-
-
-class StateEstimatorParameters(Parameters):
-    """Parameters of an estimator of 7 states; one of others declares `x_dim` anew."""
-
-    x_dim: int = parameter(Integer(7, 7), "number of fields of the state")
-    time_step: float = parameter(TIME_STEP, "period at which tf is read")
-    fixed_frame: str = parameter(FRAME, "frame the state is in", name="frames/fixed")
-    robot_frame: str = parameter(FRAME, "frame of the vehicle", name="frames/robot")
-    state_topic: str = parameter(TOPIC, "where states go", name="topics/state")
-    acts_on_arrival: bool = parameter(
-        BOOLEAN,
-        "answer a new pose as soon as it comes, at most one every `time_step`, and do not wait for "
-        "the next time step",
-        False,
-        "act_on_arrival",
-    )
-    filter_type: str = parameter(
-        Text((FINITE_DIFFERENCE, KALMAN)), "how rates are found", FINITE_DIFFERENCE, "filter/type"
-    )
-    control_topic: str | None = parameter(
-        TOPIC,
-        "the vehicle's control, such as /control/final; for the Kalman filter only",
-        None,
-        "topics/control",
-    )
-    max_speed: float = parameter(
-        Number("m/s", above=0.0),
-        "poses that a vehicle can reach only faster than this are rejected",
-        MAX_SPEED,
-        "pose/max_speed",
-    )
-    max_tilt: float = parameter(
-        Number("rad", above=0.0),
-        "a vehicle that is tilted more than this has crashed",
-        CRASH_TILT,
-        "pose/max_tilt",
-    )
-
-
-# Their squares, and quotients of these, are far from the ends of the range of floats.
-_ACCELERATION_WALK = Number("m/s^2/sqrt(s)", minimum=1e-6, maximum=1e6)
-_ACCELERATION_WALK_HELP = (
-    "by how much the unknown part of the acceleration changes in a second (standard deviation)"
-)
-
-
-class KalmanParameters(Parameters):
-    """Parameters of the Kalman filter where the control is not known."""
-
-    position_noise: float = parameter(
-        Number("m", minimum=1e-6, maximum=100.0),
-        "standard deviation of the poses' coordinates",
-        kalman.POSITION_NOISE,
-        "filter/position_noise",
-        live=True,
-    )
-    acceleration_walk: float = parameter(
-        _ACCELERATION_WALK,
-        _ACCELERATION_WALK_HELP,
-        kalman.ACCELERATION_WALK,
-        "filter/acceleration_walk",
-        live=True,
-    )
-    angle_noise: float = parameter(
-        Number("rad", minimum=1e-6, maximum=10.0),
-        "standard deviation of the poses' angles",
-        kalman.ANGLE_NOISE,
-        "filter/angle_noise",
-        live=True,
-    )
-    angular_acceleration_walk: float = parameter(
-        Number("rad/s^2/sqrt(s)", minimum=1e-6, maximum=1e6),
-        "as `filter/acceleration_walk`, of roll, pitch and yaw",
-        kalman.ANGULAR_ACCELERATION_WALK,
-        "filter/angular_acceleration_walk",
-        live=True,
-    )
-
-
-class KalmanWithControlParameters(KalmanParameters):
-    """Parameters of the Kalman filter where the control is known."""
-
-    acceleration_walk: float = parameter(
-        _ACCELERATION_WALK,
-        _ACCELERATION_WALK_HELP,
-        kalman.ACCELERATION_WALK_WITH_CONTROL,
-        "filter/acceleration_walk",
-        live=True,
-    )
 
 
 class StateEstimatorNode(Node):
@@ -142,6 +56,7 @@ class StateEstimatorNode(Node):
         self._last_success = 0.0
         self._stamp: int | None = None
         self._is_tilted: bool | None = None
+        self._frozen_poses = 0
         self._inner_type = type(self.state_type().state)
 
     def state(self, motion: Motion) -> list[float]:
@@ -153,6 +68,7 @@ class StateEstimatorNode(Node):
         self._parameters = handle.load(self.parameters_type)
         self._gate = PoseGate(self._parameters.max_speed)
         self._tilt = TiltMonitor(self._parameters.max_tilt)
+        self._frozen = FrozenPoseMonitor(self._parameters.control_topic is not None)
         if self._parameters.filter_type == KALMAN:
             self._estimator = self._load_kalman_filters(handle)
         else:
@@ -185,7 +101,7 @@ class StateEstimatorNode(Node):
         self._tilted = handle.publisher(f"{parameters.state_topic}_tilted", Bool, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._lookup = handle.listen_to_poses()
-        if parameters.filter_type == KALMAN and parameters.control_topic is not None:
+        if parameters.control_topic is not None:
             handle.subscribe(
                 parameters.control_topic, ControlStamped, self._on_control, finite="control"
             )
@@ -211,6 +127,7 @@ class StateEstimatorNode(Node):
             # The simulation was reset, and what is known belongs to the past one.
             self._estimator.reset()
             self._gate.reset()
+            self._frozen.reset()
             self._last_success = now
         try:
             pose = self._lookup(self._parameters.fixed_frame, self._parameters.robot_frame)
@@ -236,9 +153,21 @@ class StateEstimatorNode(Node):
             return None
         if verdict is Verdict.MOVED:
             self._estimator.reset()
+            self._frozen.restart()
         attitude = rpy_from_quaternion(*pose.rotation)
-        return self._estimator.update(
-            pose.stamp, pose.position, attitude, self._control.acceleration(attitude[2], now)
+        acceleration = self._control.acceleration(attitude[2], now)
+        if self._frozen.update(pose.stamp * 1e-9, pose.position, pose.rotation, acceleration):
+            self._reject_frozen()
+            return None
+        return self._estimator.update(pose.stamp, pose.position, attitude, acceleration)
+
+    def _reject_frozen(self):
+        self._frozen_poses += 1
+        self._handle.warn(
+            f"the poses of {self._parameters.robot_frame} do not follow its control, or repeat; is "
+            "motion capture frozen?",
+            throttle=1.0,
+            key="frozen",
         )
 
     def _tell_tilt(self, rotation):
@@ -251,12 +180,20 @@ class StateEstimatorNode(Node):
             self._handle.warn("the vehicle has tipped over", throttle=1.0)
 
     def _rejections(self):
-        return self._gate.rejected + sum(self._handle.rejected_transforms().values())
+        return (
+            self._gate.rejected
+            + self._frozen_poses
+            + sum(self._handle.rejected_transforms().values())
+        )
 
     def _report(self):
         silence = self._handle.time() - self._last_success
         is_silent = silence > HOLD_LIMIT
-        reasons = {"is too far away": self._gate.rejected, **self._handle.rejected_transforms()}
+        reasons = {
+            "is too far away": self._gate.rejected,
+            "does not follow the control": self._frozen_poses,
+            **self._handle.rejected_transforms(),
+        }
         values = [KeyValue(f"rejected: {key}", str(count)) for key, count in reasons.items()]
         status = DiagnosticStatus(
             level=DiagnosticStatus.ERROR if is_silent else DiagnosticStatus.OK,

@@ -10,7 +10,7 @@ from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_dev.soak import Soak, soak
-from crazyflie_dev.soak_faults import FAULTS, FROZEN_CAMERA, NODES, Flight
+from crazyflie_dev.soak_faults import FAULTS, FROZEN_CAMERA, NODES, WRONG_VELOCITIES, Flight
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped
@@ -46,6 +46,14 @@ def test_a_camera_that_freezes_does_not_make_the_vehicle_fly_away(dynamics):
     assert run.watch.highest < 0.6
     assert run.watch.farthest < 4.0
     assert run.watch.hardest < 1.5
+
+
+@pytest.mark.parametrize("dynamics", ["near_hover", "quadrotor"])
+def test_velocities_that_are_wrong_do_not_lead_away(dynamics):
+    run = Soak(seed=6, dynamics=dynamics)
+    for _ in range(6):
+        run.fly(WRONG_VELOCITIES)
+    assert run.watch.violations == []
 
 
 def test_faults_of_poses_arrive():

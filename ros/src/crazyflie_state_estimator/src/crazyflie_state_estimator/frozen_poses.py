@@ -137,11 +137,11 @@ class FrozenPoseMonitor:
             self._ground = position[2]
         elif not self._knows_control:
             self._ground = min(self._ground, position[2])
-        is_lifted = position[2] > self._ground + LIFTED
-        is_repeated = self._is_repeated(time, position, rotation, acceleration)
+        height = position[2] - self._ground
+        is_repeated = self._is_repeated(time, position, rotation, acceleration, height)
         if self._place is not None:
-            return self._is_still_frozen(position)
-        if is_lifted and acceleration is not None:
+            return self._is_still_frozen(position, self._place)
+        if height > LIFTED and acceleration is not None:
             self._collect(time, position, acceleration)
         else:
             self._stand(time, acceleration)
@@ -159,7 +159,7 @@ class FrozenPoseMonitor:
         self._stood_at = time
         self._forget()
 
-    def _is_repeated(self, time, position, rotation, acceleration):
+    def _is_repeated(self, time, position, rotation, acceleration, height):
         pose, last = (tuple(position), tuple(rotation)), self._last
         elapsed, self._time = time - self._time, time
         if pose != last:
@@ -167,7 +167,7 @@ class FrozenPoseMonitor:
             self._last_step = 0.0 if last is None else math.dist(pose[0], last[0])
             self._last = pose
             return False
-        if position[2] > self._ground + CLEAR:
+        if height > CLEAR:
             self._repeats = self._repeats or self._last_step > _ROUNDING
         elif acceleration is not None and acceleration[2] > HEAVY:
             self._lifting += (acceleration[2] - HEAVY) * elapsed
@@ -175,8 +175,8 @@ class FrozenPoseMonitor:
         # What repeats goes on to when the flight has ended.
         return self._repeats
 
-    def _is_still_frozen(self, position):
-        is_outside = math.dist(position, self._place) > _LEFT
+    def _is_still_frozen(self, position, place):
+        is_outside = math.dist(position, place) > _LEFT
         self._outside = self._outside + 1 if is_outside else 0
         if self._outside < _CONFIRMATION:
             return True

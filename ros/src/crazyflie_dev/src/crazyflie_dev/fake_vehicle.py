@@ -1,7 +1,8 @@
 """A vehicle for tests, which answers over UDP as a test lets it and has no dynamics.
 
 It knows the set-up of a connection, log blocks, parameters and replies, and keeps
-every packet that it gets. `crazyflie_virtual` is a vehicle that flies.
+every packet that it gets. Commands and the supervisor are those of `FakeFlight`.
+`crazyflie_virtual` is a vehicle that flies.
 """
 
 import socket
@@ -10,12 +11,17 @@ import threading
 import time
 from collections.abc import Callable
 
+from crazyflie_dev.fake_flight import SUPERVISOR_PROTOCOL, FakeFlight
+
 LOG_TYPES = {"B": 1, "H": 2, "I": 3, "b": 4, "h": 5, "i": 6, "f": 7, "e": 8}
 PARAMETER_TYPES = {"B": 8, "H": 9, "I": 10, "Q": 11, "b": 0, "h": 1, "i": 2, "f": 6}
 READ_ONLY, EXTENDED = 0x40, 0x10
 
 TRAJECTORY_MEMORY = (1, 0x12, 4096)
 """Number, type and size in bytes of the only memory."""
+
+_ATTITUDE = struct.Struct("<fffH")
+_EMERGENCY_STOP = 0x03
 
 
 class FakeVehicle:
@@ -31,9 +37,14 @@ class FakeVehicle:
         Version of the protocol.
     port : int
         By default any free one.
+    clock : callable
+        Returns the time of the flight, s.
 
     Attributes
     ----------
+    flight : FakeFlight
+        What is answered to commands and reported by the supervisor, also as the log variable
+        supervisor.info if ``log`` has it.
     received : list of (port, channel, bytes)
         All packets, oldest first.
     deaf : set of (port, channel, bytes)
@@ -52,7 +63,9 @@ class FakeVehicle:
         parameters: dict[str, tuple[str, float, int]] | None = None,
         protocol: int = 12,
         port: int = 0,
+        clock: Callable[[], float] = time.monotonic,
     ):
+        self.flight = FakeFlight(protocol, clock)
         self.log = log if log is not None else {"pm.vbat": ("f", 3.9)}
         self.parameters = parameters if parameters is not None else {"ring.effect": ("B", 1, 0)}
         self.protocol = protocol
@@ -211,10 +224,14 @@ class FakeVehicle:
             if now < due:
                 continue
             self._started[block] = (period, max(due + period, now))
-            values = [self.log[name] for name in self._blocks[block]]
+            values = [self._log_value(name) for name in self._blocks[block]]
             packed = struct.pack("<" + "".join(code for code, _ in values), *(v for _, v in values))
             stamp = (int(now * 1000) & 0xFFFFFF).to_bytes(3, "little")
             self.say(5, 2, bytes([block]) + stamp + packed)
+
+    def _log_value(self, name):
+        code, value = self.log[name]
+        return code, int(self.flight.state) if name == "supervisor.info" else value
 
     # Memory.
 
@@ -251,15 +268,29 @@ class FakeVehicle:
     def _on_2_3(self, data):
         return data[:3] + b"\0\x01"
 
-    # Commands.
+    # Setpoints and commands.
+
+    def _on_3_0(self, data):
+        if len(data) == _ATTITUDE.size:
+            self.flight.stream(_ATTITUDE.unpack(data)[3] > 0)
+
+    def _on_7_0(self, data):
+        self.flight.stream(data[:1] != b"\0")
+
+    def _on_7_1(self, data):
+        self.flight.end_stream()
 
     def _on_8_0(self, data):
-        return data[:3].ljust(3, b"\0") + b"\0"
+        return data[:3].ljust(3, b"\0") + bytes([self.flight.command(data)])
 
     def _on_9_0(self, data):
-        return bytes([0x80 | data[0]]) + struct.pack("<H", 0b1001)
+        if self.protocol < SUPERVISOR_PROTOCOL:
+            return None
+        return bytes([0x80 | data[0]]) + struct.pack("<H", self.flight.state)
 
     def _on_9_1(self, data):
+        if data[0] == _EMERGENCY_STOP:
+            self.flight.stop_for_good()
         return bytes([0x80 | data[0], 1, data[1] if len(data) > 1 else 1])
 
 

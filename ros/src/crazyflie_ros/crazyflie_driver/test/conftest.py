@@ -28,7 +28,8 @@ LOG = {
     "baro.pressure": ("f", 1013.25),
     "pm.vbat": ("f", 3.75),
     "radio.rssi": ("B", 47),
-    "supervisor.info": ("H", 0b1010),
+    # The value is the state of `FakeVehicle.flight`.
+    "supervisor.info": ("H", 0),
     "stateEstimate.x": ("f", 1.5),
     "stateEstimate.y": ("f", -2.5),
     "stateEstimate.z": ("f", 0.75),
@@ -55,7 +56,12 @@ class Server:
         self.vehicles = []
 
     def make_vehicle(self, **options):
-        options = {"log": dict(LOG), "parameters": dict(PARAMETERS), **options}
+        options = {
+            "log": dict(LOG),
+            "parameters": dict(PARAMETERS),
+            "clock": self.process.clock.time,
+            **options,
+        }
         self.vehicles.append(FakeVehicle(**options))
         return self.vehicles[-1]
 
@@ -126,6 +132,7 @@ def flying(shared):
     vehicle.received.clear()
     vehicle.answers.clear()
     vehicle.deaf.clear()
+    vehicle.flight.restart()
     shared.process.transport.log_records.clear()
     return shared, vehicle
 

@@ -182,7 +182,7 @@ def test_diagnostics_tell_what_an_operator_needs(server, vehicle):
     assert status(server).hardware_id == vehicle.uri
     assert found["battery (V)"] == "3.75"
     assert found["rssi (-dBm)"] == "47"
-    assert found["state"] == "armed, can fly"
+    assert found["state"] == "armed, auto armed, can fly, trajectory finished"
     assert found["link"] == "connected"
     assert float(found["link quality (%)"]) > 50.0
     assert found["findings"] == "none"

@@ -75,8 +75,7 @@ def test_setpoints_that_override_a_command_are_pointed_out(flying):
     assert "cmd_vel overrides the high-level command" in server.process.logged("warn")[0]
 
 
-def test_notify_setpoints_stop(flying):
-    server, vehicle = flying
+def test_notify_setpoints_stop(server, vehicle):
     server.call("/cf1/notify_setpoints_stop", NotifySetpointsStopRequest(0, 250))
     assert vehicle.wait_for_packets(7, 1) == [struct.pack("<BI", 0, 250)]
 
@@ -150,7 +149,7 @@ def test_an_emergency_is_latched(server, vehicle):
     assert status.message.startswith("emergency stop")
     # Only a vehicle that is added anew flies again.
     server.remove(vehicle.uri)
-    is_(vehicle, READY)
+    vehicle.flight.restart()
     server.add(vehicle.uri)
     server.call("/cf1/takeoff", TAKEOFF)
 

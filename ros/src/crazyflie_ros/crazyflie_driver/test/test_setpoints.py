@@ -141,7 +141,7 @@ def test_a_vehicle_that_will_not_fly_is_pointed_out(server, info, text):
         return any(text in warning for warning in process.logged("warn"))
 
     vehicle = server.make_vehicle()
-    vehicle.log["supervisor.info"] = ("H", info)
+    vehicle.flight.pin(info)
     server.add(vehicle.uri)
     process = server.process
     assert vehicle.wait_for(lambda: warned(process), limit=0.0) is False

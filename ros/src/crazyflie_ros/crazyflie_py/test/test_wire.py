@@ -19,6 +19,7 @@ def vehicle(shared):
     vehicle, _, parameters = shared
     vehicle.parameters.update(parameters)
     vehicle.answers.clear()
+    vehicle.flight.restart()
     vehicle.received.clear()
     return vehicle
 

@@ -11,3 +11,9 @@ def test_flags_by_name():
 def test_words():
     assert SupervisorState(0).words() == "nothing"
     assert SupervisorState.of(locked=True, can_be_armed=True).words() == "can be armed, locked"
+
+
+def test_firmware_before_protocol_12_does_not_report_its_planner():
+    # As recorded of both, at rest, in flight, and after a touchdown.
+    assert all(SupervisorState(bits).reports_planner for bits in (0x20E, 0x11E, 0x31E, 0x21E))
+    assert not any(SupervisorState(bits).reports_planner for bits in (0x0E, 0x1E, 0x44))

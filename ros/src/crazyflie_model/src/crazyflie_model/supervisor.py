@@ -30,6 +30,22 @@ class SupervisorState(enum.IntFlag):
                 state |= cls[name.upper()]
         return state
 
+    @property
+    def reports_planner(self) -> bool:
+        """Whether the firmware reports its high-level commander; before protocol 12 it does not.
+
+        In all recordings of firmware that does, one of its flags is set at any time, but while a
+        stream keeps out a plan whose time has not run out.
+        """
+        return bool(
+            self
+            & (
+                SupervisorState.HIGH_LEVEL_ACTIVE
+                | SupervisorState.TRAJECTORY_FINISHED
+                | SupervisorState.HIGH_LEVEL_DISABLED
+            )
+        )
+
     def words(self) -> str:
         """Return the state in words, such as "armed, flying"."""
         names = [

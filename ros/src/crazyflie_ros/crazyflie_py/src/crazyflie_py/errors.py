@@ -35,6 +35,10 @@ class RefusedError(CrazyflieError):
     """The vehicle has refused a request."""
 
 
+class AlreadyLandingError(RefusedError):
+    """The vehicle has refused to land, since it lands."""
+
+
 class UnknownNameError(CrazyflieError):
     """The vehicle has no log variable or parameter of this name."""
 

@@ -1,16 +1,21 @@
 """Commands that the vehicle's own planner carries out."""
 
+import copy
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Self
 
 from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crtp.crtpstack import CRTPPort
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.checks import check_byte, check_finite, check_positive
-from crazyflie_py.errors import RefusedError
-from crazyflie_py.exchange import Request
+from crazyflie_py.errors import AlreadyLandingError, RefusedError
+from crazyflie_py.exchange import REPLY_LIMIT, Request
 from crazyflie_py.link import Link
 from crazyflie_py.subsystem import Subsystem
+from crazyflie_py.supervisor import read_state
 
 ALL_GROUPS = 0
 """Group mask that every vehicle obeys."""
@@ -18,6 +23,25 @@ ALL_GROUPS = 0
 # The first protocol versions with the present forms of two commands.
 _GO_TO_2_PROTOCOL = 8
 _START_2_PROTOCOL = 10
+
+_BUSY = 1
+"""Reply to a takeoff while the planner flies, and to a landing while it lands."""
+
+
+@dataclass
+class _Knowledge:
+    """What the vehicle was told, which it cannot be asked for.
+
+    Attributes
+    ----------
+    defined : set of int
+        Trajectories.
+    groups : int or None
+        Groups that it belongs to, a bit each; None if nobody has set them here.
+    """
+
+    defined: set[int] = field(default_factory=set)
+    groups: int | None = None
 
 
 class HighLevel(Subsystem):
@@ -29,11 +53,30 @@ class HighLevel(Subsystem):
 
     def __init__(self, current_link: Callable[[], Link]):
         super().__init__(current_link)
-        self._defined: set[int] = set()
+        self._knowledge = _Knowledge()
+        self._is_dry = False
 
     def forget_trajectories(self) -> None:
-        """Take note that the vehicle has restarted: it knows no trajectory any more."""
-        self._defined = set()
+        """Take note that the vehicle has restarted: no trajectory is defined, it has no group."""
+        self._knowledge.defined.clear()
+        self._knowledge.groups = 0
+
+    def dry_run(self) -> Self:
+        """Return one that refuses what this one would refuse, and sends nothing."""
+        dry = copy.copy(self)
+        dry._is_dry = True
+        dry._knowledge = copy.deepcopy(self._knowledge)
+        return dry
+
+    def is_addressed(self, group_mask: int) -> bool | None:
+        """Return whether the vehicle obeys commands to these groups; None if that is not known.
+
+        The firmware answers "done" to those for others, and does nothing.
+        """
+        if group_mask == ALL_GROUPS:
+            return True
+        groups = self._knowledge.groups
+        return None if groups is None else bool(group_mask & groups)
 
     def set_group_mask(self, group_mask: int) -> None:
         """Set the groups (bits) that the vehicle belongs to."""
@@ -43,6 +86,7 @@ class HighLevel(Subsystem):
             HighLevelCommander.COMMAND_SET_GROUP_MASK,
             lambda c: c.set_group_mask(group_mask),
         )
+        self._knowledge.groups = group_mask
 
     def take_off(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
         """Climb to a height (m) in a duration (s), keeping position and heading."""
@@ -56,7 +100,14 @@ class HighLevel(Subsystem):
         )
 
     def land(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
-        """Sink to a height (m) in a duration (s), keeping position and heading."""
+        """Sink to a height (m) in a duration (s), keeping position and heading.
+
+        The firmware obeys on the ground, too, and starts the motors there.
+
+        Raises
+        ------
+        AlreadyLandingError
+        """
         check_finite("landing", height)
         check_positive("landing", duration)
         check_byte("group mask", group_mask)
@@ -64,6 +115,8 @@ class HighLevel(Subsystem):
             "the land command",
             HighLevelCommander.COMMAND_LAND_2,
             lambda c: c.land(height, duration, group_mask, yaw=None),
+            # After the touchdown a repetition would start the motors.
+            resend=duration > REPLY_LIMIT,
         )
 
     def stop(self, group_mask: int = ALL_GROUPS) -> None:
@@ -125,8 +178,9 @@ class HighLevel(Subsystem):
         check_positive("time scale", time_scale)
         check_byte("group mask", group_mask)
         is_new = self._current_link().protocol >= _START_2_PROTOCOL
-        if trajectory_id not in self._defined:
-            known = ", ".join(map(str, sorted(self._defined))) or "none"
+        defined = self._knowledge.defined
+        if trajectory_id not in defined:
+            known = ", ".join(map(str, sorted(defined))) or "none"
             raise RefusedError(
                 f"the start of the trajectory: {trajectory_id} has not been uploaded since the "
                 f"vehicle was connected or restarted; known: {known}"
@@ -155,14 +209,34 @@ class HighLevel(Subsystem):
             HighLevelCommander.COMMAND_DEFINE_TRAJECTORY,
             lambda c: c.define_trajectory(trajectory_id, offset, pieces),
         )
-        self._defined.add(trajectory_id)
+        self._knowledge.defined.add(trajectory_id)
 
     def _command(self, what, number, send, resend=True):
         link = self._current_link()
-        commander = link.cflib.high_level_commander
+        if self._is_dry:
+            return
+        sent = 0
+
+        def transmit():
+            nonlocal sent
+            sent += 1
+            send(link.cflib.high_level_commander)
+
         request = Request(CRTPPort.SETPOINT_HL, 0, bytes([number]), what, resend)
-        answer = link.ask(lambda: send(commander), request)
+        answer = link.ask(transmit, request)
         # The first three bytes of the request, then the firmware's errno.
         code = answer[3] if len(answer) > 3 else 0
-        if code:
-            raise RefusedError(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
+        if code and not (code == _BUSY and sent > 1 and self._is_carried_out(number)):
+            is_landing = code == _BUSY and number == HighLevelCommander.COMMAND_LAND_2
+            error = AlreadyLandingError if is_landing else RefusedError
+            raise error(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
+
+    def _is_carried_out(self, number):
+        # Whether the repetition of a command was refused because the first one, whose reply was
+        # lost, is obeyed.
+        if number != HighLevelCommander.COMMAND_TAKEOFF_2:
+            return number == HighLevelCommander.COMMAND_LAND_2
+        state = read_state(self._current_link())
+        if state is None or not state.reports_planner:
+            return True
+        return SupervisorState.HIGH_LEVEL_ACTIVE in state

@@ -134,6 +134,15 @@ class Setpoints(Subsystem):
         link.forget(_STREAM)
         link.command(lambda: link.cflib.commander.send_notify_setpoint_stop(remain_valid_ms))
 
+    def hand_over_now(self, remain_valid_ms: int = 0) -> None:
+        """Do the same at once: for the thread that sends, right before a command.
+
+        See `Subsystem.guarded`, whose ``may_send`` may do that.
+        """
+        link = self._current_link()
+        link.forget(_STREAM)
+        link.cflib.commander.send_notify_setpoint_stop(remain_valid_ms)
+
     def _stream(self, send):
         link = self._current_link()
         link.stream(_STREAM, lambda: send(link.cflib.commander))

@@ -1,8 +1,10 @@
 """What the subsystems of a vehicle have in common: a link, tables of names."""
 
+import copy
 from collections.abc import Callable
-from typing import Protocol, TypeVar
+from typing import Protocol, Self, TypeVar, cast
 
+from crazyflie_py.guarded_link import GuardedLink, MaySend
 from crazyflie_py.link import Link
 
 
@@ -17,6 +19,18 @@ class Subsystem:
 
     def __init__(self, current_link: Callable[[], Link]):
         self._current_link = current_link
+
+    def guarded(self, may_send: MaySend) -> Self:
+        """Return the same subsystem, but its commands and requests go out only if ``may_send()``.
+
+        Parameters
+        ----------
+        may_send : callable
+            Is called by the thread that sends, right before each packet.
+        """
+        guarded, current_link = copy.copy(self), self._current_link
+        guarded._current_link = lambda: cast(Link, GuardedLink(current_link(), may_send))
+        return guarded
 
 
 class TableElement(Protocol):

@@ -38,11 +38,7 @@ class Supervisor(Subsystem):
         CrazyflieError
             No link or no reply.
         """
-        link = self._current_link()
-        if link.protocol < SUPERVISOR_PROTOCOL:
-            return None
-        answer = self._ask(link, _INFO_CHANNEL, bytes([_GET_STATE]), "the supervisor's state")
-        return SupervisorState(int.from_bytes(answer[1:3], "little"))
+        return read_state(self._current_link())
 
     def arm(self, do_arm: bool = True) -> None:
         """Arm or disarm the motors; blocks until the vehicle has confirmed it.
@@ -134,3 +130,14 @@ class Supervisor(Subsystem):
     ) -> bytes:
         prefix = bytes([ANSWER | data[0]])
         return link.ask(data, Request(CRTPPort.SUPERVISOR, channel, prefix, what, accepts=accepts))
+
+
+def read_state(link: Link) -> SupervisorState | None:
+    """Return the state that is told over a link; see `Supervisor.read`."""
+    if link.protocol < SUPERVISOR_PROTOCOL:
+        return None
+    request = Request(
+        CRTPPort.SUPERVISOR, _INFO_CHANNEL, bytes([ANSWER | _GET_STATE]), "the supervisor's state"
+    )
+    answer = link.ask(bytes([_GET_STATE]), request)
+    return SupervisorState(int.from_bytes(answer[1:3], "little"))

@@ -2,14 +2,17 @@
 
 import struct
 from collections.abc import Callable, Sequence
+from typing import Self
 
 from cflib.crazyflie.mem.memory_element import MemoryElement
 from cflib.crtp.crtpstack import CRTPPort
+from typing_extensions import override
 
 from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 from crazyflie_py.checks import check_finite, check_positive
 from crazyflie_py.errors import RefusedError, ValueRangeError
 from crazyflie_py.exchange import Request
+from crazyflie_py.guarded_link import MaySend
 from crazyflie_py.high_level import HighLevel
 from crazyflie_py.link import Link
 from crazyflie_py.subsystem import Subsystem
@@ -24,6 +27,12 @@ class Trajectories(Subsystem):
     def __init__(self, current_link: Callable[[], Link], high_level: HighLevel):
         super().__init__(current_link)
         self._high_level = high_level
+
+    @override
+    def guarded(self, may_send: MaySend) -> Self:
+        guarded = super().guarded(may_send)
+        guarded._high_level = self._high_level.guarded(may_send)
+        return guarded
 
     def upload(
         self,

@@ -1,5 +1,9 @@
 """Whether setpoints may be sent: after a lost link what is streamed may be stale."""
 
+import contextlib
+import threading
+from collections.abc import Iterator
+
 PAUSE = 1.0
 """A stream that has been silent for so long, s, was begun anew by somebody who knows."""
 
@@ -14,10 +18,14 @@ class SetpointGate:
 
     After a lost link, setpoints stay blocked: the vehicle may have been restarted, or its
     battery been changed, and be in somebody's hand. What shows that they are meant is that the
-    vehicle still flies, a pause in the stream, zero thrust, or a call of a service.
+    vehicle still flies, a pause in the stream, zero thrust, or a call that has it fly.
+
+    Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
     """
 
     def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._commands = 0
         self._is_emergency = False
         self._is_leaving = False
         self._is_down = False
@@ -28,31 +36,64 @@ class SetpointGate:
 
     def stop_for_good(self) -> None:
         """Take note of an emergency stop."""
-        self._is_emergency = True
+        with self._lock:
+            self._is_emergency = True
 
     def leave(self) -> None:
         """Take note that the vehicle is being removed."""
-        self._is_leaving = True
+        with self._lock:
+            self._is_leaving = True
 
     def link_lost(self) -> None:
         """Take note that the link was lost."""
-        self._is_down = self._is_waiting = True
+        with self._lock:
+            self._is_down = self._is_waiting = True
 
     def link_back(self) -> None:
         """Take note that there is a link again."""
-        self._is_down = False
+        with self._lock:
+            self._is_down = False
 
     def open(self) -> None:
-        """Take note of a call, or of a flight that goes on."""
-        self._is_waiting = self._is_down
+        """Take note of a call that has the vehicle fly, or of a flight that goes on."""
+        with self._lock:
+            self._is_waiting = self._is_down
 
-    def high_level(self, now: float) -> None:
-        """Take note that the vehicle was given a high-level command after a stream."""
-        self._high_level_since = now
+    def high_level(self, now: float) -> int:
+        """Take note that the vehicle is given a high-level command; return its number."""
+        with self._lock:
+            self._high_level_since = now
+            self._commands += 1
+            return self._commands
+
+    def resume(self, command: int) -> None:
+        """Let setpoints pass again, as a command was not carried out; not if one has followed.
+
+        Parameters
+        ----------
+        command : int
+            Its number, from `high_level`.
+        """
+        with self._lock:
+            if command == self._commands:
+                self._high_level_since = None
 
     def stop(self, now: float) -> None:
         """Take note that a stream was ended by cmd_stop."""
-        self._stopped_since = now
+        with self._lock:
+            self._stopped_since = now
+
+    @contextlib.contextmanager
+    def passing(self, now: float, is_zero: bool) -> Iterator[str]:
+        """Decide about a setpoint that is sent within the block; nothing changes meanwhile.
+
+        Yields
+        ------
+        str
+            See `refusal`.
+        """
+        with self._lock:
+            yield self.refusal(now, is_zero)
 
     def is_blocking(self, now: float) -> bool:
         """Return whether somebody streams setpoints that are blocked because of a lost link."""
@@ -67,6 +108,10 @@ class SetpointGate:
         is_zero : bool
             Whether it has the motors stand still.
         """
+        with self._lock:
+            return self._refusal(now, is_zero)
+
+    def _refusal(self, now, is_zero):
         before, self._latest = self._latest, now
         if self._is_emergency:
             return "emergency stop"
@@ -78,7 +123,7 @@ class SetpointGate:
         if self._is_waiting and not (is_new or is_zero):
             return (
                 "the link was lost, and the vehicle does not fly: pause the stream for "
-                f"{PAUSE:g} s, send zero thrust or call a service"
+                f"{PAUSE:g} s, send zero thrust or call a service that has it fly"
             )
         self._is_waiting = False
         for since, event in (

@@ -1,6 +1,7 @@
 """Topics with setpoints and external poses, turned into what goes over the link."""
 
 import contextlib
+import math
 from collections import deque
 
 from geometry_msgs.msg import Point, PointStamped, PoseStamped, Twist, Vector3
@@ -98,6 +99,16 @@ class SetpointTopics:
         self._crazyflie.setpoints.zeros()
         self.is_streaming = False
 
+    @property
+    def last_time(self) -> float:
+        """When the last setpoint was sent, s; -inf if none was."""
+        return self._times[-1] if self._times else -math.inf
+
+    def hand_over_now(self, remain_valid_ms: int = 0) -> None:
+        """Do the same as `hand_over`, in the thread that sends: see crazyflie_py's `guarded`."""
+        self._crazyflie.setpoints.hand_over_now(remain_valid_ms)
+        self.is_streaming = False
+
     def hand_over(self, remain_valid_ms: int = 0) -> None:
         """Announce that setpoints end, so that the vehicle accepts high-level commands."""
         self._crazyflie.setpoints.hand_over(remain_valid_ms)
@@ -137,18 +148,18 @@ class SetpointTopics:
         def callback(message):
             now = self._handle.time()
             at_rest = name == CMD_STOP or (name == CMD_VEL and message.linear.z <= 0.0)
-            refusal = self.gate.refusal(now, at_rest)
+            with self.gate.passing(now, at_rest) as refusal:
+                is_sent = not refusal and send(message)
+                if is_sent:
+                    if name == CMD_STOP:
+                        self.gate.stop(now)
+                    self._times.append(now)
+                    self.is_streaming, self._is_at_rest, self._source = True, at_rest, name
             if refusal:
-                self.ignored += 1
                 self._warn(f"ignoring {name}: {refusal}", key="gate")
-                return
-            if not send(message):
+            if not is_sent:
                 self.ignored += 1
                 return
-            if name == CMD_STOP:
-                self.gate.stop(now)
-            self._times.append(now)
-            self.is_streaming, self._is_at_rest, self._source = True, at_rest, name
             if self._high_level_end is not None and now < self._high_level_end:
                 self._warn(f"{name} overrides the high-level command", key="override")
 

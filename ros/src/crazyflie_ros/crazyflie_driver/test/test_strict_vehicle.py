@@ -151,6 +151,29 @@ def test_a_takeoff_waits_for_the_moment_after_a_landing_in_which_the_firmware_re
     assert flight.virtual.observe().position[2] > 0.8 * HEIGHT
 
 
+@pytest.mark.parametrize("protocol", [11, 12])
+@pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWarning")
+def test_nothing_starts_the_motors_after_a_touchdown(server, protocol):
+    with virtual_vehicle(protocol=protocol) as (virtual, uri):
+        flight = Flight(server, virtual, uri)
+        stabilizer = virtual.vehicle.board.firmware.stabilizer
+        server.call("/cf1/takeoff", TakeoffRequest(0, HEIGHT, Duration(1)))
+        flight.run(2.0)
+        server.call("/cf1/land", LandRequest(0, 0.0, Duration(1)))
+        flight.run(LIMIT, until=lambda: not any(stabilizer.commands))
+        flight.run(0.3)
+        assert SupervisorState.FLYING in flight.state
+        server.node.leave()
+        removing = threading.Thread(target=server.remove, args=(uri,))
+        removing.start()
+        while removing.is_alive():
+            flight.run(PERIOD)
+            assert not any(stabilizer.commands)
+        flight.wait(LOCK_TIME)
+        assert not any(stabilizer.commands)
+        assert SupervisorState.LOCKED not in virtual.vehicle.board.firmware.supervisor.flags
+
+
 def test_the_emergency_watchdog_ends_a_flight_without_a_pc(make_server):
     with virtual_vehicle() as (virtual, uri):
         flight = Flight(make_server({"emergency_watchdog": True}), virtual, uri)

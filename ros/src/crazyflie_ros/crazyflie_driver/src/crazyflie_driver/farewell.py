@@ -1,9 +1,11 @@
 """What is sent to a vehicle before its link ends, so that it neither falls nor is locked."""
 
+import contextlib
 import time
 from typing import TYPE_CHECKING
 
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.errors import AlreadyLandingError
 
 if TYPE_CHECKING:
     from crazyflie_driver.vehicle import DriverVehicle
@@ -42,24 +44,33 @@ def take_leave(vehicle: "DriverVehicle", duration: float, limit: float) -> bool:
     state = vehicle.read_state()
     if state is None:
         return False
-    if SupervisorState.FLYING in state and vehicle.setpoints.knows_position(vehicle.now()):
+    setpoints = vehicle.setpoints
+    is_flying = SupervisorState.FLYING in state
+    on_setpoints = is_flying and setpoints.is_flight and setpoints.knows_position(vehicle.now())
+    if vehicle.commands.flight.is_flight(state) or on_setpoints:
         end = time.monotonic() + limit
-        if vehicle.setpoints.is_streaming:
-            vehicle.setpoints.hand_over()
-        vehicle.crazyflie.high_level.land(0.0, duration)
+        if setpoints.is_streaming:
+            setpoints.hand_over()
+        with contextlib.suppress(AlreadyLandingError):
+            vehicle.crazyflie.high_level.land(0.0, duration)
         if not _has_landed(vehicle, end):
             return True
-    vehicle.setpoints.zeros()
+    elif is_flying and not setpoints.is_streaming:
+        # It has landed less than 2 s ago, and is not locked by silence; or it is another client's.
+        return True
+    setpoints.zeros()
     return True
 
 
 def _has_landed(vehicle, end):
     time.sleep(min(_ANSWER_TIME, max(0.0, end - time.monotonic())))
     while True:
-        # "Flying" holds until 2 s after the motors have stopped.
         state = vehicle.read_state()
-        if state is not None and SupervisorState.HIGH_LEVEL_ACTIVE not in state:
-            return True
+        if state is not None:
+            # FLYING holds until 2 s after the motors have stopped.
+            reported = SupervisorState.HIGH_LEVEL_ACTIVE
+            if (reported if state.reports_planner else SupervisorState.FLYING) not in state:
+                return True
         if time.monotonic() > end:
             return False
         time.sleep(_LOOK_PERIOD)

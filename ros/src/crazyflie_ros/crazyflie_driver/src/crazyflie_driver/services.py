@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
 
 from crazyflie_driver import srv
+from crazyflie_driver.command import Command
 from crazyflie_driver.service_names import ServiceNames
 from crazyflie_model.polynomials import PolynomialPiece
-from crazyflie_py.errors import CrazyflieError
+from crazyflie_model.supervisor import SupervisorState
+from crazyflie_py.errors import CrazyflieError, LinkLostError
 from crazyflie_utils import NodeHandle, ServiceError
 
 if TYPE_CHECKING:
@@ -110,10 +112,11 @@ class VehicleServices:
 
         def work(_):
             try:
-                vehicle.setpoints.gate.open()
                 if request.data:
                     vehicle.refuse_in_emergency()
                 vehicle.crazyflie.supervisor.arm(request.data)
+                if request.data:
+                    vehicle.setpoints.gate.open()
             except (CrazyflieError, ServiceError) as error:
                 return SetBoolResponse(False, str(error))
             return SetBoolResponse(True, "armed" if request.data else "disarmed")
@@ -129,10 +132,28 @@ class VehicleServices:
 
     def _reboot(self, _):
         def work(_):
+            self._refuse_to_reboot_in_flight()
             self._vehicle.crazyflie.reboot()
             return EmptyResponse()
 
         return self._vehicle.do("reboot", work)
+
+    def _refuse_to_reboot_in_flight(self):
+        try:
+            state = self._vehicle.read_state()
+        except LinkLostError:
+            state = None
+        if state is None:
+            raise ServiceError(
+                "no reboot: nothing tells whether the vehicle flies, and it would fall; on the "
+                "ground, remove the vehicle and call `rosrun crazyflie_tools reboot --uri "
+                f"{self._vehicle.parameters.uri}`"
+            )
+        if state & (SupervisorState.FLYING | SupervisorState.HIGH_LEVEL_ACTIVE):
+            raise ServiceError(
+                f"no reboot: the vehicle flies (until 2 s after a landing it says so) and would "
+                f"fall; its state is: {state.words()}"
+            )
 
     def _set_group_mask(self, request):
         def work(_):
@@ -150,9 +171,8 @@ class VehicleServices:
         ]
 
         def work(job):
-            self._vehicle.crazyflie.trajectories.upload(
-                request.trajectoryId, request.pieceOffset, pieces, job.check
-            )
+            trajectories = self._vehicle.crazyflie.trajectories.guarded(lambda: job.is_valid)
+            trajectories.upload(request.trajectoryId, request.pieceOffset, pieces, job.check)
             return srv.UploadTrajectoryResponse()
 
         return self._vehicle.do("upload_trajectory", work, is_flight=True)
@@ -160,50 +180,51 @@ class VehicleServices:
     # High-level commands.
 
     def _takeoff(self, request):
-        duration = request.duration.to_sec()
-
-        def send(high_level):
-            self._vehicle.commands.make_ready()
-            high_level.take_off(request.height, duration, request.groupMask)
-            return srv.TakeoffResponse()
-
-        return self._vehicle.commands.send("takeoff", send, duration)
+        duration, mask = request.duration.to_sec(), request.groupMask
+        return self._command(
+            "takeoff",
+            lambda high_level: high_level.take_off(request.height, duration, mask),
+            duration,
+            mask,
+            srv.TakeoffResponse(),
+        )
 
     def _land(self, request):
         duration = request.duration.to_sec()
-
-        def send(high_level):
-            high_level.land(request.height, duration, request.groupMask)
-            return srv.LandResponse()
-
-        return self._vehicle.commands.send("land", send, duration, urgent=True)
+        return self._vehicle.commands.land(
+            request.height, duration, request.groupMask, srv.LandResponse()
+        )
 
     def _stop(self, request):
-        def send(high_level):
-            high_level.stop(request.groupMask)
-            return srv.StopResponse()
-
-        return self._vehicle.commands.send("stop", send, urgent=True)
+        mask = request.groupMask
+        return self._command(
+            "stop", lambda high_level: high_level.stop(mask), 0.0, mask, srv.StopResponse()
+        )
 
     def _go_to(self, request):
-        duration = request.duration.to_sec()
+        duration, mask = request.duration.to_sec(), request.groupMask
         goal = (request.goal.x, request.goal.y, request.goal.z)
-
-        def send(high_level):
-            high_level.go_to(goal, request.yaw, duration, request.relative, request.groupMask)
-            return srv.GoToResponse()
-
-        return self._vehicle.commands.send("go_to", send, duration)
+        return self._command(
+            "go_to",
+            lambda high_level: high_level.go_to(
+                goal, request.yaw, duration, request.relative, mask
+            ),
+            duration,
+            mask,
+            srv.GoToResponse(),
+        )
 
     def _start_trajectory(self, request):
-        def send(high_level):
-            high_level.start_trajectory(
-                request.trajectoryId,
-                request.timescale,
-                request.relative,
-                request.reversed,
-                request.groupMask,
-            )
-            return srv.StartTrajectoryResponse()
+        mask = request.groupMask
+        return self._command(
+            "start_trajectory",
+            lambda high_level: high_level.start_trajectory(
+                request.trajectoryId, request.timescale, request.relative, request.reversed, mask
+            ),
+            0.0,
+            mask,
+            srv.StartTrajectoryResponse(),
+        )
 
-        return self._vehicle.commands.send("start_trajectory", send)
+    def _command(self, name, send, duration, group_mask, response):
+        return self._vehicle.commands.send(Command(name, send, duration, group_mask), response)

@@ -258,9 +258,14 @@ class DriverVehicle:
     # What is asked of it.
 
     @property
+    def supervisor(self) -> SupervisorState | None:
+        """The state that was logged last; None if none was on the present link."""
+        return self._log.supervisor
+
+    @property
     def is_flying(self) -> bool:
         """Whether the vehicle says that it flies; so it does for 2 s after a landing."""
-        state = self._log.supervisor
+        state = self.supervisor
         return state is not None and SupervisorState.FLYING in state
 
     def read_state(self) -> SupervisorState | None:

@@ -36,6 +36,11 @@ class Job:
     overtaken_by: str = ""
     done: Future[Any] = field(default_factory=Future)
 
+    @property
+    def is_valid(self) -> bool:
+        """Whether nothing else has taken its place."""
+        return not self.overtaken_by
+
     def check(self) -> None:
         """Raise `ServiceError` if something else has taken the place of this job."""
         if self.overtaken_by:

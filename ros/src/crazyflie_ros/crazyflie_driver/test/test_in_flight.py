@@ -1,0 +1,158 @@
+"""Calls that end a flight badly, or have a vehicle fly that nobody meant."""
+
+import pytest
+from genpy import Duration
+from safety_helpers import (
+    FLYING,
+    HIGH_LEVEL,
+    LAND,
+    READY,
+    TAKEOFF,
+    is_,
+    position,
+    said,
+    wait_for_words,
+)
+from std_srvs.srv import EmptyRequest, SetBoolRequest
+
+from crazyflie_driver.srv import GoToRequest, NotifySetpointsStopRequest, StopRequest
+from crazyflie_py.address import Address
+from crazyflie_py.crazyflie import Crazyflie
+from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.waiting import wait_until
+
+
+@pytest.fixture
+def radio(monkeypatch, server):
+    """Return a vehicle that can be restarted, and how often it was."""
+    restarts = []
+    monkeypatch.setattr(Address, "is_radio", True)
+    monkeypatch.setattr(Crazyflie, "reboot", lambda self: restarts.append(self))
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri)
+    return vehicle, restarts
+
+
+@pytest.mark.parametrize("state", [FLYING, HIGH_LEVEL, 0x10E])
+def test_a_vehicle_is_not_restarted_in_flight(server, radio, state):
+    vehicle, restarts = radio
+    is_(vehicle, state)
+    with pytest.raises(ServiceError, match="no reboot: the vehicle flies"):
+        server.call("/cf1/reboot", EmptyRequest())
+    assert restarts == []
+    is_(vehicle, READY)
+    server.call("/cf1/reboot", EmptyRequest())
+    assert len(restarts) == 1
+
+
+def test_a_vehicle_of_which_nothing_is_known_is_not_restarted(server, radio):
+    vehicle, restarts = radio
+    vehicle.is_frozen = True
+    wait_for_words(server, "lost")
+    with pytest.raises(ServiceError, match="no reboot: nothing tells .* crazyflie_tools reboot"):
+        server.call("/cf1/reboot", EmptyRequest())
+    assert restarts == []
+
+
+@pytest.fixture
+def stale(server, vehicle):
+    """Return a function that streams; the link was lost, and the vehicle is on the ground."""
+    position(server)
+    vehicle.wait_for_packets(7, 0)
+    vehicle.is_frozen = True
+
+    def stream(until):
+        def is_there():
+            server.process.advance(0.02)
+            position(server)
+            return until()
+
+        wait_until(is_there, "a state of the link")
+
+    stream(lambda: "lost" in said(server))
+    vehicle.flight.restart()
+    vehicle.is_frozen = False
+    stream(lambda: "ready" in said(server))
+    # Less than a pause of the stream, and more than the age that a state may have.
+    server.process.advance(0.5)
+    vehicle.received.clear()
+    return stream
+
+
+@pytest.mark.parametrize(
+    ("service", "request_", "opens"),
+    [
+        ("arm", SetBoolRequest(False), False),
+        ("arm", SetBoolRequest(True), True),
+        ("land", LAND, False),
+        ("stop", StopRequest(), False),
+        ("notify_setpoints_stop", NotifySetpointsStopRequest(0, 0), False),
+        ("go_to", GoToRequest(duration=Duration(1)), True),
+    ],
+)
+def test_only_calls_that_have_a_vehicle_fly_let_an_old_stream_pass(
+    server, vehicle, stale, service, request_, opens
+):
+    server.call(f"/cf1/{service}", request_)
+    begin = server.process.clock.time()
+    stale(lambda: server.process.clock.time() > begin + 1.0)
+    vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)
+    assert bool(vehicle.packets(7, 0)) is opens
+
+
+def test_a_landing_for_the_battery_that_fails_is_tried_again(server, vehicle):
+    server.call("/cf1/takeoff", TAKEOFF)
+    server.process.advance(3.0)
+    wait_for_words(server, "flying")
+    vehicle.deaf.add((8, 0, b"\x08"))
+    vehicle.received.clear()
+    vehicle.log["pm.vbat"] = ("f", 2.0)
+    wait_for_words(server, "battery low")
+    server.process.advance(5.0)
+    wait_until(lambda: any("land failed" in t for t in server.process.logged("error")), "a failure")
+    vehicle.deaf.clear()
+    wait_until(lambda: vehicle.flight.is_landing, "a landing")
+    assert len([t for t in server.process.logged("error") if "battery critical" in t]) == 1
+
+
+def loses_replies(vehicle, count):
+    """Have the vehicle lose its first replies to commands."""
+    left = [count]
+
+    def lose(_):
+        is_command = vehicle.received[-1][:2] == (8, 0)
+        left[0] -= is_command
+        return is_command and left[0] >= 0
+
+    vehicle.lose = lose
+
+
+def test_a_takeoff_whose_reply_is_lost_is_none_that_failed(server, vehicle):
+    loses_replies(vehicle, 1)
+    server.call("/cf1/takeoff", TAKEOFF)
+    assert [data[0] for data in vehicle.packets(8, 0)] == [7, 7]
+
+
+def test_a_takeoff_without_any_reply_is_a_flight_all_the_same(make_server):
+    server = make_server({"emergency_watchdog": True})
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri)
+    loses_replies(vehicle, 100)
+    with pytest.raises(ServiceError, match="has not replied"):
+        server.call("/cf1/takeoff", TAKEOFF)
+    wait_for_words(server, "flying")
+    vehicle.lose = lambda _: False
+    server.process.advance(0.4)
+    assert server.process.published("/flights")[-1].data == "/crazyflie_server in flight"
+    # The emergency watchdog.
+    assert b"\x04" in vehicle.wait_for_packets(9, 1)
+    server.node.leave()
+    wait_until(lambda: vehicle.flight.is_landing, "a landing")
+
+
+def test_a_vehicle_that_flies_does_not_take_off(server, vehicle):
+    server.call("/cf1/takeoff", TAKEOFF)
+    server.process.advance(3.0)
+    with pytest.raises(ServiceError, match="no takeoff: the vehicle flies"):
+        server.call("/cf1/takeoff", TAKEOFF)
+    assert len(vehicle.packets(8, 0)) == 1

@@ -1,0 +1,85 @@
+"""What was given up for an urgent command is not sent after it."""
+
+import threading
+
+import pytest
+from genpy import Duration
+from safety_helpers import LAND, TAKEOFF, is_
+from std_srvs.srv import EmptyRequest
+
+from crazyflie_driver.srv import GoToRequest, StopRequest
+from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.waiting import wait_until
+
+LIMIT = 60.0
+
+REARMING = 0x206
+"""For 0.16 s, 3 s after a landing: a takeoff waits."""
+
+
+@pytest.mark.parametrize(("service", "request_"), [("land", LAND), ("stop", StopRequest())])
+def test_a_takeoff_that_waits_until_the_vehicle_is_ready(server, vehicle, service, request_):
+    is_(vehicle, REARMING)
+    takeoff = server.process.call("/cf1/takeoff", TAKEOFF)
+    vehicle.wait_for_packets(9, 0, 2)
+    server.call(f"/cf1/{service}", request_)
+    is_(vehicle, None)
+    with pytest.raises(ServiceError, match=f"given up for {service}"):
+        takeoff.result(LIMIT)
+    assert 7 not in [data[0] for data in vehicle.packets(8, 0)]
+    assert not vehicle.flight.motors_run
+
+
+@pytest.mark.parametrize("service", ["stop", "emergency"])
+def test_a_takeoff_that_waits_to_be_sent(server, vehicle, service):
+    """The radio may block the thread that sends for 2 s."""
+    begun, free = threading.Event(), threading.Event()
+
+    def block():
+        begun.set()
+        free.wait(LIMIT)
+
+    vehicle.answers[9, 0, 0x0C] = b"\x8c\x01\x00"
+    link = server.node._vehicles[vehicle.uri].crazyflie.link()
+    # While the takeoff waits to be armed, and its packets wait.
+    vehicle.deaf.add((9, 1, b"\x01"))
+    takeoff = server.process.call("/cf1/takeoff", TAKEOFF)
+    vehicle.wait_for_packets(9, 1)
+    link.command(block)
+    assert begun.wait(LIMIT)
+    vehicle.say(9, 1, b"\x81\x01\x01")
+    # The takeoff is the next packet, and has not been sent.
+    wait_until(lambda: link._outbox._commands, "the takeoff's packet")
+    request = EmptyRequest() if service == "emergency" else StopRequest()
+    urgent = threading.Thread(target=server.call, args=(f"/cf1/{service}", request))
+    urgent.start()
+    wait_until(lambda: len(link._outbox._commands) >= 2, "the urgent packet")
+    free.set()
+    urgent.join(LIMIT)
+    with pytest.raises(ServiceError, match="given up for"):
+        takeoff.result(LIMIT)
+    assert 7 not in [data[0] for data in vehicle.packets(8, 0)]
+    assert not vehicle.flight.motors_run
+
+
+def test_a_hand_over_is_not_sent_without_its_command(hovering):
+    server, vehicle = hovering
+    begun, free = threading.Event(), threading.Event()
+
+    def block():
+        begun.set()
+        free.wait(LIMIT)
+
+    driven = server.node._vehicles[vehicle.uri]
+    link = driven.crazyflie.link()
+    link.command(block)
+    assert begun.wait(LIMIT)
+    vehicle.received.clear()
+    go_to = server.process.call("/cf1/go_to", GoToRequest(duration=Duration(1)))
+    wait_until(lambda: link._outbox._commands, "the packet")
+    driven._worker.overtake("something else")
+    free.set()
+    with pytest.raises(ServiceError, match="given up for something else"):
+        go_to.result(LIMIT)
+    assert vehicle.packets(7, 1) == vehicle.packets(8, 0) == []
+    assert driven.setpoints.is_streaming

@@ -100,7 +100,10 @@ def test_no_node_that_is_killed_in_hover_makes_the_thrust_jump(name):
 @pytest.mark.parametrize("dynamics", ["near_hover", "quadrotor"])
 @pytest.mark.parametrize("seed", range(1, 5))
 def test_nodes_that_hardly_run_do_not_make_the_vehicle_climb(dynamics, seed):
-    """On a computer that is too busy, nodes run for 20 to 50 ms and stop for 100 to 600 ms."""
+    """On a computer that is too busy, nodes run for 20 to 50 ms and stop for 100 to 600 ms.
+
+    The filter lands, since it hardly sees the vehicle.
+    """
     run = Soak(seed, dynamics=dynamics)
     graph, random = run.graph, run.random
     takeoff = graph.call("/takeoff", EmptyRequest())
@@ -124,15 +127,15 @@ def test_nodes_that_hardly_run_do_not_make_the_vehicle_climb(dynamics, seed):
                 graph.freeze(name)
                 change[name] = graph.time + random.uniform(0.1, 0.6)
         graph.advance(0.01)
-    assert run.watch.highest < 0.5
+    assert run.watch.highest < 0.2
     assert run.watch.hardest < 1.0
     assert run.watch.distance < 0.5
     assert any("this computer is too busy" in text for _, text in graph.log)
     for name in frozen:
         graph.thaw(name)
     graph.advance(10.0)
-    assert run.watch.state == "flying"
-    assert run.watch.height == pytest.approx(1.0, abs=0.02)
+    assert run.watch.height == 0.0
+    assert run.watch.state == "on_ground"
 
 
 @pytest.fixture

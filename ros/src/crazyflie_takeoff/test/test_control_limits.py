@@ -52,6 +52,40 @@ def test_what_is_kept_for_long_changes_the_speed_by_half_a_metre_per_second(gap)
     assert gaps.apply(Setpoint(0.0, 0.0, 0.0, 14.0), G).thrust == 14.0
 
 
+def test_speeds_do_not_add_up_over_long_gaps():
+    gaps = RunGaps()
+    gaps.run(1.0)
+    gaps.run(1.3)
+    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.4).thrust == pytest.approx(
+        G + 0.1 / 0.3
+    )
+    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.8).thrust < G
+    assert gaps.apply(Setpoint(0.0, 0.0, 0.0, MIN_THRUST), G, climb=-0.8).thrust > G
+
+
+@pytest.mark.parametrize(
+    ("runs", "stops", "is_starved"),
+    [(0.035, 0.315, True), (0.05, 0.3, True), (0.3, 0.2, False), (0.5, 0.4, False)],
+)
+def test_a_filter_that_hardly_runs_says_so(runs, stops, is_starved):
+    gaps, time = RunGaps(), 0.0
+    for _ in range(20):
+        for _ in range(round(runs / 0.01)):
+            time += 0.01
+            gaps.run(time)
+        time += stops
+    gaps.run(time)
+    assert bool(gaps.complaint) == is_starved
+
+
+def test_a_filter_that_was_stopped_once_does_not_say_so():
+    gaps = RunGaps()
+    for k in range(10):
+        gaps.run(0.01 * k)
+    gaps.run(5.0)
+    assert gaps.complaint == ""
+
+
 def climb(limit, z, z_dot, seconds, highest=10.0):
     """Fly full thrust for a while; return z, z_dot and what is said at last."""
     said = ""

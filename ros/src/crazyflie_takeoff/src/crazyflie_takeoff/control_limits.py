@@ -25,6 +25,14 @@ CLIMB_PATIENCE = 2.0
 MAX_SPEED_CHANGE = 0.5
 """By which a control may change the speed while the filter does not run, m/s."""
 
+BUSY_GAP = 0.2
+"""A filter that has not run for longer than this, s, keeps the vehicle's z_dot itself within
+`MAX_SPEED_CHANGE`: controls that are made of states from before the gap add up."""
+
+STARVED_SHARE, STARVATION_MEMORY = 0.5, 3.0
+"""A filter that has not run in so much of its time, in gaps longer than `BUSY_GAP`, cannot see a
+vehicle fly; averaged over the latter, s."""
+
 LONGEST_GAP = 1.0
 """Of a filter that runs, s; a clock that steps further was set."""
 
@@ -115,12 +123,20 @@ class RunGaps:
     """How long the filter does not run, as on a computer that is too busy.
 
     The vehicle keeps its last control meanwhile. So the longer the gaps, the less may a control
-    differ from hover: `MAX_SPEED_CHANGE` divided by the longest gap of the last seconds.
+    differ from hover: `MAX_SPEED_CHANGE` divided by the longest gap of the last seconds; less by
+    the speed that there is, once that has been longer than `BUSY_GAP`.
     """
 
     def __init__(self) -> None:
         self._time = math.nan
         self._longest = 0.0
+        self._lost = 0.0
+
+    @property
+    def complaint(self) -> str:
+        """In words, that the filter runs too seldom for a flight; empty if it does not."""
+        is_starved = self._lost > STARVED_SHARE
+        return "this computer is too busy for a flight" if is_starved else ""
 
     @property
     def longest(self) -> float:
@@ -133,7 +149,10 @@ class RunGaps:
         self._time = time
         if gap > 0.0:
             remembered = self._longest * math.exp(-gap / GAP_MEMORY)
-            self._longest = max(remembered, min(gap, LONGEST_GAP))
+            gap = min(gap, LONGEST_GAP)
+            self._longest = max(remembered, gap)
+            share = 1.0 - math.exp(-gap / STARVATION_MEMORY)
+            self._lost += share * (float(gap > BUSY_GAP) - self._lost)
 
     def apply(
         self, control: Setpoint, hover: float, climb: float = 0.0, is_ramp: bool = False
@@ -153,8 +172,10 @@ class RunGaps:
         if self._longest <= 0.0:
             return control
         tilt = math.atan(MAX_SPEED_CHANGE / self._longest / GRAVITY)
-        most = hover + (MAX_SPEED_CHANGE + max(-climb, 0.0)) / self._longest
-        least = hover - (MAX_SPEED_CHANGE + max(climb, 0.0)) / self._longest
+        is_busy = self._longest > BUSY_GAP
+        rising, sinking = (climb, -climb) if is_busy else (min(climb, 0.0), min(-climb, 0.0))
+        most = hover + (MAX_SPEED_CHANGE - rising) / self._longest
+        least = hover - (MAX_SPEED_CHANGE - sinking) / self._longest
         return Setpoint(
             limited(control.roll, tilt),
             limited(control.pitch, tilt),

@@ -98,5 +98,5 @@ class FlightWatch:
         crash = self._position_limit.advance(step)
         if self.is_tilted:
             crash = "the vehicle has tilted over"
-        objection = self._climb.advance(step)
+        objection = self._climb.advance(step) or self.gaps.complaint
         return crash, self._descent.advance(step, height) or objection

@@ -60,6 +60,17 @@ def test_names_of_one_vehicle_reach_all_nodes(composed):
     assert parameters["/cmd_vel_converter/topics/cmd_vel"] == "/cf3/cmd_vel"
     assert parameters["/cmd_vel_converter/topics/control"] == "/control/cf3"
     assert parameters["/state_estimator/frames/robot"] == "cf3"
+    assert parameters["/takeoff_server/topics/connected"] == "/cf3/connected"
+
+
+def test_takeoff_servers_ask_for_the_driver_where_one_flies():
+    of_driver = "takeoff_server/topics/connected"
+    _, simulated = launch_files.expand(LAUNCH / "sw_hover.launch", rviz="false")
+    assert f"/{of_driver}" not in simulated
+    _, swarm = launch_files.expand(LAUNCH / "virtual_hw_swarm.launch", rviz="false")
+    assert swarm[f"/fleet/nodes/{of_driver}"] == "connected"
+    _, simulated_swarm = launch_files.expand(LAUNCH / "sw_swarm.launch", rviz="false")
+    assert f"/fleet/nodes/{of_driver}" not in simulated_swarm
 
 
 def test_the_virtual_pair_meets_on_the_ports_that_are_given():

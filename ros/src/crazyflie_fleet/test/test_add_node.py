@@ -69,7 +69,22 @@ def test_who_is_not_there_is_named_and_the_others_are_added():
     process, driver, _ = add(missing=("cf1",))
     assert process.exit_status == 1
     assert list(driver.updated) == ["cf2"]
-    assert process.logged("error")[-1] == "/fleet_add: not all vehicles are there: cf1"
+    assert process.logged("error")[-1] == (
+        "/fleet_add: not all vehicles are there: cf1; to try again: rosrun crazyflie_fleet "
+        "fleet_add_node __name:=fleet_add _vehicles:='[cf1]'"
+    )
+
+
+def test_vehicles_that_were_missing_are_added_without_the_others():
+    process, driver, _ = add(vehicles=["cf2"])
+    assert process.exit_status == 0
+    assert list(driver.added) == list(driver.updated) == ["cf2"]
+
+
+def test_a_vehicle_that_is_not_in_the_file_is_named():
+    process, _, launched = add(vehicles=["cf9"])
+    assert not launched
+    assert "parameter vehicles has cf9; expected some of cf1, cf2" in process.logged("error")[0]
 
 
 def test_virtual_vehicles_have_ports_for_addresses():

@@ -8,6 +8,7 @@ from std_msgs.msg import Bool, String
 from std_srvs.srv import EmptyResponse
 from takeoff_helpers import SERVER, state
 
+from crazyflie_takeoff.driver_connection import MAX_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
 from crazyflie_utils.runtime.transport import ServiceError
 
@@ -189,3 +190,50 @@ def test_landing_needs_neither():
     process.publish("/in_flight_controller", Bool(False))
     process.advance(1.0)
     assert not call(process, "/land").done()
+
+
+DRIVEN = {**SERVER, "topics/connected": "/cf1/connected"}
+NOT_CONNECTED = "the driver is not connected to the vehicle, {} on /cf1/connected; .*prefix:=cf1"
+
+
+def test_takeoff_waits_for_the_driver():
+    process = on_ground(DRIVEN)
+    answer = call(process, "/takeoff")
+    process.publish("/cf1/connected", Bool(False))
+    process.advance(2.0)
+    assert (states(process), answer.done()) == (["on_ground"], False)
+    process.publish("/state", state(0.0))
+    process.publish("/cf1/connected", Bool(True))
+    process.advance(0.02)
+    assert states(process)[-1] == "taking_off"
+
+
+@pytest.mark.parametrize(("said", "words"), [([], "nothing"), ([True, False], "false")])
+def test_takeoff_without_the_driver_is_refused(said, words):
+    process = on_ground(DRIVEN)
+    process.advance(START_LIMIT)
+    for value in said:
+        process.publish("/cf1/connected", Bool(value))
+    process.publish("/state", state(0.0))
+    with pytest.raises(ServiceError, match=NOT_CONNECTED.format(words)):
+        call(process, "/takeoff")
+    process.advance(0.2)
+    assert "the driver is not connected" in process.published("/in_flight_status")[-1].data
+
+
+def test_a_driver_that_has_died_is_not_connected():
+    process = on_ground(DRIVEN)
+    process.advance(START_LIMIT)
+    process.publish("/cf1/connected", Bool(True))
+    process.advance(MAX_AGE + 0.1)
+    process.publish("/state", state(0.0))
+    with pytest.raises(ServiceError, match=NOT_CONNECTED.format("nothing")):
+        call(process, "/takeoff")
+
+
+def test_a_driver_is_asked_for_only_if_there_is_one():
+    process = on_ground(SERVER)
+    process.publish("/state", state(0.0))
+    call(process, "/takeoff")
+    process.advance(0.02)
+    assert states(process)[-1] == "taking_off"

@@ -4,11 +4,13 @@ from functools import partial
 
 from typing_extensions import override
 
+from crazyflie_driver.add_node import command_again
 from crazyflie_driver.srv import AddCrazyflie, UpdateParams, UpdateParamsRequest
 from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS, VehicleParameters
-from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.fleet import Fleet, Vehicle
 from crazyflie_fleet.fleet_parameters import FleetParameters
-from crazyflie_utils import Node, NodeHandle, ParameterError
+from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
+from crazyflie_utils.parameter_types import TEXT, ListOf
 
 ADD = "/add_crazyflie"
 
@@ -34,6 +36,24 @@ def connection(vehicle: Vehicle) -> VehicleParameters:
     )
 
 
+class FleetAddParameters(FleetParameters):
+    """Which vehicles are added."""
+
+    vehicles: tuple[str, ...] = parameter(
+        ListOf(TEXT), "only these are added; empty for all of the machine", ()
+    )
+
+    @override
+    def own_names(self, fleet: Fleet) -> tuple[str, ...]:
+        names = super().own_names(fleet)
+        unknown = [name for name in self.vehicles if name not in names]
+        if unknown:
+            raise ParameterError(
+                f"parameter vehicles has {', '.join(unknown)}; expected some of {', '.join(names)}"
+            )
+        return self.vehicles or names
+
+
 class FleetAddNode(Node):
     """Have vehicles connected and their firmware parameters written.
 
@@ -43,7 +63,7 @@ class FleetAddNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        parameters = handle.load(FleetParameters)
+        parameters = handle.load(FleetAddParameters)
         fleet = parameters.fleet()
         self._vehicles = [fleet[name] for name in parameters.own_names(fleet)]
         missing = [vehicle.name for vehicle in self._vehicles if vehicle.uri is None]
@@ -84,5 +104,10 @@ class FleetAddNode(Node):
         if self._open:
             return
         if self._failed:
-            self._handle.error(f"not all vehicles are there: {', '.join(sorted(self._failed))}")
+            again = command_again(self._handle, "crazyflie_fleet", "fleet_add_node")
+            missing = sorted(self._failed)
+            self._handle.error(
+                f"not all vehicles are there: {', '.join(missing)}; to try again: {again} "
+                f"_vehicles:='[{', '.join(missing)}]'"
+            )
         self._handle.end(1 if self._failed else 0)

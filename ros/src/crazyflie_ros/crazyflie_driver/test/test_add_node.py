@@ -74,7 +74,9 @@ def test_all_parameters_arrive():
 def test_a_refusal_ends_the_process_with_status_1():
     launch = Launch(PARAMETERS, refusal="nothing listens on this port")
     assert launch.process.exit_status == 1
-    assert "nothing listens on this port" in launch.process.logged("error")[0]
+    (text,) = launch.process.logged("error")
+    assert "nothing listens on this port" in text
+    assert text.endswith("; to try again: rosrun crazyflie_driver crazyflie_add __name:=add")
 
 
 @pytest.mark.parametrize(

@@ -117,6 +117,7 @@ def test_without_logging_there_are_only_status_and_packets(server, log_block):
     assert set(server.process.transport.publishers) == {
         "/diagnostics",
         "/flights",
+        "/cf1/connected",
         "/cf1/rssi",
         "/cf1/status",
         "/cf1/packets",

@@ -70,7 +70,8 @@ def test_many_vehicles_and_one_that_is_stuck(server):
         ("udp://127.0.0.1:1", "nothing listens on this port"),
     ],
 )
-def test_errors_that_an_operator_can_act_on(server, uri, text):
+def test_errors_that_an_operator_can_act_on(make_server, uri, text):
+    server = make_server({"connect/limit": 0.5})
     with pytest.raises(ServiceError, match=text):
         server.add(uri)
     assert any(uri in line for line in server.process.logged("error"))
@@ -86,7 +87,8 @@ def test_a_vehicle_whose_port_opens_a_little_later(server):
     assert server.process.logged("error") == []
 
 
-def test_a_silent_port(server):
+def test_a_silent_port(make_server):
+    server = make_server({"connect/limit": 0.0})
     vehicle = server.make_vehicle()
     vehicle.is_frozen = True
     with pytest.raises(ServiceError, match="nobody has answered within 2 s"):

@@ -18,6 +18,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.battery import Charge
 from crazyflie_takeoff.calls import Calls
+from crazyflie_takeoff.driver_connection import DriverConnection
 from crazyflie_takeoff.fence_box import follow_box
 from crazyflie_takeoff.filter_report import NO_FILTER, parse
 from crazyflie_takeoff.flight import FlightStateMachine
@@ -65,6 +66,7 @@ class TakeoffServerNode(Node):
         self._has_controller = True
         self._had_controller = False
         self._position = MeasuredPosition()
+        self._driver = DriverConnection()
         self._published_state: FlightState | None = None
         self._published_status = ""
         self._cause = ""
@@ -104,6 +106,8 @@ class TakeoffServerNode(Node):
             follow_box(handle, parameters.box_topic, self._on_box)
         if parameters.battery_topic is not None:
             handle.subscribe(parameters.battery_topic, Float32, self._on_battery)
+        if parameters.connected_topic is not None:
+            handle.subscribe(parameters.connected_topic, Bool, self._on_connected)
         if parameters.state_topic is not None:
             handle.subscribe(
                 parameters.state_topic,
@@ -168,7 +172,8 @@ class TakeoffServerNode(Node):
         # What was there and is gone is no matter of waiting.
         lacks_state = self._expects_states and not self._position.is_measured
         lacks_controller = not self._has_controller and not self._had_controller
-        return self._is_starting and (lacks_state or lacks_controller)
+        lacks = lacks_state or lacks_controller or bool(self._driver_refusal())
+        return self._is_starting and lacks
 
     def _end_start(self):
         self._start_timer.stop()
@@ -199,6 +204,8 @@ class TakeoffServerNode(Node):
             return self._filter.reason
         if complaint := hover_complaint(self._parameters.hover, self._box):
             return complaint
+        if reason := self._driver_refusal():
+            return reason
         if topic is not None:
             name = self._handle.resolve(topic)
             if reason := self._position.explanation(self._handle.time(), name):
@@ -208,6 +215,15 @@ class TakeoffServerNode(Node):
         if self._charge() in (Charge.LOW, Charge.CRITICAL):
             return f"the battery is low, {self._battery.voltage:.2f} V"
         return ""
+
+    def _driver_refusal(self):
+        topic = self._parameters.connected_topic
+        if topic is None:
+            return ""
+        return self._driver.refusal(self._handle.time(), self._handle.resolve(topic))
+
+    def _on_connected(self, message):
+        self._driver.update(self._handle.time(), message.data)
 
     # Where the flight stands.
 

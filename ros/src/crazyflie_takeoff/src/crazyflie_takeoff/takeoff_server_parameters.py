@@ -66,6 +66,12 @@ class TakeoffServerParameters(FlightTopicParameters):
     battery_topic: str | None = parameter(
         TOPIC, "the battery's voltage; without it none is watched", None, "topics/battery"
     )
+    connected_topic: str | None = parameter(
+        TOPIC,
+        "whether the driver is connected; with it /takeoff is refused while it is not",
+        None,
+        "topics/connected",
+    )
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
     hover_x: float = parameter(METRES, "hover point after takeoff", name="hover/x", live=True)

@@ -11,6 +11,13 @@ _LIMIT = 60.0
 """How long, in s, the server may take to come up and to connect."""
 
 
+def command_again(handle: NodeHandle, package: str, executable: str) -> str:
+    """Return the command that runs a node with its name and parameters once more."""
+    namespace, _, name = handle.name.rpartition("/")
+    below = f" __ns:={namespace}" if namespace else ""
+    return f"rosrun {package} {executable}{below} __name:={name}"
+
+
 class CrazyflieAddNode(Node):
     """Ask for a vehicle; the process exits with status 1 if that fails."""
 
@@ -31,5 +38,6 @@ class CrazyflieAddNode(Node):
         if error is None:
             self._handle.info(f"added {parameters.uri} as {parameters.tf_prefix or '/'}")
         else:
-            self._handle.error(f"cannot add {parameters.uri}: {error}")
+            again = command_again(self._handle, "crazyflie_driver", "crazyflie_add")
+            self._handle.error(f"cannot add {parameters.uri}: {error}; to try again: {again}")
         self._handle.end(0 if error is None else 1)

@@ -43,6 +43,13 @@ class CrazyflieServerParameters(SafetyParameters):
     fixed_frame: str = parameter(
         FRAME, "frame of the pose that vehicles estimate", "world", "frames/fixed"
     )
+    connect_limit: float = parameter(
+        Number("s", minimum=0.0, maximum=45.0),
+        "how long it is tried to connect to a vehicle that does not answer, such as one that is "
+        "switched on or launched together with the driver",
+        15.0,
+        "connect/limit",
+    )
     emergency_topic: str = parameter(
         TOPIC,
         "std_msgs/Empty, stops the motors of all vehicles, for good",

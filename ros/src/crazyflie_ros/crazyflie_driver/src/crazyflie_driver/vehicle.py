@@ -1,7 +1,6 @@
 """One vehicle of the server: its link, topics and services, from adding to removing."""
 
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, TypeVar
@@ -9,6 +8,8 @@ from typing import Any, TypeVar
 from std_msgs.msg import String
 
 from crazyflie_driver.battery import Battery
+from crazyflie_driver.connected_topic import ConnectedTopic
+from crazyflie_driver.connecting import connect_within
 from crazyflie_driver.delivery import Delivery
 from crazyflie_driver.farewell import take_leave
 from crazyflie_driver.flight_commands import FlightCommands
@@ -18,21 +19,18 @@ from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import Status
-from crazyflie_driver.vehicle_parameters import STATUS_TOPIC, VehicleParameters
+from crazyflie_driver.vehicle_parameters import (
+    CONNECTED_TOPIC,
+    STATUS_TOPIC,
+    VehicleParameters,
+)
 from crazyflie_driver.worker import Job, Worker
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_py.crazyflie import Crazyflie, LinkState
-from crazyflie_py.errors import CrazyflieError, NoAnswerError, NoReplyError
+from crazyflie_py.errors import CrazyflieError, NoReplyError
 from crazyflie_utils import NodeHandle, ServiceError
 
 Result = TypeVar("Result")
-
-CONNECT_LIMIT = 3.0
-"""How long it is tried to connect to a vehicle that does not answer, s: one that is
-switched on or launched together with the driver needs a while."""
-
-CONNECT_PAUSE = 0.2
-"""Between two attempts, s."""
 
 _EMERGENCY_LIMIT = 1.0
 """How long a removal waits until the vehicle has obeyed an emergency stop, s."""
@@ -116,6 +114,7 @@ class DriverVehicle:
         self._status = self._handle.publisher(
             f"{parameters.prefix}/{STATUS_TOPIC}", String, latch=True
         )
+        self._connected = ConnectedTopic(self._handle, f"{parameters.prefix}/{CONNECTED_TOPIC}")
         self._publish_status()
 
     # Life.
@@ -144,6 +143,7 @@ class DriverVehicle:
             What could not be done; empty if nothing.
         """
         self.is_leaving = True
+        self._connected.update(False)
         self.setpoints.gate.leave()
         self._worker.overtake("the removal")
         done: Future[str] = Future()
@@ -182,7 +182,9 @@ class DriverVehicle:
 
     def _connect(self):
         try:
-            self._connect_link()
+            connect_within(
+                self._safety.connect_limit, self.crazyflie.connect, lambda: self.is_leaving
+            )
             self._services.names.wait_for_controllers(lambda: self.is_leaving)
             with self._announcing:
                 if self.is_leaving:
@@ -200,17 +202,8 @@ class DriverVehicle:
             self.is_leaving = True
             self._end()
             raise
+        self._delivery.submit(self._publish_status)
         self._server.info(f"{self.parameters.name}: connected to {self.parameters.uri}")
-
-    def _connect_link(self):
-        end = time.monotonic() + CONNECT_LIMIT
-        while True:
-            try:
-                return self.crazyflie.connect()
-            except NoAnswerError:
-                if self.is_leaving or time.monotonic() > end:
-                    raise
-            time.sleep(CONNECT_PAUSE)
 
     def _leave(self, limit):
         problem = ""
@@ -359,6 +352,8 @@ class DriverVehicle:
         if words != self._words:
             self._words = words
             self._status.publish(String(words))
+        is_linked = self.crazyflie.state is LinkState.CONNECTED and not self.is_leaving
+        self._connected.update(is_linked and self._services.are_advertised)
 
     def _on_link_state(self, state, text):
         # From the link's own thread. At the end nothing may wait for the callbacks'

@@ -23,6 +23,9 @@ from crazyflie_utils.parameters import REQUIRED, Declaration, read_parameter
 STATUS_TOPIC = "status"
 """Topic that says what state a vehicle is in."""
 
+CONNECTED_TOPIC = "connected"
+"""Topic that says whether the driver is connected to a vehicle."""
+
 
 class EachLogBlock(ListOf):
     """A value for each log block; on the parameter server, a parameter for each."""
@@ -58,7 +61,7 @@ class LogTopic(Namespace):
         name = super().__call__(value)
         if not name:
             raise ValueError
-        if name in (*STANDARD_TOPICS, "rssi", STATUS_TOPIC):
+        if name in (*STANDARD_TOPICS, "rssi", STATUS_TOPIC, CONNECTED_TOPIC):
             raise ValueError(f"the driver itself has a topic {name!r}")
         return name
 

@@ -33,9 +33,37 @@ def test_what_was_streamed_before_a_loss_stays_blocked(lost):
     assert not lost.is_blocking(62.0)
 
 
-def test_a_flight_that_goes_on_opens_it(lost):
-    lost.open()
+@pytest.mark.parametrize("event", [SetpointGate.flight_goes_on, SetpointGate.open])
+def test_a_flight_that_goes_on_and_a_call_open_it(lost, event):
+    event(lost)
     assert stream(lost, 2.0, 3.0) == (0, "")
+
+
+@pytest.fixture
+def standing():
+    """Return a gate whose vehicle has not lifted off at 2 s, while somebody streams."""
+    gate = SetpointGate()
+    assert stream(gate, 0.0, 2.0) == (0, "")
+    gate.not_lifted()
+    return gate
+
+
+def test_what_was_streamed_while_a_vehicle_did_not_lift_off_stays_blocked(standing):
+    # Its motors have run: for 2 s more it says that it flies.
+    standing.flight_goes_on()
+    count, why = stream(standing, 2.0, 60.0)
+    assert count == 2900
+    assert why.startswith("the vehicle was told to fly and did not lift off")
+
+
+def test_a_new_stream_zero_thrust_and_a_call_are_new_attempts(standing):
+    assert stream(standing, 2.0 + PAUSE + 0.1, 4.0) == (0, "")
+    standing.not_lifted()
+    assert standing.refusal(4.0, True) == ""
+    assert stream(standing, 4.02, 5.0) == (0, "")
+    standing.not_lifted()
+    standing.open()
+    assert stream(standing, 5.0, 6.0) == (0, "")
 
 
 def test_a_pause_opens_it(lost):

@@ -19,6 +19,16 @@ from crazyflie_utils.runtime.topics import Publisher
 STATUS_PERIOD_MS = 100
 """Period of the log block that the diagnostics rest on, ms; its absence shows a restart."""
 
+STATUS_VARIABLES = (
+    "pm.vbat",
+    "radio.rssi",
+    "supervisor.info",
+    "stateEstimate.z",
+    "stateEstimate.vz",
+    "stateEstimate.yaw",
+)
+"""What is in it, as far as the firmware has it: 19 of the 26 bytes of a packet."""
+
 _MOST_DATA = 30
 _LINK = 3 << 2
 """Bits of the header that belong to the link; cflib sets them."""
@@ -47,6 +57,8 @@ class LogTopics:
     ----------
     voltage, rssi : float or None
         Latest values of the battery (V) and the vehicle's reception (-dBm).
+    height, vertical_speed, heading : float or None
+        Latest estimate of the vehicle: z (m, fixed frame), its derivative (m/s), yaw (degrees).
     supervisor : SupervisorState or None
         Latest state; None until it has come on the present link.
     """
@@ -62,6 +74,9 @@ class LogTopics:
     ):
         self.voltage: float | None = None
         self.rssi: float | None = None
+        self.height: float | None = None
+        self.vertical_speed: float | None = None
+        self.heading: float | None = None
         self.supervisor: SupervisorState | None = None
         self._handle = handle
         self._parameters = parameters
@@ -127,8 +142,7 @@ class LogTopics:
         self._delivery.submit_data(publisher.publish, message)
 
     def _start_status(self, known, rssi_publisher):
-        wanted = ("pm.vbat", "radio.rssi", "supervisor.info")
-        variables = tuple(variable for variable in wanted if variable in known)
+        variables = tuple(variable for variable in STATUS_VARIABLES if variable in known)
         self._logs_state = "supervisor.info" in known
         if variables:
             self._add(
@@ -151,6 +165,9 @@ class LogTopics:
 
     def _note_status(self, latest, rssi_publisher):
         self.voltage = latest.get("pm.vbat")
+        self.height = latest.get("stateEstimate.z")
+        self.vertical_speed = latest.get("stateEstimate.vz")
+        self.heading = latest.get("stateEstimate.yaw")
         # The Crazyradio's figure is the same, and comes without the firmware's help.
         self.rssi = self._crazyflie.rssi
         if self.rssi is None:

@@ -1,4 +1,4 @@
-"""Whether setpoints may be sent: after a lost link what is streamed may be stale."""
+"""Whether setpoints may be sent: after a lost link, or without a liftoff, a stream is blocked."""
 
 import contextlib
 import threading
@@ -30,6 +30,7 @@ class SetpointGate:
         self._is_leaving = False
         self._is_down = False
         self._is_waiting = False
+        self._has_not_lifted = False
         self._latest: float | None = None
         self._high_level_since: float | None = None
         self._stopped_since: float | None = None
@@ -55,9 +56,20 @@ class SetpointGate:
             self._is_down = False
 
     def open(self) -> None:
-        """Take note of a call that has the vehicle fly, or of a flight that goes on."""
+        """Take note of a call that has the vehicle fly."""
         with self._lock:
             self._is_waiting = self._is_down
+            self._has_not_lifted = False
+
+    def flight_goes_on(self) -> None:
+        """Take note that the vehicle says that it flies, which thrust on the ground is, too."""
+        with self._lock:
+            self._is_waiting = self._is_down
+
+    def not_lifted(self) -> None:
+        """Take note that the vehicle was told to fly, and has not lifted off."""
+        with self._lock:
+            self._has_not_lifted = True
 
     def high_level(self, now: float) -> int:
         """Take note that the vehicle is given a high-level command; return its number."""
@@ -125,7 +137,12 @@ class SetpointGate:
                 "the link was lost, and the vehicle does not fly: pause the stream for "
                 f"{PAUSE:g} s, send zero thrust or call a service that has it fly"
             )
-        self._is_waiting = False
+        if self._has_not_lifted and not (is_new or is_zero):
+            return (
+                "the vehicle was told to fly and did not lift off: pause the stream for "
+                f"{PAUSE:g} s, send zero thrust or call a service"
+            )
+        self._is_waiting = self._has_not_lifted = False
         for since, event in (
             (self._high_level_since, "given a high-level command"),
             (self._stopped_since, "stopped by cmd_stop"),

@@ -3,10 +3,13 @@
 import contextlib
 import math
 from collections import deque
+from collections.abc import Callable
+from typing import Any
 
-from geometry_msgs.msg import Point, PointStamped, PoseStamped, Twist, Vector3
+from geometry_msgs.msg import Point, PointStamped, PoseStamped, Quaternion, Twist, Vector3
 from std_msgs.msg import Empty
 
+from crazyflie_driver.lift_watch import LIMIT, LiftWatch
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_driver.setpoint_gate import SetpointGate
@@ -18,6 +21,13 @@ from crazyflie_py.errors import CrazyflieError
 from crazyflie_utils import NodeHandle
 
 CMD_VEL, CMD_STOP = "cmd_vel", "cmd_stop"
+
+_HEIGHT_AND_YAW: dict[str, Callable[[Any], tuple[float, float | None]]] = {
+    "cmd_full_state": lambda message: (message.pose.position.z, _yaw(message.pose.orientation)),
+    "cmd_hover": lambda message: (message.zDistance, None),
+    "cmd_position": lambda message: (message.z, message.yaw),
+}
+"""Topic -> height (m) and yaw (degrees) that its setpoints ask for; the others ask for none."""
 
 _THROTTLE = 1.0
 _RATE_WINDOW = 1.0
@@ -39,7 +49,7 @@ class SetpointTopics:
     parameters : VehicleParameters
     crazyflie : crazyflie_py.Crazyflie
     log : LogTopics
-        Knows whether the vehicle is armed.
+        Knows whether the vehicle is armed, and where it is.
 
     Attributes
     ----------
@@ -70,6 +80,8 @@ class SetpointTopics:
         self._is_at_rest = False
         self._source = ""
         self._external_time: float | None = None
+        self._lift = LiftWatch()
+        self._told_yaw: float | None = None
 
     def subscribe(self) -> None:
         """Begin to listen."""
@@ -98,6 +110,7 @@ class SetpointTopics:
         """Send zero thrust a hundred times, and that setpoints end; blocks."""
         self._crazyflie.setpoints.zeros()
         self.is_streaming = False
+        self._lift.end()
 
     @property
     def last_time(self) -> float:
@@ -108,11 +121,44 @@ class SetpointTopics:
         """Do the same as `hand_over`, in the thread that sends: see crazyflie_py's `guarded`."""
         self._crazyflie.setpoints.hand_over_now(remain_valid_ms)
         self.is_streaming = False
+        self._lift.end()
 
     def hand_over(self, remain_valid_ms: int = 0) -> None:
         """Announce that setpoints end, so that the vehicle accepts high-level commands."""
         self._crazyflie.setpoints.hand_over(remain_valid_ms)
         self.is_streaming = False
+        self._lift.end()
+
+    def check_lift(self) -> None:
+        """End a stream that has the vehicle fly, while it stays on the ground.
+
+        The firmware's integrators wind up then, and the vehicle would leap. "Setpoints stop" ends
+        that; what is streamed then is blocked until it has paused.
+        """
+        log, state = self._log, self._log.supervisor
+        is_flying = None if state is None else SupervisorState.FLYING in state
+        finding = self._lift.sample(self._handle.time(), is_flying, log.height, log.vertical_speed)
+        if finding is None or state is None:
+            return
+        words = [f"state: {state.words()}"]
+        if log.height is not None:
+            words.append(f"height {log.height:.2f} m")
+        if log.heading is not None:
+            words.append(f"yaw {log.heading:.0f} degrees")
+        told = f"{self._source}, {finding.height:.2f} m"
+        if self._told_yaw is not None:
+            told += f", yaw {self._told_yaw:.0f} degrees"
+        advice = "is it free, do all propellers turn, and is it told its own yaw?"
+        if finding.is_certain:
+            self.gate.not_lifted()
+            # Without a link, which is said by its state, the firmware stops the motors.
+            with contextlib.suppress(CrazyflieError):
+                self.hand_over()
+            advice += " Its motors are stopped, since it might leap; pause the stream to try again"
+        self._handle.warn(
+            f"{self._parameters.name}: was told to fly ({told}), and has not lifted off within "
+            f"{LIMIT:g} s ({', '.join(words)}): {advice}"
+        )
 
     def knows_position(self, now: float) -> bool:
         """Return whether the vehicle's planner can land it, as far as its inputs tell."""
@@ -160,6 +206,8 @@ class SetpointTopics:
             if not is_sent:
                 self.ignored += 1
                 return
+            height, self._told_yaw = _HEIGHT_AND_YAW.get(name, _nothing)(message)
+            self._lift.command(now, height)
             if self._high_level_end is not None and now < self._high_level_end:
                 self._warn(f"{name} overrides the high-level command", key="override")
 
@@ -226,6 +274,16 @@ class SetpointTopics:
             _xyz(message.pose.position),
             (orientation.x, orientation.y, orientation.z, orientation.w),
         )
+
+
+def _yaw(orientation: Quaternion) -> float:
+    # For quaternions of any norm.
+    x, y, z, w = orientation.x, orientation.y, orientation.z, orientation.w
+    return math.degrees(math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z))
+
+
+def _nothing(_: object) -> tuple[None, None]:
+    return None, None
 
 
 def _xyz(vector: Point | Vector3) -> tuple[float, float, float]:

@@ -344,7 +344,8 @@ class DriverVehicle:
             self._battery.update(voltage, self._handle.time())
             self.commands.check_battery()
         if self.is_flying and self.crazyflie.state is LinkState.CONNECTED:
-            self.setpoints.gate.open()
+            self.setpoints.gate.flight_goes_on()
+        self.setpoints.check_lift()
         self._publish_status()
 
     def _publish_status(self):

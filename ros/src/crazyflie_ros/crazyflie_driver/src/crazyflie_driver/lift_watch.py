@@ -1,0 +1,105 @@
+"""Whether a vehicle that is told to fly lifts off.
+
+While the ground holds a vehicle, the firmware's integrators wind up: it stands with running
+motors, and leaps as soon as what has held it goes away. So it does when a position is asked for
+with another heading than its own. The supervisor's FLYING does not tell, since it is set by thrust.
+
+Nothing is certain of a vehicle whose estimate moves. Where motion capture is frozen, the estimate
+hardly rises, but its vertical speed, which the accelerometer drives, is that of the flight.
+"""
+
+from typing import NamedTuple
+
+LIMIT = 2.0
+"""How long a vehicle may take to lift off, s."""
+
+MIN_CLIMB = 0.15
+"""Setpoints that are lower above the ground do not ask for a flight, m."""
+
+MAX_RISE, MAX_SPEED = 0.05, 0.1
+"""A vehicle on the ground estimates no more, m and m/s."""
+
+MAX_GAP = 0.5
+"""Setpoints older than this are levelled out by the firmware, s."""
+
+PAUSE = 1.0
+"""After silence of so long, s, setpoints are a new attempt."""
+
+
+class NoLift(NamedTuple):
+    """A vehicle that has not lifted off.
+
+    Attributes
+    ----------
+    height : float
+        Height that it was told, m.
+    is_certain : bool
+        Whether its estimate says that it is on the ground; otherwise only that it does not fly.
+    """
+
+    height: float
+    is_certain: bool
+
+
+class LiftWatch:
+    """Compare the heights that are asked for with the vehicle's estimate; times in s."""
+
+    def __init__(self) -> None:
+        self._is_on_ground = False
+        self._ground: float | None = None
+        self._told = 0.0
+        self._latest: float | None = None
+        self._begin: float | None = None
+        self._is_reported = False
+
+    def end(self) -> None:
+        """Take note that there are no setpoints any more."""
+        self._begin, self._latest, self._is_reported = None, None, False
+
+    def command(self, now: float, height: float | None) -> None:
+        """Take note of a setpoint that was sent.
+
+        Parameters
+        ----------
+        now : float
+        height : float or None
+            Height that it asks for, m, in the frame of the estimate; None if for none.
+        """
+        if self._latest is not None and now - self._latest > PAUSE:
+            self.end()
+        self._latest = now
+        if height is None or not self._is_on_ground or height - (self._ground or 0.0) < MIN_CLIMB:
+            self._begin = None
+            return
+        self._told = height
+        if self._begin is None:
+            self._begin = now
+
+    def sample(
+        self, now: float, is_flying: bool | None, height: float | None, speed: float | None
+    ) -> NoLift | None:
+        """Return what is wrong, once in an attempt; None if nothing is.
+
+        Parameters
+        ----------
+        now : float
+        is_flying : bool or None
+            Whether the supervisor says so; None if it says nothing.
+        height, speed : float or None
+            The vehicle's estimate, m, and its vertical speed, m/s; None if not known.
+        """
+        if self._begin is None and is_flying is False:
+            self._is_on_ground, self._ground = True, height
+        elif is_flying is None or self._has_left(is_flying, height, speed):
+            self._is_on_ground, self._begin = False, None
+        if self._begin is None or self._latest is None or self._is_reported:
+            return None
+        if now - self._begin < LIMIT or now - self._latest > MAX_GAP:
+            return None
+        self._is_reported = True
+        return NoLift(self._told, height is not None and speed is not None)
+
+    def _has_left(self, is_flying, height, speed):
+        if height is None or speed is None or self._ground is None:
+            return is_flying
+        return abs(height - self._ground) > MAX_RISE or abs(speed) > MAX_SPEED

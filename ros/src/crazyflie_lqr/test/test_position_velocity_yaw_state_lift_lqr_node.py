@@ -403,3 +403,13 @@ def test_bad_gains_are_refused_and_the_old_ones_stay(process, tmp_path):
         reconfigure(process, K_file=str(gains))
     [after] = answer(process, z=0.5)
     np.testing.assert_array_equal(after, before)
+
+
+@pytest.mark.parametrize(("state", "warnings"), [("flying", 1), ("landing", 0)])
+def test_the_end_of_a_descent_is_no_reason_to_warn(process, state, warnings):
+    process.publish("/in_flight_state", String("flying"))
+    refer(process, z=1.0, z_dot=-0.3)
+    process.publish("/in_flight_state", String(state))
+    process.advance(0.6)
+    answer(process, z=1.0)
+    assert len(process.logged("warn")) == warnings

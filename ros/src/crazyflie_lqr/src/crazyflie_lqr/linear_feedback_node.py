@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from std_msgs.msg import String
 from typing_extensions import override
 
-from crazyflie_lqr.flight_phase import DESCENDING, FLYING, TAKING_OFF, GroundGuess
+from crazyflie_lqr.flight_phase import DESCENDING, FLYING, LANDING, TAKING_OFF, GroundGuess
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference
@@ -284,6 +284,9 @@ class LinearFeedbackNode(Node):
             self._controller.rest()
 
     def _warn_of_reference(self, text):
+        # The last reference of every descent has a velocity.
+        if self._flight_state == LANDING:
+            return
         self._handle.warn(text, throttle=1.0, key="reference")
 
 

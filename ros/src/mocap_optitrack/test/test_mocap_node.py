@@ -288,7 +288,7 @@ def test_what_means_nothing_is_warned_of():
         ({"rigid_bodies": 5}, "rigid_bodies", "expected a dictionary of number or name"),
         ({"backend": "kinect"}, "backend", "expected one of natnet, vicon, qualisys, vrpn"),
         ({"up_axis": "x"}, "up_axis", "expected one of z, y"),
-        ({"stale_after": 0}, "stale_after", "> 0 (s)"),
+        ({"stale_after": 0}, "stale_after", ">= 0.0001 (s)"),
         ({"backend": "vicon"}, "motioncapture_config/hostname", "is not set"),
         (
             {"optitrack_config": {"multicast_address": "192.168.1.1"}},

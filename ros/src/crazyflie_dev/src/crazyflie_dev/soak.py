@@ -21,8 +21,9 @@ import rospkg
 from std_srvs.srv import EmptyRequest
 from tqdm import tqdm
 
+from crazyflie_dev import soak_faults, soak_intruders, soak_operator
 from crazyflie_dev.launch_files import composed_nodes, expand
-from crazyflie_dev.soak_faults import EMERGENCY, FAULTS, STARVATION, Fault, Flight, Undo
+from crazyflie_dev.soak_faults import EMERGENCY, STARVATION, Fault, Flight, Undo
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.runtime.runner import NodeClasses
@@ -37,6 +38,8 @@ _STEP = 0.05
 _PATIENCE = 30.0
 """How long the operator waits for a call, or for the vehicle to come to rest, s."""
 
+
+FAULTS = (*soak_faults.FAULTS, *soak_operator.FAULTS, *soak_intruders.FAULTS)
 
 _SIMULATOR = "/simulator"
 
@@ -69,10 +72,11 @@ class Soak:
         )
         given = {"composed": True, "rviz": False, "simulator_dt": 0.005, **arguments}
         _, parameters = expand(launch_file, **given)
-        self._classes = {
-            f"/{name}": node for name, node in NodeClasses()(composed_nodes(parameters)).items()
-        }
-        self.graph = FakeGraph({**parameters, "/simulator/seed": seed})
+        nodes = {**composed_nodes(parameters), **soak_operator.MISSION_NODE}
+        self._classes = {f"/{name}": node for name, node in NodeClasses()(nodes).items()}
+        self.graph = FakeGraph(
+            {**parameters, **soak_operator.MISSION_PARAMETERS, "/simulator/seed": seed}
+        )
         self.random = Random(seed)
         self.watch = Watch(self.graph)
         self.faults: Counter[str] = Counter()
@@ -180,6 +184,7 @@ class _Fault:
         if self._undo is None and not self.is_over and now >= self._begin:
             self._watch.is_blind = self._fault.blinds
             self._watch.may_fall = self._fault.drops
+            self._watch.allow(self._fault.height)
             self._undo = self._fault.begin(self._flight)
             self._watch.is_emergency = self._fault.name == EMERGENCY
             self._watch.is_starved = self._fault.name == STARVATION

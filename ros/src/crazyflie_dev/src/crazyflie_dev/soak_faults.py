@@ -32,9 +32,6 @@ STARVATION = "this computer is too busy"
 _RESPAWN = 1.0
 """From the end of a node until roslaunch has started it anew, s."""
 
-_FROZEN_ABOVE = 0.02
-"""A vehicle that is no higher, m, cannot be told from one that does not lift off."""
-
 Undo = Callable[[], None]
 
 
@@ -73,6 +70,8 @@ class Fault:
         are to stand still.
     again : callable, optional
         ``again(flight)`` is called twenty times a second while it lasts.
+    height : float, optional
+        Highest reference that it may lead to, m.
     """
 
     name: str
@@ -82,9 +81,12 @@ class Fault:
     blinds: bool = False
     drops: bool = False
     again: Callable[[Flight], None] = lambda _: None
+    height: float = 0.0
 
 
-def _on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Undo]:
+def on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Undo]:
+    """Return what begins a fault: ``change(message, flight)`` returns what arrives on /tf."""
+
     def begin(flight):
         flight.graph.faults["/tf"] = lambda message: change(message, flight)
         return lambda: flight.graph.faults.pop("/tf")
@@ -92,7 +94,9 @@ def _on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Und
     return begin
 
 
-def _with_each(edit: Callable[[Any, Flight], None]) -> Callable[[Flight], Undo]:
+def with_each(edit: Callable[[Any, Flight], None]) -> Callable[[Flight], Undo]:
+    """Return what begins a fault: ``edit(transform, flight)`` changes each transform on /tf."""
+
     def change(message, flight):
         # Transforms are decoded anew whenever they are asked for, and have to be encoded again.
         changed = TFMessage(copy.deepcopy(message.transforms))
@@ -102,7 +106,7 @@ def _with_each(edit: Callable[[Any, Flight], None]) -> Callable[[Flight], Undo]:
         changed.serialize(encoded)
         return [RawTransforms().deserialize(encoded.getvalue())]
 
-    return _on_tf(change)
+    return on_tf(change)
 
 
 def _nan(transform, _):
@@ -125,17 +129,6 @@ def _shift(offset: float) -> Callable[[Any, Flight], None]:
         transform.header.stamp = genpy.Time.from_sec(stamp)
 
     return edit
-
-
-def _freeze_camera(flight: Flight) -> Undo:
-    """Repeat the first pose in the air, with the stamps of those that follow."""
-    first: dict[str, Any] = {}
-
-    def change(transform, _):
-        if first or transform.transform.translation.z > _FROZEN_ABOVE:
-            transform.transform = first.setdefault(transform.child_frame_id, transform.transform)
-
-    return _with_each(change)(flight)
 
 
 def _dropout(message, flight):
@@ -192,18 +185,16 @@ class _Starvation:
 _starvation = _Starvation()
 
 
-def _nothing(_: Flight) -> Undo:
+def nothing(_: Flight) -> Undo:
+    """Begin a fault that consists of what is repeated while it lasts."""
     return lambda: None
 
 
-def _refer_to(
-    x: float, y: float, z: float, age: float = 0.0, speed: float = 0.0
-) -> Callable[[Flight], None]:
+def _refer_to(x: float, y: float, z: float, age: float = 0.0) -> Callable[[Flight], None]:
     def publish(flight):
         message = PositionVelocityStateStamped()
         message.header.stamp = genpy.Time.from_sec(flight.graph.time - age)
         message.state.x, message.state.y, message.state.z = x, y, z
-        message.state.x_dot, message.state.y_dot, message.state.z_dot = speed, -speed, speed
         flight.graph.publish("/ref", message)
 
     return publish
@@ -223,34 +214,25 @@ def _stop_motors(flight: Flight) -> Undo:
     return reset
 
 
-FROZEN_CAMERA = Fault("motion capture is frozen", _freeze_camera, 0.3, 9.0, blinds=True)
-"""Not among the others: the first frozen pose shows a slower vehicle, and the thrust that answers
-it is held until the filter notices the silence."""
-
-WRONG_VELOCITIES = Fault(
-    "velocities are wrong", _nothing, 0.1, 5.0, again=_refer_to(0.0, 0.0, 1.0, speed=100.0)
-)
-"""Not yet among the others either."""
-
 FAULTS = [
-    Fault("poses stop for a moment", _on_tf(lambda *_: []), 0.05, 0.45, blinds=True),
-    Fault("poses stop", _on_tf(lambda *_: []), 0.7, 9.0, blinds=True),
-    Fault("every second pose is lost", _on_tf(_dropout), 1.0, 5.0),
-    Fault("poses are not finite", _with_each(_nan), 0.3, 4.0, blinds=True),
-    Fault("quaternions are no rotations", _with_each(_flat_quaternion), 0.3, 4.0, blinds=True),
-    Fault("poses jump", _with_each(_jump), 0.3, 4.0, blinds=True),
-    Fault("stamps are 3 s old", _with_each(_shift(-3.0)), 0.3, 4.0, blinds=True),
-    Fault("stamps are 8 s ahead", _with_each(_shift(8.0)), 0.3, 4.0, blinds=True),
+    Fault("poses stop for a moment", on_tf(lambda *_: []), 0.05, 0.45, blinds=True),
+    Fault("poses stop", on_tf(lambda *_: []), 0.7, 9.0, blinds=True),
+    Fault("every second pose is lost", on_tf(_dropout), 1.0, 5.0),
+    Fault("poses are not finite", with_each(_nan), 0.3, 4.0, blinds=True),
+    Fault("quaternions are no rotations", with_each(_flat_quaternion), 0.3, 4.0, blinds=True),
+    Fault("poses jump", with_each(_jump), 0.3, 4.0, blinds=True),
+    Fault("stamps are 3 s old", with_each(_shift(-3.0)), 0.3, 4.0, blinds=True),
+    Fault("stamps are 8 s ahead", with_each(_shift(8.0)), 0.3, 4.0, blinds=True),
     *(
         Fault(f"{name} is killed", _kill(name), _RESPAWN, _RESPAWN, drops=name == FILTER)
         for name in NODES
     ),
     *(Fault(f"{name} is frozen", _freeze(name), 0.1, 4.0, drops=name == FILTER) for name in NODES),
     Fault(STARVATION, _starvation.begin, 2.0, 12.0, drops=True, again=_starvation.again),
-    Fault("references are not finite", _nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
-    Fault("references are far away", _nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),
-    Fault("references are old", _nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),
-    Fault("somebody streams references", _nothing, 3.0, 9.0, again=_refer_to(0.3, 0.2, 1.0)),
-    Fault("services are hammered", _nothing, 0.1, 3.0, again=_call_everything),
+    Fault("references are not finite", nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
+    Fault("references are far away", nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),
+    Fault("references are old", nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),
+    Fault("somebody streams references", nothing, 3.0, 9.0, again=_refer_to(0.3, 0.2, 1.0)),
+    Fault("services are hammered", nothing, 0.1, 3.0, again=_call_everything),
     Fault(EMERGENCY, _stop_motors, 0.2, 3.0, drops=True),
 ]

@@ -105,6 +105,14 @@ class FakeGraph:
         """Have ``callback(message)`` called with what is published on a topic, faults aside."""
         self._listeners.setdefault(topic, []).append(callback)
 
+    def services(self) -> dict[str, type]:
+        """Return the services of all processes that are alive, name -> type."""
+        return {
+            name: service_type
+            for process in self._processes.values()
+            for name, service_type in process.transport.service_types.items()
+        }
+
     def call(self, service: str, request: genpy.Message) -> Future[Any]:
         """Call a service; the future may never be done when its process dies."""
         for process in self._processes.values():

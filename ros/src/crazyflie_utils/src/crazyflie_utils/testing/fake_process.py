@@ -62,6 +62,7 @@ class FakeTransport(Transport):
         self.subscribers: dict[str, list[Callable[[Any], None]]] = {}
         self.unpublished: set[str] = set()
         self.services: dict[str, Callable[[Any], Future[Any]]] = {}
+        self.service_types: dict[str, type] = {}
         self.foreign_services: dict[str, str] = {}
         self.log_records: list[tuple[str, str]] = []
 
@@ -113,9 +114,10 @@ class FakeTransport(Transport):
     ) -> Callable[[], None]:
         """Keep ``serve`` for `FakeProcess.call`."""
         self.services[name] = serve
+        self.service_types[name] = service_type
 
         def withdraw() -> None:
-            del self.services[name]
+            del self.services[name], self.service_types[name]
 
         return withdraw
 

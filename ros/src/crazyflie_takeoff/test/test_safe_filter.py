@@ -11,7 +11,14 @@ from crazyflie_takeoff.filter_mode import Mode, Patience
 from crazyflie_takeoff.flight_state import FlightState, Takeover
 from crazyflie_takeoff.limits import Box, Limits
 from crazyflie_takeoff.motion import Motion
-from crazyflie_takeoff.safe_control import MAX_SAFE_TILT, MOTORS_OFF, HoverThrust, Setpoint
+from crazyflie_takeoff.safe_control import (
+    MAX_BRAKING,
+    MAX_SAFE_TILT,
+    MOTORS_OFF,
+    HoverThrust,
+    SafeControl,
+    Setpoint,
+)
 from crazyflie_takeoff.safe_filter import SafeFilter
 from crazyflie_utils.refusal import RefusalError
 
@@ -375,3 +382,14 @@ def check(control_filter, out):
         assert out is None or out == MOTORS_OFF
     if control_filter.mode is Mode.SINKING:
         assert out is None or isinstance(out, Setpoint)
+
+
+def test_a_state_that_is_the_last_one_is_not_taken_again():
+    # 0.2 s at full thrust after it, the vehicle rises by 1.2 m/s more: that is braked at once.
+    motion = Motion((0.0, 0.0, 0.5), (0.0, 0.0, 0.4))
+    safe = SafeControl(G, motion, 0.2, Setpoint(0.0, 0.0, 0.0, 16.0))
+    thrusts = [safe.advance(0.01, motion, False).thrust for _ in range(3)]
+    assert max(thrusts) == pytest.approx(G - MAX_BRAKING)
+    # A new one counts.
+    slow = motion._replace(velocity=(0.0, 0.0, 0.0))
+    assert safe.advance(0.01, slow, False).thrust > G - 1.0

@@ -155,6 +155,7 @@ class SafeControl:
         self._yaw = 0.0 if motion is None else motion.yaw
         self._place: tuple[float, float, float] | None = None
         self._target = 0.0
+        self._seen = motion
         if motion is not None:
             self._reckon(age)
 
@@ -171,6 +172,7 @@ class SafeControl:
         step : float
             Since the last one, s.
         measured : Motion or None
+            The latest one; the same object again is one that has been taken already.
         sinks : bool
             Whether the vehicle is to come down.
         """
@@ -199,7 +201,9 @@ class SafeControl:
         if measured is None:
             self._place = None
             return 0.0, 0.0, 0.0
-        self._velocity, self._yaw = measured.velocity, measured.yaw
+        if measured is not self._seen:
+            self._seen = measured
+            self._velocity, self._yaw = measured.velocity, measured.yaw
         if self._place is None:
             self._place = tuple(
                 x + STOPPING_TIME * v

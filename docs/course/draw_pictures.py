@@ -25,7 +25,7 @@ from crazyflie_dev.launching import roslaunch
 from crazyflie_dev.programs import running
 from crazyflie_dev.render_rviz import background_of, crop_to_scene
 from crazyflie_dev.virtual_display import screenshot, virtual_display
-from crazyflie_utils.runtime import runner
+from crazyflie_utils.main import begin
 
 COURSE = Path(__file__).resolve().parent
 QUICK = "sim_time:=true real_time_factor:=2 composed:=true simulator_dt:=0.01".split()
@@ -39,7 +39,7 @@ def operate() -> FlightOperator:
     """Return an operator of what was launched, as soon as it can take off."""
     # Before, nobody has told yet whether time is simulated.
     wait_for_service("/takeoff")
-    operator = FlightOperator(runner.begin("draw_pictures"), limit=LIMIT)
+    operator = FlightOperator(begin("draw_pictures"), limit=LIMIT)
     operator.wait_until_ready()
     return operator
 
@@ -148,7 +148,7 @@ def draw_scene(path: Path, log: Path, arguments: list[str], config: Path, fly: C
 
 def draw_sweep(path: Path, log: Path) -> None:
     """Draw a sweep when about half of the area is covered."""
-    package = COURSE.parents[1] / "ros/src/crazyflie_tutorials/crazyflie_mission"
+    package = COURSE.parents[1] / "ros/src/crazyflie_tutorials/crazyflie_sweep"
 
     def fly():
         operator = operate()
@@ -156,7 +156,7 @@ def draw_sweep(path: Path, log: Path) -> None:
         time.sleep(3.0)
         return operator
 
-    arguments = ["crazyflie_mission", "sweep.launch"]
+    arguments = ["crazyflie_sweep", "sweep.launch"]
     draw_scene(path, log, arguments, package / "launch" / "sweep.rviz", fly)
 
 

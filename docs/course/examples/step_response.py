@@ -5,7 +5,7 @@ import argparse
 import numpy as np
 
 from crazyflie_dev.flight_operator import FlightOperator
-from crazyflie_utils.runtime import runner
+from crazyflie_utils.main import begin
 
 HEIGHT = 1.0
 DURATION = 5.0
@@ -39,7 +39,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--size", type=float, default=0.5, help="of the step, m")
     size = parser.parse_args().size
-    operator = FlightOperator(runner.begin("step_response"))
+    operator = FlightOperator(begin("step_response"))
     operator.wait_until_ready()
     for x in (0.0, size):
         operator.hover(DURATION)

@@ -3,6 +3,7 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-PACKAGES = ["crazyflie_utils", "crazyflie_utils.runtime", "crazyflie_utils.testing"]
+FOLDERS = ("parameters", "ros1", "testing", "tf")
+PACKAGES = ["crazyflie_utils", *(f"crazyflie_utils.{folder}" for folder in FOLDERS)]
 
 setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

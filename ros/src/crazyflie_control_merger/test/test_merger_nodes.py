@@ -17,8 +17,8 @@ from crazyflie_msgs.msg import (
     PrioritizedControl,
     PrioritizedControlStamped,
 )
-from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.transport import ServiceError
 from crazyflie_utils.vectors import to_vector
 
 NODES = [RegularControlMergerNode, NoYawMergerNode]

@@ -1,8 +1,8 @@
 """Tables of parameters, from declarations."""
 
 from crazyflie_dev.parameter_tables import table, with_tables
-from crazyflie_utils.parameter_types import BOOLEAN, TOPIC, Integer, Number, Text
-from crazyflie_utils.parameters import Parameters, group, parameter
+from crazyflie_utils.parameters.declaration import Parameters, group, parameter
+from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, Integer, Number, Text
 
 
 class AxisParameters(Parameters):

@@ -15,8 +15,8 @@ from crazyflie_dev.soak_operator import LIVE_VALUES, live_parameters
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import Control, ControlStamped
-from crazyflie_utils.runtime.poses import PoseCodec, StampedPose
 from crazyflie_utils.testing import FakeGraph
+from crazyflie_utils.tf.poses import PoseCodec, StampedPose
 
 
 @pytest.fixture(scope="module")

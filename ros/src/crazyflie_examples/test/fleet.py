@@ -4,7 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from crazyflie_dev.flight_operator import FlightOperator
 from crazyflie_dev.flight_record import FlightRecord
-from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_utils.main import ros_process
 
 
 def fly(names: list[str], hover: float) -> dict[str, FlightRecord]:

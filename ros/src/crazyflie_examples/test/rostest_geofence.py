@@ -14,7 +14,7 @@ from crazyflie_geofence.geofence import MAX_HORIZONTAL, MAX_VERTICAL_BRAKING
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import ControlStamped
-from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_utils.main import ros_process
 from crazyflie_utils.vectors import to_vector
 
 PERIOD = 0.01

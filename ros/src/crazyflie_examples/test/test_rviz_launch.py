@@ -9,7 +9,7 @@ import yaml
 
 from crazyflie_description.visualizer_node import VisualizerNode
 from crazyflie_dev import launch_files
-from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 
 PACKAGES = rospkg.RosPack()

@@ -14,7 +14,7 @@ from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
 )
 from crazyflie_lqr.position_velocity_yaw_state_lqr_node import PositionVelocityYawStateLqrNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 

@@ -9,7 +9,7 @@ from roslaunch.core import RLException
 
 from crazyflie_dev import launch_files
 from crazyflie_lqr.gain_file import load_matrix
-from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 
 PACKAGES = rospkg.RosPack()

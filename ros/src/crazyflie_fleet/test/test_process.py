@@ -16,7 +16,7 @@ from crazyflie_fleet import lander
 from crazyflie_fleet.process import make_nodes
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, ParameterError, ServiceError
-from crazyflie_utils.parameter_types import FRAME, Number
+from crazyflie_utils.parameters.types import FRAME, Number
 from crazyflie_utils.testing import FakeProcess
 
 GAINS = Path(rospkg.RosPack().get_path("crazyflie_lqr")) / "config"

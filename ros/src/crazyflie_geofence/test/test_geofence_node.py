@@ -19,9 +19,9 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils.runtime.runner import NodeClasses
-from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.transport import ServiceError
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"

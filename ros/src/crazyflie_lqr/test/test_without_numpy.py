@@ -6,7 +6,7 @@ from pathlib import Path
 
 PROGRAM = """
 import sys
-import crazyflie_utils.runtime.light_rospy
+import crazyflie_utils.ros1.light_rospy
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (

@@ -23,7 +23,7 @@ from crazyflie_dev.fake_vehicle import FakeVehicle
 from crazyflie_dev.programs import free_port, running
 from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest
 from crazyflie_mission_api.connection import RosVehicle
-from crazyflie_utils.runtime.runner import begin_script
+from crazyflie_utils.main import begin_script
 from crazyflie_utils.testing.waiting import wait_until
 
 COMMANDS = (8, 0, b"\x0c")

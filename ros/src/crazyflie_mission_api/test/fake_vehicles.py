@@ -9,7 +9,7 @@ from crazyflie_driver.msg import FullState
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import ServiceError
-from crazyflie_utils.runtime.poses import StampedPose
+from crazyflie_utils.tf.poses import StampedPose
 
 
 class Stack:

@@ -22,6 +22,9 @@ MD5 = {
     "PrioritizedControlStamped": "283a1ef833d93b1cfda5ddc7601205cd",
 }
 
+STATUS = ("FilterStatus", "FlightStatus", "VehicleStatus")
+"""Of this workspace alone."""
+
 POSITION_VELOCITY = ["x", "y", "z", "x_dot", "y_dot", "z_dot"]
 FIELDS = {
     "Control": ["roll", "pitch", "yaw_dot", "thrust"],
@@ -40,7 +43,7 @@ def test_md5(name, md5):
 
 def test_these_are_all():
     definitions = Path(__file__).resolve().parents[1] / "msg"
-    assert sorted(path.stem for path in definitions.glob("*.msg")) == sorted(MD5)
+    assert sorted(path.stem for path in definitions.glob("*.msg")) == sorted([*MD5, *STATUS])
 
 
 @pytest.mark.parametrize(("name", "fields"), FIELDS.items())
@@ -73,3 +76,14 @@ def test_the_comment_of_every_field_has_its_unit(name):
         if line.startswith("float64"):
             field, _, comment = line.removeprefix("float64").partition("#")
             assert UNITS[field.strip()] in re.split("[ ,;]+", comment), line
+
+
+@pytest.mark.parametrize("name", STATUS)
+def test_a_status_has_a_stamp_and_words(name):
+    status = getattr(msg, name)
+    assert status.__slots__[0] == "header"
+    assert {"reason", "text"} & set(status.__slots__)
+
+
+def test_the_flight_state_that_a_filter_reports_is_unknown_at_first():
+    assert msg.FilterStatus().flight_state == msg.FlightStatus.UNKNOWN

@@ -9,9 +9,9 @@ from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_simulator.simulator_node import NearHoverSimulatorNode
 from crazyflie_utils.node import Node
-from crazyflie_utils.runtime.process import Process
-from crazyflie_utils.runtime.timers import Timer
+from crazyflie_utils.process import Process
 from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
+from crazyflie_utils.timers import Timer
 
 
 class ClockedProcess(FakeProcess):

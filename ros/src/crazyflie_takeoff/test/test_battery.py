@@ -8,8 +8,8 @@ from takeoff_helpers import SERVER, state
 
 from crazyflie_takeoff.battery import Battery, Charge
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
-from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.transport import ServiceError
 
 # The battery.
 

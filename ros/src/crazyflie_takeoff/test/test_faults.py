@@ -7,8 +7,8 @@ from std_srvs.srv import EmptyRequest
 from takeoff_helpers import SERVER, ControllerNode, HoverNetwork, control, state
 
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
-from crazyflie_utils.runtime.transport import ServiceError
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.transport import ServiceError
 
 G = 9.81
 

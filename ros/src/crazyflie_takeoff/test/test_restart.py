@@ -14,7 +14,7 @@ from crazyflie_takeoff.takeoff_control_filter_node import (
     TakeoffControlFilterNode,
 )
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
-from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.transport import ServiceError
 
 GAP = 1.0
 """How long there is no server or filter, s."""

@@ -10,7 +10,7 @@ from takeoff_helpers import SERVER, state
 
 from crazyflie_takeoff.driver_connection import MAX_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
-from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.transport import ServiceError
 
 
 def test_says_nothing_until_it_knows_where_the_flight_stands():

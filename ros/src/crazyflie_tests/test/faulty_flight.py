@@ -19,7 +19,7 @@ import rosgraph
 from crazyflie_dev.flight_operator import FlightOperator
 from crazyflie_dev.launching import complaints
 from crazyflie_dev.programs import free_port, running
-from crazyflie_utils.runtime import runner
+from crazyflie_utils.main import begin
 from crazyflie_utils.testing.peer import wait_until
 
 LIMIT = 60.0
@@ -37,7 +37,7 @@ class Observer:
     """Looks at a flight from outside, whether there is a master or not."""
 
     def __init__(self):
-        self._process = runner.begin("flight")
+        self._process = begin("flight")
         self._operator = FlightOperator(self._process)
         self._operator.wait_until_ready()
         self.takeoff, self.land = self._operator.takeoff, self._operator.land

@@ -26,8 +26,8 @@ from crazyflie_dev.flight_record import Series
 from crazyflie_dev.programs import free_port, running
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_driver.srv import RemoveCrazyflie
+from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_utils.testing.peer import wait_until
 
 _VARIABLES = ("stateEstimate.z", "stateEstimate.vz", "motor.m1", "motor.m2", "motor.m3", "motor.m4")

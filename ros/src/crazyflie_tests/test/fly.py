@@ -10,7 +10,7 @@ from pathlib import Path
 from crazyflie_dev.flight_operator import FlightError, FlightOperator
 from crazyflie_dev.flight_report import FlightReport
 from crazyflie_dev.launching import roslaunch
-from crazyflie_utils.runtime import runner
+from crazyflie_utils.main import begin
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0
@@ -22,7 +22,7 @@ def main(arguments: list[str]) -> int:
         log = Path(folder) / "launch.log"
         with roslaunch(arguments, log):
             try:
-                record = FlightOperator(runner.begin("flight")).fly(HOVER_DURATION)
+                record = FlightOperator(begin("flight")).fly(HOVER_DURATION)
             except FlightError as error:
                 print(f"the flight failed: {error}\n{log.read_text()}")
                 return 1

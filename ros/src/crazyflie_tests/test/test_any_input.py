@@ -10,7 +10,7 @@ from test_parameter_tables import COMMENT
 
 from crazyflie_demo import trajectory_file
 from crazyflie_lqr.gain_file import GainFileError, load_matrix, load_vector
-from crazyflie_utils.parameters import ParameterError
+from crazyflie_utils.parameters.declaration import ParameterError
 
 SCALARS = (
     st.none()

@@ -17,7 +17,7 @@ PACKAGES = {
 }
 
 LAYERS = [
-    {"crazyflie_msgs", "crazyflie_model", "crazyflie_mission_msgs"},
+    {"crazyflie_msgs", "crazyflie_model", "crazyflie_tutorial_msgs"},
     {"crazyflie_utils"},
     {
         "crazyflie_simulator",
@@ -28,8 +28,8 @@ LAYERS = [
         "crazyflie_takeoff",
         "crazyflie_description",
         "crazyflie_controller",
-        "crazyflie_py",
-        "crazyflie_mission",
+        "crazyflie_link",
+        "crazyflie_sweep",
         "crazyflie_package_generator",
         "crazyflie_spawner",
         "crazyflie_world",

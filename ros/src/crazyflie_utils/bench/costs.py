@@ -22,7 +22,7 @@ import rospy
 
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils import Node, TransformError, run
-from crazyflie_utils.runtime.runner import begin
+from crazyflie_utils.main import begin
 
 _COUNT = 5000
 _LIMIT = 30.0

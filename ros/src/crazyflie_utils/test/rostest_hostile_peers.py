@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger, TriggerResponse
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_utils import TransformError
-from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_utils.main import ros_process
 from crazyflie_utils.testing.hostile_publisher import HostilePublisher, crowd, frame
 from crazyflie_utils.testing.peer import LIMIT, wait_until
 

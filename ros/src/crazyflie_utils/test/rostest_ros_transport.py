@@ -13,9 +13,9 @@ from std_msgs.msg import Float64, Int64, String
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from crazyflie_utils import ServiceError
-from crazyflie_utils.parameter_types import BOOLEAN, FINITE, TEXT, Integer
-from crazyflie_utils.parameters import ParameterError
-from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_utils.main import ros_process
+from crazyflie_utils.parameters.declaration import ParameterError
+from crazyflie_utils.parameters.types import BOOLEAN, FINITE, TEXT, Integer
 from crazyflie_utils.testing.peer import LIMIT, wait_until
 
 

@@ -10,7 +10,7 @@ from processes import composed
 from std_msgs.msg import Int64
 from std_srvs.srv import Trigger, TriggerResponse
 
-from crazyflie_utils.runtime.runner import ros_process
+from crazyflie_utils.main import ros_process
 from crazyflie_utils.testing.peer import LIMIT, wait_until
 
 NAMES = {"/starting/published", "/starting/heard", "/starting/offered"}

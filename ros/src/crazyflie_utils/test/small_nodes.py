@@ -8,7 +8,7 @@ from std_msgs.msg import Float64, Int64
 from std_srvs.srv import Trigger, TriggerResponse
 
 from crazyflie_utils import Node, Parameters, ServiceError, parameter, run
-from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Integer
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Integer
 
 SAFE = -1.0
 """What a `Ticker` says at last."""

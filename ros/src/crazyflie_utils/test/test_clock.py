@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils.runtime import clock
-from crazyflie_utils.runtime.clock import SimulatedClock, SteadyClock
+from crazyflie_utils import clock
+from crazyflie_utils.clock import SimulatedClock, SteadyClock
 
 SECOND = 1_000_000_000
 

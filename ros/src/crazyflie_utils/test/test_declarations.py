@@ -5,9 +5,9 @@ import math
 
 import pytest
 
-from crazyflie_utils.command_line import parse_arguments
-from crazyflie_utils.parameter_types import BOOLEAN, METRES, TOPIC, Integer, Number, Text
-from crazyflie_utils.parameters import ParameterError, Parameters, group, parameter
+from crazyflie_utils.parameters.command_line import parse_arguments
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters, group, parameter
+from crazyflie_utils.parameters.types import BOOLEAN, METRES, TOPIC, Integer, Number, Text
 from crazyflie_utils.testing import FakeProcess
 
 

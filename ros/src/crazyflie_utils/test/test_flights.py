@@ -3,7 +3,7 @@
 import pytest
 from std_msgs.msg import String
 
-from crazyflie_utils.runtime.flights import Flights
+from crazyflie_utils.flights import Flights
 from crazyflie_utils.testing import FakeProcess
 
 PILOT = "/cf/pilot"

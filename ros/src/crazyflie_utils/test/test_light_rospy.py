@@ -17,7 +17,7 @@ def run(program):
 
 def test_a_process_does_without_what_it_does_not_use():
     loaded = run(
-        "import sys, crazyflie_utils.runtime.runner, crazyflie_utils.runtime.reconfiguration\n"
+        "import sys, crazyflie_utils.main, crazyflie_utils.parameters.reconfigure\n"
         "print(*sys.modules)"
     ).split()
     assert "rospy" in loaded
@@ -27,7 +27,7 @@ def test_a_process_does_without_what_it_does_not_use():
 
 def test_all_is_there_for_who_uses_it():
     run("""
-import crazyflie_utils.runtime.runner
+import crazyflie_utils.main
 import hashlib, html, http.server, roslib, ssl, urllib.request, yaml
 import genpy, rospy
 from dynamic_reconfigure.client import Client
@@ -49,7 +49,7 @@ def test_what_was_imported_before_stays():
     run(
         "import hashlib, numpy, ssl, sys, yaml\n"
         "before = dict(sys.modules)\n"
-        "import crazyflie_utils.runtime.runner, genpy.message\n"
+        "import crazyflie_utils.main, genpy.message\n"
         "assert all(sys.modules[name] is module for name, module in before.items())\n"
         "assert numpy.float32 in genpy.message._valid_float_types"
     )
@@ -59,7 +59,7 @@ def test_what_was_imported_before_stays():
 def test_messages_take_the_numbers_of_numpy(before):
     complaint = run(
         f"{before}\n"
-        "import crazyflie_utils.runtime.runner\n"
+        "import crazyflie_utils.main\n"
         "import genpy, io, numpy\n"
         "from geometry_msgs.msg import Vector3\n"
         "Vector3(numpy.float32(1), numpy.int8(2), numpy.uint64(3)).serialize(io.BytesIO())\n"

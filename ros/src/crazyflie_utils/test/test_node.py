@@ -4,7 +4,7 @@ import pytest
 from std_msgs.msg import String
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameter_types import POSITIVE
+from crazyflie_utils.parameters.types import POSITIVE
 
 
 class Echo(Node):

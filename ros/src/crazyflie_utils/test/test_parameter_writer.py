@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from crazyflie_utils.runtime.parameter_writer import ParameterWriter
+from crazyflie_utils.parameters.writer import ParameterWriter
 from crazyflie_utils.testing.waiting import wait_until
 
 

@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_utils.messages import shown
-from crazyflie_utils.parameter_types import (
+from crazyflie_utils.parameters.declaration import ParameterError
+from crazyflie_utils.parameters.types import (
     BOOLEAN,
     DURATION,
     FINITE,
@@ -22,7 +23,6 @@ from crazyflie_utils.parameter_types import (
     Number,
     Text,
 )
-from crazyflie_utils.parameters import ParameterError
 from crazyflie_utils.testing import FakeProcess
 
 NUMBERS = [FINITE, METRES, POSITIVE, DURATION, TIME_STEP, Number(minimum=-1.0, maximum=1.0)]

@@ -12,8 +12,8 @@ from tf2_msgs.msg import TFMessage
 from transform_helpers import hear, transform, x_of
 
 from crazyflie_utils import TransformError
-from crazyflie_utils.runtime.poses import PoseCodec, RawTransforms
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.tf.poses import PoseCodec, RawTransforms
 
 
 def raw(*transforms):

@@ -7,7 +7,7 @@ import pytest
 from rospy.exceptions import TransportTerminated
 from std_msgs.msg import Int64
 
-from crazyflie_utils.runtime.rospy_receiving import _Inbox
+from crazyflie_utils.ros1.receiving import _Inbox
 from crazyflie_utils.testing.hostile_publisher import frame
 
 
@@ -81,7 +81,7 @@ def test_who_collects_by_themselves_are_not_reminded(publisher, monkeypatch):
             collected.extend(numbers(inbox.take_waiting(1)))
 
     clock = SimpleNamespace(sleep=sleep, monotonic=lambda: now[0])
-    monkeypatch.setattr("crazyflie_utils.runtime.rospy_receiving.time", clock)
+    monkeypatch.setattr("crazyflie_utils.ros1.receiving.time", clock)
     assert [inbox.wait(), inbox.wait()] == [False, False]
     assert collected == [0, 1]
     here.sendall(frame(Int64(2)))

@@ -8,7 +8,7 @@ from dynamic_reconfigure.msg import Config, DoubleParameter, StrParameter
 from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, TOPIC, Integer, Number, Text
+from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, Integer, Number, Text
 from crazyflie_utils.testing import FakeProcess
 
 

@@ -14,8 +14,9 @@ from rospy.impl import registration, tcpros_base
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from crazyflie_utils import ServiceError
-from crazyflie_utils.runtime import ros_transport, rospy_internals
-from crazyflie_utils.runtime.ros_transport import RosTransport, wait_for_answer
+from crazyflie_utils.ros1 import internals as rospy_internals
+from crazyflie_utils.ros1 import transport as ros_transport
+from crazyflie_utils.ros1.transport import RosTransport, wait_for_answer
 
 
 def test_an_answer_is_returned():
@@ -129,7 +130,7 @@ def test_connections_that_come_at_once_are_not_put_off(monkeypatch):
 def test_a_process_may_have_more_topics_than_a_shell_lets_it_have_files():
     program = """
 import resource
-from crazyflie_utils.runtime import rospy_internals
+from crazyflie_utils.ros1 import internals as rospy_internals
 
 _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
 resource.setrlimit(resource.RLIMIT_NOFILE, (100, most))

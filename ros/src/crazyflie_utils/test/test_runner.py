@@ -2,8 +2,8 @@
 
 import pytest
 
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.node import Node
-from crazyflie_utils.runtime.runner import NodeClasses
 
 NODE = "crazyflie_utils.node:Node"
 

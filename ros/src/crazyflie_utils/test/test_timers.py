@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils.runtime.clock import SteadyClock
-from crazyflie_utils.runtime.executor import Executor
-from crazyflie_utils.runtime.timers import SteadyTimers, TimerQueue
+from crazyflie_utils.clock import SteadyClock
+from crazyflie_utils.executor import Executor
+from crazyflie_utils.timers import SteadyTimers, TimerQueue
 
 LIMIT = 60.0
 

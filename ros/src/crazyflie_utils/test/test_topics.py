@@ -3,8 +3,8 @@
 import pytest
 from std_msgs.msg import Empty, String
 
-from crazyflie_utils.runtime.topics import Topics
-from crazyflie_utils.runtime.transport import ExternalPublisher, ExternalSubscriber
+from crazyflie_utils.topics import Topics
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber
 
 
 class Wire(ExternalPublisher):

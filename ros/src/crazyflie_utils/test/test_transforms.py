@@ -11,8 +11,8 @@ from tf2_msgs.msg import TFMessage
 from transform_helpers import hear, transform, x_of
 
 from crazyflie_utils import TransformError
-from crazyflie_utils.runtime.poses import StampedPose
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.tf.poses import StampedPose
 
 
 def test_latest_transform_with_its_own_stamp(process, lookup):
@@ -35,7 +35,7 @@ def test_stamps_come_back_to_the_nanosecond(seconds, nanoseconds):
 
 
 def test_transforms_of_many_threads(process, lookup, monkeypatch):
-    monkeypatch.setattr("crazyflie_utils.runtime.tf2_memory._MOST_STAMPS", 3)
+    monkeypatch.setattr("crazyflie_utils.tf.tf2_memory._MOST_STAMPS", 3)
     process.clock.set(103.0)
     failures = []
 

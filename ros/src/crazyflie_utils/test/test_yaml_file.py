@@ -5,9 +5,9 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_utils import yaml_file
-from crazyflie_utils.parameter_types import BOOLEAN, POSITION, POSITIVE, TEXT
-from crazyflie_utils.parameters import ParameterError, Parameters, group, parameter
+from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters, group, parameter
+from crazyflie_utils.parameters.types import BOOLEAN, POSITION, POSITIVE, TEXT
 
 
 class NoiseParameters(Parameters):

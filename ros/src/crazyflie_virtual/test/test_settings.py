@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from crazyflie_utils.command_line import parse_arguments
+from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.mocap.settings import MocapSettings
 from crazyflie_virtual.settings import VehicleSettings

@@ -2,7 +2,7 @@
 
 import pytest
 
-from crazyflie_mission_msgs.srv import VelocityAtRequest
+from crazyflie_tutorial_msgs.srv import VelocityAtRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 from triangle_velocity.triangle_velocity_node import TriangleVelocityNode

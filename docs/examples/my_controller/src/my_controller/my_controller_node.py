@@ -7,7 +7,7 @@ from crazyflie_lqr.linear_feedback import PITCH, ROLL, LinearFeedback
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import parameter
-from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters.types import Number
 
 
 class GentleFeedback(LinearFeedback):

@@ -6,7 +6,7 @@ from typing_extensions import override
 
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
 from odometer.odometer import Odometer
 
 

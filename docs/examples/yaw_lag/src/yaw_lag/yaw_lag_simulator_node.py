@@ -5,7 +5,7 @@ from typing_extensions import override
 from crazyflie_model.dynamics import Dynamics
 from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
 from crazyflie_utils import parameter
-from crazyflie_utils.parameter_types import TIME_STEP
+from crazyflie_utils.parameters.types import TIME_STEP
 from yaw_lag.dynamics import YawLag
 from yaw_lag.gains import TIME_CONSTANT
 

@@ -6,7 +6,7 @@ from typing_extensions import override
 from crazyflie_state_estimator.estimator_node import StateEstimatorNode, StateEstimatorParameters
 from crazyflie_state_estimator.motion import Motion
 from crazyflie_utils import parameter
-from crazyflie_utils.parameter_types import Integer
+from crazyflie_utils.parameters.types import Integer
 from yaw_lag.msg import YawRateStateStamped
 
 

@@ -7,7 +7,7 @@ from crazyflie_lqr.gain_file import MatrixFile
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils import parameter
-from crazyflie_utils.parameter_types import Integer
+from crazyflie_utils.parameters.types import Integer
 from yaw_lag.msg import YawRateStateStamped
 
 

@@ -6,7 +6,7 @@ from typing_extensions import override
 from crazyflie_control_merger.cmd_vel import cmd_vel_from_control
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_utils.vectors import to_vector
 
 

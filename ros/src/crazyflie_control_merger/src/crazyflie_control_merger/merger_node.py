@@ -7,7 +7,7 @@ from typing_extensions import override
 from crazyflie_control_merger.merging import ALL_ENTRIES, MODES, Merger
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC, Text
+from crazyflie_utils.parameters.types import TOPIC, Text
 from crazyflie_utils.vectors import from_vector, to_vector
 
 

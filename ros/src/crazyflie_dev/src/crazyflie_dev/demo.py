@@ -8,7 +8,7 @@ from pathlib import Path
 from crazyflie_dev import flight_plot, flight_report
 from crazyflie_dev.flight_operator import FlightError, FlightOperator
 from crazyflie_dev.launching import LaunchError, complaints, roslaunch
-from crazyflie_utils.runtime import runner
+from crazyflie_utils.main import begin
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0
@@ -26,7 +26,7 @@ def fly(folder: Path, launch_arguments: list[str]) -> int:
     with roslaunch(arguments, log):
         print(f"watch it with  export ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}", flush=True)
         try:
-            operator = FlightOperator(runner.begin("demo"), limit=LIMIT)
+            operator = FlightOperator(begin("demo"), limit=LIMIT)
             operator.wait_until_ready()
             print("rosservice call /takeoff", flush=True)
             operator.takeoff()

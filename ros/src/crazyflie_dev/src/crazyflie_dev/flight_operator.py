@@ -11,9 +11,9 @@ from std_srvs.srv import Empty, EmptyRequest
 from crazyflie_dev.flight_record import FlightRecord
 from crazyflie_dev.flight_recorder_node import FlightRecorderNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
-from crazyflie_utils.runtime.process import Process
-from crazyflie_utils.runtime.runner import ros_process
-from crazyflie_utils.runtime.transport import ServiceError
+from crazyflie_utils.main import ros_process
+from crazyflie_utils.process import Process
+from crazyflie_utils.transport import ServiceError
 
 
 class FlightError(Exception):

@@ -12,7 +12,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_utils.vectors import to_vector
 
 

@@ -15,7 +15,7 @@ import re
 import sys
 from pathlib import Path
 
-from crazyflie_utils.parameters import REQUIRED, Declaration, Parameters
+from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, Parameters
 
 _PLACE = re.compile(r"(<!-- parameters: (.+?) -->\n)(?:\n?(?:\|.*\n)+)?")
 

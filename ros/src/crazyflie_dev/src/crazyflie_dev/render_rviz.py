@@ -21,7 +21,7 @@ from crazyflie_dev.flight_operator import FlightError, FlightOperator
 from crazyflie_dev.flight_report import HOVER_TOLERANCE
 from crazyflie_dev.launching import roslaunch
 from crazyflie_dev.virtual_display import DisplayError, screenshot, virtual_display
-from crazyflie_utils.runtime import runner
+from crazyflie_utils.main import begin
 
 SCREEN = (1400, 900)
 """Width and height in pixels of the screen, and of RViz's window in its configuration."""
@@ -159,7 +159,7 @@ def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
         arguments = ["crazyflie_examples", "sw_hover.launch", "rviz:=true", *launch_arguments]
         show_progress(f"launching {' '.join(arguments)} on display {display}")
         with roslaunch(arguments, log):
-            operator = FlightOperator(runner.begin("render_rviz"))
+            operator = FlightOperator(begin("render_rviz"))
             operator.wait_until_ready()
             show_progress("waiting for RViz to draw the vehicle")
             scene.wait_for_vehicle()

@@ -26,7 +26,7 @@ from crazyflie_dev.launch_files import composed_nodes, expand
 from crazyflie_dev.soak_faults import EMERGENCY, STARVATION, Fault, Flight, Undo
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeGraph
 
 HOVER_HEIGHT = 1.0

@@ -15,8 +15,8 @@ from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_utils.runtime.poses import RawTransforms
 from crazyflie_utils.testing import FakeGraph
+from crazyflie_utils.tf.poses import RawTransforms
 
 CONTROLLER, ESTIMATOR, SERVER, FILTER = (
     "/lqr_controller",

@@ -21,7 +21,7 @@ import rosgraph
 from crazyflie_dev.flight_operator import FlightError, FlightOperator
 from crazyflie_dev.launching import roslaunch
 from crazyflie_dev.soak_faults import NODES
-from crazyflie_utils.runtime import runner
+from crazyflie_utils.main import begin
 
 HOVER_HEIGHT = 1.0
 """Of the launch file, m."""
@@ -79,7 +79,7 @@ def main() -> int:
     arguments = ["rviz:=false", f"dynamics:={options.dynamics}"]
     log = Path(tempfile.mkdtemp()) / "sw_hover.log"
     with roslaunch(["crazyflie_examples", "sw_hover.launch", *arguments], log):
-        operator = FlightOperator(runner.begin("starve"), limit=60.0)
+        operator = FlightOperator(begin("starve"), limit=60.0)
         operator.wait_until_ready()
         operator.takeoff()
         starve(process_ids(NODES), options.share, options.duration, options.seed)

@@ -6,7 +6,7 @@ from typing_extensions import override
 from crazyflie_examples.route import DEFAULT_POINTS, Point, Points, Route
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import SERVICE, TOPIC
+from crazyflie_utils.parameters.types import SERVICE, TOPIC
 
 
 class MoveServerParameters(Parameters):

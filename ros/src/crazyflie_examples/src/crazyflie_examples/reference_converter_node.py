@@ -10,7 +10,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC, Text
+from crazyflie_utils.parameters.types import TOPIC, Text
 
 TYPES = {
     "position_velocity_yaw": PositionVelocityYawStateStamped,

@@ -6,7 +6,7 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_utils.messages import shown
-from crazyflie_utils.parameter_types import METRES, ParameterType
+from crazyflie_utils.parameters.types import METRES, ParameterType
 
 Point = tuple[float, float, float]
 """x, y, z in m."""

@@ -10,7 +10,7 @@ from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS, VehicleParamete
 from crazyflie_fleet.fleet import Fleet, Vehicle
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
-from crazyflie_utils.parameter_types import TEXT, ListOf
+from crazyflie_utils.parameters.types import TEXT, ListOf
 
 ADD = "/add_crazyflie"
 

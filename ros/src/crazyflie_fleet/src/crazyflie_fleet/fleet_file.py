@@ -22,9 +22,9 @@ from crazyflie_fleet.settings import (
 )
 from crazyflie_utils import ParameterError
 from crazyflie_utils.messages import shortened, shown
-from crazyflie_utils.parameter_types import BOOLEAN, ParameterType
-from crazyflie_utils.yaml_file import Entry
-from crazyflie_utils.yaml_file import load as load_yaml
+from crazyflie_utils.parameters.types import BOOLEAN, ParameterType
+from crazyflie_utils.parameters.yaml_file import Entry
+from crazyflie_utils.parameters.yaml_file import load as load_yaml
 
 FIRST_PORT = 19850
 """UDP port of a grid's first vehicle."""

@@ -8,7 +8,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from crazyflie_fleet.fleet import DOWNWASH, Vehicle
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_utils.parameters.types import TOPIC
 
 BODY = ColorRGBA(0.15, 0.17, 0.20, 1.0)
 NAME = ColorRGBA(0.05, 0.25, 0.60, 1.0)

@@ -8,7 +8,8 @@ from typing_extensions import override
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet import Fleet
 from crazyflie_utils import Node, ParameterError, Parameters, parameter
-from crazyflie_utils.parameter_types import (
+from crazyflie_utils.main import NodeClasses
+from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FRAME,
     TEXT,
@@ -17,7 +18,6 @@ from crazyflie_utils.parameter_types import (
     ParameterType,
     Text,
 )
-from crazyflie_utils.runtime.runner import NodeClasses
 
 
 class NodeParameters(ParameterType):

@@ -19,9 +19,9 @@ from crazyflie_fleet.stack import REFERENCE, SAFE_REFERENCE
 from crazyflie_fleet.way import Way, along
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
-from crazyflie_utils.parameter_types import TIME_STEP, TOPIC
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.runtime.topics import Publisher
+from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
 
 SILENCE_PERIOD = 5.0

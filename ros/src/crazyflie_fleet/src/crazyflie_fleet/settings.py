@@ -6,7 +6,7 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import (
+from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FINITE,
     FRAME,

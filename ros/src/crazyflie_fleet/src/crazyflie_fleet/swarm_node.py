@@ -30,9 +30,9 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_simulator.simulator_node import MAX_CATCH_UP
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, Number
-from crazyflie_utils.runtime.poses import StampedPose
-from crazyflie_utils.runtime.topics import Publisher
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, Number
+from crazyflie_utils.tf.poses import StampedPose
+from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import to_tuple
 
 YAW = 6

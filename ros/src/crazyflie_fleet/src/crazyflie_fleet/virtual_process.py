@@ -2,7 +2,7 @@
 
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
-from crazyflie_utils.parameter_types import Integer, Number
+from crazyflie_utils.parameters.types import Integer, Number
 from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
 from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
 from mocap_optitrack.mocap_node import MocapNode

@@ -20,8 +20,8 @@ from crazyflie_msgs.msg import (
     PrioritizedControlStamped,
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC, Number
-from crazyflie_utils.parameters import group
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import TOPIC, Number
 from crazyflie_utils.vectors import from_vector, to_vector
 
 # Without these bounds the fence's equations overflow or divide by nothing.

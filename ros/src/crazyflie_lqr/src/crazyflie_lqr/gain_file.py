@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from typing_extensions import override
 
 from crazyflie_utils.messages import shortened, shown
-from crazyflie_utils.parameter_types import TEXT, ParameterType
+from crazyflie_utils.parameters.types import TEXT, ParameterType
 from crazyflie_utils.text_input import number_from_text
 
 if TYPE_CHECKING:

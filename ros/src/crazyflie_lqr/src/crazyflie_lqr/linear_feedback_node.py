@@ -17,7 +17,7 @@ from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import Control, ControlStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
-from crazyflie_utils.parameter_types import TOPIC, Integer, Number
+from crazyflie_utils.parameters.types import TOPIC, Integer, Number
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
 
 if TYPE_CHECKING:

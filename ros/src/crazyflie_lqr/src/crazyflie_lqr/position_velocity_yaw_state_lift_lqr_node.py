@@ -6,8 +6,8 @@ from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_lqr.linear_feedback_node import LinearFeedbackNode, LinearFeedbackParameters
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import Number
-from crazyflie_utils.parameters import group
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import Number
 
 _TILT_GAIN = Number("rad/(m s)")
 _LIMIT = Number("m s", minimum=0.0)

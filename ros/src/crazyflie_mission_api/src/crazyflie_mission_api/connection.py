@@ -21,7 +21,7 @@ from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
-from crazyflie_utils.parameter_types import FINITE
+from crazyflie_utils.parameters.types import FINITE
 
 CALL_LIMIT = 60.0
 """How long a service may take, s of the machine's clock."""

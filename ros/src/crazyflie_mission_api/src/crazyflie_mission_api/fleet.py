@@ -25,9 +25,9 @@ from crazyflie_mission_api.roster import Rules
 from crazyflie_mission_api.starter import Starter
 from crazyflie_mission_api.team import Team
 from crazyflie_utils import NodeHandle, ParameterError
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME, Number
-from crazyflie_utils.runtime.process import Process
-from crazyflie_utils.runtime.runner import begin_script
+from crazyflie_utils.main import begin_script
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, Number
+from crazyflie_utils.process import Process
 
 _SERVICES = (
     "takeoff",

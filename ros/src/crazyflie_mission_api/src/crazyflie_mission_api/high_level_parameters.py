@@ -1,7 +1,7 @@
 """Parameters of the node that offers the driver's high-level services."""
 
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, SERVICE, TIME_STEP, TOPIC
+from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC
 
 START_TOPIC = "/all/start_trajectory"
 """Nodes, one space between two, that begin what was uploaded to them as trajectory 0: vehicles that

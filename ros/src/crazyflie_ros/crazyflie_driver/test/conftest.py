@@ -12,7 +12,7 @@ from crazyflie_utils.testing import FakeProcess
 
 LIMIT = 60.0
 """The longest that a test waits for the driver, s; how soon it gives up by itself is in Limits of
-crazyflie_py."""
+crazyflie_link."""
 
 LOG = {
     "acc.x": ("f", 0.5),

@@ -16,8 +16,8 @@ from safety_helpers import (
 from std_srvs.srv import EmptyRequest, SetBoolRequest
 
 from crazyflie_driver.srv import GoToRequest, NotifySetpointsStopRequest, StopRequest
-from crazyflie_py.address import Address
-from crazyflie_py.crazyflie import Crazyflie
+from crazyflie_link.address import Address
+from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.waiting import wait_until
 

@@ -8,7 +8,7 @@ from std_msgs.msg import Bool
 from crazyflie_dev.programs import free_port
 from crazyflie_driver.connecting import connect_within
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
-from crazyflie_py.errors import AddressError, NoAnswerError, NoDongleError, SetupError
+from crazyflie_link.errors import AddressError, NoAnswerError, NoDongleError, SetupError
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.waiting import wait_until
 

@@ -16,8 +16,8 @@ from safety_helpers import (
 
 from crazyflie_dev.fake_vehicle import READ_ONLY
 from crazyflie_driver.srv import UpdateParamsRequest
+from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.crazyflie import Crazyflie
 from crazyflie_utils.testing.waiting import wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 

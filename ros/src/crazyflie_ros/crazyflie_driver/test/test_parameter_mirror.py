@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from crazyflie_driver.parameter_mirror import ParameterMirror
-from crazyflie_py.errors import LinkLostError, NoReplyError, RefusedError
+from crazyflie_link.errors import LinkLostError, NoReplyError, RefusedError
 from crazyflie_utils.testing import FakeProcess
 
 

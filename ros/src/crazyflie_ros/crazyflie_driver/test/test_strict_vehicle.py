@@ -8,9 +8,9 @@ from std_msgs.msg import Empty
 
 from crazyflie_driver.msg import Position
 from crazyflie_driver.srv import LandRequest, NotifySetpointsStopRequest, TakeoffRequest
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.log import LogBlock
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.crazyflie import Crazyflie
-from crazyflie_py.log import LogBlock
 from crazyflie_utils.testing.waiting import LIMIT, wait_until
 from crazyflie_virtual.testing import virtual_vehicle
 

@@ -9,8 +9,8 @@ from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_simulator.simulator_node import SimulatorNode, SimulatorParameters
 from crazyflie_simulator.wind import Wind
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import Number
-from crazyflie_utils.parameters import group
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import Number
 
 _ERROR = Number(minimum=-0.5, maximum=0.5)
 _SPEED = Number("m/s", minimum=-100.0, maximum=100.0)

@@ -12,7 +12,8 @@ from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, StampedPose, parameter
-from crazyflie_utils.parameter_types import (
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import (
     BOOLEAN,
     FRAME,
     METRES,
@@ -21,7 +22,6 @@ from crazyflie_utils.parameter_types import (
     Integer,
     Number,
 )
-from crazyflie_utils.parameters import group
 from crazyflie_utils.vectors import to_tuple
 
 MAX_CATCH_UP = 1.0

@@ -25,7 +25,7 @@ from crazyflie_state_estimator.pose_gate import PoseGate, TiltMonitor, Verdict
 from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils import Node, NodeHandle, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
-from crazyflie_utils.parameter_types import Integer
+from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple
 
 REPORT_PERIOD = 1.0

@@ -3,7 +3,7 @@
 from crazyflie_model.limits import CRASH_TILT, MAX_SPEED
 from crazyflie_state_estimator import kalman
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer, Number, Text
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer, Number, Text
 
 FINITE_DIFFERENCE, KALMAN = "finite_difference", "kalman"
 

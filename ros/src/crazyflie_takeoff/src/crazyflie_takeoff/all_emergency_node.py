@@ -6,7 +6,7 @@ from std_srvs.srv import EmptyResponse
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
-from crazyflie_utils.parameter_types import SERVICE, TOPIC
+from crazyflie_utils.parameters.types import SERVICE, TOPIC
 
 REPETITIONS = 20
 """How often a call is repeated on the topic."""

@@ -4,8 +4,8 @@ import math
 
 from crazyflie_takeoff.limits import NO_BOX, Box
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import METRES, TOPIC
-from crazyflie_utils.parameters import group
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import METRES, TOPIC
 
 
 class CornerParameters(Parameters):

@@ -17,7 +17,7 @@ from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import Setpoint
 from crazyflie_takeoff.safe_filter import SafeFilter
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
-from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import stamped
 

@@ -10,7 +10,7 @@ from crazyflie_takeoff.flight import Plan
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
 from crazyflie_takeoff.limits import Box
 from crazyflie_utils import parameter
-from crazyflie_utils.parameter_types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
 
 SLOWEST_DESCENT = 0.05
 """A slower descent would hardly ever end, m/s."""

@@ -19,7 +19,7 @@ from std_srvs.srv import EmptyRequest
 
 from crazyflie_dev import launch_files
 from crazyflie_ranging.range_sensors import DIRECTIONS
-from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_world import world_file
 from crazyflie_world.shapes import Box

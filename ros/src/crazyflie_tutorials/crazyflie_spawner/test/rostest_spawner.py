@@ -5,8 +5,8 @@ import rosnode
 import rospy
 from std_srvs.srv import Empty
 
-from crazyflie_mission_msgs.srv import RemoveVehicle, SpawnVehicle
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_tutorial_msgs.srv import RemoveVehicle, SpawnVehicle
 from crazyflie_utils.testing import peer
 
 LIMIT = 60.0

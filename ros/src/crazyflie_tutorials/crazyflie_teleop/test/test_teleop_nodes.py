@@ -23,7 +23,7 @@ from crazyflie_teleop.heading_lift_lqr_node import HeadingLiftLqrNode
 from crazyflie_teleop.joy_velocity_node import JoyVelocityNode
 from crazyflie_teleop.takeoff_caller_node import TakeoffCallerNode
 from crazyflie_teleop.velocity_reference_node import VelocityReferenceNode
-from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_dev import launch_files
-from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_vision.images import to_array
 

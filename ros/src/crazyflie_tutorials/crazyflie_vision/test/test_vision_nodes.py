@@ -11,7 +11,7 @@ from tf2_msgs.msg import TFMessage
 
 from crazyflie_dev import launch_files
 from crazyflie_model.angles import quaternion_from_rpy
-from crazyflie_utils.runtime.runner import NodeClasses
+from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_vision.blur_node import BlurNode
 from crazyflie_vision.camera_node import CameraNode

@@ -1,33 +1,33 @@
 """What every node of the workspace needs: the node handle and declared parameters.
 
 The names below are loaded when they are first used, so that algorithms can
-import `crazyflie_utils.parameters` and the like without ROS.
+import `crazyflie_utils.parameters.declaration` and the like without ROS.
 """
 
 import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from crazyflie_utils.handle import NodeHandle
+    from crazyflie_utils.main import run, run_composed, run_nodes
     from crazyflie_utils.node import Node
-    from crazyflie_utils.parameters import ParameterError, Parameters, parameter
-    from crazyflie_utils.runtime.handle import NodeHandle
-    from crazyflie_utils.runtime.poses import StampedPose
-    from crazyflie_utils.runtime.runner import run, run_composed, run_nodes
-    from crazyflie_utils.runtime.tf2_memory import TransformError
-    from crazyflie_utils.runtime.transport import ServiceError
+    from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
+    from crazyflie_utils.tf.poses import StampedPose
+    from crazyflie_utils.tf.tf2_memory import TransformError
+    from crazyflie_utils.transport import ServiceError
 
 _HOME = {
     "Node": "crazyflie_utils.node",
-    "NodeHandle": "crazyflie_utils.runtime.handle",
-    "ParameterError": "crazyflie_utils.parameters",
-    "Parameters": "crazyflie_utils.parameters",
-    "ServiceError": "crazyflie_utils.runtime.transport",
-    "StampedPose": "crazyflie_utils.runtime.poses",
-    "TransformError": "crazyflie_utils.runtime.tf2_memory",
-    "parameter": "crazyflie_utils.parameters",
-    "run": "crazyflie_utils.runtime.runner",
-    "run_composed": "crazyflie_utils.runtime.runner",
-    "run_nodes": "crazyflie_utils.runtime.runner",
+    "NodeHandle": "crazyflie_utils.handle",
+    "ParameterError": "crazyflie_utils.parameters.declaration",
+    "Parameters": "crazyflie_utils.parameters.declaration",
+    "ServiceError": "crazyflie_utils.transport",
+    "StampedPose": "crazyflie_utils.tf.poses",
+    "TransformError": "crazyflie_utils.tf.tf2_memory",
+    "parameter": "crazyflie_utils.parameters.declaration",
+    "run": "crazyflie_utils.main",
+    "run_composed": "crazyflie_utils.main",
+    "run_nodes": "crazyflie_utils.main",
 }
 
 __all__ = [

@@ -3,8 +3,8 @@
 import traceback
 from typing import ClassVar
 
-from crazyflie_utils.parameters import ParameterError
-from crazyflie_utils.runtime.handle import NodeHandle
+from crazyflie_utils.handle import NodeHandle
+from crazyflie_utils.parameters.declaration import ParameterError
 
 
 class Node:

@@ -5,8 +5,8 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from crazyflie_utils.command_line import parse_arguments
-from crazyflie_utils.parameters import ParameterError, Parameters
+from crazyflie_utils.parameters.command_line import parse_arguments
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters
 
 _DESCRIPTION = (
     "A Crazyflie in software that speaks CRTP over UDP: connect with any cflib program to "

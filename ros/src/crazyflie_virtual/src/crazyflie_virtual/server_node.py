@@ -4,9 +4,9 @@ from typing import ClassVar, Protocol
 
 from typing_extensions import override
 
+from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.node import Node
-from crazyflie_utils.parameters import ParameterError, Parameters
-from crazyflie_utils.runtime.handle import NodeHandle
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters
 
 _POLL_PERIOD = 0.5
 """How often the switches are read, s."""

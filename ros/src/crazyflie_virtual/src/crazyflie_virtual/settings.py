@@ -1,6 +1,7 @@
 """The settings of a virtual vehicle: ROS parameters, or a command line."""
 
-from crazyflie_utils.parameter_types import (
+from crazyflie_utils.parameters.declaration import Parameters, parameter
+from crazyflie_utils.parameters.types import (
     BOOLEAN,
     METRES,
     TEXT,
@@ -8,7 +9,6 @@ from crazyflie_utils.parameter_types import (
     Number,
     Text,
 )
-from crazyflie_utils.parameters import Parameters, parameter
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.localization import DECK, NONE
 from crazyflie_virtual.observer import DEFAULT_PORT

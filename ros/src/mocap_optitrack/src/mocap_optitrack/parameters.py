@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing_extensions import override
 
 from crazyflie_utils.messages import shortened, shown
-from crazyflie_utils.parameter_types import (
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters, group, parameter
+from crazyflie_utils.parameters.types import (
     FRAME,
     TEXT,
     TIME_STEP,
@@ -16,7 +17,6 @@ from crazyflie_utils.parameter_types import (
     ParameterType,
     Text,
 )
-from crazyflie_utils.parameters import ParameterError, Parameters, group, parameter
 from mocap_optitrack.axes import UP_AXES
 from mocap_optitrack.library_source import SYSTEMS
 

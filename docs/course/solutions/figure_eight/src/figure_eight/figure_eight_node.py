@@ -5,7 +5,7 @@ from std_msgs.msg import String, UInt32
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TIME_STEP, Number
+from crazyflie_utils.parameters.types import TIME_STEP, Number
 from figure_eight.figure_eight import FigureEight
 
 

@@ -6,7 +6,7 @@ from typing_extensions import override
 from visualization_msgs.msg import Marker
 
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
-from crazyflie_utils.parameter_types import FRAME, Number
+from crazyflie_utils.parameters.types import FRAME, Number
 from pole.pole import Pole
 
 PERIOD = 0.1

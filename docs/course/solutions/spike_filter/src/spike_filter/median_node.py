@@ -7,7 +7,7 @@ from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC, Integer
+from crazyflie_utils.parameters.types import TOPIC, Integer
 from spike_filter.median import Median
 
 

@@ -2,7 +2,7 @@
 
 from typing_extensions import override
 
-from crazyflie_mission_msgs.srv import VelocityAt, VelocityAtResponse
+from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtResponse
 from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from triangle_velocity.triangle_velocity import triangle_velocity

@@ -12,8 +12,8 @@ from crazyflie_controller.go_to import GoToController
 from crazyflie_controller.pid import PidParameters
 from crazyflie_controller.pose_source import PoseParameters, PoseSource, pose
 from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
-from crazyflie_utils.parameter_types import Number
-from crazyflie_utils.parameters import group
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.refusal import RefusalError
 
 _LEAVE_LIMIT = 7.0

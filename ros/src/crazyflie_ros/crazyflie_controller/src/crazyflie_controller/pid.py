@@ -1,7 +1,7 @@
 """A PID controller with limits on its output and on its integral."""
 
-from crazyflie_utils.parameter_types import Number
-from crazyflie_utils.parameters import Parameters, parameter
+from crazyflie_utils.parameters.declaration import Parameters, parameter
+from crazyflie_utils.parameters.types import Number
 
 INTEGRATED_ERROR = 0.2
 """What of an error enters the integral at most, m or rad.

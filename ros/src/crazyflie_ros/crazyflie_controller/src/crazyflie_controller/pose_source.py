@@ -5,7 +5,7 @@ from geometry_msgs.msg import Point, Quaternion, Vector3
 from crazyflie_controller.go_to import Pose
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils import NodeHandle, Parameters, TransformError, parameter
-from crazyflie_utils.parameter_types import FRAME
+from crazyflie_utils.parameters.types import FRAME
 
 
 class WorldFrameParameters(Parameters):

@@ -8,7 +8,7 @@ from crazyflie_demo.joy_axes import JoyAxes
 from crazyflie_demo.parameters import AXIS, JoyParameters, SetpointParameters
 from crazyflie_model.limits import FULL_PWM, MAX_SETPOINT_PWM
 from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters.types import Number
 
 _TILT = Number("deg", above=0.0, maximum=60.0)
 

@@ -6,7 +6,7 @@ from typing_extensions import override
 from crazyflie_demo.parameters import SetpointParameters
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters.types import Number
 
 
 class ConstThrustParameters(SetpointParameters):

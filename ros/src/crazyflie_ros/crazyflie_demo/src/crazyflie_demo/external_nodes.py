@@ -7,7 +7,7 @@ from geometry_msgs.msg import Point, PointStamped, PoseStamped, TransformStamped
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_utils.parameters.types import TOPIC
 
 
 class ExternalParameters(Parameters):

@@ -19,7 +19,7 @@ from crazyflie_driver.srv import (
     UpdateParamsRequest,
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters.types import Number
 
 _LIMIT = 15.0
 """How long a service may take, and at the beginning the driver to connect, s."""

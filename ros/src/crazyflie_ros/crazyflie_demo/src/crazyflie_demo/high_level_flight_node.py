@@ -6,7 +6,7 @@ from typing_extensions import override
 from crazyflie_demo.flight_plan_node import FlightPlanNode, FlightPlanParameters, Step, seconds
 from crazyflie_driver.srv import GoTo, GoToRequest
 from crazyflie_utils import NodeHandle, parameter
-from crazyflie_utils.parameter_types import METRES
+from crazyflie_utils.parameters.types import METRES
 
 
 class HighLevelFlightParameters(FlightPlanParameters):

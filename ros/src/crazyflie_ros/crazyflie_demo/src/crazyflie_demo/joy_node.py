@@ -9,7 +9,7 @@ from typing_extensions import override
 from crazyflie_demo.joy_axes import JOY_LIMIT, REPEATED
 from crazyflie_demo.joystick import EVENT, Joystick, JoystickState
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TEXT, Number
+from crazyflie_utils.parameters.types import TEXT, Number
 
 _POLL_PERIOD = 0.01
 """Time between two looks at the device, s."""

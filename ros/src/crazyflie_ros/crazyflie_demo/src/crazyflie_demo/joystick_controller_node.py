@@ -8,7 +8,7 @@ from crazyflie_demo.gamepad import EMERGENCY, HEADLIGHT, LAND, TAKEOFF
 from crazyflie_demo.parameters import JoyParameters
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, Integer
+from crazyflie_utils.parameters.types import BOOLEAN, Integer
 
 _HEADLIGHT_PARAMETER = "ring/headlightEnable"
 

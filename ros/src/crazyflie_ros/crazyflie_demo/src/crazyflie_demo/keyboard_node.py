@@ -15,7 +15,7 @@ from crazyflie_demo.gamepad import BUTTONS
 from crazyflie_demo.joy_axes import REPEATED
 from crazyflie_demo.keyboard import HELP, Keyboard
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters.types import Number
 
 _PERIOD = 0.05
 """Time between two messages, s."""

@@ -2,7 +2,7 @@
 
 from crazyflie_controller.pose_source import WorldFrameParameters
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC, Integer, Number
+from crazyflie_utils.parameters.types import TOPIC, Integer, Number
 
 AXIS = Integer(0, 255)
 """Number of a joystick's axis."""

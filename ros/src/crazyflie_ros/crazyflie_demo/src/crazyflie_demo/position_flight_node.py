@@ -8,7 +8,7 @@ from crazyflie_demo.parameters import SetpointParameters
 from crazyflie_demo.stream_node import StreamNode
 from crazyflie_driver.msg import Position
 from crazyflie_utils import NodeHandle, parameter
-from crazyflie_utils.parameter_types import METRES, Number
+from crazyflie_utils.parameters.types import METRES, Number
 
 
 class PositionFlightParameters(SetpointParameters):

@@ -8,7 +8,7 @@ from crazyflie_demo.goals import goal_message
 from crazyflie_demo.joy_axes import JoyAxes
 from crazyflie_demo.parameters import AXIS, GoalParameters, JoyParameters
 from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameter_types import METRES, TOPIC, Number
+from crazyflie_utils.parameters.types import METRES, TOPIC, Number
 
 _SPEED = Number("m/s", minimum=0.0)
 

@@ -11,7 +11,7 @@ import numpy as np
 from crazyflie_model.elementwise import join
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
 from crazyflie_utils.messages import shortened, shown
-from crazyflie_utils.parameter_types import TEXT, ParameterType
+from crazyflie_utils.parameters.types import TEXT, ParameterType
 from crazyflie_utils.text_input import TextFileError, number_from_text, read_text
 
 COLUMNS = 1 + 4 * COEFFICIENTS

@@ -13,7 +13,7 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_utils import NodeHandle, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, Number
+from crazyflie_utils.parameters.types import BOOLEAN, Number
 
 
 class TrajectoryFlightParameters(FlightPlanParameters):

@@ -14,7 +14,7 @@ from crazyflie_demo.uav_trajectory import Trajectory
 from crazyflie_driver.msg import FullState
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_utils import NodeHandle, ParameterError, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_utils.parameters.types import TOPIC
 
 _REST = np.zeros(3)
 

@@ -8,7 +8,7 @@ from crazyflie_demo.goals import goal_message
 from crazyflie_demo.parameters import GoalParameters
 from crazyflie_demo.waypoints import Waypoint, WaypointFollower, WaypointList
 from crazyflie_utils import Node, NodeHandle, parameter
-from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters.types import Number
 
 
 class WaypointParameters(GoalParameters, PoseParameters):

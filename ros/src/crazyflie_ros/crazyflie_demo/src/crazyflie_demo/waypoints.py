@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_utils.messages import shown
-from crazyflie_utils.parameter_types import DURATION, FINITE, ParameterType
+from crazyflie_utils.parameters.types import DURATION, FINITE, ParameterType
 
 
 class Waypoint(NamedTuple):

@@ -10,7 +10,7 @@ from crazyflie_description.flown_path import FlownPath, circle
 from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.last_valid import LastValid
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TOPIC
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC
 
 PERIOD = 0.05
 """Between two looks at the vehicle's pose, s."""

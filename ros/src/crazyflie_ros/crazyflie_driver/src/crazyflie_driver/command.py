@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from crazyflie_py.high_level import ALL_GROUPS, HighLevel
+from crazyflie_link.high_level import ALL_GROUPS, HighLevel
 
 TAKEOFF, LAND, STOP = "takeoff", "land", "stop"
 """Commands that are not as all others, which move a vehicle in the air."""

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable
 
-from crazyflie_py.errors import NoAnswerError
+from crazyflie_link.errors import NoAnswerError
 
 PAUSE = 0.2
 """Between two attempts, s."""

@@ -4,8 +4,8 @@ import contextlib
 import time
 from typing import TYPE_CHECKING
 
+from crazyflie_link.errors import AlreadyLandingError
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.errors import AlreadyLandingError
 
 if TYPE_CHECKING:
     from crazyflie_driver.vehicle import DriverVehicle

@@ -12,10 +12,10 @@ from crazyflie_driver.server_parameters import SafetyParameters
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.status import NOT_FLYABLE
 from crazyflie_driver.worker import Job
+from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError
+from crazyflie_link.high_level import ALL_GROUPS
+from crazyflie_link.supervisor import Supervisor
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.errors import AlreadyLandingError, CrazyflieError, LinkLostError
-from crazyflie_py.high_level import ALL_GROUPS
-from crazyflie_py.supervisor import Supervisor
 from crazyflie_utils import NodeHandle, ServiceError
 
 if TYPE_CHECKING:

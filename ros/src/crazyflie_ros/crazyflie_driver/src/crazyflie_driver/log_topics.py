@@ -10,11 +10,11 @@ from crazyflie_driver import telemetry
 from crazyflie_driver.delivery import Delivery
 from crazyflie_driver.msg import GenericLogData, crtpPacket
 from crazyflie_driver.vehicle_parameters import VehicleParameters
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.log import PERIOD_STEP_MS, LogBlock
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.crazyflie import Crazyflie
-from crazyflie_py.log import PERIOD_STEP_MS, LogBlock
 from crazyflie_utils import NodeHandle
-from crazyflie_utils.runtime.topics import Publisher
+from crazyflie_utils.topics import Publisher
 
 STATUS_PERIOD_MS = 100
 """Period of the log block that the diagnostics rest on, ms; its absence shows a restart."""
@@ -45,7 +45,7 @@ class LogTopics:
     ----------
     handle : NodeHandle
     parameters : VehicleParameters
-    crazyflie : crazyflie_py.Crazyflie
+    crazyflie : crazyflie_link.Crazyflie
     delivery : Delivery
         Has the messages published in their turn.
     fixed_frame : str

@@ -2,10 +2,10 @@
 
 from typing_extensions import override
 
-from crazyflie_py.crazyflie import Crazyflie
-from crazyflie_py.errors import CrazyflieError, LinkLostError
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_utils import NodeHandle, ParameterError, ServiceError
-from crazyflie_utils.parameter_types import ParameterType
+from crazyflie_utils.parameters.types import ParameterType
 
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
@@ -21,7 +21,7 @@ class ParameterMirror:
     handle : NodeHandle
     prefix : str
         Namespace of the vehicle.
-    crazyflie : crazyflie_py.Crazyflie
+    crazyflie : crazyflie_link.Crazyflie
     """
 
     def __init__(self, handle: NodeHandle, prefix: str, crazyflie: Crazyflie):

@@ -16,7 +16,7 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_driver.vehicle_parameters import VehicleParameters
-from crazyflie_py.errors import CrazyflieError
+from crazyflie_link.errors import CrazyflieError
 from crazyflie_utils import Node, NodeHandle, ServiceError
 
 ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"

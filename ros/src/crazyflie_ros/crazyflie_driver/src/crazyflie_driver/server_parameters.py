@@ -1,7 +1,7 @@
 """Parameters of the driver."""
 
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TOPIC, Number
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC, Number
 
 _VOLTS = Number("V", minimum=0.0)
 _SECONDS = Number("s", minimum=0.0)

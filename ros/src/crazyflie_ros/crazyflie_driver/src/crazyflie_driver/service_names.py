@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from typing_extensions import override
 
 from crazyflie_utils import NodeHandle
-from crazyflie_utils.parameter_types import ParameterType
+from crazyflie_utils.parameters.types import ParameterType
 
 PAUSE, LIMIT = 0.1, 3.0
 """How often, and how long at most, in s, a controller that has parameters is waited for."""

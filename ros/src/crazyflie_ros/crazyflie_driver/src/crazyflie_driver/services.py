@@ -10,9 +10,9 @@ from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
 from crazyflie_driver import srv
 from crazyflie_driver.command import Command
 from crazyflie_driver.service_names import ServiceNames
+from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.errors import CrazyflieError, LinkLostError
 from crazyflie_utils import NodeHandle, ServiceError
 
 if TYPE_CHECKING:

@@ -14,10 +14,10 @@ from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
 from crazyflie_driver.setpoint_gate import SetpointGate
 from crazyflie_driver.vehicle_parameters import VehicleParameters
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import CrazyflieError
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.crazyflie import Crazyflie
-from crazyflie_py.errors import CrazyflieError
 from crazyflie_utils import NodeHandle
 
 CMD_VEL, CMD_STOP = "cmd_vel", "cmd_stop"
@@ -47,7 +47,7 @@ class SetpointTopics:
     ----------
     handle : NodeHandle
     parameters : VehicleParameters
-    crazyflie : crazyflie_py.Crazyflie
+    crazyflie : crazyflie_link.Crazyflie
     log : LogTopics
         Knows whether the vehicle is armed, and where it is.
 
@@ -118,7 +118,7 @@ class SetpointTopics:
         return self._times[-1] if self._times else -math.inf
 
     def hand_over_now(self, remain_valid_ms: int = 0) -> None:
-        """Do the same as `hand_over`, in the thread that sends: see crazyflie_py's `guarded`."""
+        """Do the same as `hand_over`, in the thread that sends: see crazyflie_link's `guarded`."""
         self._crazyflie.setpoints.hand_over_now(remain_valid_ms)
         self.is_streaming = False
         self._lift.end()
@@ -226,7 +226,7 @@ class SetpointTopics:
         self._handle.warn(f"{name}: {text}", throttle=_THROTTLE, key=(name, key))
 
     # One message each. Signs: the link's pitch is the negative of cmd_vel's, and
-    # crazyflie_py (cflib) negates it; the tests compare bytes.
+    # crazyflie_link (cflib) negates it; the tests compare bytes.
 
     def _cmd_vel(self, message):
         # In this order a NaN stays one, and is refused.

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from crazyflie_driver.battery import Battery, Charge
+from crazyflie_link.crazyflie import LinkState
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.crazyflie import LinkState
 
 LOW_QUALITY = 0.8
 """Share of answered pings below which the link is poor."""

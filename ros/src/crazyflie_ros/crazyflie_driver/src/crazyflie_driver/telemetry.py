@@ -10,8 +10,8 @@ from sensor_msgs.msg import Imu, MagneticField, Temperature
 from std_msgs.msg import Float32, Header
 
 from crazyflie_driver.msg import GenericLogData
+from crazyflie_link.log import quaternion_from_compressed
 from crazyflie_model.units import GRAVITY
-from crazyflie_py.log import quaternion_from_compressed
 
 FAST_MS, SLOW_MS = 10, 100
 """Periods of imu and pose, and of the rest, ms: those of the C++ driver."""

@@ -25,9 +25,9 @@ from crazyflie_driver.vehicle_parameters import (
     VehicleParameters,
 )
 from crazyflie_driver.worker import Job, Worker
+from crazyflie_link.crazyflie import Crazyflie, LinkState
+from crazyflie_link.errors import CrazyflieError, NoReplyError
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_py.crazyflie import Crazyflie, LinkState
-from crazyflie_py.errors import CrazyflieError, NoReplyError
 from crazyflie_utils import NodeHandle, ServiceError
 
 Result = TypeVar("Result")
@@ -56,7 +56,7 @@ class DriverVehicle:
 
     Attributes
     ----------
-    crazyflie : crazyflie_py.Crazyflie
+    crazyflie : crazyflie_link.Crazyflie
         The vehicle at the other end of the link.
     is_leaving : bool
         Whether the vehicle is being removed.

@@ -8,9 +8,10 @@ from typing_extensions import override
 
 from crazyflie_driver.msg import LogBlock
 from crazyflie_driver.srv import AddCrazyflieRequest
-from crazyflie_py.log import LONGEST_PERIOD_MS, SHORTEST_PERIOD_MS
+from crazyflie_link.log import LONGEST_PERIOD_MS, SHORTEST_PERIOD_MS
 from crazyflie_utils import ParameterError, Parameters, ServiceError, parameter
-from crazyflie_utils.parameter_types import (
+from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, read_parameter
+from crazyflie_utils.parameters.types import (
     BOOLEAN,
     TEXT,
     Integer,
@@ -18,7 +19,6 @@ from crazyflie_utils.parameter_types import (
     Number,
     ParameterType,
 )
-from crazyflie_utils.parameters import REQUIRED, Declaration, read_parameter
 
 STATUS_TOPIC = "status"
 """Topic that says what state a vehicle is in."""

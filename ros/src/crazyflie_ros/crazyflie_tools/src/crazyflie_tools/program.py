@@ -7,8 +7,8 @@ import sys
 import threading
 from collections.abc import Callable
 
-from crazyflie_py.address import Address
-from crazyflie_py.errors import AddressError, CrazyflieError
+from crazyflie_link.address import Address
+from crazyflie_link.errors import AddressError, CrazyflieError
 
 FINE, FAILED = 0, 1
 """Exit statuses; argparse's own for wrong usage is 2."""

@@ -11,8 +11,8 @@ import time
 
 import numpy as np
 
-import crazyflie_py
-from crazyflie_py.errors import NoAnswerError
+import crazyflie_link
+from crazyflie_link.errors import NoAnswerError
 from crazyflie_tools.program import FINE, LIMIT, add_timeout, add_uri, make_parser, run, seconds
 
 _CHECK_PERIOD = 0.1
@@ -38,7 +38,7 @@ def scan(arguments: list[str] | None = None) -> int:
 
 
 def _scan(address):
-    found, problems = crazyflie_py.scan(address)
+    found, problems = crazyflie_link.scan(address)
     print(*found, sep="\n", end="\n" if found else "")
     if not found:
         reasons = "".join(f"\n  {problem}" for problem in problems)
@@ -101,7 +101,7 @@ def _set_param(vehicle, options):
 
 def reboot(arguments: list[str] | None = None) -> int:
     """Restart a vehicle, or switch it off."""
-    from crazyflie_py.reboot import MODES
+    from crazyflie_link.reboot import MODES
 
     parser = make_parser("reboot", "Restart a vehicle, or switch it off; only by radio.")
     parser.add_argument(
@@ -114,7 +114,7 @@ def reboot(arguments: list[str] | None = None) -> int:
     add_uri(parser)
     add_timeout(parser)
     options = parser.parse_args(arguments)
-    vehicle = crazyflie_py.Crazyflie(options.uri.uri)
+    vehicle = crazyflie_link.Crazyflie(options.uri.uri)
     return run(parser.prog, lambda: vehicle.reboot(options.mode), options.timeout)
 
 
@@ -137,7 +137,7 @@ def console(arguments: list[str] | None = None) -> int:
 
 def _console(uri, duration):
     lines: queue.SimpleQueue[str] = queue.SimpleQueue()
-    with crazyflie_py.Crazyflie(uri, on_console=lines.put) as vehicle:
+    with crazyflie_link.Crazyflie(uri, on_console=lines.put) as vehicle:
         end = time.monotonic() + duration
         while time.monotonic() < end:
             try:
@@ -154,7 +154,7 @@ def _talk(parser, arguments, work):
     options = parser.parse_args(arguments)
 
     def talk():
-        with crazyflie_py.Crazyflie(options.uri.uri) as vehicle:
+        with crazyflie_link.Crazyflie(options.uri.uri) as vehicle:
             work(vehicle, options)
 
     return run(parser.prog, talk, options.timeout)

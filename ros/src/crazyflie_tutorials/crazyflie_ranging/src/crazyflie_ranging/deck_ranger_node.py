@@ -9,7 +9,7 @@ from crazyflie_driver.msg import GenericLogData
 from crazyflie_ranging.range_publisher import RangePublisher
 from crazyflie_ranging.range_sensors import RangeSensor, SensorFile
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import FRAME, TEXT, TOPIC, ListOf
+from crazyflie_utils.parameters.types import FRAME, TEXT, TOPIC, ListOf
 
 _MILLIMETRE = 0.001
 

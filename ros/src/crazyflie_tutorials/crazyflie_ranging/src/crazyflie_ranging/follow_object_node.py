@@ -8,7 +8,7 @@ from typing_extensions import override
 from crazyflie_ranging.follower import FollowDistances, Follower
 from crazyflie_ranging.latest_ranges import LatestRanges
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
 
 _DISTANCE = Number("m", above=0.0)
 

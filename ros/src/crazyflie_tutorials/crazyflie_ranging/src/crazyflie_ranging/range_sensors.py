@@ -9,9 +9,10 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_model.angles import Quaternion, Triple, quaternion_from_rpy
-from crazyflie_utils import ParameterError, Parameters, parameter, yaml_file
+from crazyflie_utils import ParameterError, Parameters, parameter
 from crazyflie_utils.messages import shown
-from crazyflie_utils.parameter_types import (
+from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.types import (
     FRAME,
     POSITION,
     TOPIC,

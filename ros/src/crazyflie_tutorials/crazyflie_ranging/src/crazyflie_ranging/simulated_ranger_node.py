@@ -12,7 +12,7 @@ from crazyflie_ranging.range_publisher import RangePublisher
 from crazyflie_ranging.range_sensors import RangeSensor, SensorFile
 from crazyflie_ranging.ranger import Ranger
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WorldFile
 

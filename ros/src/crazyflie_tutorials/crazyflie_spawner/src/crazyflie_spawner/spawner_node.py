@@ -7,16 +7,16 @@ from dataclasses import dataclass, field
 
 from typing_extensions import override
 
-from crazyflie_mission_msgs.srv import (
+from crazyflie_spawner.names import vehicle_name
+from crazyflie_spawner.vehicle_process import VehicleProcess
+from crazyflie_tutorial_msgs.srv import (
     RemoveVehicle,
     RemoveVehicleResponse,
     SpawnVehicle,
     SpawnVehicleResponse,
 )
-from crazyflie_spawner.names import vehicle_name
-from crazyflie_spawner.vehicle_process import VehicleProcess
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
-from crazyflie_utils.parameter_types import FRAME, SERVICE, TEXT, TIME_STEP, Number, Text
+from crazyflie_utils.parameters.types import FRAME, SERVICE, TEXT, TIME_STEP, Number, Text
 from crazyflie_utils.refusal import RefusalError
 
 PERIOD = 0.2

@@ -5,7 +5,7 @@ from typing_extensions import override
 
 from crazyflie_teleop.circle import circle_velocity
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import BOOLEAN, TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameters.types import BOOLEAN, TIME_STEP, TOPIC, Number
 
 
 class CircleParameters(Parameters):

@@ -9,8 +9,8 @@ from typing_extensions import override
 
 from crazyflie_teleop.joy_velocity import Axes
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import SERVICE, TOPIC, Integer, Number
-from crazyflie_utils.parameters import group
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import SERVICE, TOPIC, Integer, Number
 
 FLIGHT_LIMIT = 120.0
 """The longest that takeoff or landing may take, s of the machine's clock."""

@@ -4,7 +4,7 @@ from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import SERVICE
+from crazyflie_utils.parameters.types import SERVICE
 
 PERIOD = 0.5
 """Between two looks whether the service is there, s of the machine's clock."""

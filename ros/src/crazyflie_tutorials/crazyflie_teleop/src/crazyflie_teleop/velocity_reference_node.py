@@ -13,8 +13,8 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_teleop.velocity_reference import Limits, Velocity, VelocityReference
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
-from crazyflie_utils.parameters import group
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
 from crazyflie_utils.vectors import is_finite
 
 FLYING = "flying"

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from crazyflie_utils import Parameters, parameter, yaml_file
-from crazyflie_utils.parameter_types import DURATION, METRES, Integer, Number
-from crazyflie_utils.parameters import group
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import DURATION, METRES, Integer, Number
 
 OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """Takes the optical frame of a camera that looks ahead to forward, left, up."""

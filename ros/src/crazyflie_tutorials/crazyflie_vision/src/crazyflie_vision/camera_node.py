@@ -19,7 +19,7 @@ from crazyflie_utils import (
     TransformError,
     parameter,
 )
-from crazyflie_utils.parameter_types import FRAME, TOPIC, ParameterType
+from crazyflie_utils.parameters.types import FRAME, TOPIC, ParameterType
 from crazyflie_vision.camera import CameraParameters, Pinhole, Pose, load, optical_pose
 from crazyflie_vision.images import camera_info, to_message
 from crazyflie_vision.noise import PixelNoise

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_utils import parameter
-from crazyflie_utils.parameter_types import Integer, Number
+from crazyflie_utils.parameters.types import Integer, Number
 from crazyflie_vision.colour_tracker import ColourBounds, find
 from crazyflie_vision.target import Target
 from crazyflie_vision.tracker_node import TrackerNode, TrackerParameters

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from typing_extensions import override
 
 from crazyflie_utils import parameter
-from crazyflie_utils.parameter_types import Number
+from crazyflie_utils.parameters.types import Number
 from crazyflie_vision import filters
 from crazyflie_vision.blur_node import KERNEL
 from crazyflie_vision.filter_node import FilterNode, FilterParameters

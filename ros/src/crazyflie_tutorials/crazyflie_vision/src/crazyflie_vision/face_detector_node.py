@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from typing_extensions import override
 
 from crazyflie_utils import NodeHandle, ParameterError, parameter
-from crazyflie_utils.parameter_types import TEXT, Integer
+from crazyflie_utils.parameters.types import TEXT, Integer
 from crazyflie_vision.face_detector import CASCADE, FaceDetector
 from crazyflie_vision.target import Target
 from crazyflie_vision.tracker_node import TrackerNode, TrackerParameters

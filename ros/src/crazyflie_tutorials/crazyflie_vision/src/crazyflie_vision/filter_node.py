@@ -7,7 +7,7 @@ from std_msgs.msg import Header
 from typing_extensions import override
 
 from crazyflie_utils import NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TOPIC
+from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_vision import filters
 from crazyflie_vision.image_node import ImageNode
 from crazyflie_vision.images import to_message

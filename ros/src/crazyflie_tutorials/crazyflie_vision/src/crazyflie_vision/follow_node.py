@@ -8,8 +8,8 @@ from typing_extensions import override
 
 from crazyflie_teleop.velocity_reference import Velocity
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameter_types import TIME_STEP, TOPIC, Number
-from crazyflie_utils.parameters import group
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
 from crazyflie_vision.follow import Follower
 from crazyflie_vision.target import Target
 

@@ -8,7 +8,7 @@ from std_msgs.msg import Header
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
-from crazyflie_utils.parameter_types import FRAME, TEXT, TOPIC, Integer, Number
+from crazyflie_utils.parameters.types import FRAME, TEXT, TOPIC, Integer, Number
 from crazyflie_vision.camera import Pinhole
 from crazyflie_vision.frame_source import FrameSource, open_source
 from crazyflie_vision.images import camera_info, to_message

@@ -11,12 +11,12 @@ from typing import Any
 import genpy
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.runtime.transport import (
+from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
+from crazyflie_utils.transport import (
     ExternalPublisher,
     ExternalSubscriber,
     ServiceError,
 )
-from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
 
 Deliver = Callable[[Any], None]
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import genpy
 
+from crazyflie_utils.clock import SimulatedClock
 from crazyflie_utils.node import Node
-from crazyflie_utils.runtime.clock import SimulatedClock
-from crazyflie_utils.runtime.process import Process
-from crazyflie_utils.runtime.timers import Timer
-from crazyflie_utils.runtime.transport import (
+from crazyflie_utils.process import Process
+from crazyflie_utils.timers import Timer
+from crazyflie_utils.transport import (
     ExternalPublisher,
     ExternalSubscriber,
     ServiceError,

@@ -4,8 +4,8 @@ import math
 
 from hypothesis import strategies as st
 
-from crazyflie_utils.parameter_types import Number
-from crazyflie_utils.parameters import Parameters
+from crazyflie_utils.parameters.declaration import Parameters
+from crazyflie_utils.parameters.types import Number
 
 
 def legal_numbers(number: Number) -> st.SearchStrategy[float]:

@@ -1,7 +1,7 @@
 """The settings of the virtual motion capture system: ROS parameters, or a command line."""
 
-from crazyflie_utils.parameter_types import BOOLEAN, TEXT, Integer, Number, Text
-from crazyflie_utils.parameters import Parameters, parameter
+from crazyflie_utils.parameters.declaration import Parameters, parameter
+from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, Number, Text
 from crazyflie_virtual.mocap.natnet import VERSIONS
 from crazyflie_virtual.mocap.scene import MocapSwitches
 from crazyflie_virtual.observer import DEFAULT_PORT

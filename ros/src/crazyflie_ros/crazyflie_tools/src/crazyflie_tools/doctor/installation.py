@@ -11,7 +11,7 @@ LEAST_FREE = 100e6
 
 FEW_FREE = 1e9
 
-_RULES = "sudo cp $(rospack find crazyflie_py)/udev/99-crazyflie.rules /etc/udev/rules.d/"
+_RULES = "sudo cp $(rospack find crazyflie_link)/udev/99-crazyflie.rules /etc/udev/rules.d/"
 _SOURCE = "source devel/setup.bash (or install/setup.bash) of the workspace in this shell"
 
 

@@ -10,7 +10,7 @@ from tf2_msgs.msg import TFMessage
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_tools.doctor.graph import Graph
 from crazyflie_tools.doctor.motion import Heard, Transform
-from crazyflie_utils.runtime.runner import begin
+from crazyflie_utils.main import begin
 
 
 def listen(graph: Graph, duration: float) -> Heard:

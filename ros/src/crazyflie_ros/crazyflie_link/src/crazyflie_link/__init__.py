@@ -1,0 +1,35 @@
+"""Link to a Crazyflie: connections with limits, log blocks, parameters, commands.
+
+The names below are loaded when they are first used, so that the modules that need
+little (`crazyflie_link.errors`, `crazyflie_link.address`, ...) can be had without the rest.
+"""
+
+import importlib
+import warnings
+
+# cflib switches deprecation warnings on for the whole process, so that rospy's were
+# printed to the operator. Its drivers, which take long to load, are not loaded here.
+with warnings.catch_warnings():
+    import cflib  # noqa: F401
+
+_HOME = {
+    "Crazyflie": "crazyflie_link.crazyflie",
+    "CrazyflieError": "crazyflie_link.errors",
+    "LinkState": "crazyflie_link.crazyflie",
+    "LogBlock": "crazyflie_link.log",
+    "scan": "crazyflie_link.scanning",
+}
+
+__all__ = [
+    "Crazyflie",
+    "CrazyflieError",
+    "LinkState",
+    "LogBlock",
+    "scan",
+]
+
+
+def __getattr__(name):
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(_HOME[name]), name)

@@ -1,0 +1,242 @@
+"""Commands that the vehicle's own planner carries out."""
+
+import copy
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Self
+
+from cflib.crazyflie.high_level_commander import HighLevelCommander
+from cflib.crtp.crtpstack import CRTPPort
+
+from crazyflie_link.checks import check_byte, check_finite, check_positive
+from crazyflie_link.errors import AlreadyLandingError, RefusedError
+from crazyflie_link.exchange import REPLY_LIMIT, Request
+from crazyflie_link.link import Link
+from crazyflie_link.subsystem import Subsystem
+from crazyflie_link.supervisor import read_state
+from crazyflie_model.supervisor import SupervisorState
+
+ALL_GROUPS = 0
+"""Group mask that every vehicle obeys."""
+
+# The first protocol versions with the present forms of two commands.
+_GO_TO_2_PROTOCOL = 8
+_START_2_PROTOCOL = 10
+
+_BUSY = 1
+"""Reply to a takeoff while the planner flies, and to a landing while it lands."""
+
+
+@dataclass
+class _Knowledge:
+    """What the vehicle was told, which it cannot be asked for.
+
+    Attributes
+    ----------
+    defined : set of int
+        Trajectories.
+    groups : int or None
+        Groups that it belongs to, a bit each; None if nobody has set them here.
+    """
+
+    defined: set[int] = field(default_factory=set)
+    groups: int | None = None
+
+
+class HighLevel(Subsystem):
+    """High-level commands; each blocks until the vehicle has replied.
+
+    All raise `CrazyflieError`: `RefusedError` with the vehicle's reason,
+    `NoReplyError`, `LinkLostError`, or `ValueRangeError` before anything is sent.
+    """
+
+    def __init__(self, current_link: Callable[[], Link]):
+        super().__init__(current_link)
+        self._knowledge = _Knowledge()
+        self._is_dry = False
+
+    def forget_trajectories(self) -> None:
+        """Take note that the vehicle has restarted: no trajectory is defined, it has no group."""
+        self._knowledge.defined.clear()
+        self._knowledge.groups = 0
+
+    def dry_run(self) -> Self:
+        """Return one that refuses what this one would refuse, and sends nothing."""
+        dry = copy.copy(self)
+        dry._is_dry = True
+        dry._knowledge = copy.deepcopy(self._knowledge)
+        return dry
+
+    def is_addressed(self, group_mask: int) -> bool | None:
+        """Return whether the vehicle obeys commands to these groups; None if that is not known.
+
+        The firmware answers "done" to those for others, and does nothing.
+        """
+        if group_mask == ALL_GROUPS:
+            return True
+        groups = self._knowledge.groups
+        return None if groups is None else bool(group_mask & groups)
+
+    def set_group_mask(self, group_mask: int) -> None:
+        """Set the groups (bits) that the vehicle belongs to."""
+        check_byte("group mask", group_mask)
+        self._command(
+            "the group mask",
+            HighLevelCommander.COMMAND_SET_GROUP_MASK,
+            lambda c: c.set_group_mask(group_mask),
+        )
+        self._knowledge.groups = group_mask
+
+    def take_off(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
+        """Climb to a height (m) in a duration (s), keeping position and heading."""
+        check_finite("takeoff", height)
+        check_positive("takeoff", duration)
+        check_byte("group mask", group_mask)
+        self._command(
+            "the takeoff command",
+            HighLevelCommander.COMMAND_TAKEOFF_2,
+            lambda c: c.takeoff(height, duration, group_mask, yaw=None),
+        )
+
+    def land(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
+        """Sink to a height (m) in a duration (s), keeping position and heading.
+
+        The firmware obeys on the ground, too, and starts the motors there.
+
+        Raises
+        ------
+        AlreadyLandingError
+        """
+        check_finite("landing", height)
+        check_positive("landing", duration)
+        check_byte("group mask", group_mask)
+        self._command(
+            "the land command",
+            HighLevelCommander.COMMAND_LAND_2,
+            lambda c: c.land(height, duration, group_mask, yaw=None),
+            # After the touchdown a repetition would start the motors.
+            resend=duration > REPLY_LIMIT,
+        )
+
+    def stop(self, group_mask: int = ALL_GROUPS) -> None:
+        """Stop the motors, wherever the vehicle is."""
+        check_byte("group mask", group_mask)
+        self._command(
+            "the stop command",
+            HighLevelCommander.COMMAND_STOP,
+            lambda c: c.stop(group_mask),
+        )
+
+    def go_to(
+        self,
+        position: Sequence[float],
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        group_mask: int = ALL_GROUPS,
+    ) -> None:
+        """Fly to a position (x, y, z in m) and a yaw (rad) in a duration (s)."""
+        x, y, z = position
+        check_finite("go-to", x, y, z, yaw)
+        check_positive("go-to", duration)
+        check_byte("group mask", group_mask)
+        is_new = self._current_link().protocol >= _GO_TO_2_PROTOCOL
+        self._command(
+            "the go-to command",
+            HighLevelCommander.COMMAND_GO_TO_2 if is_new else HighLevelCommander.COMMAND_GO_TO,
+            lambda c: c.go_to(x, y, z, yaw, duration, relative=relative, group_mask=group_mask),
+            resend=not relative,
+        )
+
+    def start_trajectory(
+        self,
+        trajectory_id: int,
+        time_scale: float = 1.0,
+        relative: bool = False,
+        is_reversed: bool = False,
+        group_mask: int = ALL_GROUPS,
+    ) -> None:
+        """Fly a trajectory that was defined before.
+
+        The firmware answers "done" for one that was not, and does nothing: therefore it is
+        refused here.
+
+        Parameters
+        ----------
+        trajectory_id : int
+            0 to 255.
+        time_scale : float
+            2.0 takes twice as long.
+        relative : bool
+            Shift it so that it begins at the present setpoint.
+        is_reversed : bool
+            From its end to its beginning.
+        group_mask : int
+        """
+        check_byte("trajectory number", trajectory_id)
+        check_positive("time scale", time_scale)
+        check_byte("group mask", group_mask)
+        is_new = self._current_link().protocol >= _START_2_PROTOCOL
+        defined = self._knowledge.defined
+        if trajectory_id not in defined:
+            known = ", ".join(map(str, sorted(defined))) or "none"
+            raise RefusedError(
+                f"the start of the trajectory: {trajectory_id} has not been uploaded since the "
+                f"vehicle was connected or restarted; known: {known}"
+            )
+        self._command(
+            "the start of the trajectory",
+            HighLevelCommander.COMMAND_START_TRAJECTORY_2
+            if is_new
+            else HighLevelCommander.COMMAND_START_TRAJECTORY,
+            lambda c: c.start_trajectory(
+                trajectory_id,
+                time_scale,
+                relative_position=relative,
+                reversed=is_reversed,
+                group_mask=group_mask,
+            ),
+            resend=False,
+        )
+
+    def define_trajectory(self, trajectory_id: int, offset: int, pieces: int) -> None:
+        """Define a trajectory: pieces in the trajectory memory, from an offset (bytes) on."""
+        check_byte("trajectory number", trajectory_id)
+        check_byte("number of pieces", pieces)
+        self._command(
+            "the definition of the trajectory",
+            HighLevelCommander.COMMAND_DEFINE_TRAJECTORY,
+            lambda c: c.define_trajectory(trajectory_id, offset, pieces),
+        )
+        self._knowledge.defined.add(trajectory_id)
+
+    def _command(self, what, number, send, resend=True):
+        link = self._current_link()
+        if self._is_dry:
+            return
+        sent = 0
+
+        def transmit():
+            nonlocal sent
+            sent += 1
+            send(link.cflib.high_level_commander)
+
+        request = Request(CRTPPort.SETPOINT_HL, 0, bytes([number]), what, resend)
+        answer = link.ask(transmit, request)
+        # The first three bytes of the request, then the firmware's errno.
+        code = answer[3] if len(answer) > 3 else 0
+        if code and not (code == _BUSY and sent > 1 and self._is_carried_out(number)):
+            is_landing = code == _BUSY and number == HighLevelCommander.COMMAND_LAND_2
+            error = AlreadyLandingError if is_landing else RefusedError
+            raise error(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
+
+    def _is_carried_out(self, number):
+        # Whether the repetition of a command was refused because the first one, whose reply was
+        # lost, is obeyed.
+        if number != HighLevelCommander.COMMAND_TAKEOFF_2:
+            return number == HighLevelCommander.COMMAND_LAND_2
+        state = read_state(self._current_link())
+        if state is None or not state.reports_planner:
+            return True
+        return SupervisorState.HIGH_LEVEL_ACTIVE in state

@@ -1,0 +1,146 @@
+"""Log blocks: variables that the vehicle sends by itself, every so many milliseconds."""
+
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from cflib.crazyflie.log import LogConfig, LogTocElement
+from cflib.utils.encoding import decompress_quaternion
+
+from crazyflie_link.errors import (
+    NoReplyError,
+    RefusedError,
+    ValueRangeError,
+    unknown_name,
+)
+from crazyflie_link.exchange import REPLY_LIMIT
+from crazyflie_link.subsystem import Subsystem, elements
+
+SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS, PERIOD_STEP_MS = 10, 2540, 10
+"""The firmware counts periods in 10 ms, in one byte of which 255 is not allowed."""
+
+MOST_BYTES = 26
+"""Bytes of values that fit in a log packet."""
+
+
+def quaternion_from_compressed(number: int) -> tuple[float, ...]:
+    """Return the unit quaternion (x, y, z, w) of the log variable stateEstimateZ.quat.
+
+    It has 32 bits: which component is largest, and the three others with 10 bits each.
+    """
+    return tuple(map(float, decompress_quaternion(int(number))))
+
+
+@dataclass(frozen=True)
+class LogBlock:
+    """Variables that come together.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    period_ms : int
+        Time between two packets, in ms: 10 to 2540, in steps of 10.
+    variables : tuple of str
+        Such as "stateEstimate.x"; in the vehicle's own type, together at most 26
+        bytes.
+    callback : callable
+        ``callback(time_ms, values)``, from cflib's thread: the vehicle's time (24
+        bits, ms) and a tuple of numbers in the order of ``variables``.
+    """
+
+    name: str
+    period_ms: int
+    variables: tuple[str, ...]
+    callback: Callable[[int, tuple[float, ...]], None] = field(compare=False)
+
+
+class Log(Subsystem):
+    """The log variables of a vehicle."""
+
+    def variables(self) -> dict[str, str]:
+        """Return the vehicle's variables: "group.name" -> C type, sorted by name."""
+        table = self._current_link().cflib.log.toc.toc
+        return {name: element.ctype for name, element in elements(table).items()}
+
+    def check(self, block: LogBlock) -> None:
+        """Check that the vehicle can send a block.
+
+        Raises
+        ------
+        UnknownNameError
+            A variable is not in the vehicle's table.
+        ValueRangeError
+            The period, the number or the size of the variables is out of range.
+        """
+        is_in_range = SHORTEST_PERIOD_MS <= block.period_ms <= LONGEST_PERIOD_MS
+        if not is_in_range or block.period_ms % PERIOD_STEP_MS:
+            raise ValueRangeError(
+                f"log block {block.name!r}: its period is {block.period_ms} ms; expected "
+                f"{SHORTEST_PERIOD_MS} to {LONGEST_PERIOD_MS} ms, in steps of {PERIOD_STEP_MS} (a "
+                "frequency is not meant)"
+            )
+        if not block.variables:
+            raise ValueRangeError(f"log block {block.name!r} has no variables")
+        known = self.variables()
+        size = 0
+        for variable in block.variables:
+            if variable not in known:
+                raise unknown_name("log variable", variable, list(known))
+            size += LogTocElement.get_size_from_id(
+                LogTocElement.get_id_from_cstring(known[variable])
+            )
+        if size > MOST_BYTES:
+            raise ValueRangeError(
+                f"log block {block.name!r}: its {len(block.variables)} variables take {size} "
+                f"bytes; at most {MOST_BYTES} fit in a packet: make it two blocks"
+            )
+
+    def start(self, block: LogBlock) -> None:
+        """Have the vehicle send a block; blocks until it has agreed.
+
+        Raises
+        ------
+        CrazyflieError
+            The block is not possible (see `check`), the vehicle has refused it, or
+            has not replied.
+        """
+        self.check(block)
+        link = self._current_link()
+        backend = link.cflib
+        config = LogConfig(block.name, block.period_ms)
+        for variable in block.variables:
+            config.add_variable(variable)
+        decided = threading.Event()
+        refusals: list[str] = []
+
+        def refuse(_, text):
+            refusals.append(text)
+            decided.set()
+
+        def note_start(_, is_started):
+            # cflib reports a start that is refused here, too, and not as an error.
+            if not is_started:
+                refusals.append(backend.log_error(config.err_no))
+            decided.set()
+
+        def deliver(time_ms, values, _):
+            block.callback(time_ms, tuple(values[variable] for variable in block.variables))
+
+        config.error_cb.add_callback(refuse)
+        config.started_cb.add_callback(note_start)
+        config.data_received_cb.add_callback(deliver)
+        try:
+            backend.log.add_config(config)
+            config.start()
+        except (AttributeError, KeyError) as error:
+            # cflib's own check of what fits on the vehicle.
+            raise RefusedError(f"log block {block.name!r}: {error}") from None
+        if not decided.wait(REPLY_LIMIT):
+            raise NoReplyError(
+                f"log block {block.name!r}: the vehicle has not replied within {REPLY_LIMIT:g} s"
+            )
+        if refusals:
+            raise RefusedError(f"log block {block.name!r}: the vehicle says: {refusals[0]}")
+        link.liveness.expect_log(block.period_ms / 1000.0, time.monotonic())

@@ -1,0 +1,91 @@
+"""One thread per link that sends, so that no caller ever waits for a radio.
+
+cflib's radio driver blocks a sender for up to 2 s when the vehicle is out of
+range. A setpoint that is that old is worse than none; so of setpoints (and of
+external positions) only the latest is kept. Commands are all sent, in order.
+"""
+
+import logging
+import threading
+from collections import deque
+from collections.abc import Callable
+
+from crazyflie_link.errors import LinkLostError
+
+_MOST_COMMANDS = 256
+
+_log = logging.getLogger(__name__)
+
+Send = Callable[[], None]
+"""Sends something."""
+
+
+class Outbox:
+    """What is to be sent: commands in their order, and the latest of each stream."""
+
+    def __init__(self) -> None:
+        self._commands: deque[Send] = deque()
+        self._streams: dict[str, Send] = {}
+        self._wake = threading.Condition()
+        self._closed = False
+        self._thread = threading.Thread(target=self._run, name="crazyflie-outbox", daemon=True)
+        self._thread.start()
+
+    def command(self, send: Send, urgent: bool = False) -> None:
+        """Have ``send()`` called after the commands before it.
+
+        An urgent one goes first, and what waits on streams is forgotten.
+
+        Raises
+        ------
+        LinkLostError
+            The outbox is closed, or too much waits in it: the link is stuck.
+        """
+        with self._wake:
+            self._check_open()
+            if urgent:
+                self._streams.clear()
+                self._commands.appendleft(send)
+            elif len(self._commands) >= _MOST_COMMANDS:
+                raise LinkLostError(f"{_MOST_COMMANDS} packets wait to be sent: the link is stuck")
+            else:
+                self._commands.append(send)
+            self._wake.notify()
+
+    def latest(self, stream: str, send: Send) -> None:
+        """Have ``send()`` called, in the place of what still waits on this stream."""
+        with self._wake:
+            self._check_open()
+            self._streams[stream] = send
+            self._wake.notify()
+
+    def forget(self, stream: str) -> None:
+        """Do not send what waits on a stream."""
+        with self._wake:
+            self._streams.pop(stream, None)
+
+    def close(self) -> None:
+        """Send nothing any more."""
+        with self._wake:
+            self._closed = True
+            self._wake.notify()
+
+    def _check_open(self):
+        if self._closed:
+            raise LinkLostError("the link is closed")
+
+    def _run(self):
+        while True:
+            with self._wake:
+                while not (self._closed or self._commands or self._streams):
+                    self._wake.wait()
+                if self._closed:
+                    return
+                if self._commands:
+                    send = self._commands.popleft()
+                else:
+                    send = self._streams.pop(next(iter(self._streams)))
+            try:
+                send()
+            except Exception:
+                _log.exception("a packet could not be sent")

@@ -1,0 +1,130 @@
+"""Parameters of the firmware: names, types, values."""
+
+import struct
+
+from cflib.crazyflie.param import ParamTocElement
+from cflib.crtp.crtpstack import CRTPPort
+
+from crazyflie_link.errors import NoReplyError, RefusedError, ValueRangeError, unknown_name
+from crazyflie_link.exchange import Request
+from crazyflie_link.link import Link
+from crazyflie_link.subsystem import Subsystem, elements
+
+_READ_CHANNEL, _WRITE_CHANNEL = 1, 2
+
+
+class FirmwareParameters(Subsystem):
+    """The parameters of a vehicle; all were read when the link was set up."""
+
+    def types(self) -> dict[str, tuple[str, bool]]:
+        """Return the parameters: "group.name" -> (C type, whether it can be written)."""
+        table = self._current_link().cflib.param.toc.toc
+        return {
+            name: (element.ctype, element.access == ParamTocElement.RW_ACCESS)
+            for name, element in elements(table).items()
+        }
+
+    def values(self) -> dict[str, int | float]:
+        """Return the values as last read or written: "group.name" -> int or float."""
+        param = self._current_link().cflib.param
+        return {
+            name: _number(element, param.values[element.group][element.name])
+            for name, element in elements(param.toc.toc).items()
+            if element.name in param.values.get(element.group, {})
+        }
+
+    def read(self, name: str) -> int | float:
+        """Ask the vehicle for a parameter, such as "ring.effect"; blocks.
+
+        Raises
+        ------
+        CrazyflieError
+            There is no such parameter, or no reply.
+        """
+        link = self._current_link()
+        element = self._find(link, name)
+        ident = struct.pack("<H", element.ident)
+        request = Request(CRTPPort.PARAM, _READ_CHANNEL, ident, f"reading {name}")
+        answer = link.ask(ident, request)
+        # Identifier, status, value.
+        if len(answer) < 3 or answer[2] != 0:
+            raise RefusedError(f"reading {name}: the vehicle says {answer[2:].hex() or 'nothing'}")
+        return self._keep(link, element, answer[3:])
+
+    def write(self, name: str, value: int | float) -> int | float:
+        """Set a parameter and return the value that the vehicle confirms; blocks.
+
+        Raises
+        ------
+        CrazyflieError
+            There is no such parameter, it cannot be written, the value does not
+            fit its type, the vehicle keeps another, or no reply.
+        """
+        link = self._current_link()
+        element = self._find(link, name)
+        if element.access != ParamTocElement.RW_ACCESS:
+            raise RefusedError(f"parameter {name} can only be read")
+        ident = struct.pack("<H", element.ident)
+        data = ident + self._pack(element, name, value)
+
+        def accepts(answer: bytes) -> bool:
+            # The reply to an earlier write has another value.
+            return answer == data or len(answer) != len(data)
+
+        what = f"writing {name}"
+        request = Request(CRTPPort.PARAM, _WRITE_CHANNEL, ident, what, accepts=accepts)
+        try:
+            answer = link.ask(data, request)
+        except NoReplyError as error:
+            return self._look_up(name, data[2:], error)
+        if answer != data:
+            raise RefusedError(f"{what}: the vehicle says {answer[2:].hex() or 'nothing'}")
+        return self._keep(link, element, answer[2:])
+
+    def _look_up(self, name: str, expected: bytes, error: NoReplyError) -> int | float:
+        # Only the reply may have been lost; or the vehicle has kept another value.
+        element = self._find(self._current_link(), name)
+        try:
+            kept = self.read(name)
+        except NoReplyError:
+            raise error from None
+        if struct.pack(element.pytype, kept) != expected:
+            (value,) = struct.unpack(element.pytype, expected)
+            raise RefusedError(
+                f"writing {name}: the vehicle keeps {kept:g} in the place of {value:g}"
+            )
+        return kept
+
+    @staticmethod
+    def _find(link: Link, name: str) -> ParamTocElement:
+        known = elements(link.cflib.param.toc.toc)
+        if name not in known:
+            raise unknown_name("parameter", name, list(known))
+        return known[name]
+
+    @staticmethod
+    def _pack(element: ParamTocElement, name: str, value: float) -> bytes:
+        try:
+            number = float(value) if _is_real(element) else int(value)
+            if number != float(value):
+                raise ValueError
+            return struct.pack(element.pytype, number)
+        except (ValueError, TypeError, OverflowError, struct.error):
+            raise ValueRangeError(
+                f"parameter {name} is a {element.ctype}; {value!r} does not fit"
+            ) from None
+
+    @staticmethod
+    def _keep(link: Link, element: ParamTocElement, data: bytes) -> int | float:
+        (value,) = struct.unpack(element.pytype, data)
+        link.cflib.param.values.setdefault(element.group, {})[element.name] = str(value)
+        return value
+
+
+def _number(element, text):
+    return float(text) if _is_real(element) else int(text)
+
+
+def _is_real(element):
+    # The last letter of a format of the module struct: half, single, double precision.
+    return element.pytype[-1] in "efd"

@@ -1,0 +1,57 @@
+"""Search for vehicles within reach."""
+
+import contextlib
+import io
+
+import cflib.crtp
+
+from crazyflie_link.backend import init_drivers
+from crazyflie_link.errors import AddressError, CrazyflieError, explain
+
+DEFAULT_ADDRESS = "E7E7E7E7E7"
+"""Radio address that vehicles have when they are new."""
+
+
+def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError]]:
+    """Look for vehicles on all interfaces; takes some seconds with a radio.
+
+    On UDP the ports 19850 to 19859 of 127.0.0.1, or of the environment variable
+    SCAN_ADDRESS, are tried.
+
+    Parameters
+    ----------
+    address : str
+        Radio address to call, up to 10 hexadecimal digits.
+
+    Returns
+    -------
+    found : list of str
+        Addresses of vehicles.
+    problems : list of CrazyflieError
+        Interfaces that could not be searched, such as a missing Crazyradio.
+
+    Raises
+    ------
+    AddressError
+        The address is none.
+    """
+    try:
+        number = int(address, 16)
+    except ValueError:
+        number = -1
+    if not 0 <= number < 1 << 40:
+        raise AddressError(f"{address!r} is no radio address: expected up to 10 hexadecimal digits")
+    init_drivers()
+    found: list[str] = []
+    problems: list[CrazyflieError] = []
+    for driver_class in cflib.crtp.CLASSES:
+        # What stops the radio driver it prints, and finds nothing.
+        printed = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(printed):
+                found += [uri for uri, *_ in driver_class().scan_interface(number)]
+        except Exception as error:
+            printed.write(str(error) or repr(error))
+        if printed.getvalue().strip():
+            problems.append(explain(driver_class.__name__, printed.getvalue()))
+    return found, problems

@@ -1,0 +1,143 @@
+"""The vehicle's supervisor: arming, its state, emergency stop."""
+
+from collections.abc import Callable
+
+from cflib.crtp.crtpstack import CRTPPort
+
+from crazyflie_link.emergency import ANSWER, SUPERVISOR_PROTOCOL, EmergencyStop
+from crazyflie_link.errors import RefusedError
+from crazyflie_link.exchange import Request
+from crazyflie_link.link import Link
+from crazyflie_link.subsystem import Subsystem
+from crazyflie_model.supervisor import SupervisorState
+
+_INFO_CHANNEL, _COMMAND_CHANNEL = 0, 1
+_GET_STATE, _ARM, _RECOVER = 0x0C, 0x01, 0x02
+_WATCHDOG = "watchdog"
+
+
+class Supervisor(Subsystem):
+    """The supervisor: the part of the firmware that arms and stops the motors.
+
+    Parameters
+    ----------
+    current_link : callable
+        Returns the living `Link`, or raises `LinkLostError`.
+    emergency : EmergencyStop
+    """
+
+    def __init__(self, current_link: Callable[[], Link], emergency: EmergencyStop):
+        super().__init__(current_link)
+        self._emergency = emergency
+
+    def read(self) -> SupervisorState | None:
+        """Ask for the state; blocks. None when the firmware is too old to report it.
+
+        Raises
+        ------
+        CrazyflieError
+            No link or no reply.
+        """
+        return read_state(self._current_link())
+
+    def arm(self, do_arm: bool = True) -> None:
+        """Arm or disarm the motors; blocks until the vehicle has confirmed it.
+
+        Firmware before protocol 12 confirms nothing.
+
+        Raises
+        ------
+        RefusedError
+            The vehicle cannot be armed now; the text says why.
+        CrazyflieError
+            No link or no reply.
+        """
+        link = self._current_link()
+        if link.protocol < SUPERVISOR_PROTOCOL:
+            link.command(lambda: link.cflib.supervisor.send_arming_request(do_arm))
+            return
+        verb = "arming" if do_arm else "disarming"
+        self._command(link, bytes([_ARM, do_arm]), verb)
+
+    def recover(self) -> None:
+        """Let a vehicle that has crashed be armed again; blocks until it has confirmed it.
+
+        Raises
+        ------
+        CrazyflieError
+            As `arm`.
+        """
+        link = self._current_link()
+        if link.protocol < SUPERVISOR_PROTOCOL:
+            link.command(link.cflib.supervisor.send_crash_recovery_request)
+            return
+        self._command(link, bytes([_RECOVER]), "recovering from a crash")
+
+    def emergency_stop(self) -> None:
+        """Stop the motors at once, before anything else that waits to be sent; does not block.
+
+        Sent again and again until the vehicle is seen to be locked, also on a link that is silent
+        or being opened, and on every later one. The vehicle has to be restarted before it can fly
+        again.
+        """
+        self._emergency.begin()
+
+    def wait_for_emergency_stop(self, limit: float) -> bool:
+        """Wait until the vehicle has obeyed an emergency stop; return whether it has.
+
+        Firmware before protocol 12 does not tell: there it means that the stop has been sent
+        several times while the vehicle was heard.
+
+        Parameters
+        ----------
+        limit : float
+            How long to wait, s.
+        """
+        return self._emergency.wait(limit)
+
+    def feed_watchdog(self) -> None:
+        """Feed the emergency-stop watchdog; does not block.
+
+        It begins with the first feed and cannot be ended: 1 s after the last one the vehicle
+        stops its motors and is locked until it is restarted, also on the ground.
+
+        Raises
+        ------
+        LinkLostError
+            Nothing can be sent.
+        """
+        link = self._current_link()
+        link.stream(_WATCHDOG, link.cflib.supervisor.send_emergency_stop_watchdog)
+
+    def _command(self, link: Link, data: bytes, what: str) -> None:
+        def accepts(answer: bytes) -> bool:
+            # Success, and the state of what was commanded: armed is not the answer to disarming.
+            return len(answer) < 3 or len(data) < 2 or not answer[1] or answer[2] == data[1]
+
+        answer = self._ask(link, _COMMAND_CHANNEL, data, what, accepts)
+        if len(answer) > 1 and not answer[1]:
+            state = self.read()
+            words = "unknown" if state is None else state.words()
+            raise RefusedError(f"{what}: the vehicle refuses it; its state is: {words}")
+
+    @staticmethod
+    def _ask(
+        link: Link,
+        channel: int,
+        data: bytes,
+        what: str,
+        accepts: Callable[[bytes], bool] = lambda answer: True,
+    ) -> bytes:
+        prefix = bytes([ANSWER | data[0]])
+        return link.ask(data, Request(CRTPPort.SUPERVISOR, channel, prefix, what, accepts=accepts))
+
+
+def read_state(link: Link) -> SupervisorState | None:
+    """Return the state that is told over a link; see `Supervisor.read`."""
+    if link.protocol < SUPERVISOR_PROTOCOL:
+        return None
+    request = Request(
+        CRTPPort.SUPERVISOR, _INFO_CHANNEL, bytes([ANSWER | _GET_STATE]), "the supervisor's state"
+    )
+    answer = link.ask(bytes([_GET_STATE]), request)
+    return SupervisorState(int.from_bytes(answer[1:3], "little"))

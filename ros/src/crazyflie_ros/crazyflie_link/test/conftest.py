@@ -1,0 +1,105 @@
+"""Fixtures of the tests: a vehicle with scripted answers."""
+
+import queue
+
+import pytest
+
+from crazyflie_dev.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
+from crazyflie_dev.fixtures import own_cache  # noqa: F401
+from crazyflie_link.crazyflie import Crazyflie
+
+LIMIT = 60.0
+
+LOG = {
+    "stateEstimate.x": ("f", 1.5),
+    "stateEstimate.y": ("f", -2.5),
+    "pm.vbat": ("f", 3.75),
+    "radio.rssi": ("B", 47),
+    "pm.state": ("b", -1),
+    "stateEstimateZ.quat": ("I", 0xC0000000),
+    "gyro.xRaw": ("h", -1234),
+    "kalman.q0": ("e", 0.5),
+}
+
+PARAMETERS = {
+    "ring.effect": ("B", 6, 0),
+    "pid_rate.roll_kp": ("f", 0.25, EXTENDED),
+    "cpu.id0": ("I", 2**32 - 1, READ_ONLY),
+    "sound.freq": ("H", 4000, 0),
+    "motor.trim": ("b", -3, 0),
+}
+
+
+@pytest.fixture
+def make_vehicle():
+    """Return a function that makes vehicles, which end with the test."""
+    vehicles = []
+
+    def make(**options):
+        options.setdefault("log", dict(LOG))
+        options.setdefault("parameters", dict(PARAMETERS))
+        vehicles.append(FakeVehicle(**options))
+        return vehicles[-1]
+
+    yield make
+    for vehicle in vehicles:
+        vehicle.close()
+
+
+@pytest.fixture
+def make_link():
+    """Return a function that makes (unconnected) links, which end with the test."""
+    links = []
+
+    def make(uri, **options):
+        links.append(Crazyflie(uri, **options))
+        return links[-1]
+
+    yield make
+    for link in links:
+        link.close()
+
+
+@pytest.fixture
+def vehicle(make_vehicle):
+    return make_vehicle()
+
+
+@pytest.fixture
+def link(vehicle, make_link):
+    """Return a link that is connected to ``vehicle``."""
+    link = make_link(vehicle.uri)
+    link.connect()
+    return link
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory):
+    """Return a vehicle, a connected link and the vehicle's first parameters, for a module."""
+    cache = str(tmp_path_factory.mktemp("cache"))
+    with (
+        FakeVehicle(log=dict(LOG), parameters=dict(PARAMETERS)) as vehicle,
+        Crazyflie(vehicle.uri, cache=cache) as link,
+    ):
+        yield vehicle, link, dict(PARAMETERS)
+
+
+class States:
+    """The states that a link goes through, to be waited for."""
+
+    def __init__(self):
+        self._states = queue.Queue()
+
+    def __call__(self, state, text):
+        self._states.put((state, text))
+
+    def wait_for(self, state):
+        while True:
+            seen, text = self._states.get(timeout=LIMIT)
+            if seen is state:
+                return text
+
+
+@pytest.fixture
+def states():
+    return States()

@@ -1,0 +1,57 @@
+"""Texts of cflib's drivers, explained to the operator."""
+
+import pytest
+
+from crazyflie_link.errors import (
+    AddressError,
+    NoAnswerError,
+    NoDongleError,
+    explain,
+    unknown_name,
+)
+
+URI = "radio://0/25/2M/E7E7E7E701"
+
+
+@pytest.mark.parametrize(
+    ("text", "error_type", "advice"),
+    [
+        (
+            "Couldn't load link driver: Cannot find a Crazyradio Dongle\n\nTrace",
+            NoDongleError,
+            "udev",
+        ),
+        ("Cannot find radio with serial ABC", NoDongleError, "plug it in"),
+        (
+            "[Errno 13] Access denied (insufficient permissions)",
+            NoDongleError,
+            "99-crazyflie.rules",
+        ),
+        ("[Errno 16] Resource busy", NoDongleError, "another program"),
+        ("Too many packets lost", NoAnswerError, "scan"),
+        ("Exception: [Errno 111] Connection refused", NoAnswerError, "nothing listens"),
+        ("[Errno -2] Name or service not known", AddressError, "IP address"),
+        ("[Errno 101] Network is unreachable", NoAnswerError, "network"),
+        ("No driver found or malformed URI: usb://7", NoAnswerError, "plugged in"),
+    ],
+)
+def test_known_texts(text, error_type, advice):
+    error = explain(URI, text)
+    assert type(error) is error_type
+    assert str(error).startswith(URI + ": ")
+    assert advice in str(error)
+    assert "Trace" not in str(error)
+
+
+def test_unknown_texts_are_passed_on_in_one_line():
+    assert str(explain(URI, "\n strange thing\nTraceback ...")) == f"{URI}: strange thing"
+    assert str(explain(URI, "")) == f"{URI}: no reason given"
+
+
+def test_unknown_names_come_with_a_suggestion():
+    known = ["stateEstimate.x", "stateEstimate.y", "pm.vbat"]
+    text = str(unknown_name("log variable", "stateEstimate.X", known))
+    assert "log variable 'stateEstimate.X' among its 3" in text
+    assert "did you mean stateEstimate.x" in text
+    assert "did you mean" not in str(unknown_name("log variable", "motor.m1", ["pm.vbat"]))
+    assert "did you mean pm.vbat" in str(unknown_name("log variable", "pm.q", ["pm.vbat"]))

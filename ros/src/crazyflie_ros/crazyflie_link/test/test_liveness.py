@@ -1,0 +1,190 @@
+"""The watchdog of a link, with time by hand."""
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from crazyflie_link.liveness import LOST_AFTER, Life, Liveness, Uptime
+
+
+def watch(liveness, begin, end, step=0.05, bad=Life.SILENT):
+    """Ask every ``step`` until ``end``; return when the link was first said to be lost."""
+    for k in range(1, round((end - begin) / step) + 1):
+        if liveness.state(begin + k * step) is bad:
+            return begin + k * step
+    return None
+
+
+def test_silence_is_noticed_within_half_a_second():
+    liveness = Liveness(10.0)
+    assert watch(liveness, 10.0, 12.0) <= 10.5 + 1e-9
+    assert liveness.age(12.0) == pytest.approx(2.0)
+
+
+def test_a_packet_now_and_then_is_enough():
+    liveness = Liveness(0.0)
+    for k in range(1, 100):
+        liveness.received(0.4 * k)
+        assert watch(liveness, 0.4 * k, 0.4 * k + 0.4) is None
+
+
+def test_when_the_machine_was_busy_the_vehicle_gets_a_new_period():
+    liveness = Liveness(0.0)
+    assert liveness.state(0.1) is Life.ALIVE
+    assert liveness.state(5.0) is Life.ALIVE
+    assert watch(liveness, 5.0, 6.0) == pytest.approx(5.25)
+
+
+@given(st.lists(st.floats(0.01, 0.22), min_size=30, max_size=60))
+def test_a_silent_vehicle_is_always_noticed(pauses):
+    liveness, now = Liveness(0.0), 0.0
+    verdicts = []
+    for pause in pauses:
+        now += pause
+        verdicts.append(liveness.state(now) is Life.SILENT)
+        assert verdicts[-1] == (now > LOST_AFTER)
+
+
+def test_quality_is_the_share_of_answered_pings():
+    liveness = Liveness(0.0)
+    assert liveness.quality() == 1.0
+    for k in range(100):
+        liveness.ping_sent(bytes([k]))
+        if k % 4:
+            liveness.ping_answered(bytes([k]), 0.1 * k)
+    assert liveness.quality() == pytest.approx(0.75, abs=0.05)
+
+
+def test_an_answer_under_way_is_not_lost():
+    liveness = Liveness(0.0)
+    liveness.ping_sent(b"1")
+    assert liveness.quality() == 1.0
+    liveness.ping_answered(b"1", 0.0)
+    liveness.ping_sent(b"2")
+    assert liveness.quality() == 1.0
+    liveness.ping_sent(b"3")
+    assert liveness.quality() == 0.5
+    liveness.ping_answered(b"2", 0.0)
+    assert liveness.quality() == 1.0
+
+
+def test_an_answer_may_be_received_before_the_ping_is_noted():
+    liveness = Liveness(0.0)
+    for content in (b"1", b"2", b"3"):
+        liveness.ping_answered(content, 0.0)
+        liveness.ping_sent(content)
+    assert liveness.quality() == 1.0
+
+
+def life(liveness, begin, end, pings, logs):
+    """Receive for a while what is to come, at 10 Hz; return the states in between."""
+    states = []
+    for k in range(1, round((end - begin) / 0.1) + 1):
+        now = begin + 0.1 * k
+        if pings:
+            liveness.received(now)
+        if logs:
+            liveness.log_received(now)
+        states.append(liveness.state(now))
+    return states
+
+
+def test_pings_without_log_data_are_a_restart():
+    liveness = Liveness(0.0)
+    liveness.expect_log(0.1, 0.0)
+    assert set(life(liveness, 0.0, 2.0, True, True)) == {Life.ALIVE}
+    states = life(liveness, 2.0, 3.0, True, False)
+    assert states.index(Life.RESTARTED) <= 4
+
+
+def test_a_vehicle_that_is_frozen_between_log_data_and_ping_is_silent():
+    liveness = Liveness(0.0)
+    liveness.expect_log(0.01, 0.0)
+    assert set(life(liveness, 0.0, 2.0, True, True)) == {Life.ALIVE}
+    liveness.ping_answered(b"", 2.09)
+    assert watch(liveness, 2.09, 4.0, step=0.01, bad=Life.RESTARTED) is None
+    assert liveness.state(4.0) is Life.SILENT
+
+
+def test_slow_log_blocks_get_more_time():
+    liveness = Liveness(0.0)
+    liveness.expect_log(1.0, 0.0)
+    assert set(life(liveness, 0.0, 3.9, True, False)) == {Life.ALIVE}
+    assert Life.RESTARTED in life(liveness, 3.9, 4.5, True, False)
+
+
+def test_after_a_silence_log_data_may_come_a_little_later():
+    liveness = Liveness(0.0)
+    liveness.expect_log(0.1, 0.0)
+    assert life(liveness, 0.0, 0.8, False, False)[-1] is Life.SILENT
+    assert set(life(liveness, 0.8, 1.0, True, False)) == {Life.SILENT}
+    assert set(life(liveness, 1.0, 1.2, True, True)) == {Life.ALIVE}
+    assert life(liveness, 1.2, 2.0, False, False)[-1] is Life.SILENT
+    assert life(liveness, 2.0, 2.5, True, False)[-1] is Life.RESTARTED
+
+
+def test_half_of_the_packets_lost_is_a_poor_link_at_once():
+    liveness = Liveness(0.0)
+    for k in range(40):
+        liveness.ping_sent(bytes([k]))
+        liveness.ping_answered(bytes([k]), 0.1 * k)
+        assert not liveness.is_poor()
+    for k in range(40, 46):
+        liveness.ping_sent(bytes([k]))
+        if k % 2:
+            liveness.ping_answered(bytes([k]), 0.1 * k)
+    assert liveness.is_poor()
+
+
+HOUR_MS = 3_600_000
+WRAP_MS = 1 << 24
+"""The clock has 24 bits, which are 4.66 h."""
+
+
+def restarts(*packets):
+    """Return whether a restart is seen; packets are (clock in ms, arrival in s)."""
+    uptime = Uptime()
+    return any([uptime.has_restarted(clock % WRAP_MS, arrival) for clock, arrival in packets])
+
+
+@pytest.mark.parametrize(
+    ("packets", "restarted"),
+    [
+        ([(100, 0.0), (200, 0.1), (300, 0.2)], False),
+        # Two blocks may overtake each other.
+        ([(100, 0.0), (200, 0.1), (190, 0.1), (300, 0.2)], False),
+        # The clock begins anew every 4.66 h by itself.
+        ([(WRAP_MS - 16, 0.0), (WRAP_MS + 5, 0.02), (WRAP_MS + 100, 0.1)], False),
+        ([(60_000, 0.0), (60_100, 0.1), (900, 2.0)], True),
+        ([(60_000, 0.0), (90_000, 30.0)], False),
+        # A radio that was off for an hour.
+        ([(60_000, 0.0), (60_000 + HOUR_MS, 3600.0)], False),
+        # Packets that waited for this machine: late, and then all at once.
+        ([(1000, 0.0), (1100, 10.0), (6000, 10.0), (11_000, 10.0), (11_100, 10.1)], False),
+        ([(1000, 0.0), (1100, 10.0), (11_100, 10.1), (1000, 12.0)], True),
+    ],
+)
+def test_a_clock_that_begins_anew_is_a_restart(packets, restarted):
+    assert restarts(*packets) is restarted
+
+
+@given(st.floats(0.1, 100.0), st.floats(1.5, 600.0))
+def test_a_restart_is_noticed_however_long_the_vehicle_was_on(hours, silence):
+    before = round(hours * HOUR_MS)
+    # Shortly before the clock wraps by itself, silence or a late packet may be the reason.
+    assume(before % WRAP_MS < WRAP_MS - 1000.0 * (silence + 60.0))
+    packets = [(before - 100, 0.0), (before, 0.1), (1200, 0.1 + silence)]
+    assert restarts(*packets)
+
+
+@given(
+    st.integers(0, WRAP_MS),
+    st.lists(st.tuples(st.integers(1, 5000), st.floats(0.0, 20.0)), min_size=2, max_size=50),
+)
+def test_late_packets_and_slow_clocks_are_no_restart(clock, steps):
+    """The arrivals are in order, and none comes before it was sent."""
+    uptime, sent, arrived = Uptime(), 0.0, 0.0
+    for step_ms, late in steps:
+        clock, sent = clock + step_ms, sent + step_ms / 1000.0
+        arrived = max(arrived, sent + late)
+        assert not uptime.has_restarted(clock % WRAP_MS, arrived)

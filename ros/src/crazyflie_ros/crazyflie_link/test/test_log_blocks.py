@@ -1,0 +1,60 @@
+"""Log blocks that the vehicle refuses, at first or when it is connected again."""
+
+import queue
+
+import pytest
+
+from crazyflie_link.crazyflie import LinkState
+from crazyflie_link.errors import RefusedError, ValueRangeError
+from crazyflie_link.log import LogBlock
+
+LIMIT = 60.0
+
+
+def log_block(name, receive=lambda *_: None, variables=("pm.vbat",), period_ms=20):
+    return LogBlock(name, period_ms, variables, receive)
+
+
+def test_a_start_that_the_vehicle_refuses_is_none(vehicle, make_link, states):
+    link = make_link(vehicle.uri, reconnect=True, on_state=states)
+    link.connect()
+    vehicle.answers[5, 1, 3] = b"\3\1\2"
+    with pytest.raises(RefusedError, match="'refused': the vehicle says: No such block id"):
+        link.add_log_block(log_block("refused"))
+    # Its data are not missed.
+    vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 10)
+    assert (link.state, link.links) == (LinkState.CONNECTED, 1)
+
+
+def test_an_error_code_that_nobody_knows_is_a_refusal(vehicle, link):
+    vehicle.answers[5, 1, 3] = b"\3\1\x63"
+    with pytest.raises(RefusedError, match="'odd': the vehicle says: error 99"):
+        link.add_log_block(log_block("odd"))
+
+
+def test_a_block_that_is_refused_later_does_not_end_connecting(vehicle, make_link, states):
+    """Firmware without one of its variables may have been installed meanwhile."""
+    received = queue.Queue()
+    link = make_link(vehicle.uri, reconnect=True, on_state=states)
+    link.connect()
+    link.add_log_block(log_block("gone", variables=("pm.state",)))
+    link.add_log_block(log_block("kept", lambda *data: received.put(data)))
+    vehicle.is_frozen = True
+    states.wait_for(LinkState.LOST)
+    del vehicle.log["pm.state"]
+    vehicle.forget_logs()
+    vehicle.is_frozen = False
+    text = states.wait_for(LinkState.CONNECTED)
+    assert "again, without log block 'gone'" in text
+    assert "no log variable 'pm.state'" in text
+    while not received.empty():
+        received.get()
+    assert received.get(timeout=LIMIT)[1] == (3.75,)
+
+
+@pytest.mark.parametrize("period_ms", [15, 99, 2539])
+def test_periods_between_the_steps_are_not_cut(link, period_ms):
+    with pytest.raises(
+        ValueRangeError, match=f"{period_ms} ms; expected 10 to 2540 ms, in steps of 10"
+    ):
+        link.add_log_block(log_block("odd", period_ms=period_ms))

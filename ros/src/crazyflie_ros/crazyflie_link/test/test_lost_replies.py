@@ -1,0 +1,110 @@
+"""The reply to a command is lost, and the firmware refuses its repetition."""
+
+import pytest
+
+from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError
+
+STATE, TAKEOFF, LAND = (9, 0, 0x0C), 7, 8
+
+
+@pytest.fixture
+def flying(vehicle, link):
+    """Return the vehicle and its high-level commands; the first reply to each is lost."""
+    seen = set()
+
+    def lose(_):
+        port, channel, data = vehicle.received[-1]
+        is_first = (port, channel) == (8, 0) and data not in seen
+        seen.add(data)
+        return is_first
+
+    vehicle.lose = lose
+    return vehicle, link.high_level
+
+
+def numbers(vehicle):
+    return [data[0] for data in vehicle.packets(8, 0)]
+
+
+def test_takeoff_and_landing_are_carried_out_once(flying):
+    vehicle, high_level = flying
+    high_level.take_off(1.0, 2.0)
+    assert numbers(vehicle) == [TAKEOFF, TAKEOFF]
+    high_level.land(0.0, 2.0)
+    assert numbers(vehicle)[2:] == [LAND, LAND]
+    assert vehicle.flight.starts == 1
+
+
+@pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWarning")
+def test_before_protocol_12_nobody_can_be_asked(make_vehicle, make_link):
+    vehicle = make_vehicle(protocol=11)
+    link = make_link(vehicle.uri)
+    link.connect()
+    vehicle.lose = lambda _: len(vehicle.packets(8, 0)) == 1
+    link.high_level.take_off(1.0, 2.0)
+    assert numbers(vehicle) == [TAKEOFF, TAKEOFF]
+
+
+def test_a_repetition_is_refused_while_the_planner_does_not_fly(flying):
+    vehicle, high_level = flying
+    vehicle.answers[8, 0, TAKEOFF] = b"\x07\x00\x00\x01"
+    vehicle.flight.pin(0x20E)
+    with pytest.raises(RefusedError, match="takeoff command"):
+        high_level.take_off(1.0, 2.0)
+
+
+def test_a_refusal_without_a_repetition_is_one(vehicle, link):
+    link.high_level.take_off(1.0, 2.0)
+    with pytest.raises(RefusedError, match="takeoff command"):
+        link.high_level.take_off(1.0, 2.0)
+    link.high_level.land(0.0, 2.0)
+    with pytest.raises(AlreadyLandingError, match="land command"):
+        link.high_level.land(0.0, 2.0)
+
+
+def test_a_landing_that_may_have_ended_is_not_repeated(flying):
+    """On the ground the firmware obeys, and starts the motors."""
+    vehicle, high_level = flying
+    with pytest.raises(NoReplyError):
+        high_level.land(0.0, 0.5)
+    assert numbers(vehicle) == [LAND]
+
+
+def test_a_dry_run_refuses_the_same_and_sends_nothing(vehicle, link):
+    link.high_level.define_trajectory(3, 0, 1)
+    vehicle.received.clear()
+    dry = link.high_level.dry_run()
+    dry.take_off(1.0, 2.0)
+    dry.start_trajectory(3)
+    with pytest.raises(RefusedError, match="4 has not been uploaded"):
+        dry.start_trajectory(4)
+    dry.define_trajectory(4, 0, 1)
+    with pytest.raises(RefusedError, match="4 has not been uploaded"):
+        link.high_level.start_trajectory(4)
+    assert vehicle.packets(8, 0) == []
+
+
+def test_groups_are_known_once_they_are_set(link):
+    high_level = link.high_level
+    assert high_level.is_addressed(0) is True
+    assert high_level.is_addressed(1) is None
+    high_level.set_group_mask(5)
+    assert [high_level.is_addressed(mask) for mask in (0, 1, 2, 6)] == [True, True, False, True]
+    high_level.forget_trajectories()
+    assert high_level.is_addressed(1) is False
+
+
+def test_a_guarded_subsystem_sends_only_what_it_may(vehicle, link):
+    allowed = [True]
+    high_level = link.high_level.guarded(lambda: allowed[0])
+    supervisor = link.supervisor.guarded(lambda: allowed[0])
+    high_level.define_trajectory(3, 0, 1)
+    supervisor.arm()
+    # What is known is known to both.
+    link.high_level.start_trajectory(3)
+    vehicle.received.clear()
+    allowed[0] = False
+    for send in (high_level.stop, supervisor.arm):
+        with pytest.raises(NoReplyError):
+            send()
+    assert vehicle.packets(8, 0) == vehicle.packets(9, 1) == []

@@ -1,0 +1,97 @@
+"""The thread that sends: order, latest values, and a radio that blocks."""
+
+import threading
+
+import pytest
+
+from crazyflie_link.errors import LinkLostError
+from crazyflie_link.outbox import Outbox
+
+LIMIT = 60.0
+
+
+class Radio:
+    """A radio that sends nothing until it is let."""
+
+    def __init__(self):
+        self.outbox = Outbox()
+        self.sent = []
+        self._free = threading.Event()
+        entered = threading.Event()
+
+        def block():
+            entered.set()
+            self._free.wait(LIMIT)
+
+        self.outbox.command(block)
+        assert entered.wait(LIMIT)
+
+    def note(self, what):
+        return lambda: self.sent.append(what)
+
+    def let_go(self):
+        """Let everything be sent that waits, and return it."""
+        done = threading.Event()
+        self.outbox.latest("end", done.set)
+        self._free.set()
+        assert done.wait(LIMIT)
+        return self.sent
+
+
+@pytest.fixture
+def radio():
+    radio = Radio()
+    yield radio
+    radio.outbox.close()
+
+
+def test_commands_keep_their_order(radio):
+    for k in range(50):
+        radio.outbox.command(radio.note(k))
+    assert radio.let_go() == list(range(50))
+
+
+def test_of_a_stream_only_the_latest_is_sent(radio):
+    for k in range(1000):
+        radio.outbox.latest("setpoint", radio.note(f"setpoint {k}"))
+        radio.outbox.latest("position", radio.note(f"position {k}"))
+    assert radio.let_go() == ["setpoint 999", "position 999"]
+
+
+def test_an_emergency_comes_first_and_alone(radio):
+    radio.outbox.latest("setpoint", radio.note("setpoint"))
+    radio.outbox.command(radio.note("command"))
+    radio.outbox.command(radio.note("stop"), urgent=True)
+    assert radio.let_go() == ["stop", "command"]
+
+
+def test_what_is_forgotten_is_not_sent(radio):
+    radio.outbox.latest("setpoint", radio.note("setpoint"))
+    radio.outbox.forget("setpoint")
+    assert radio.let_go() == []
+
+
+def test_a_stuck_radio_is_an_error_and_no_memory_leak(radio):
+    with pytest.raises(LinkLostError, match="wait to be sent"):
+        for k in range(1000):
+            radio.outbox.command(radio.note(k))
+    radio.outbox.command(radio.note("stop"), urgent=True)
+    assert radio.let_go()[0] == "stop"
+
+
+def test_one_failure_does_not_end_it(radio, caplog):
+    def fail():
+        raise OSError("broken")
+
+    radio.outbox.command(fail)
+    radio.outbox.command(radio.note("next"))
+    assert radio.let_go() == ["next"]
+    assert "broken" in caplog.text
+
+
+def test_nothing_is_taken_after_the_end(radio):
+    radio.outbox.close()
+    with pytest.raises(LinkLostError):
+        radio.outbox.command(radio.note(1))
+    with pytest.raises(LinkLostError):
+        radio.outbox.latest("setpoint", radio.note(1))

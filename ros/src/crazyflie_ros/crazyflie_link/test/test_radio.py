@@ -1,0 +1,163 @@
+"""What needs a Crazyradio, on mocks of cflib."""
+
+import threading
+from unittest.mock import MagicMock, patch
+
+import cflib.crtp
+import pytest
+from cflib.crazyflie import Crazyflie as CflibCrazyflie
+from cflib.crtp.radiodriver import RadioDriver
+from cflib.crtp.udpdriver import UdpDriver
+from cflib.utils.power_switch import PowerSwitch
+
+from crazyflie_link import scan
+from crazyflie_link.address import Address
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import AddressError, LinkLostError, NoAnswerError, NoDongleError
+from crazyflie_link.link import Limits, Link
+from crazyflie_link.reboot import MODES, reboot
+
+# cflib warns of one of its own attributes when a mock takes stock of them.
+pytestmark = pytest.mark.filterwarnings("ignore:link_quality_updated:DeprecationWarning")
+
+URI = "radio://0/25/2M/E7E7E7E701"
+
+
+class Mock:
+    """A link on a cflib that does only what a test has it do."""
+
+    def __init__(self):
+        self.cflib = None
+        self.fail = None
+
+    def __call__(self, cache, on_error):
+        self.cflib = MagicMock(spec=CflibCrazyflie())
+        self.cflib.ask_for_source = MagicMock()
+        self.cflib.drop = MagicMock()
+        self.cflib.platform.get_protocol_version.return_value = -1
+        self.fail = on_error
+        return self.cflib
+
+
+@pytest.fixture
+def mock():
+    return Mock()
+
+
+@pytest.mark.parametrize(
+    ("text", "error"),
+    [
+        ("Couldn't load link driver: Cannot find a Crazyradio Dongle\n\nTraceback", NoDongleError),
+        ("Too many packets lost", NoAnswerError),
+    ],
+)
+def test_a_driver_that_gives_up_ends_the_attempt(mock, text, error):
+    link = Link(Address.parse(URI), backend=mock)
+    mock.cflib.open_link.side_effect = lambda uri: mock.fail(text)
+    with pytest.raises(error):
+        link.open()
+    mock.cflib.open_link.assert_called_once_with(URI)
+    mock.cflib.drop.assert_called()
+
+
+def test_a_dongle_that_hangs_does_not_hang_us(mock):
+    release = threading.Event()
+    link = Link(Address.parse(URI), Limits(first_answer=0.3), backend=mock)
+    mock.cflib.open_link.side_effect = lambda uri: release.wait(60.0)
+    with pytest.raises(NoAnswerError):
+        link.open()
+    drops = mock.cflib.drop.call_count
+    assert drops == 1
+    # When it comes to life after all, what it opened is closed.
+    dropped = threading.Event()
+    mock.cflib.drop.side_effect = dropped.set
+    release.set()
+    assert dropped.wait(30.0)
+
+
+def test_the_first_request_is_repeated(mock):
+    link = Link(Address.parse(URI), Limits(first_answer=1.0), backend=mock)
+    with pytest.raises(NoAnswerError):
+        link.open()
+    assert mock.cflib.ask_for_source.call_count >= 2
+
+
+def test_an_error_in_flight_is_a_lost_link(mock):
+    link = Link(Address.parse(URI), backend=mock)
+    link._on_connected(URI)
+    link._on_complete(URI)
+    assert link.error is None
+    # With this cflib's radio driver goes on, and the vehicle may be heard again.
+    mock.fail("Too many packets lost")
+    assert link.error is None
+    mock.fail("it has probably been unplugged!")
+    assert isinstance(link.error, LinkLostError)
+    assert "the link was lost" in str(link.error)
+    link.close()
+
+
+def test_the_radios_figures():
+    with patch("crazyflie_link.crazyflie.Link", spec=Link) as link_class:
+        link = link_class.return_value
+        link.cflib = CflibCrazyflie()
+        link.error = None
+        vehicle = Crazyflie(URI)
+        vehicle.connect()
+        assert vehicle.rssi is None
+        link.cflib.link_statistics.uplink_rssi_updated.call(47.0)
+        assert vehicle.rssi == 47.0
+        vehicle.close()
+
+
+def test_restarting():
+    with patch("crazyflie_link.reboot.PowerSwitch", spec=PowerSwitch) as switch:
+        before = MagicMock()
+        reboot(Address.parse(URI), before)
+        before.assert_called_once_with()
+        switch.assert_called_once_with(URI)
+        switch.return_value.reboot_to_fw.assert_called_once_with()
+        switch.return_value.close.assert_called_once_with()
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_switching_a_vehicle(mode):
+    with patch("crazyflie_link.reboot.PowerSwitch", spec=PowerSwitch) as switch:
+        Crazyflie(URI).reboot(mode)
+        getattr(switch.return_value, MODES[mode]).assert_called_once_with()
+
+
+def test_restarting_a_vehicle_that_is_off():
+    with patch("crazyflie_link.reboot.PowerSwitch", spec=PowerSwitch) as switch:
+        switch.return_value.reboot_to_fw.side_effect = Exception("Failed to connect to Crazyflie")
+        with pytest.raises(NoAnswerError, match="Failed to connect"):
+            reboot(Address.parse(URI))
+        switch.return_value.close.assert_called_once_with()
+
+
+def driver_class(base, **behaviour):
+    instance = MagicMock(spec=base())
+    instance.scan_interface.configure_mock(**behaviour)
+    result = MagicMock(return_value=instance)
+    result.__name__ = base.__name__
+    return result
+
+
+def test_scanning(monkeypatch):
+    def find_no_dongle(address):
+        print("Cannot find a Crazyradio Dongle")
+        return []
+
+    radio = driver_class(RadioDriver, side_effect=find_no_dongle)
+    udp = driver_class(UdpDriver, return_value=[["udp://127.0.0.1:19850", ""]])
+    broken = driver_class(UdpDriver, side_effect=OSError("strange"))
+    monkeypatch.setattr(cflib.crtp, "CLASSES", [radio, udp, broken])
+    found, problems = scan("E7E7E7E701")
+    assert found == ["udp://127.0.0.1:19850"]
+    assert [type(problem) for problem in problems] == [NoDongleError, NoAnswerError]
+    radio().scan_interface.assert_called_once_with(0xE7E7E7E701)
+
+
+@pytest.mark.parametrize("address", ["", "E7E7E7E7E7E7", "hello", "-1"])
+def test_scanning_for_no_address(address):
+    with pytest.raises(AddressError):
+        scan(address)

@@ -1,0 +1,270 @@
+"""ROS interface of the sweep: takes off, flies the lanes, lands, and reports."""
+
+from std_msgs.msg import String
+from std_srvs.srv import Empty, EmptyRequest, Trigger, TriggerResponse
+from typing_extensions import override
+from visualization_msgs.msg import MarkerArray
+
+from crazyflie_msgs.msg import (
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
+from crazyflie_sweep.sweep_markers import markers
+from crazyflie_sweep.sweep_parameters import SweepParameters
+from crazyflie_sweep.sweeper import Sweeper
+from crazyflie_sweep.velocity_source import VelocitySource
+from crazyflie_tutorial_msgs.msg import SweepReport, Vel
+from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtRequest
+from crazyflie_utils import Node, NodeHandle
+
+TIME_STEP = 0.02
+"""Between two references, s."""
+
+ASK_PERIOD = 0.1
+"""Between two questions for a velocity, s."""
+
+REPORT_PERIOD = 0.5
+"""Between two reports, and pictures for RViz, s."""
+
+STATE_LIMIT = 0.5
+"""Without a state for so long, s, the reference stands still."""
+
+FLIGHT_LIMIT = 120.0
+"""The longest that takeoff or landing may take, s of the machine's clock."""
+
+FLYING = "flying"
+"""Flight state of a vehicle that follows references."""
+
+IDLE = (SweepReport.WAITING, SweepReport.DONE, SweepReport.FAILED)
+"""States in which a sweep may begin."""
+
+
+class SweepNode(Node):
+    """Sweep an area in lanes, at velocities that a service gives; hover when it does not."""
+
+    def __init__(self) -> None:
+        self._state = SweepReport.WAITING
+        self._reason = ""
+        self._sweeper: Sweeper | None = None
+        self._position: tuple[float, float, float] | None = None
+        self._position_time = 0.0
+        self._flight_state = ""
+        self._is_asking = False
+        self._failure = ""
+        self._begin = 0.0
+        self._end: float | None = None
+        self._hovering = 0.0
+        self._tick_time = 0.0
+        self._markers_are_old = True
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(SweepParameters)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._reference = handle.publisher(parameters.reference_topic, PositionVelocityStateStamped)
+        self._report = handle.publisher(parameters.report_topic, SweepReport, latch=True)
+        self._velocity = handle.publisher(parameters.velocity_topic, Vel)
+        self._markers = handle.publisher(parameters.markers_topic, MarkerArray, latch=True)
+        handle.advertise_service("~start", Trigger, self._on_start)
+        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(
+            parameters.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
+        )
+        self._publish_report()
+        self._tick_time = handle.time()
+        handle.timer(TIME_STEP, self._on_timer)
+        handle.timer(ASK_PERIOD, self._ask)
+        handle.timer(REPORT_PERIOD, self._publish_report)
+        if parameters.start:
+            self._start_timer = handle.timer(REPORT_PERIOD, self._start_when_possible)
+
+    @override
+    def make_safe(self) -> None:
+        """Let the vehicle hover where the reference is."""
+        if self._sweeper is not None and self._is_sweeping():
+            self._sweeper.speed = 0.0
+            self._publish_reference(self._sweeper)
+
+    # Begin and end.
+
+    def _start_when_possible(self):
+        takeoff = self._handle.resolve(self._parameters.takeoff_service)
+        if self._knows_position() and takeoff in self._handle.service_nodes():
+            self._start_timer.stop()
+            if self._state in IDLE:
+                self._start()
+
+    def _on_start(self, _):
+        if self._state not in IDLE:
+            return TriggerResponse(False, f"a sweep is under way: {self._state}")
+        if not self._knows_position():
+            return TriggerResponse(False, "no state of the vehicle has come")
+        self._start()
+        return TriggerResponse(True, "")
+
+    def _start(self):
+        self._sweeper = None
+        self._failure = ""
+        self._begin = self._handle.time()
+        self._end = None
+        self._hovering = 0.0
+        if self._flight_state == FLYING:
+            self._sweep()
+        else:
+            self._set_state(SweepReport.TAKING_OFF)
+            self._call(self._parameters.takeoff_service, self._sweep)
+
+    def _call(self, service, proceed):
+        def on_reply(reply):
+            if reply.exception() is None:
+                proceed()
+            else:
+                self._finish(str(reply.exception()))
+
+        future = self._handle.call_service(service, Empty, EmptyRequest(), FLIGHT_LIMIT)
+        future.add_done_callback(on_reply)
+
+    def _sweep(self):
+        if self._position is None:
+            self._finish("no state of the vehicle has come")
+            return
+        # It has to say so by itself: the answer of takeoff may come before this topic.
+        self._flight_state = FLYING
+        self._sweeper = Sweeper(self._parameters.plan(), self._position)
+        self._source = VelocitySource(
+            self._parameters.velocity_limit, self._parameters.velocity_most, self._handle.time()
+        )
+        self._markers_are_old = True
+        self._set_state(SweepReport.SWEEPING)
+
+    def _land(self, sweeper):
+        if not sweeper.is_covered:
+            wanted = self._parameters.coverage
+            self._failure = (
+                f"{sweeper.coverage.share:.1%} is covered after {wanted.max_passes} passes; "
+                f"expected {wanted.goal:.1%}"
+            )
+        self._set_state(SweepReport.LANDING)
+        self._call(self._parameters.land_service, lambda: self._finish(self._failure))
+
+    def _finish(self, failure):
+        self._end = self._handle.time()
+        self._set_state(SweepReport.FAILED if failure else SweepReport.DONE, failure)
+        if failure:
+            self._handle.error(f"the sweep has failed: {failure}")
+        report = self._publish_report()
+        self._handle.info(
+            f"{report.coverage:.1%} of the area is covered after {report.duration:.1f} s, "
+            f"{report.hovering:.1f} s of them without a velocity; "
+            f"at most {report.max_lane_distance:.3f} m from the lane"
+        )
+
+    def _set_state(self, state, reason=""):
+        if (state, reason) == (self._state, self._reason):
+            return
+        self._state, self._reason = state, reason
+        self._publish_report()
+
+    # The flight.
+
+    def _on_flight_state(self, message):
+        self._flight_state = message.data
+        if self._flight_state != FLYING and self._is_sweeping():
+            self._finish(f"the flight was ended: the takeoff server says {message.data}")
+
+    def _on_state(self, message):
+        state = message.state
+        self._position = (state.x, state.y, state.z)
+        self._position_time = self._handle.time()
+        if self._sweeper is not None and self._is_sweeping():
+            self._markers_are_old |= self._sweeper.measure(self._position)
+
+    def _knows_position(self):
+        age = self._handle.time() - self._position_time
+        return self._position is not None and abs(age) < STATE_LIMIT
+
+    def _is_sweeping(self):
+        return self._state in (SweepReport.SWEEPING, SweepReport.HOVERING)
+
+    def _on_timer(self):
+        now = self._handle.time()
+        dt, self._tick_time = max(now - self._tick_time, 0.0), now
+        if self._sweeper is None or not self._is_sweeping():
+            return
+        velocity = self._usable_velocity(now)
+        if velocity is None:
+            self._hovering += dt
+        self._sweeper.advance(dt, velocity)
+        self._publish_reference(self._sweeper)
+        self._velocity.publish(Vel("linear", self._sweeper.speed))
+        if self._sweeper.is_done:
+            self._land(self._sweeper)
+
+    def _usable_velocity(self, now):
+        velocity = self._source.velocity(now)
+        reason = self._source.reason
+        service = self._handle.resolve(self._parameters.velocity_service)
+        if reason and service not in reason:
+            reason = f"{service}: {reason}"
+        if not self._knows_position():
+            velocity = None
+            reason = f"no state of the vehicle has come for {STATE_LIMIT:g} s"
+        if not reason:
+            if self._state == SweepReport.HOVERING:
+                self._handle.info("the sweep goes on")
+            self._set_state(SweepReport.SWEEPING)
+        elif self._state != SweepReport.HOVERING or reason != self._reason:
+            self._handle.warn(f"hovering: {reason}", throttle=1.0)
+            self._set_state(SweepReport.HOVERING, reason)
+        return velocity
+
+    def _publish_reference(self, sweeper):
+        message = PositionVelocityStateStamped(state=PositionVelocityState(*sweeper.reference))
+        message.header.stamp = self._handle.stamp()
+        message.header.frame_id = self._parameters.fixed_frame
+        self._reference.publish(message)
+
+    # The velocity service.
+
+    def _ask(self):
+        if self._sweeper is None or self._is_asking or not self._is_sweeping():
+            return
+        if self._position is None or not self._knows_position():
+            return
+        self._is_asking = True
+        request = VelocityAtRequest(self._sweeper.service_position(self._position[0]))
+        future = self._handle.call_service(
+            self._parameters.velocity_service, VelocityAt, request, self._parameters.velocity_limit
+        )
+        future.add_done_callback(self._on_velocity)
+
+    def _on_velocity(self, reply):
+        self._is_asking = False
+        if reply.exception() is None:
+            self._source.answer(reply.result().vel, self._handle.time())
+        else:
+            self._source.fail(str(reply.exception()))
+
+    # Reports.
+
+    def _publish_report(self):
+        sweeper = self._sweeper
+        report = SweepReport(state=self._state, reason=self._reason)
+        report.header.stamp = self._handle.stamp()
+        report.is_final = self._state in (SweepReport.DONE, SweepReport.FAILED)
+        report.hovering = self._hovering
+        if self._state != SweepReport.WAITING:
+            end = self._handle.time() if self._end is None else self._end
+            report.duration = end - self._begin
+        if sweeper is not None:
+            report.coverage = sweeper.coverage.share
+            report.max_lane_distance = sweeper.max_lane_distance
+            if self._markers_are_old:
+                self._markers_are_old = False
+                self._markers.publish(markers(sweeper, self._parameters.fixed_frame))
+        self._report.publish(report)
+        return report

@@ -1,0 +1,117 @@
+"""What a sweep is told."""
+
+from collections.abc import Iterator
+
+from typing_extensions import override
+
+from crazyflie_sweep.lanes import Area
+from crazyflie_sweep.sweeper import Plan
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import (
+    BOOLEAN,
+    FRAME,
+    METRES,
+    SERVICE,
+    TIME_STEP,
+    TOPIC,
+    Integer,
+    Number,
+)
+
+_WIDTH = Number("m", above=0.0)
+_SPEED = Number("m/s", above=0.0)
+
+
+class AreaParameters(Parameters):
+    """The rectangle to sweep; arcs reach half a lane beyond it, along x."""
+
+    x_min: float = parameter(METRES, "the area begins here, in the fixed frame", -1.5)
+    x_max: float = parameter(METRES, "and ends here", 1.5)
+    y_min: float = parameter(METRES, "the first lane is beside it", -1.5)
+    y_max: float = parameter(METRES, "the last lane is beside it", 1.5)
+
+
+class SpeedParameters(Parameters):
+    """How fast the reference goes."""
+
+    min: float = parameter(_SPEED, "least speed on lanes", 0.1)
+    max: float = parameter(_SPEED, "largest speed on lanes", 0.7)
+    turn: float = parameter(_SPEED, "on arcs, and to the first lane", 0.25)
+    acceleration: float = parameter(Number("m/s^2", above=0.0), "largest along the way", 0.5)
+
+
+class CoverageParameters(Parameters):
+    """What counts as covered."""
+
+    swath: float = parameter(_WIDTH, "diameter of what the vehicle covers at a time", 0.7)
+    cell: float = parameter(_WIDTH, "width of the cells that are counted", 0.1)
+    goal: float = parameter(
+        Number(above=0.0, maximum=1.0), "share of the area that has to be covered", 0.99
+    )
+    max_passes: int = parameter(
+        Integer(1, 100), "how often the lanes are flown, there and back, to get there", 2
+    )
+
+
+class SweepParameters(Parameters):
+    """Parameters of `SweepNode`."""
+
+    area: AreaParameters = group(AreaParameters, "area")
+    lane_width: float = parameter(_WIDTH, "largest distance of two lanes", 0.5)
+    height: float = parameter(_WIDTH, "of the lanes, above the ground", 1.0)
+    speed: SpeedParameters = group(SpeedParameters, "speed")
+    coverage: CoverageParameters = group(CoverageParameters, "coverage")
+    velocity_limit: float = parameter(
+        TIME_STEP, "how long an answer of the velocity service may be used", 0.5, "velocity/limit"
+    )
+    velocity_most: float = parameter(
+        Number(above=0.0), "an answer that is not > 0 and <= this is nonsense", 3.0, "velocity/most"
+    )
+    start: bool = parameter(
+        BOOLEAN, "begin as soon as there is a vehicle; otherwise `~start` is waited for", True
+    )
+    fixed_frame: str = parameter(FRAME, "of the area", "world", "frames/fixed")
+    takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
+    land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
+    velocity_service: str = parameter(
+        SERVICE, "position in, velocity out", "oscillator", "srv/velocity"
+    )
+    state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
+    reference_topic: str = parameter(TOPIC, "where references go", name="topics/reference")
+    flight_state_topic: str = parameter(
+        TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
+    )
+    report_topic: str = parameter(TOPIC, "how the sweep stands", "~report", "topics/report")
+    velocity_topic: str = parameter(
+        TOPIC, "speed of the reference, as `Vel` linear", "~velocity", "topics/velocity"
+    )
+    markers_topic: str = parameter(TOPIC, "for RViz", "~markers", "topics/markers")
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        for axis in "xy":
+            least = getattr(self.area, f"{axis}_min")
+            most = getattr(self.area, f"{axis}_max")
+            if not least < most:
+                yield f"area/{axis}_min is {least:g}; expected < area/{axis}_max, {most:g} (m)"
+        speed = self.speed
+        if speed.min > speed.max:
+            yield f"speed/min is {speed.min:g}; expected <= speed/max, {speed.max:g} (m/s)"
+
+    def plan(self) -> Plan:
+        """Return what to fly."""
+        area, speed, coverage = self.area, self.speed, self.coverage
+        return Plan(
+            area=Area(area.x_min, area.x_max, area.y_min, area.y_max),
+            lane_width=self.lane_width,
+            height=self.height,
+            min_speed=speed.min,
+            max_speed=speed.max,
+            turn_speed=speed.turn,
+            acceleration=speed.acceleration,
+            swath=coverage.swath,
+            cell=coverage.cell,
+            goal=coverage.goal,
+            max_passes=coverage.max_passes,
+        )

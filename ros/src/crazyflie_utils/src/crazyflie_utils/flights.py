@@ -1,0 +1,96 @@
+"""Which vehicles are in flight: what a process must know before it ends."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from std_msgs.msg import String
+
+if TYPE_CHECKING:
+    from crazyflie_utils.process import Process
+
+TOPIC = "/flights"
+"""Where whoever starts and ends flights tells of them, latched."""
+
+_IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
+
+
+class Announcement:
+    """Tells every process of the flights that a node starts and ends.
+
+    Attributes
+    ----------
+    node : str
+        Its absolute name.
+    in_flight : bool
+        What was told last.
+
+    Parameters
+    ----------
+    process : Process
+    node : str
+    """
+
+    def __init__(self, process: Process, node: str):
+        self.node = node
+        self.in_flight = False
+        self._publisher = process.topics.publisher(TOPIC, String, latch=True)
+
+    def tell(self, in_flight: bool) -> None:
+        """Tell whether there is a flight."""
+        self.in_flight = in_flight
+        self._publish(_IN_FLIGHT if in_flight else _ON_GROUND)
+
+    def tell_of_end(self) -> None:
+        """Tell that a flight, if there is one, is to end because its process is to end."""
+        if self.in_flight:
+            self._publish(_TO_END)
+
+    def close(self) -> None:
+        """Tell no more."""
+        self.in_flight = False
+        self._publisher.close()
+
+    def _publish(self, state):
+        self._publisher.publish(String(f"{self.node} {state}"))
+
+
+class Flights:
+    """The flights that matter to some nodes: those in their namespaces, above and below.
+
+    Parameters
+    ----------
+    process : Process
+    nodes : iterable of str
+        Absolute names.
+    """
+
+    def __init__(self, process: Process, nodes: Iterable[str]):
+        self._namespaces = [_namespace(node) for node in nodes]
+        self._in_flight: dict[str, bool] = {}
+        self._to_end_since: dict[str, float] = {}
+        process.topics.subscribe(TOPIC, String, self._note)
+
+    @property
+    def in_flight(self) -> list[str]:
+        """Names of the nodes whose flights have not ended."""
+        return sorted(name for name, flies in self._in_flight.items() if flies)
+
+    def unattended(self, within: float) -> list[str]:
+        """Return those in flight of which nobody has told within ``within`` (s) that they end."""
+        since = time.monotonic() - within
+        return [name for name in self.in_flight if self._to_end_since.get(name, since) <= since]
+
+    def _note(self, message: String) -> None:
+        name, _, state = message.data.partition(" ")
+        here = _namespace(name)
+        if any(here.startswith(each) or each.startswith(here) for each in self._namespaces):
+            self._in_flight[name] = state in (_IN_FLIGHT, _TO_END)
+            if state == _TO_END:
+                self._to_end_since[name] = time.monotonic()
+
+
+def _namespace(name):
+    return name.rpartition("/")[0] + "/"

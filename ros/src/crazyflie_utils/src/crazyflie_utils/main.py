@@ -1,0 +1,356 @@
+"""Main programs: one node in a process, or many."""
+
+import gc
+import importlib
+import io
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+# Before all else that imports rospy.
+import crazyflie_utils.ros1.light_rospy  # noqa: F401
+
+# isort: split
+import rosgraph
+import rospy
+
+from crazyflie_utils.flights import Flights
+from crazyflie_utils.handle import NodeHandle
+from crazyflie_utils.master_watch import MasterWatch
+from crazyflie_utils.node import Node
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
+from crazyflie_utils.parameters.types import BOOLEAN, GraphName, ParameterType
+from crazyflie_utils.process import Process
+from crazyflie_utils.ros1 import internals as rospy_internals
+from crazyflie_utils.ros1.transport import RosTransport
+
+_MASTER_LIMIT = 10.0
+"""How long, in s, a node waits for a ROS master."""
+
+_SHUTDOWN_LIMIT = 2.0
+"""How long, in s, shutdown waits for a callback that does not return."""
+
+_FLIGHT_LIMIT = 10.0
+"""How long, in s, a process lives on for a flight that is to end: less than the 15 s
+that roslaunch gives it."""
+
+_NOTICE_DELAY = 1.0
+"""How long, in s, a process waits for the word of another that its flight is to end, before it says
+itself what it waits for."""
+
+_FLUSH_TIME = 0.2
+"""How long, in s, the last messages have to be sent by rospy's threads and to be
+read: a subscriber hangs up as soon as the master tells it of the publisher's end."""
+
+_SWITCH_INTERVAL = 0.0005
+"""How long, in s, a thread that has something to do waits for another that computes."""
+
+
+def run(node_class: type | str, default_name: str) -> None:
+    """Run one node in this process until ROS shuts down; does not return.
+
+    Exits with status 1 when the node cannot be initialized.
+
+    Parameters
+    ----------
+    node_class : type or str
+        Subclass of `Node`, or where it is, "package.module:Class": a process that has not
+        imported it yet begins sooner and is smaller by half, see `light_rospy`.
+    default_name : str
+        Name of the node unless the launch file gives another.
+    """
+
+    def make_node(handle):
+        make = _node_class(node_class) if isinstance(node_class, str) else node_class
+        return {handle.name: make()}
+
+    run_nodes(default_name, make_node)
+
+
+def run_composed(default_name: str) -> None:
+    """Run the nodes that the private parameter ``nodes`` lists; does not return.
+
+    ``nodes`` maps a node's name, relative to this process's namespace, to its
+    class as "package.module:Class". Each node has the parameters, topics and
+    services it would have in a process of its own.
+    """
+
+    def make_nodes(handle):
+        classes = handle.load(ComposedParameters).nodes
+        return {handle.resolve(name): make() for name, make in classes.items()}
+
+    run_nodes(default_name, make_nodes)
+
+
+def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, Node]]) -> None:
+    """Run the nodes that a function makes; does not return.
+
+    Parameters
+    ----------
+    default_name : str
+        Name of the process's own node unless the launch file gives another.
+    make_nodes : callable
+        ``make_nodes(handle)``, with the handle of that node, returns all nodes by absolute name.
+        What it raises ends the process with status 1.
+    """
+    # Before rospy's own handlers, which shut down inside the handler, where any lock may be held
+    # by the very code that was interrupted: a node that registers would hang.
+    signals = _catch_signals()
+    _run(_begin(default_name, signals), make_nodes, signals)
+
+
+class NodeClasses(ParameterType):
+    """The nodes of a process: a dictionary of name to class."""
+
+    label = "dictionary, string to string"
+
+    def __call__(self, value: Any) -> dict[str, type[Node]]:
+        """Return node name -> node class."""
+        if not isinstance(value, dict) or not value:
+            raise ValueError
+        return {GraphName()(name): _node_class(path) for name, path in _flatten(value).items()}
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return 'a dictionary of node name: "package.module:Class"'
+
+
+class ComposedParameters(Parameters):
+    """What a process of many nodes is told."""
+
+    nodes: dict[str, type[Node]] = parameter(NodeClasses(), 'node name to "package.module:Class"')
+
+
+def _flatten(tree, prefix=""):
+    # A name such as cf1/simulator is a tree to the parameter server.
+    leaves = {}
+    for key, value in tree.items():
+        if isinstance(value, dict):
+            leaves.update(_flatten(value, f"{prefix}{key}/"))
+        else:
+            leaves[prefix + key] = value
+    return leaves
+
+
+def _node_class(path):
+    module, _, name = str(path).partition(":")
+    try:
+        found = getattr(importlib.import_module(module), name)
+    except Exception as error:
+        raise ValueError(f"no class {path!r}: {error!r}") from error
+    if not (isinstance(found, type) and issubclass(found, Node)):
+        raise ValueError(f"{path!r} is not a subclass of Node")
+    return found
+
+
+def begin(default_name: str) -> Process:
+    """Make this process a ROS node and return what its nodes share, not yet started.
+
+    Exits with status 1 when there is no ROS master.
+    """
+    return _begin(default_name, None)
+
+
+def _begin(default_name, signals):
+    # rospy's log does not flush: what a node said before it died would be lost in a pipe.
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(line_buffering=True)
+    _wait_for_master(signals)
+    rospy_internals.never_wait_long_to_begin()
+    rospy_internals.connect_once()
+    rospy.init_node(default_name, disable_signals=signals is not None)
+    return ros_process()
+
+
+def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
+    """Make a user's script a ROS node, unless it is one already.
+
+    Ctrl-C remains what it is in Python; ROS does not end by it.
+
+    Returns
+    -------
+    Process
+        Not yet started. When ROS has shut down, it has an exit status.
+    callable
+        ``end()`` stops the process, and the ROS node if it was made here.
+    """
+    is_own = not rospy.core.is_initialized()
+    if is_own:
+        _wait_for_master()
+        rospy_internals.never_wait_long_to_begin()
+        rospy_internals.connect_once()
+        rospy.init_node(default_name, anonymous=True, disable_signals=True)
+    process = ros_process()
+    rospy.on_shutdown(lambda: process.end(0))
+
+    def end() -> None:
+        process.stop()
+        if is_own:
+            time.sleep(_FLUSH_TIME)
+            rospy.signal_shutdown("the script has ended")
+
+    return process, end
+
+
+def ros_process() -> Process:
+    """Return what the nodes of this process share, when it is a ROS node already."""
+    transport = RosTransport()
+    try:
+        value = transport.get_param("/use_sim_time")
+    except KeyError:
+        value = False
+    try:
+        use_sim_time = BOOLEAN(value)
+    except ValueError:
+        transport.log("error", f"parameter /use_sim_time is {value!r}; expected {BOOLEAN}")
+        _fail()
+    # In simulated time there is no such thing as too many messages a second.
+    transport.receive(limits_rate=not use_sim_time)
+    return Process(transport, use_sim_time)
+
+
+def _wait_for_master(signals=None):
+    pause = threading.Event()
+    waited = 0.0
+    while not rosgraph.is_master_online():
+        if waited == 0.0:
+            print(f"waiting for a ROS master at {rosgraph.get_master_uri()}", file=sys.stderr)
+        if waited >= _MASTER_LIMIT:
+            sys.exit(
+                f"no ROS master at {rosgraph.get_master_uri()} after {_MASTER_LIMIT:g} s; "
+                "start one with roscore or roslaunch"
+            )
+        pause.wait(0.5)
+        waited += 0.5
+        if signals:
+            sys.exit(f"signal {signals[0]}: ends before there was a ROS master")
+
+
+def _run(process, make_nodes, signals):
+    handle = process.handle(rospy.get_name())
+    try:
+        with process.transport.starting():
+            nodes = make_nodes(handle)
+            for name, node in nodes.items():
+                if not node.initialize(process.handle(name)):
+                    process.transport.log("fatal", f"{name}: not initialized; the process exits")
+                    _fail()
+            flights = _flights(process, nodes)
+    except ParameterError as error:
+        handle.error(str(error))
+        _fail()
+    except Exception:
+        handle.error(f"failed to initialize\n{traceback.format_exc()}")
+        _fail()
+    ending = _Ending(process, nodes)
+    rospy.on_shutdown(ending.run)
+    watch = MasterWatch()
+    watch.start()
+    _stop_for_nobody()
+    # Not in this thread, which must stay free to end a callback that does not.
+    threading.Thread(target=process.start, name="start", daemon=True).start()
+    while not signals and process.exit_status is None and not rospy.is_shutdown():
+        time.sleep(0.1)
+    if signals == [signal.SIGINT] and flights is not None:
+        _let_flights_end(process, nodes, flights, signals)
+    watch.stop()
+    rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
+    if ending.is_stuck:
+        _exit_at_once(1)
+    sys.exit(process.exit_status or 0)
+
+
+class _Ending:
+    """What a process does before rospy closes its connections."""
+
+    def __init__(self, process: Process, nodes: list[Node]):
+        self._process = process
+        self._nodes = nodes
+        self.is_stuck = False
+
+    def run(self):
+        work = threading.Thread(target=self._process.shut_down, args=(self._nodes,), daemon=True)
+        work.start()
+        work.join(_SHUTDOWN_LIMIT)
+        self.is_stuck = work.is_alive()
+        if self.is_stuck:
+            self._process.transport.log(
+                "fatal", f"a callback has not returned within {_SHUTDOWN_LIMIT:g} s; exiting"
+            )
+        time.sleep(_FLUSH_TIME)
+
+
+def _stop_for_nobody():
+    """Keep what Python does by the way from delaying controls."""
+    # A search for garbage among all that has been imported takes 10 ms; none of it ever is.
+    gc.collect()
+    gc.freeze()
+    # By default a thread that computes lets others wait for 5 ms.
+    sys.setswitchinterval(_SWITCH_INTERVAL)
+
+
+def _flights(process, nodes):
+    needed = [name for name, node in nodes.items() if node.needed_in_flight]
+    return Flights(process, needed) if needed else None
+
+
+def _let_flights_end(process, nodes, flights, signals):
+    if not flights.in_flight:
+        return
+
+    def say(names):
+        process.transport.log(
+            "warn",
+            f"{', '.join(names)}: in flight; ends after the landing, or in {_FLIGHT_LIMIT:g} s; "
+            "a second SIGINT ends at once",
+        )
+
+    own = process.own_flights
+    if own:
+        say(own)
+    # Not in this thread: a callback may never return.
+    threading.Thread(target=process.leave, args=(nodes,), name="leave", daemon=True).start()
+    begin = time.monotonic()
+    is_said = bool(own)
+    while flights.in_flight and len(signals) == 1 and time.monotonic() < begin + _FLIGHT_LIMIT:
+        time.sleep(0.05)
+        if not is_said and time.monotonic() > begin + _NOTICE_DELAY:
+            is_said = True
+            if names := flights.unattended(2.0 * _NOTICE_DELAY):
+                say(names)
+
+
+def _catch_signals():
+    caught = []
+
+    def note(number, _frame):
+        caught.append(number)
+        # After a first SIGINT a flight may have to end; the next signal ends that.
+        if len(caught) > 1 or number != signal.SIGINT:
+            for each in ends:
+                signal.signal(each, signal.SIG_DFL)
+
+    ends = (signal.SIGINT, signal.SIGTERM)
+    for each in ends:
+        signal.signal(each, note)
+    return caught
+
+
+def _fail():
+    rospy.signal_shutdown("failed to initialize")
+    _exit_at_once(1)
+
+
+def _exit_at_once(status):
+    # Otherwise threads, of rospy or stuck in a callback, keep the process alive
+    # for half a second or for ever.
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)

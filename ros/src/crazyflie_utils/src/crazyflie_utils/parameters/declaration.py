@@ -1,0 +1,215 @@
+"""Parameters, declared once: a class whose fields say name, type, default and help.
+
+From a declaration come the checks at start, the tables in the READMEs, command
+lines, and what dynamic_reconfigure may change in flight::
+
+    class LimiterParameters(Parameters):
+        limit: float = parameter(Number("m/s^2", above=0.0), "largest thrust", live=True)
+        control_topic: str = parameter(TOPIC, "where controls come from", name="topics/control")
+"""
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, Self, dataclass_transform
+
+from crazyflie_utils.messages import shown
+from crazyflie_utils.parameters.types import ParameterType
+
+REQUIRED = dataclasses.MISSING
+"""Default of a parameter that has none."""
+
+_KEY = "declaration"
+
+
+class ParameterError(Exception):
+    """Parameters are missing or unusable; the text names each of them in full.
+
+    Parameters
+    ----------
+    complaints : str
+        One about each thing that is wrong.
+    """
+
+    def __init__(self, *complaints: str):
+        super().__init__("\n".join(complaints))
+        self.complaints = complaints
+
+
+@dataclasses.dataclass(frozen=True)
+class Declaration:
+    """What is known about a parameter.
+
+    Attributes
+    ----------
+    name : str
+        Below the node's name, such as "topics/state"; a name that begins with a
+        slash is not the node's own.
+    type : ParameterType
+    help : str
+        What it is; without its type, unit, range and default.
+    default : object
+        Taken as it is when the parameter is not set; `REQUIRED` for none.
+    live : bool
+        Whether it may be changed while the node runs.
+    """
+
+    name: str
+    type: ParameterType
+    help: str
+    default: Any
+    live: bool
+
+
+@dataclasses.dataclass(frozen=True)
+class _Group:
+    prefix: str
+    type: "type[Parameters]"
+
+
+def parameter(
+    type: ParameterType,  # noqa: A002
+    help: str,  # noqa: A002
+    default: Any = REQUIRED,
+    name: str = "",
+    live: bool = False,
+) -> Any:
+    """Declare a field of a `Parameters` class; see `Declaration`.
+
+    Parameters
+    ----------
+    name : str
+        If it is not the field's.
+    """
+    declaration = Declaration(name, type, help, default, live)
+    return dataclasses.field(default=default, metadata={_KEY: declaration})
+
+
+def group(type: "type[Parameters]", prefix: str) -> Any:  # noqa: A002
+    """Declare a field that holds further parameters, whose names begin with ``prefix/``."""
+    return dataclasses.field(metadata={_KEY: _Group(prefix, type)})
+
+
+@dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(parameter, group))
+class Parameters:
+    """Base class of declarations; an object of a subclass has checked values.
+
+    A subclass is a frozen dataclass whose arguments are given by name.
+    """
+
+    def __init_subclass__(cls) -> None:
+        dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+
+    def complaints(self) -> Iterable[str]:
+        """Return a text about each thing wrong with values that are good one by one."""
+        return ()
+
+    @classmethod
+    def declarations(cls) -> Iterator[Declaration]:
+        """Yield every declaration, those of groups with their full names."""
+        for _, declaration in cls._fields():
+            if isinstance(declaration, _Group):
+                for inner in declaration.type.declarations():
+                    yield dataclasses.replace(inner, name=f"{declaration.prefix}/{inner.name}")
+            else:
+                yield declaration
+
+    @classmethod
+    def read(cls, get: Callable[[str], Any], full_name: Callable[[str], str] = str) -> Self:
+        """Return the parameters that a source holds, all of them checked.
+
+        Parameters
+        ----------
+        get : callable
+            ``get(name)`` returns the raw value of a parameter, or raises KeyError.
+        full_name : callable
+            ``full_name(name)`` is how messages call it.
+
+        Raises
+        ------
+        ParameterError
+            About everything that is missing or not what is expected.
+        """
+        values: dict[str, Any] = {}
+        complaints: list[str] = []
+        for field, declaration in cls._fields():
+            try:
+                values[field] = _read_field(declaration, get, full_name)
+            except ParameterError as error:
+                complaints += error.complaints
+        if not complaints:
+            parameters = cls(**values)
+            complaints += parameters.complaints()
+        if complaints:
+            raise ParameterError(*complaints)
+        return parameters
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any], prefix: str = "") -> Self:
+        """Return the parameters in a mapping of name to raw value.
+
+        Messages call a parameter ``prefix`` and its name.
+
+        Raises
+        ------
+        ParameterError
+            See `read`; also about names that are not declared.
+        """
+        known = {declaration.name for declaration in cls.declarations()}
+        unknown = [
+            f"{prefix}{name} is no parameter; expected one of {', '.join(sorted(known))}"
+            for name in values
+            if name not in known
+        ]
+        try:
+            parameters = cls.read(values.__getitem__, lambda name: prefix + name)
+        except ParameterError as error:
+            raise ParameterError(*unknown, *error.complaints) from None
+        if unknown:
+            raise ParameterError(*unknown)
+        return parameters
+
+    @classmethod
+    def _fields(cls) -> Iterator[tuple[str, Declaration | _Group]]:
+        for field in dataclasses.fields(cls):  # type: ignore[arg-type]
+            declaration = field.metadata[_KEY]
+            if isinstance(declaration, Declaration) and not declaration.name:
+                declaration = dataclasses.replace(declaration, name=field.name)
+            yield field.name, declaration
+
+
+def read_parameter(
+    declaration: Declaration, get: Callable[[str], Any], full_name: Callable[[str], str] = str
+) -> Any:
+    """Return one parameter, checked; see `Parameters.read`.
+
+    Raises
+    ------
+    ParameterError
+        It is required but not set, or not what is expected.
+    """
+    expected = declaration.type
+    try:
+        raw = get(declaration.name)
+    except KeyError:
+        if declaration.default is not REQUIRED:
+            return declaration.default
+        raise ParameterError(
+            f"parameter {full_name(declaration.name)} is not set; expected {expected}"
+        ) from None
+    try:
+        return expected(raw)
+    except (ValueError, TypeError, OverflowError) as error:
+        # The latter two are Python's own words about a number that is none.
+        reason = f" ({error})" if isinstance(error, ValueError) and str(error) else ""
+        raise ParameterError(
+            f"parameter {full_name(declaration.name)} is {shown(raw)}; expected {expected}{reason}"
+        ) from None
+
+
+def _read_field(declaration, get, full_name):
+    if isinstance(declaration, Declaration):
+        return read_parameter(declaration, get, full_name)
+    return declaration.type.read(
+        lambda name: get(f"{declaration.prefix}/{name}"),
+        lambda name: full_name(f"{declaration.prefix}/{name}"),
+    )

@@ -1,0 +1,165 @@
+"""Parameters that may be changed in flight, as dynamic_reconfigure and rqt_reconfigure do it.
+
+The library's own server uses rospy, in threads of rospy's; this one goes
+through the node handle, so that a change comes between two callbacks and works
+for many nodes in one process. What goes over the wire is encoded by the library.
+"""
+
+import contextlib
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+from dynamic_reconfigure import encoding
+from dynamic_reconfigure.msg import Config, ConfigDescription
+from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
+
+from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, ParameterError, Parameters
+from crazyflie_utils.parameters.types import Boolean, Integer, Number, Text
+from crazyflie_utils.transport import ServiceError
+
+if TYPE_CHECKING:
+    from crazyflie_utils.handle import NodeHandle
+
+
+class Reconfiguration:
+    """Offer the live parameters of a node.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+        Of the node.
+    parameters : Parameters
+        As they are now.
+    get : callable
+        Where they were read from; see `Parameters.read`.
+    on_change : callable
+        See `NodeHandle.load`.
+    """
+
+    def __init__(
+        self,
+        handle: "NodeHandle",
+        parameters: Parameters,
+        get: Callable[[str], Any],
+        on_change: Callable[[Any], None],
+    ):
+        self._handle = handle
+        self._type = type(parameters)
+        self._on_change = on_change
+        # All of them now: at a change, in flight, nobody may wait for the master.
+        self._values = _read(self._type.declarations(), get)
+        self._live = {d.name: d for d in self._type.declarations() if d.live}
+        descriptions = handle.publisher("~parameter_descriptions", ConfigDescription, latch=True)
+        self._updates = handle.publisher("~parameter_updates", Config, latch=True)
+        descriptions.publish(_description(self._live.values(), self._config()))
+        self._updates.publish(encoding.encode_config(self._config()))
+        handle.advertise_service("~set_parameters", Reconfigure, self._on_set_parameters)
+
+    def _on_set_parameters(self, request):
+        sent = request.config
+        wanted = {
+            parameter.name: parameter.value
+            for parameter in (*sent.bools, *sent.ints, *sent.strs, *sent.doubles)
+        }
+        try:
+            self._apply(wanted)
+        except ParameterError as error:
+            self._updates.publish(encoding.encode_config(self._config()))
+            raise ServiceError(str(error)) from None
+        for name, value in wanted.items():
+            self._handle.set_param_later(f"~{name}", value)
+        self._updates.publish(encoding.encode_config(self._config()))
+        return ReconfigureResponse(encoding.encode_config(self._config()))
+
+    def _apply(self, wanted):
+        unknown = wanted.keys() - self._live.keys()
+        if unknown:
+            raise ParameterError(
+                f"{', '.join(sorted(unknown))} cannot be changed while {self._handle.name} runs; "
+                f"expected some of {', '.join(self._live)}"
+            )
+        before = self._values
+        self._values = {**before, **wanted}
+        try:
+            full_name = self._handle.resolve
+            self._on_change(
+                self._type.read(self._values.__getitem__, lambda name: full_name(f"~{name}"))
+            )
+        except Exception:
+            self._values = before
+            raise
+
+    def _config(self):
+        return {name: self._value(declaration) for name, declaration in self._live.items()}
+
+    def _value(self, declaration):
+        raw = self._values.get(declaration.name, declaration.default)
+        return _PYTHON_TYPES[_wire_type(declaration)](raw)
+
+
+_PYTHON_TYPES = {"double": float, "int": int, "bool": bool, "str": str}
+
+
+def _read(declarations, get):
+    values = {}
+    for declaration in declarations:
+        with contextlib.suppress(KeyError):
+            values[declaration.name] = get(declaration.name)
+    return values
+
+
+def _wire_type(declaration: Declaration) -> str:
+    for parameter_type, name in ((Number, "double"), (Integer, "int"), (Boolean, "bool")):
+        if isinstance(declaration.type, parameter_type):
+            return name
+    return "str"
+
+
+def _description(live, config):
+    low, high, parameters = {}, {}, []
+    for declaration in live:
+        wire_type = _wire_type(declaration)
+        low[declaration.name], high[declaration.name] = _limits(declaration, wire_type)
+        unit = f", {declaration.type.unit}" if declaration.type.unit else ""
+        parameters.append(
+            {
+                "name": declaration.name,
+                "type": wire_type,
+                "level": 0,
+                "description": declaration.help + unit,
+                "edit_method": _choices(declaration.type),
+            }
+        )
+    defaults = {
+        d.name: config[d.name] if d.default is REQUIRED else type(config[d.name])(d.default)
+        for d in live
+    }
+    root = {"name": "Default", "id": 0, "parent": 0, "type": "", "groups": []}
+    return encoding.encode_description(
+        SimpleNamespace(
+            max=high,
+            min=low,
+            defaults=defaults,
+            config_description={**root, "parameters": parameters},
+        )
+    )
+
+
+def _limits(declaration, wire_type):
+    if wire_type == "double":
+        return max(declaration.type.minimum, declaration.type.above), declaration.type.maximum
+    if wire_type == "int":
+        return declaration.type.minimum, declaration.type.maximum
+    return (False, True) if wire_type == "bool" else ("", "")
+
+
+def _choices(parameter_type):
+    # A Python literal in a string, as dynamic_reconfigure's own generator writes it.
+    if not isinstance(parameter_type, Text) or not parameter_type.choices:
+        return ""
+    choices = [
+        {"name": name, "type": "str", "value": name, "description": ""}
+        for name in parameter_type.choices
+    ]
+    return repr({"enum": choices, "enum_description": ""})

@@ -1,0 +1,199 @@
+"""Settings in a YAML file: declared parameters, and for everything wrong the file and line.
+
+For what is a list of many alike things, such as the vehicles of a fleet, which does
+not fit the parameter server::
+
+    for name, entry in yaml_file.load("lab.yaml")["boxes"].entries().items():
+        boxes[name] = entry.read(BoxParameters)
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+
+from crazyflie_utils.messages import shortened, shown
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters
+from crazyflie_utils.parameters.yaml_loader import MAX_SIZE, compose
+from crazyflie_utils.text_input import TextFileError, read_text
+
+P = TypeVar("P", bound=Parameters)
+
+
+def load(path: str | Path) -> "Entry":
+    """Return the content of a file, which is a mapping.
+
+    Raises
+    ------
+    ParameterError
+        It cannot be read, is no YAML, no mapping, has a key twice, or is larger than a file of
+        settings can be: see `yaml_loader`.
+    """
+    path = Path(path)
+    try:
+        node = compose(read_text(path, MAX_SIZE))
+    except TextFileError as error:
+        where = shortened(str(path)) if error.line is None else f"{path}:{error.line}"
+        raise ParameterError(f"{where}: {error}") from None
+    if node is None:
+        raise ParameterError(f"{path}: is empty; expected a mapping")
+    entry = Entry(path, "", node)
+    entry.entries()
+    return entry
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A value in a file, and where it stands.
+
+    Attributes
+    ----------
+    file : Path
+    name : str
+        Its keys from the top of the file, such as "boxes/table"; empty for the whole.
+    node : yaml.Node
+        What the parser made of it.
+    """
+
+    file: Path
+    name: str
+    node: yaml.Node
+
+    @property
+    def line(self) -> int:
+        """Number of its first line, from 1."""
+        return self.node.start_mark.line + 1
+
+    @property
+    def value(self) -> Any:
+        """The value as YAML means it.
+
+        Raises
+        ------
+        ParameterError
+            It means nothing, such as a date with a 13th month.
+        """
+        loader = yaml.SafeLoader("")
+        try:
+            return loader.construct_document(self.node)
+        except (yaml.YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
+            # The latter two are how PyYAML finds that a text does not fit its tag.
+            raise self.error(f"cannot be read: {shortened(str(error))}") from None
+        finally:
+            loader.dispose()
+
+    def error(self, text: str) -> ParameterError:
+        """Return an error about it: file, line and name, then the text."""
+        return ParameterError(f"{self.file}:{self.line}: {self._title()} {text}")
+
+    def entries(self) -> dict[str, "Entry"]:
+        """Return what it holds, by key.
+
+        Raises
+        ------
+        ParameterError
+            It is no mapping, a key is no string, or it is there twice.
+        """
+        if not isinstance(self.node, yaml.MappingNode):
+            raise self.error(f"is {shown(self.value)}; expected a mapping")
+        found: dict[str, Entry] = {}
+        for key_node, node in self.node.value:
+            key = Entry(self.file, self.name, key_node).value
+            if not isinstance(key, str):
+                raise Entry(self.file, self.name, key_node).error(
+                    f"has the key {shown(key)}; expected a string"
+                )
+            entry = Entry(self.file, f"{self.name}/{key}".lstrip("/"), node)
+            if key in found:
+                raise entry.error(f"is there twice, first in line {found[key].line}")
+            found[key] = entry
+        return found
+
+    def elements(self) -> list["Entry"]:
+        """Return what it holds in order.
+
+        Raises
+        ------
+        ParameterError
+            It is no list.
+        """
+        if not isinstance(self.node, yaml.SequenceNode):
+            raise self.error(f"is {shown(self.value)}; expected a list")
+        return [
+            Entry(self.file, f"{self.name}[{index}]", node)
+            for index, node in enumerate(self.node.value)
+        ]
+
+    def __contains__(self, key: str) -> bool:
+        """Whether it holds something of that name."""
+        return key in self.entries()
+
+    def __getitem__(self, key: str) -> "Entry":
+        """Return what it holds of that name.
+
+        Raises
+        ------
+        ParameterError
+            It holds no such thing.
+        """
+        entries = self.entries()
+        if key not in entries:
+            raise self.error(f"has no {key}; it has {shortened(', '.join(entries)) or 'nothing'}")
+        return entries[key]
+
+    def read(self, parameters: type[P], besides: tuple[str, ...] = ()) -> P:
+        """Return the parameters that it holds; those of a group in a mapping of their own.
+
+        Parameters
+        ----------
+        parameters : type
+            Subclass of `Parameters`.
+        besides : tuple of str
+            Keys that it may hold besides them; somebody else reads these.
+
+        Raises
+        ------
+        ParameterError
+            About everything that is missing, unknown, or not what is expected.
+        """
+        names = {declaration.name for declaration in parameters.declarations()}
+        known: dict[str, Entry] = {}
+        complaints: list[str] = []
+        for path, entry in self._leaves(names):
+            if path in names:
+                known[path] = entry
+            elif path not in besides:
+                expected = ", ".join(sorted(names | set(besides)))
+                complaints += entry.error(f"is not known; expected one of {expected}").complaints
+
+        def place(name: str) -> str:
+            entry = known.get(name, self)
+            return f"{shortened(f'{self.name}/{name}'.lstrip('/'))} ({self.file}:{entry.line})"
+
+        try:
+            result = parameters.read(lambda name: known[name].value, place)
+        except ParameterError as error:
+            complaints += [self._with_place(text) for text in error.complaints]
+        if complaints:
+            raise ParameterError(*complaints)
+        return result
+
+    def _leaves(self, names: set[str], prefix: str = "") -> Iterator[tuple[str, "Entry"]]:
+        for key, entry in self.entries().items():
+            path = prefix + key
+            is_group = any(name.startswith(path + "/") for name in names)
+            if is_group and path not in names:
+                yield from entry._leaves(names, path + "/")
+            else:
+                yield path, entry
+
+    def _with_place(self, complaint: str) -> str:
+        # One about how values fit together does not know where they stand.
+        if str(self.file) in complaint:
+            return complaint
+        return f"{self.file}:{self.line}: {self._title()}: {complaint}"
+
+    def _title(self) -> str:
+        return shortened(self.name) or "the file"

@@ -1,0 +1,152 @@
+"""What the nodes of one process share, and the node handles into it."""
+
+from collections.abc import Callable
+from functools import partial
+
+from rosgraph_msgs.msg import Clock
+
+from crazyflie_utils.clock import SimulatedClock, SteadyClock
+from crazyflie_utils.executor import Executor
+from crazyflie_utils.flights import Announcement
+from crazyflie_utils.handle import NodeHandle
+from crazyflie_utils.node import Node
+from crazyflie_utils.tf.transforms import AHEAD, SIMULATED_AHEAD, Transforms
+from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
+from crazyflie_utils.topics import Topics
+from crazyflie_utils.transport import Transport
+
+
+class Process:
+    """One executor, one clock, one set of topics, one tf buffer; any number of nodes.
+
+    Parameters
+    ----------
+    transport : Transport
+        The world outside.
+    use_sim_time : bool
+        Live by simulated time, which stands still until it is set.
+    """
+
+    def __init__(self, transport: Transport, use_sim_time: bool):
+        self.transport = transport
+        self.executor = Executor()
+        self.topics = Topics(transport)
+        self.clock: SimulatedClock | SteadyClock = (
+            SimulatedClock() if use_sim_time else SteadyClock()
+        )
+        self.transforms = Transforms(
+            self.topics,
+            self._warn_about_transform,
+            self.clock.nanoseconds,
+            SIMULATED_AHEAD if use_sim_time else AHEAD,
+        )
+        self._log = NodeHandle(self, "/tf")
+        self._steady_clock = SteadyClock()
+        # The poses of vehicles that are simulated in one tick are one message.
+        tf = self.transforms.gather, self.transforms.send_gathered
+        self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
+        self._simulated = TimerQueue(self.executor, *tf)
+        self._announcements: list[Announcement] = []
+        self.exit_status: int | None = None
+        if isinstance(self.clock, SimulatedClock):
+            self.clock.on_change(self._run_simulated)
+            self.topics.subscribe("/clock", Clock, partial(self._on_clock, self.clock))
+
+    def end(self, status: int) -> None:
+        """Have the process shut down and exit with ``status``."""
+        self.exit_status = status
+
+    @property
+    def uses_sim_time(self) -> bool:
+        """Whether this process lives by simulated time."""
+        return isinstance(self.clock, SimulatedClock)
+
+    def handle(self, name: str) -> NodeHandle:
+        """Return the handle of the node with this absolute name."""
+        return NodeHandle(self, name)
+
+    def announce_flights(self, node: str) -> Announcement:
+        """Return what tells every process of the flights of a node, named absolutely."""
+        announcement = Announcement(self, node)
+        self._announcements.append(announcement)
+        return announcement
+
+    @property
+    def own_flights(self) -> list[str]:
+        """Names of the nodes of this process that are in flight."""
+        return [each.node for each in self._announcements if each.in_flight]
+
+    def add_timer(
+        self,
+        period: float,
+        work: Callable[[], None],
+        steady: bool = False,
+        is_spread: bool = False,
+        may_be_early: bool = False,
+    ) -> Timer:
+        """Add a timer by this process's clock, or by the machine's if ``steady``.
+
+        Raises
+        ------
+        ValueError
+            The period is negative or not finite; or zero by simulated time,
+            where the moment would never end.
+        """
+        if self.uses_sim_time and not steady:
+            if period == 0.0:
+                raise ValueError("a timer by simulated time needs a period > 0")
+            return self._simulated.add(period, work, self.clock.time(), is_spread, may_be_early)
+        return self._steady.add(period, work, is_spread, may_be_early)
+
+    def next_simulated_deadline(self) -> float:
+        """Return when the next timer by simulated time is due, s."""
+        return self._simulated.next_deadline()
+
+    def start(self) -> None:
+        """Let callbacks run: every node is complete."""
+        self._steady.start()
+        self.executor.start()
+
+    def stop(self) -> None:
+        """Let no timer fire again."""
+        self._steady.stop()
+        self._simulated.stop()
+
+    def leave(self, nodes: dict[str, Node]) -> None:
+        """Have every node begin to end what needs time, and other processes told of it.
+
+        Parameters
+        ----------
+        nodes : dict of str to Node
+            By absolute name.
+        """
+        for announcement in self._announcements:
+            self.executor.submit(announcement.tell_of_end)
+        for name, node in nodes.items():
+            self.executor.submit(self.handle(name).guard(node.leave))
+
+    def shut_down(self, nodes: dict[str, Node]) -> None:
+        """Let no timer fire again, and every node leave its vehicle safe.
+
+        Parameters
+        ----------
+        nodes : dict of str to Node
+            By absolute name.
+        """
+        self.stop()
+        for name, node in nodes.items():
+            self.executor.submit(self.handle(name).guard(node.shutdown))
+
+    def _on_clock(self, clock, message):
+        # As work among the other work: time does not move within a callback, and
+        # a reset is not overtaken by what the last simulation still said.
+        self.executor.submit(partial(clock.set, message.clock.to_sec()))
+
+    def _run_simulated(self, now, is_reset):
+        if is_reset:
+            self.transforms.clear()
+            self._simulated.rebase(now)
+        self._simulated.run_due(now)
+
+    def _warn_about_transform(self, text, key):
+        self._log.warn(text, throttle=1.0, key=key)

@@ -1,0 +1,83 @@
+"""Services that are answered in their turn, at once or later."""
+
+import traceback
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import TYPE_CHECKING, Any
+
+from typing_extensions import override
+
+from crazyflie_utils.transport import ServiceError
+
+if TYPE_CHECKING:
+    from crazyflie_utils.handle import NodeHandle
+
+
+def serve(
+    callback: Callable[[Any], Any], request: Any, answer: Future[Any], handle: "NodeHandle"
+) -> None:
+    """Answer a request of a service.
+
+    Parameters
+    ----------
+    callback : callable
+        See `NodeHandle.advertise_service`.
+    request : genpy.Message
+    answer : Future
+        Is given the response, or a `ServiceError`; now, or when the future that the
+        callback has returned is done.
+    handle : NodeHandle
+        Of the node that offers the service.
+    """
+    if handle.is_closed:
+        answer.set_exception(ServiceError(f"{handle.name} has ended this service"))
+        return
+    try:
+        response = callback(request)
+    except ServiceError as error:
+        answer.set_exception(error)
+    except Exception as error:
+        handle.report_fault(callback, error)
+        answer.set_exception(ServiceError(f"{handle.name}: {error!r}"))
+    else:
+        if isinstance(response, Future):
+            response.add_done_callback(lambda done: pass_on(done, answer, handle))
+        else:
+            answer.set_result(response)
+
+
+class Reply(Future[Any]):
+    """What a call of a service brings; what is added to it is a callback of the node.
+
+    A plain future would only log what that raises, and the node would not be made safe.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+        Of the node that calls.
+    """
+
+    def __init__(self, handle: "NodeHandle"):
+        super().__init__()
+        self._guard = handle.guard
+
+    @override
+    def add_done_callback(self, fn: Callable[[Future[Any]], object]) -> None:
+        super().add_done_callback(self._guard(fn))
+
+
+def pass_on(done: Future[Any], to: Future[Any], handle: "NodeHandle") -> None:
+    """Let one future have the outcome of another, any error as a `ServiceError`."""
+    if not to.set_running_or_notify_cancel():
+        return
+    if done.cancelled():
+        to.set_exception(ServiceError(f"{handle.name}: cancelled"))
+        return
+    error = done.exception()
+    if error is None:
+        to.set_result(done.result())
+    elif isinstance(error, ServiceError):
+        to.set_exception(error)
+    else:
+        handle.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
+        to.set_exception(ServiceError(f"{handle.name}: {error!r}"))

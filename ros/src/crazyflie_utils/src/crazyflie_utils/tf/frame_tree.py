@@ -1,0 +1,262 @@
+"""What a process knows of tf's frames.
+
+What comes from other processes is decoded only where somebody in this one looks it up: the
+frames that were asked for, and those above them in the tree. Of the others the last transform
+is kept as it came, for whoever asks later.
+
+Nearly every look-up is of the latest pose of a frame in the one right above it, which is answered
+here. tf2 has the others; it is begun, and told of what has come lately, at the first of them.
+"""
+
+import math
+import struct
+from collections import Counter, deque
+from collections.abc import Callable, Hashable
+
+from crazyflie_utils.tf.poses import PoseCodec, StampedPose, entries
+from crazyflie_utils.tf.tf2_memory import Tf2Memory, TransformError
+
+_HISTORY = 100
+"""Poses of a frame that are kept for the moment when tf2 is begun."""
+
+_NORM_TOLERANCE = 0.01
+"""How far tf2 lets the squared norm of a quaternion be from 1."""
+
+_STEP_BACK = 100_000_000
+"""A stamp that is older than the last one of its frame by less than this, ns, came by a slower
+way; the present pose is still the younger one."""
+
+_STEPS_BACK = 3
+"""So many of them in a row, and the source's clock has been set back."""
+
+_MOST_FRAMES = 1000
+"""Names of frames that are known, and frames that are kept for later."""
+
+_MOST_BYTES = 1024
+"""Of a transform that is kept for later."""
+
+_ONE = b"\x01\0\0\0"
+"""The length of a message with one transform."""
+
+
+class _Frame:
+    """What is known of a frame that moves."""
+
+    __slots__ = ("latest", "recent", "steps_back")
+
+    def __init__(self, pose: StampedPose):
+        self.latest = pose
+        self.recent: deque[StampedPose] = deque(maxlen=_HISTORY)
+        self.steps_back = 0
+
+
+class FrameTree:
+    """Frames, their poses and who is above whom. Not for several threads at once.
+
+    Parameters
+    ----------
+    codec : PoseCodec
+    warn : callable
+        ``warn(text, key)`` is called about every transform that is dropped; with the same key
+        it is for the same reason.
+    ahead : float
+        How far the stamp of a transform may be ahead of now, s.
+    on_new : callable
+        ``on_new(pose)`` is called with every pose that is the latest of its frame.
+
+    Attributes
+    ----------
+    rejected : collections.Counter
+        How many transforms were dropped, by reason.
+    followed : set of str
+        Frames that are decoded.
+    """
+
+    def __init__(
+        self,
+        codec: PoseCodec,
+        warn: Callable[[str, Hashable], None],
+        ahead: float,
+        on_new: Callable[[StampedPose], None],
+    ):
+        self.rejected: Counter[str] = Counter()
+        self.followed: set[str] = set()
+        self._codec = codec
+        self._warn = warn
+        self._ahead = round(ahead * 1e9)
+        self._on_new = on_new
+        self._frames: dict[str, _Frame] = {}
+        self._static: dict[str, StampedPose] = {}
+        self._names: set[str] = set()
+        # Those that are followed, as they may be on the wire; and names that nobody may use.
+        self._wanted = {b"", b"/"}
+        self._unread: dict[bytes, bytes] = {}
+        self._tf2: Tf2Memory | None = None
+
+    def clear(self) -> None:
+        """Forget everything that moves: time has been reset."""
+        self._frames.clear()
+        self._unread.clear()
+        if self._tf2 is not None:
+            self._tf2.clear()
+
+    def latest(self, target: str, source: str) -> StampedPose | None:
+        """Return the latest pose of a moving frame, if ``target`` is right above it."""
+        frame = self._frames.get(source)
+        if frame is not None and frame.latest.parent == target and source not in self._static:
+            return frame.latest
+        return None
+
+    def ask_tf2(self, target: str, source: str) -> StampedPose:
+        """Return the latest pose of frame ``source`` in frame ``target``.
+
+        Raises
+        ------
+        TransformError
+            A frame is unknown, or the two are not connected.
+        """
+        # tf2 need not begin as long as it would know no answer.
+        for name in (target, source):
+            if name not in self._names and target != source:
+                raise TransformError(f"frame {name} is not known; looked up {target} -> {source}")
+        if not set(self._chain(target)) & set(self._chain(source)):
+            raise TransformError(f"frames {target} and {source} are not connected")
+        if self._tf2 is None:
+            self._tf2 = self._begin_tf2()
+        return self._tf2.lookup(target, source)
+
+    def read(self, raw: bytes, now: int) -> None:
+        """Take what is in a serialized message, at the ROS time ``now`` (ns)."""
+        try:
+            for child, start, end in entries(raw):
+                if child in self._wanted:
+                    self.take(self._codec.decode(raw, start, end), now)
+                elif end - start <= _MOST_BYTES:
+                    self._unread[child] = raw[start:end]
+                    if len(self._unread) > _MOST_FRAMES:
+                        del self._unread[next(iter(self._unread))]
+        except (struct.error, ValueError):
+            self.rejected["cannot be read"] += 1
+            self._warn("ignoring a message on /tf that cannot be read", "cannot be read")
+
+    def take(self, pose: StampedPose, now: int) -> None:
+        """Take a pose, unless something is wrong with it, at the ROS time ``now`` (ns)."""
+        frame = self._frames.get(pose.child)
+        reason = _why_invalid(pose) or self._why_too_many(pose)
+        if reason is None:
+            reason = self._why_untimely(frame, pose.stamp, now)
+        if reason:
+            self._reject(pose, reason)
+        if reason is not None:
+            return
+        # The frames may have been forgotten meanwhile.
+        frame = self._frames.get(pose.child)
+        if frame is None:
+            frame = self._frames[pose.child] = _Frame(pose)
+            self._notice(pose, now)
+        if pose.stamp >= frame.latest.stamp:
+            if pose.parent != frame.latest.parent:
+                self._notice(pose, now)
+            frame.latest = pose
+            frame.steps_back = 0
+            self._on_new(pose)
+        if self._tf2 is None:
+            frame.recent.append(pose)
+        else:
+            self._tf2.tell(pose)
+
+    def take_static(self, pose: StampedPose, now: int) -> None:
+        """Take a pose that holds for ever, unless something is wrong with it."""
+        reason = _why_invalid(pose) or self._why_too_many(pose)
+        if reason is not None:
+            self._reject(pose, reason)
+            return
+        self._static[pose.child] = pose
+        if self._tf2 is not None:
+            self._tf2.tell(pose, is_static=True)
+        self._notice(pose, now)
+
+    def follow(self, frame: str | None, now: int) -> None:
+        """Have a frame and all above it decoded, from the ROS time ``now`` (ns) on."""
+        while frame is not None and frame not in self.followed:
+            if len(self.followed) >= _MOST_FRAMES:
+                return
+            for name in (frame.encode(), b"/" + frame.encode()):
+                self._wanted.add(name)
+                kept = self._unread.pop(name, None)
+                if kept is not None:
+                    self.read(_ONE + kept, now)
+            # Not before, or a long chain would be followed by recursion.
+            self.followed.add(frame)
+            frame = self._parent(frame)
+
+    def _chain(self, name):
+        """Yield a frame and all above it."""
+        seen = set()
+        while name is not None and name not in seen:
+            yield name
+            seen.add(name)
+            name = self._parent(name)
+
+    def _parent(self, name):
+        if name in self._frames:
+            return self._frames[name].latest.parent
+        return self._static[name].parent if name in self._static else None
+
+    def _begin_tf2(self):
+        tf2 = Tf2Memory()
+        for pose in self._static.values():
+            tf2.tell(pose, is_static=True)
+        for frame in self._frames.values():
+            for pose in frame.recent:
+                tf2.tell(pose)
+            frame.recent.clear()
+        return tf2
+
+    def _notice(self, pose, now):
+        """Take note of names that are new."""
+        self._names.update((pose.parent, pose.child))
+        if pose.child in self.followed:
+            self.follow(pose.parent, now)
+
+    def _reject(self, pose, reason):
+        self.rejected[reason] += 1
+        text = f"ignoring a transform {pose.parent[:50]} -> {pose.child[:50]} that {reason}"
+        self._warn(text, (pose.parent, pose.child, reason))
+
+    def _why_untimely(self, frame, stamp, now):
+        """Return why a pose must not be taken now; "" if it is known already."""
+        if stamp > now + self._ahead:
+            return "is stamped in the future"
+        if frame is None:
+            return None
+        latest = frame.latest.stamp
+        if stamp == latest:
+            return ""
+        if stamp < latest - _STEP_BACK:
+            frame.steps_back += 1
+            if frame.steps_back < _STEPS_BACK:
+                return "is stamped in the past"
+            # The clock of the source was set back, and the last pose of before would
+            # stand until the stamps have caught up.
+            self.clear()
+        return None
+
+    def _why_too_many(self, pose):
+        # tf2 never forgets a name.
+        names = self._names
+        if (pose.parent in names and pose.child in names) or len(names) < _MOST_FRAMES:
+            return None
+        return "is one frame too many"
+
+
+def _why_invalid(pose):
+    # tf2 refuses all of them, too, but says so without a throttle.
+    if not pose.child.strip("/") or not pose.parent.strip("/"):
+        return "does not name its frames"
+    (a, b, c), (x, y, z, w) = pose.position, pose.rotation
+    if not math.isfinite(a + b + c + x + y + z + w):
+        return "is not finite"
+    if abs(x * x + y * y + z * z + w * w - 1.0) > _NORM_TOLERANCE:
+        return "has no unit quaternion"
+    return None

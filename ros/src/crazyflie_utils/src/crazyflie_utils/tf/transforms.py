@@ -1,0 +1,225 @@
+"""tf for a process, however many nodes.
+
+What has come on /tf and /tf_static is in a `FrameTree`; here are the ways into and out of it.
+"""
+
+import threading
+from collections import Counter
+from collections.abc import Callable, Hashable
+from typing import Any
+
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+
+from crazyflie_utils.tf.frame_tree import FrameTree
+from crazyflie_utils.tf.poses import PoseCodec, RawTransforms, StampedPose
+from crazyflie_utils.topics import Subscriber, Topics
+
+AHEAD = 0.2
+"""How far a stamp may be ahead of now, s. tf's static_transform_publisher stamps 0.1 s ahead."""
+
+SIMULATED_AHEAD = 2.0
+"""The same in simulated time: pose and /clock come by different ways."""
+
+
+class _Listener:
+    """Somebody who is told of new poses of a frame, so often and no oftener.
+
+    Parameters
+    ----------
+    period : float
+        s, by the poses' stamps.
+    tell : callable
+    """
+
+    def __init__(self, period: float, tell: Callable[[], None]):
+        self.tell = tell
+        self._period = round(period * 1e9)
+        self._due = 0
+
+    def is_due(self, stamp: int) -> bool:
+        """Tell whether a pose, by its stamp in ns, is one of those to be told of."""
+        early = self._due - stamp
+        # Rounding makes none late by one pose; much earlier ones are of a clock that was set back.
+        if self._period // 100 < early <= 2 * self._period:
+            return False
+        self._due = stamp + self._period if early > 0 else max(self._due + self._period, stamp)
+        return True
+
+
+class Transforms:
+    """What tf knows, and the way to tell it more.
+
+    Parameters
+    ----------
+    topics : Topics
+        Of the process; /tf and /tf_static are among them.
+    warn : callable
+        ``warn(text, key)`` is called about every transform that is dropped; with the same key
+        it is for the same reason.
+    now : callable
+        Returns the present ROS time, ns.
+    ahead : float
+        How far the stamp of a transform may be ahead of it, s.
+    """
+
+    def __init__(
+        self,
+        topics: Topics,
+        warn: Callable[[str, Hashable], None],
+        now: Callable[[], int],
+        ahead: float,
+    ):
+        self._topics = topics
+        self._now = now
+        self._codec = PoseCodec()
+        self._tree = FrameTree(self._codec, warn, ahead, self._note_arrival)
+        self._publisher: Any = None
+        self._own: TFMessage | None = None
+        self._broadcasters = 0
+        self._gathered: list[StampedPose] | None = None
+        self._subscriber: Subscriber | None = None
+        self._listeners: dict[str, list[_Listener]] = {}
+        self._arrived: list[_Listener] = []
+        self._sources: list[Callable[[], None]] = []
+        # Each broadcaster outside has a thread of its own.
+        self._lock = threading.RLock()
+
+    @property
+    def rejected(self) -> Counter[str]:
+        """How many transforms were dropped, by reason."""
+        return self._tree.rejected
+
+    def advertise(self) -> None:
+        """Announce that one more in this process will broadcast."""
+        self._broadcasters += 1
+        if self._publisher is None:
+            self._publisher = self._topics.publisher("/tf", TFMessage, latch=False)
+
+    def on_lookup(self, refresh: Callable[[], None]) -> None:
+        """Have ``refresh()`` called before poses are looked up."""
+        self._sources.append(refresh)
+
+    def is_heard(self) -> bool:
+        """Tell whether poses that are broadcast go anywhere but into look-ups of this process."""
+        beside = int(self._subscriber is not None)
+        return bool(self._listeners) or self._publisher.has_subscribers(beside)
+
+    def broadcast(self, transforms: list[TransformStamped]) -> None:
+        """Publish a list of geometry_msgs/TransformStamped on /tf."""
+        self._publisher.publish(TFMessage(transforms))
+
+    def broadcast_poses(self, poses: list[StampedPose]) -> None:
+        """Publish poses on /tf; a message is made only if anybody else gets it."""
+        if self._subscriber is not None:
+            now = self._now()
+            with self._lock:
+                for pose in poses:
+                    self._tree.take(pose, now)
+            self._tell_of_arrivals()
+        if not self._publisher.has_subscribers(beside=int(self._subscriber is not None)):
+            return
+        if self._gathered is None:
+            self._send(poses)
+        else:
+            self._gathered += poses
+
+    def gather(self) -> None:
+        """Keep the poses that several broadcast from now on for one message."""
+        if self._broadcasters > 1 and self._gathered is None:
+            self._gathered = []
+
+    def send_gathered(self) -> None:
+        """Publish what has been gathered; from now on each broadcast is a message again."""
+        poses, self._gathered = self._gathered, None
+        if poses:
+            self._send(poses)
+
+    def _send(self, poses):
+        self._own = self._codec.encode(poses)
+        self._publisher.publish(self._own)
+
+    def listen(self) -> None:
+        """Begin to collect what is said on /tf and /tf_static."""
+        if self._subscriber is None:
+            self._subscriber = self._topics.subscribe(
+                "/tf", TFMessage, self._on_transforms, RawTransforms
+            )
+            self._subscriber.read_lazily(True)
+            self._topics.subscribe("/tf_static", TFMessage, self._on_static)
+
+    def on_pose(self, frame: str, period: float, tell: Callable[[], None]) -> None:
+        """Have ``tell()`` called when a pose of a frame is new; once in ``period`` (s)."""
+        self.listen()
+        if self._subscriber is not None:
+            self._subscriber.read_lazily(False)
+        with self._lock:
+            self._listeners.setdefault(frame, []).append(_Listener(period, tell))
+            self._tree.follow(frame, self._now())
+
+    def clear(self) -> None:
+        """Forget everything that moves: time has been reset."""
+        with self._lock:
+            self._tree.clear()
+
+    def lookup(self, target: str, source: str) -> TransformStamped:
+        """Return the latest transform from ``source`` to ``target`` coordinates.
+
+        Returns
+        -------
+        geometry_msgs/TransformStamped
+            The pose of frame ``source`` in frame ``target``, with its own stamp.
+
+        Raises
+        ------
+        TransformError
+            A frame is unknown, or the two are not connected.
+        """
+        return self.lookup_pose(target, source).message()
+
+    def lookup_pose(self, target: str, source: str) -> StampedPose:
+        """Return the same as `lookup`, as a pose, which is quicker."""
+        for refresh in self._sources:
+            refresh()
+        if self._subscriber is not None:
+            self._subscriber.collect()
+        tree = self._tree
+        if target not in tree.followed or source not in tree.followed:
+            with self._lock:
+                tree.follow(target, self._now())
+                tree.follow(source, self._now())
+        pose = tree.latest(target, source)
+        if pose is not None:
+            return pose
+        with self._lock:
+            return tree.ask_tf2(target, source)
+
+    def _on_transforms(self, message):
+        if message is self._own:
+            return
+        now = self._now()
+        with self._lock:
+            if isinstance(message, RawTransforms):
+                self._tree.read(message.raw, now)
+            else:
+                for transform in message.transforms:
+                    self._tree.take(StampedPose.of(transform), now)
+        self._tell_of_arrivals()
+
+    def _note_arrival(self, pose):
+        for listener in self._listeners.get(pose.child, ()):
+            if listener.is_due(pose.stamp):
+                self._arrived.append(listener)
+
+    def _tell_of_arrivals(self):
+        # Not under the lock, since what is done now may look poses up.
+        if self._arrived:
+            with self._lock:
+                arrived, self._arrived = self._arrived, []
+            for listener in arrived:
+                listener.tell()
+
+    def _on_static(self, message):
+        with self._lock:
+            for transform in message.transforms:
+                self._tree.take_static(StampedPose.of(transform), self._now())

@@ -1,0 +1,268 @@
+"""Timers, by whatever clock, whose callbacks run on an `Executor`."""
+
+import contextlib
+import heapq
+import itertools
+import math
+import threading
+from collections import Counter
+from collections.abc import Callable
+from operator import attrgetter
+
+from crazyflie_utils.clock import SteadyClock
+from crazyflie_utils.executor import Executor
+
+_TOLERANCE = 1e-6
+"""A timer is due this much early, s: more than the rounding of a float that holds
+the seconds since 1970, less than anyone can notice."""
+
+_TOGETHER = 0.1
+"""Timers of at most this period, s, are due together where they can be: waking up costs more than
+most of them do."""
+
+_SLOT = 0.01
+"""Timers that are spread are due so far apart, s: most others are due as often as that."""
+
+
+class Timer:
+    """A callback that is due every ``period`` seconds; ends with `stop`."""
+
+    def __init__(self, period: float, work: Callable[[], None], now: float):
+        self.deadline = math.nan
+        self.number = 0
+        self.stopped = False
+        self._period = period
+        self._work = work
+        self.restart(now)
+
+    def stop(self) -> None:
+        """Let the timer never fire again, not even if it is due already."""
+        self.stopped = True
+
+    def restart(self, now: float) -> None:
+        """Make it due one period from ``now`` (s)."""
+        self._start = now
+        self._count = 1
+        self.deadline = now + self._period
+
+    def skip_to(self, now: float) -> None:
+        """Make it due at the first moment of its phase after ``now`` (s)."""
+        if self._period == 0.0:
+            self.deadline = now
+            return
+        # Multiples of the period do not add up rounding errors as sums do.
+        deadline = self._start + (self._count + 1) * self._period
+        if now + _TOLERANCE < deadline:
+            self._count += 1
+            self.deadline = deadline
+            return
+        passed = math.floor((now - self._start + _TOLERANCE) / self._period)
+        self._count = max(self._count, passed) + 1
+        self.deadline = self._start + self._count * self._period
+
+    def fire(self) -> None:
+        """Call back, unless stopped."""
+        if not self.stopped:
+            self._work()
+
+
+_number = attrgetter("number")
+
+
+class TimerQueue:
+    """Timers in the order of their deadlines.
+
+    Parameters
+    ----------
+    executor : Executor
+        Where their callbacks run.
+    before, after : callable, optional
+        Called before and after several that are due at once.
+    """
+
+    def __init__(
+        self,
+        executor: Executor,
+        before: Callable[[], None] | None = None,
+        after: Callable[[], None] | None = None,
+    ):
+        self._executor = executor
+        self._before = before
+        self._after = after
+        self._lock = threading.Lock()
+        self._heap: list[tuple[float, int, Timer]] = []
+        self._order = itertools.count()
+        self._origin: float | None = None
+        self._is_running = False
+        self._spread: Counter[float] = Counter()
+        self._is_stopped = False
+
+    def add(
+        self,
+        period: float,
+        work: Callable[[], None],
+        now: float,
+        is_spread: bool = False,
+        may_be_early: bool = False,
+    ) -> Timer:
+        """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
+
+        Before the first `run_due`, that of a short period, up to 0.1 s, is due at multiples of it
+        since the first timer began, so that many of them need not wake the process up often.
+        Those that are to be spread are due at different ones of such moments, 10 ms apart; the
+        first deadline comes up to one period later. What is added later may be waited for, and is
+        not delayed. But where the first deadline may be early, it is at such a moment all the
+        same, spread or not.
+
+        Raises
+        ------
+        ValueError
+            The period is negative or not finite.
+        """
+        if not 0.0 <= period < math.inf:
+            raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
+        with self._lock:
+            if may_be_early and period > 0.0:
+                begin = self._next_moment(period, now, is_spread) - period
+            else:
+                begin = self._begin(period, now, is_spread)
+            timer = Timer(period, work, begin)
+            timer.number = next(self._order)
+            timer.stopped = self._is_stopped
+            self._push(timer)
+        return timer
+
+    def _begin(self, period, now, is_spread):
+        if self._is_running or period == 0.0:
+            return now
+        if is_spread:
+            return self._next_multiple(_SLOT, now) + self._next_slot(period)
+        return self._next_multiple(period, now) if period <= _TOGETHER else now
+
+    def _next_moment(self, period, now, is_spread):
+        first = self._next_multiple(_SLOT, now) + (self._next_slot(period) if is_spread else 0.0)
+        # Of the moments of its phase, the first one after now.
+        return first - math.floor((first - now - _TOLERANCE) / period) * period
+
+    def _next_slot(self, period):
+        slot = self._spread[period] % max(round(period / _SLOT), 1)
+        self._spread[period] += 1
+        return slot * _SLOT
+
+    def _next_multiple(self, period, now):
+        if self._origin is None or now < self._origin:
+            self._origin = now
+        passed = (now - self._origin - _TOLERANCE) / period
+        return self._origin + math.ceil(passed) * period
+
+    def next_deadline(self) -> float:
+        """Return when the next timer is due; infinity without timers."""
+        with self._lock:
+            return self._heap[0][0] if self._heap else math.inf
+
+    def run_due(self, now: float) -> None:
+        """Submit every timer that is due at ``now`` (s), in order, each once.
+
+        A timer that is late by more than a period skips what it missed and
+        keeps its phase.
+        """
+        self._is_running = True
+        due = self._take_due(now)
+        are_several = len(due) > 1
+        if are_several and self._before is not None:
+            self._executor.submit(self._before)
+        for timer in due:
+            self._executor.submit(timer.fire)
+        if are_several and self._after is not None:
+            self._executor.submit(self._after)
+
+    def rebase(self, now: float) -> None:
+        """Make every timer due one period from ``now`` (s): time has been reset."""
+        with self._lock:
+            timers = [timer for _, _, timer in sorted(self._heap)]
+            self._heap.clear()
+            for timer in timers:
+                timer.restart(now)
+                self._push(timer)
+
+    def stop(self) -> None:
+        """Let no timer fire again, not even those that are due already."""
+        with self._lock:
+            self._is_stopped = True
+            for _, _, timer in self._heap:
+                timer.stop()
+
+    def _push(self, timer):
+        heapq.heappush(self._heap, (timer.deadline, next(self._order), timer))
+
+    def _take_due(self, now):
+        due: list[Timer] = []
+        with self._lock:
+            while self._heap and self._heap[0][0] <= now + _TOLERANCE:
+                timer = heapq.heappop(self._heap)[2]
+                if not timer.stopped:
+                    due.append(timer)
+            # Those of one moment differ by rounding only, each time in another way. Who was there
+            # first is first, so that it has an even period.
+            if due and due[-1].deadline - due[0].deadline < _TOLERANCE:
+                due.sort(key=_number)
+            for timer in due:
+                timer.skip_to(now)
+                self._push(timer)
+        return due
+
+
+class SteadyTimers:
+    """A thread that runs a queue of timers by a steady clock.
+
+    Parameters
+    ----------
+    queue : TimerQueue
+        Whose timers are run.
+    clock : SteadyClock
+        By which they are due.
+    """
+
+    def __init__(self, queue: TimerQueue, clock: SteadyClock):
+        self._queue = queue
+        self._clock = clock
+        # Released when there is anything new. Waiting for a bare lock costs half of what it
+        # costs to wait for a condition.
+        self._news = threading.Lock()
+        self._news.acquire()
+        self._stopped = False
+        self._thread = threading.Thread(target=self._run, name="timers", daemon=True)
+
+    def start(self) -> None:
+        """Begin to fire."""
+        self._thread.start()
+
+    def add(
+        self,
+        period: float,
+        work: Callable[[], None],
+        is_spread: bool = False,
+        may_be_early: bool = False,
+    ) -> Timer:
+        """Add a timer; its first deadline is one period from now, or see `TimerQueue.add`."""
+        timer = self._queue.add(period, work, self._clock.time(), is_spread, may_be_early)
+        self._tell()
+        return timer
+
+    def stop(self) -> None:
+        """Let no timer fire again, and end the thread."""
+        self._queue.stop()
+        self._stopped = True
+        self._tell()
+
+    def _tell(self):
+        # Another may have told already.
+        with contextlib.suppress(RuntimeError):
+            self._news.release()
+
+    def _run(self) -> None:
+        while not self._stopped:
+            wait = self._queue.next_deadline() - self._clock.time()
+            if wait > 0.0:
+                self._news.acquire(timeout=min(wait, 1.0))
+            self._queue.run_due(self._clock.time())

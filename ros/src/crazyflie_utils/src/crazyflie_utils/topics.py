@@ -1,0 +1,198 @@
+"""Topics within a process: messages go from hand to hand.
+
+A message that is published goes to the subscribers in this process as the very
+object, by a call, and to those outside only when there are any. Subscribers
+must therefore not change what they receive.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import genpy
+
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, Transport
+
+Receiver = Callable[[Any], None]
+
+
+class Topic:
+    """One topic as this process sees it."""
+
+    def __init__(self, name: str, message_type: type[genpy.Message]):
+        self.name = name
+        self.message_type = message_type
+        self.publishers: list[Publisher] = []
+        self.receivers: list[Receiver] = []
+
+    def deliver(self, message: genpy.Message) -> None:
+        """Hand a message to every subscriber in this process."""
+        for receiver in self.receivers:
+            receiver(message)
+
+
+class Publisher:
+    """The right to publish on a topic.
+
+    Attributes
+    ----------
+    latched : genpy.Message or None
+        What late subscribers are sent.
+    """
+
+    def __init__(self, topic: Topic, external: ExternalPublisher, latch: bool):
+        self.latched: genpy.Message | None = None
+        self._topic = topic
+        self._external = external
+        self._latch = latch
+        self._is_closed = False
+        topic.publishers.append(self)
+
+    @property
+    def topic(self) -> str:
+        """Name of the topic, absolute."""
+        return self._topic.name
+
+    def has_subscribers(self, beside: int = 0) -> bool:
+        """Tell whether anyone, here or outside, is connected and receives.
+
+        Parameters
+        ----------
+        beside : int
+            So many receivers in this process do not count.
+        """
+        return self.is_read_here(beside) or self.is_heard_outside()
+
+    def is_heard_outside(self) -> bool:
+        """Tell whether anyone in another process is connected."""
+        return self._external.has_subscribers()
+
+    def is_read_here(self, beside: int = 0) -> bool:
+        """Tell whether anyone in this process receives; so many do not count."""
+        return len(self._topic.receivers) > beside
+
+    def publish(self, message: genpy.Message, before: Sequence[genpy.Message] = ()) -> None:
+        """Send a message; it must not be changed afterwards.
+
+        Parameters
+        ----------
+        message : genpy.Message
+        before : sequence of genpy.Message, optional
+            Sent before it, in one go, to other processes only.
+
+        Raises
+        ------
+        TypeError
+            The message is not of the topic's type.
+        """
+        if not isinstance(message, self._topic.message_type):
+            raise TypeError(
+                f"topic {self.topic} carries {self._topic.message_type._type}, "
+                f"not {type(message).__name__}"
+            )
+        if self._is_closed:
+            return
+        if self._latch:
+            self.latched = message
+        if self._latch or self._external.has_subscribers():
+            self._external.publish(*before, message)
+        self._topic.deliver(message)
+
+    def close(self) -> None:
+        """Publish no more; what is published later, and what was latched, is lost."""
+        if not self._is_closed:
+            self._is_closed = True
+            self._topic.publishers.remove(self)
+            self._external.close()
+
+
+class Subscriber:
+    """One subscription of a topic."""
+
+    def __init__(self, topic: Topic, receiver: Receiver, external: ExternalSubscriber):
+        self._topic = topic
+        self._receiver = receiver
+        self._external = external
+
+    def has_publishers(self) -> bool:
+        """Tell whether anyone, here or outside, is connected and may publish."""
+        return bool(self._topic.publishers) or self._external.has_publishers()
+
+    def caller(self, message: genpy.Message) -> str:
+        """Return the name of the node of another process that sent a message; else ""."""
+        header = getattr(message, "_connection_header", None) or {}
+        # A node of this process may have passed on what it received on another topic.
+        is_here = header.get("topic", self._topic.name) == self._topic.name
+        return header.get("callerid", "") if is_here else ""
+
+    def read_lazily(self, is_lazy: bool, remind: Callable[[], None] | None = None) -> None:
+        """Let messages from outside wait for `collect`; see `ExternalSubscriber.read_lazily`."""
+        self._external.read_lazily(is_lazy, remind)
+
+    def collect(self) -> None:
+        """Deliver what has come from outside."""
+        self._external.collect()
+
+    def close(self) -> None:
+        """Receive no more."""
+        # Not in place: a message may be on its way to the others.
+        receivers = self._topic.receivers
+        self._topic.receivers = [each for each in receivers if each is not self._receiver]
+        self._external.close()
+
+
+class Topics:
+    """All topics of a process.
+
+    Parameters
+    ----------
+    transport : Transport
+    """
+
+    def __init__(self, transport: Transport):
+        self._transport = transport
+        self._topics: dict[str, Topic] = {}
+
+    def publisher(self, name: str, message_type: type[genpy.Message], latch: bool) -> Publisher:
+        """Return a publisher; a latched one repeats its last message to late subscribers.
+
+        Raises
+        ------
+        TypeError
+            The topic has another type in this process.
+        """
+        topic = self._topic(name, message_type)
+        return Publisher(topic, self._transport.advertise(name, message_type, latch), latch)
+
+    def subscribe(
+        self,
+        name: str,
+        message_type: type[genpy.Message],
+        receiver: Receiver,
+        outside_type: type[genpy.Message] | None = None,
+    ) -> Subscriber:
+        """Have ``receiver(message)`` called for every message on a topic.
+
+        Messages from outside come as ``outside_type``, a subclass of ``message_type``, if given.
+
+        Raises
+        ------
+        TypeError
+            The topic has another type in this process.
+        """
+        topic = self._topic(name, message_type)
+        topic.receivers.append(receiver)
+        for publisher in topic.publishers:
+            if publisher.latched is not None:
+                receiver(publisher.latched)
+        # Each receiver for itself, so that one that comes late is sent what an
+        # outside publisher has latched; the connection is shared all the same.
+        external = self._transport.subscribe(name, outside_type or message_type, receiver)
+        return Subscriber(topic, receiver, external)
+
+    def _topic(self, name, message_type):
+        topic = self._topics.setdefault(name, Topic(name, message_type))
+        if topic.message_type is not message_type:
+            raise TypeError(
+                f"topic {name} carries {topic.message_type._type}, not {message_type._type}"
+            )
+        return topic

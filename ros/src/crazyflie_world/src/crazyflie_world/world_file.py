@@ -1,0 +1,281 @@
+"""Worlds in YAML files."""
+
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path as FilePath
+from typing import Any
+
+from typing_extensions import override
+
+from crazyflie_utils import ParameterError, Parameters, parameter
+from crazyflie_utils.messages import shortened, shown
+from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import (
+    BOOLEAN,
+    FINITE,
+    FRAME,
+    METRES,
+    POSITION,
+    TEXT,
+    TIME_STEP,
+    ListOf,
+    Number,
+    ParameterType,
+    Text,
+)
+from crazyflie_utils.parameters.yaml_file import Entry
+from crazyflie_world.paths import Circle, Path, Waypoints
+from crazyflie_world.shapes import WALL_COLOUR, Ball, Box, Cylinder, Shape, wall
+from crazyflie_world.world import FLOOR, TEXTURES, Floor, World
+
+_LENGTH = Number("m", above=0.0)
+_ANGLE = Number("rad")
+_PLACE = ListOf(METRES, 2)
+_COLOUR = ListOf(Number(minimum=0.0, maximum=1.0), 3)
+
+
+class _Name(ParameterType):
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str) or not re.fullmatch(r"[A-Za-z]\w*", value, re.ASCII):
+            raise ValueError
+        return value
+
+    @override
+    def __str__(self) -> str:
+        return "a name of letters, digits and underscores that begins with a letter"
+
+
+class CircleParameters(Parameters):
+    """A path in a circle."""
+
+    centre: tuple[float, float, float] = parameter(POSITION, "of the circle")
+    radius: float = parameter(_LENGTH, "of the circle")
+    period: float = parameter(TIME_STEP, "of one round")
+    phase: float = parameter(_ANGLE, "where it begins, from the x axis", 0.0)
+    clockwise: bool = parameter(BOOLEAN, "direction, as seen from above", False)
+
+    def path(self) -> Circle:
+        """Return what is declared."""
+        return Circle(self.centre, self.radius, self.period, self.phase, self.clockwise)
+
+
+class WaypointsParameters(Parameters):
+    """A path from point to point."""
+
+    points: tuple[tuple[float, ...], ...] = parameter(
+        ListOf(ListOf(FINITE, 4)), "[time, x, y, z], s and m"
+    )
+    repeat: bool = parameter(BOOLEAN, "begin again after the last", True)
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        times = [point[0] for point in self.points]
+        if len(times) < 2:
+            yield f"points are {len(times)}; expected two or more"
+        elif times[0] != 0.0 or any(a >= b for a, b in pairwise(times)):
+            yield f"the times of points are {times}; expected each larger than the last, from 0 (s)"
+        elif self.repeat and self.points[0][1:] != self.points[-1][1:]:
+            yield (
+                f"the last of points is {list(self.points[-1][1:])}; expected the first, "
+                f"{list(self.points[0][1:])} (m), where the path begins again"
+            )
+
+    def path(self) -> Waypoints:
+        """Return what is declared."""
+        return Waypoints(
+            tuple(point[0] for point in self.points),
+            tuple((x, y, z) for _, x, y, z in self.points),
+            self.repeat,
+        )
+
+
+class _ObjectParameters(Parameters):
+    """What all objects but walls have."""
+
+    name: str = parameter(_Name(), "no other object has it")
+    colour: tuple[float, float, float] = parameter(_COLOUR, "red, green, blue", (0.5, 0.5, 0.5))
+    centre: tuple[float, float, float] | None = parameter(
+        POSITION, "of an object that does not move", None
+    )
+
+    def shape(self, path: Path | None) -> Shape:
+        """Return what is declared, at the beginning of its path if it has one."""
+        raise NotImplementedError
+
+    def _common(self, path: Path | None) -> dict[str, Any]:
+        centre = self.centre if path is None else path.position(0.0)
+        return {"name": self.name, "colour": self.colour, "centre": centre, "path": path}
+
+
+class BoxParameters(_ObjectParameters):
+    """A box."""
+
+    size: tuple[float, float, float] = parameter(ListOf(_LENGTH, 3), "along its x, y and z")
+    yaw: float = parameter(_ANGLE, "turned about the vertical", 0.0)
+    picture: str = parameter(
+        TEXT, "file of a picture on its front, which looks along its own x", ""
+    )
+
+    @override
+    def shape(self, path: Path | None) -> Box:
+        return Box(extent=self.size, yaw=self.yaw, picture=self.picture, **self._common(path))
+
+
+class CylinderParameters(_ObjectParameters):
+    """An upright cylinder."""
+
+    radius: float = parameter(_LENGTH, "of the cylinder")
+    height: float = parameter(_LENGTH, "of the cylinder")
+
+    @override
+    def shape(self, path: Path | None) -> Cylinder:
+        return Cylinder(radius=self.radius, height=self.height, **self._common(path))
+
+
+class BallParameters(_ObjectParameters):
+    """A ball."""
+
+    radius: float = parameter(_LENGTH, "of the ball")
+
+    @override
+    def shape(self, path: Path | None) -> Ball:
+        return Ball(radius=self.radius, **self._common(path))
+
+
+class WallParameters(Parameters):
+    """A wall that stands on the floor."""
+
+    name: str = parameter(_Name(), "no other object has it")
+    colour: tuple[float, float, float] = parameter(_COLOUR, "red, green, blue", WALL_COLOUR)
+    start: tuple[float, float] = parameter(_PLACE, "where it begins, x and y", name="from")
+    end: tuple[float, float] = parameter(_PLACE, "where it ends, x and y", name="to")
+    height: float = parameter(_LENGTH, "above the floor", 2.5)
+    thickness: float = parameter(_LENGTH, "half of it to each side", 0.1)
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        if self.start == self.end:
+            yield f"from and to are both {list(self.start)}; expected two points (m)"
+
+    def shape(self) -> Box:
+        """Return what is declared."""
+        return wall(self.name, self.start, self.end, self.height, self.thickness, self.colour)
+
+
+class FloorParameters(Parameters):
+    """The floor."""
+
+    size: tuple[float, float] = parameter(ListOf(_LENGTH, 2), "along x and y")
+    texture: str = parameter(Text(TEXTURES), "what a camera sees of it", "plain")
+    colour: tuple[float, float, float] = parameter(_COLOUR, "red, green, blue", (0.6, 0.6, 0.6))
+
+
+class WorldParameters(Parameters):
+    """What is in a world file besides objects."""
+
+    frame: str = parameter(FRAME, "tf frame of all positions", "world")
+    floor: FloorParameters = group(FloorParameters, "floor")
+
+
+OBJECTS: dict[str, type[_ObjectParameters]] = {
+    "box": BoxParameters,
+    "cylinder": CylinderParameters,
+    "ball": BallParameters,
+}
+"""Objects that may move, by their type."""
+
+WALL = "wall"
+
+PATHS: dict[str, type[CircleParameters] | type[WaypointsParameters]] = {
+    "circle": CircleParameters,
+    "waypoints": WaypointsParameters,
+}
+"""Paths, by their type."""
+
+
+class WorldFile(ParameterType):
+    """The path of a world file; as a value, the `World` in it."""
+
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> World:
+        if not isinstance(value, str) or not value:
+            raise ValueError
+        return load(value)
+
+    @override
+    def __str__(self) -> str:
+        return "the path of a world file"
+
+
+def load(path: str | FilePath) -> World:
+    """Return the world in a file.
+
+    Raises
+    ------
+    ParameterError
+        About everything that is wrong in it: file, line and what was expected.
+    """
+    file = yaml_file.load(path)
+    settings = file.read(WorldParameters, besides=("objects",))
+    entries = file["objects"].elements() if "objects" in file else []
+    objects: list[Shape] = []
+    complaints: list[str] = []
+    lines = {FLOOR: "the floor", settings.frame: "the frame"}
+    for entry in entries:
+        try:
+            made = _object(entry)
+            name = entry["name"]
+            if made.name in lines:
+                raise name.error(f"is {shown(made.name)}, which is the name of {lines[made.name]}")
+            lines[made.name] = f"the object in line {name.line}"
+            objects.append(made)
+        except ParameterError as error:
+            complaints += error.complaints
+    if complaints:
+        raise ParameterError(*complaints)
+    floor = settings.floor
+    return World(settings.frame, Floor(floor.size, floor.texture, floor.colour), tuple(objects))
+
+
+def _object(entry: Entry) -> Shape:
+    kind = _type(entry, (*OBJECTS, WALL))
+    if kind == WALL:
+        return entry.read(WallParameters, besides=("type",)).shape()
+    path = _path(entry["path"]) if "path" in entry else None
+    parameters = entry.read(OBJECTS[kind], besides=("type", "path"))
+    if (parameters.centre is None) == (path is None):
+        raise entry.error("has a centre and a path, or none of them; expected one of them")
+    return _with_picture(parameters.shape(path), entry)
+
+
+def _with_picture(shape: Shape, entry: Entry) -> Shape:
+    # Its name is relative to the file in which it stands.
+    if not isinstance(shape, Box) or not shape.picture:
+        return shape
+    picture = entry.file.parent / shape.picture
+    # Unlike pathlib's, this takes a name that is too long for one.
+    if not os.path.isfile(picture):
+        raise entry["picture"].error(
+            f"is {shown(shape.picture)}; expected a file, and {shortened(str(picture))} is none"
+        )
+    return replace(shape, picture=str(picture))
+
+
+def _path(entry: Entry) -> Path:
+    return entry.read(PATHS[_type(entry, tuple(PATHS))], besides=("type",)).path()
+
+
+def _type(entry: Entry, choices: tuple[str, ...]) -> str:
+    kind = entry["type"]
+    if kind.value not in choices:
+        raise kind.error(f"is {shown(kind.value)}; expected one of {', '.join(choices)}")
+    return kind.value

@@ -1,0 +1,84 @@
+"""ROS interface of a world: shows it in RViz, and tells where its moving objects are."""
+
+from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
+from std_msgs.msg import String
+from typing_extensions import override
+from visualization_msgs.msg import MarkerArray
+
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
+from crazyflie_world.markers import markers, pose
+from crazyflie_world.world import World
+from crazyflie_world.world_file import WorldFile
+
+FLYING = "flying"
+"""Flight state of a vehicle that follows references."""
+
+
+class WorldNodeParameters(Parameters):
+    """Parameters of `WorldNode`."""
+
+    world: World = parameter(WorldFile(), "the world, a YAML file")
+    markers_topic: str = parameter(
+        TOPIC, "for RViz, latched", "world/markers", name="topics/markers"
+    )
+    poses_topic: str = parameter(
+        TOPIC, "below it, each moving object has NAME/pose", "world", name="topics/poses"
+    )
+    flight_state_topic: str | None = parameter(
+        TOPIC,
+        "the takeoff server's flight state: paths begin when a vehicle flies; by default at once",
+        None,
+        name="topics/flight_state",
+    )
+    time_step: float = parameter(TIME_STEP, "between two poses", 0.02)
+
+
+class WorldNode(Node):
+    """Show a world in RViz; move what has a path, on /tf and as poses."""
+
+    def __init__(self) -> None:
+        self._begin: float | None = None
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(WorldNodeParameters)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        world = parameters.world
+        self._poses = {
+            each.name: handle.publisher(f"{parameters.poses_topic}/{each.name}/pose", PoseStamped)
+            for each in world.moving
+        }
+        self._broadcast = handle.broadcast_transforms()
+        handle.publisher(parameters.markers_topic, MarkerArray, latch=True).publish(markers(world))
+        if parameters.flight_state_topic:
+            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        else:
+            self._begin = handle.time()
+        if world.moving:
+            handle.timer(parameters.time_step, self._on_timer)
+
+    def _on_flight_state(self, message):
+        if self._begin is None and message.data == FLYING:
+            self._begin = self._handle.time()
+
+    def _on_timer(self):
+        now = self._handle.time()
+        elapsed = 0.0 if self._begin is None else now - self._begin
+        world = self._parameters.world.at(elapsed)
+        stamp = self._handle.stamp(now)
+        transforms = []
+        for each in world.moving:
+            message = PoseStamped(pose=pose(each))
+            message.header.stamp = stamp
+            message.header.frame_id = world.frame
+            self._poses[each.name].publish(message)
+            transform = TransformStamped(header=message.header, child_frame_id=each.name)
+            transform.transform.translation = Vector3(*each.centre)
+            # A frame as the world's: markers are turned in it.
+            transform.transform.rotation = Quaternion(w=1.0)
+            transforms.append(transform)
+        self._broadcast(transforms)

@@ -13,10 +13,6 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-# Before all else that imports rospy.
-import crazyflie_utils.ros1.light_rospy  # noqa: F401
-
-# isort: split
 import rosgraph
 import rospy
 
@@ -60,8 +56,7 @@ def run(node_class: type | str, default_name: str) -> None:
     Parameters
     ----------
     node_class : type or str
-        Subclass of `Node`, or where it is, "package.module:Class": a process that has not
-        imported it yet begins sooner and is smaller by half, see `light_rospy`.
+        Subclass of `Node`, or its place, "package.module:Class".
     default_name : str
         Name of the node unless the launch file gives another.
     """

@@ -229,21 +229,6 @@ def test_transforms_that_nobody_looks_up_are_taken_all_the_same(handle, process)
     wait_until(lambda: not process.transforms._subscriber.has_publishers(), "the end")
 
 
-def test_where_only_the_latest_counts_others_are_not_delivered(handle):
-    numbers = []
-    subscriber = handle.subscribe(
-        "/latest", Int64, lambda message: numbers.append(message.data), latest_only=True
-    )
-    with HostilePublisher("/latest", Int64) as publisher:
-        connected(publisher)
-        publisher.send(frame(Int64(-1)))
-        wait_until(lambda: numbers == [-1], "the first one")
-        publisher.send(b"".join(frame(Int64(number)) for number in range(100)))
-        wait_until(lambda: len(numbers) > 1, "the last one")
-    wait_until(lambda: not subscriber.has_publishers(), "the end")
-    assert numbers == [-1, 99]
-
-
 def test_of_two_who_want_the_latest_one_may_leave(handle):
     first, second = [], []
     part = handle.child()

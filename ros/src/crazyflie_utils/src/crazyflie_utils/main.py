@@ -157,7 +157,6 @@ def _begin(default_name, signals):
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     _wait_for_master(signals)
-    rospy_internals.never_wait_long_to_begin()
     rospy_internals.connect_once()
     rospy.init_node(default_name, disable_signals=signals is not None)
     return ros_process()
@@ -178,7 +177,6 @@ def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
     is_own = not rospy.core.is_initialized()
     if is_own:
         _wait_for_master()
-        rospy_internals.never_wait_long_to_begin()
         rospy_internals.connect_once()
         rospy.init_node(default_name, anonymous=True, disable_signals=True)
     process = ros_process()

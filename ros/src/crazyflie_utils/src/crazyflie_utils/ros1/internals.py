@@ -9,18 +9,16 @@ import functools
 import http.client
 import resource
 import threading
-import time
 import weakref
 import xmlrpc.client
 from collections.abc import Callable, Hashable, Iterator
-from types import SimpleNamespace
 from typing import Any
 
 import genpy
 import rosgraph.roslogging
 import rospy
 from rospy import rostime
-from rospy.impl import init, registration, tcpros_base
+from rospy.impl import registration, tcpros_base
 
 _HEADER_LIMIT = 5.0
 """How long, in s, who connects may take to say what for."""
@@ -118,12 +116,6 @@ def never_fail_to_log() -> None:
             emit(self, record)
 
     handler.emit = emit_if_possible
-
-
-@functools.cache
-def never_wait_long_to_begin() -> None:
-    """Have ``rospy.init_node`` look every ms, not every 0.1 s, whether its thread is ready."""
-    init.time = SimpleNamespace(sleep=lambda duration: time.sleep(min(duration, 0.001)))
 
 
 @functools.cache

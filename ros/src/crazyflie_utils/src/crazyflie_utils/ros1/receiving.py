@@ -1,19 +1,15 @@
 """How messages come into a process, whatever publishers send; more of what rospy does not offer."""
 
 import functools
-import math
-import select
 import socket
 import struct
-import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import genpy
 import rospy
 from rospy.exceptions import TransportException, TransportTerminated
-from rospy.impl import registration, tcpros_base
+from rospy.impl import tcpros_base
 from rospy.impl.tcpros_pubsub import TCPROSSub
 
 from crazyflie_utils.ros1.internals import Report
@@ -35,12 +31,6 @@ _REST = 0.005
 _TURNS = 16
 """How often a socket is read for what waits there: a flood never ends, but a millionth part of it
 is enough."""
-
-_PAUSE = 0.05
-"""How long messages that are read lazily wait to be collected, at most, s;"""
-
-_LATEST_PAUSE = 0.15
-"""and where only the last one counts: less often than their nodes collect them by themselves."""
 
 
 class _Flow:
@@ -85,14 +75,6 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
         if self.socket is None:
             raise TransportException("connection not initialized")
         inbox = _inbox(self, report)
-        if inbox.is_lazy:
-            if not inbox.wait():
-                return []
-            if reminders := inbox.reminders:
-                for remind in reminders:
-                    remind()
-                return []
-            return _note(self, inbox.take_waiting(_TURNS))
         messages: list[genpy.Message] = []
         while not (messages or self.done or rospy.core.is_shutdown()):
             frames = inbox.take()
@@ -120,36 +102,6 @@ def bear_hostile_publishers(report: Report, limits_rate: bool) -> None:
 
     tcpros_base.TCPROSTransport.receive_once = receive
     tcpros_base.TCPROSTransport._validate_header = validate_type
-
-
-def read_lazily(
-    subscriber: rospy.Subscriber, is_lazy: bool, remind: Callable[[], None] | None = None
-) -> None:
-    """Let messages wait for `collect`, or for 50 ms, unless others subscribe here, too.
-
-    Then they are delivered; or after 150 ms ``remind()`` is called, with which only the last one
-    is delivered.
-    """
-    # It is shared with those who have subscribed here before, or will.
-    implementation = subscriber.impl
-    implementation.is_lazy = is_lazy
-    if remind is not None:
-        implementation.reminders = [*getattr(implementation, "reminders", ()), remind]
-
-
-def collect(subscriber: rospy.Subscriber) -> None:
-    """Call back, in this thread, for messages that wait."""
-    implementation = subscriber.impl
-    if implementation is None:
-        return
-    for connection in implementation.connections:
-        inbox = getattr(connection, "inbox", None)
-        if inbox is not None and inbox.sock is connection.socket and inbox.is_lazy:
-            # Once: in a flood the connection's own thread is at work as well, and whoever looks
-            # something up has no time for all of it.
-            messages = _note(connection, inbox.take_waiting(1))
-            if messages:
-                implementation.receive_callback(messages, connection)
 
 
 def _note(connection, messages):
@@ -206,74 +158,6 @@ class _Inbox:
         self._part = bytearray()
         self._read = read
         self.sock.setblocking(True)
-        # Of what is read lazily.
-        self._lock = threading.Lock()
-        self._collected = -math.inf
-        self._is_behind = True
-        self._end: TransportTerminated | None = None
-
-    @property
-    def is_lazy(self) -> bool:
-        """Whether messages may wait; see `read_lazily`."""
-        implementation = self._implementation()
-        return getattr(implementation, "is_lazy", False) and len(implementation.callbacks) == 1
-
-    @property
-    def reminders(self) -> list[Callable[[], None]]:
-        """Who is told of messages that have waited; see `read_lazily`."""
-        return getattr(self._implementation(), "reminders", [])
-
-    def _implementation(self):
-        return registration.get_topic_manager().get_subscriber_impl(self.protocol.resolved_name)
-
-    def wait(self) -> bool:
-        """Wait a little, and then for data, unless somebody has collected it meanwhile.
-
-        Returns
-        -------
-        bool
-            Whether nobody has.
-
-        Raises
-        ------
-        TransportTerminated
-            The publisher has hung up, or makes messages without end.
-        """
-        if self._end is not None:
-            raise self._end
-        if not self._is_behind:
-            pause = _LATEST_PAUSE if self.reminders else _PAUSE
-            rest = self._collected + pause - time.monotonic()
-            time.sleep(rest if rest > 0.0 else pause)
-            if time.monotonic() < self._collected + pause:
-                return False
-        try:
-            poll = select.poll()
-            poll.register(self.sock, select.POLLIN)
-            poll.poll(1000)
-        # It may be closed by others at any moment.
-        except (OSError, ValueError) as error:
-            raise TransportTerminated(str(error)) from None
-        return True
-
-    def take_waiting(self, turns: int) -> list[genpy.Message]:
-        """Return the messages that are there, read at most so many times.
-
-        A hang-up is left to `wait`.
-        """
-        frames: list[bytes] = []
-        self._collected = time.monotonic()
-        with self._lock:
-            try:
-                for _ in range(turns):
-                    frames += self.take(socket.MSG_DONTWAIT)
-                    if not self._is_behind:
-                        break
-            except BlockingIOError:
-                self._is_behind = False
-            except TransportTerminated as end:
-                self._end = end
-        return self.decoded(frames[-1:] if self.reminders else frames)
 
     def decoded(self, frames: list[bytes]) -> list[genpy.Message]:
         """Return messages without those that cannot be decoded."""
@@ -328,8 +212,6 @@ class _Inbox:
         if not data:
             raise TransportTerminated("the publisher has hung up")
         self._connection.stat_bytes += len(data)
-        # A great part of what the socket holds.
-        self._is_behind = len(data) > self.protocol.buff_size // 2
         return data
 
     def _needed(self, data, start=0):

@@ -63,12 +63,6 @@ class _RosSubscriber(ExternalSubscriber):
     def has_publishers(self) -> bool:
         return self._subscriber.get_num_connections() > 0
 
-    def read_lazily(self, is_lazy: bool, remind: Callable[[], None] | None = None) -> None:
-        rospy_receiving.read_lazily(self._subscriber, is_lazy, remind)
-
-    def collect(self) -> None:
-        rospy_receiving.collect(self._subscriber)
-
     def close(self) -> None:
         self._subscriber.unregister()
 

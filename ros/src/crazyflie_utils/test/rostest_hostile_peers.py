@@ -171,7 +171,7 @@ def test_of_a_flood_only_the_latest_is_taken(handle, warnings):
     assert warnings == ["more than 2000 messages a second on /flood"]
 
 
-def test_of_a_flood_of_transforms_each_counts(handle, process):
+def test_of_a_flood_of_transforms_lossless(handle, process):
     lookup = handle.listen_to_transforms()
     with HostilePublisher("/tf", TFMessage) as hostile:
         connected(hostile)

@@ -1,5 +1,6 @@
 """What a publisher sends, cut into messages, without a master."""
 
+import io
 import socket
 from types import SimpleNamespace
 
@@ -7,7 +8,7 @@ import pytest
 from rospy.exceptions import TransportTerminated
 from std_msgs.msg import Int64
 
-from crazyflie_utils.ros1.receiving import _Inbox
+from crazyflie_utils.ros1.receiving import Inbox, RateLimiter
 from crazyflie_utils.testing.hostile_publisher import frame
 
 
@@ -17,28 +18,50 @@ def publisher():
     here, there = socket.socketpair()
     with here, there:
         protocol = SimpleNamespace(resolved_name="/t", recv_data_class=Int64, buff_size=65536)
-        yield here, SimpleNamespace(socket=there, protocol=protocol, header={}, stat_bytes=0)
+        yield (
+            here,
+            SimpleNamespace(
+                socket=there, protocol=protocol, header={}, stat_bytes=0, read_buff=io.BytesIO()
+            ),
+        )
 
 
 def inbox_of(connection):
-    return _Inbox(connection, b"", lambda text, key: None)
+    return Inbox(connection, lambda text, key: None)
 
 
 def numbers(inbox):
-    return [message.data for message in inbox.decoded(inbox.take(socket.MSG_DONTWAIT))]
+    return [message.data for message in inbox.receive(limits_rate=False)]
 
 
 def test_messages_in_pieces(publisher):
     here, connection = publisher
     inbox = inbox_of(connection)
-    with pytest.raises(BlockingIOError):
-        numbers(inbox)
     here.sendall(frame(Int64(1)) + frame(Int64(2))[:5])
     assert numbers(inbox) == [1]
     here.sendall(frame(Int64(2))[5:] + frame(Int64(3))[:2])
     assert numbers(inbox) == [2]
     here.sendall(frame(Int64(3))[2:])
     assert numbers(inbox) == [3]
+
+
+def test_of_a_flood_the_last_message_is_decoded(publisher):
+    here, connection = publisher
+    inbox = inbox_of(connection)
+    here.sendall(b"".join(frame(Int64(number)) for number in range(500)))
+    assert [each.data for each in inbox.receive(limits_rate=True)] == [499]
+    connection.protocol.recv_data_class = type("Lossless", (Int64,), {"lossless": True})
+    here.sendall(b"".join(frame(Int64(number)) for number in range(500)))
+    assert [each.data for each in inbox.receive(limits_rate=True)] == list(range(500))
+
+
+def test_a_connection_recovers_from_a_flood(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    limiter = RateLimiter()
+    assert limiter.is_flooded(1_000_000)
+    now[0] = 0.2
+    assert not limiter.is_flooded(1)
 
 
 def test_a_connection_that_another_thread_closes_at_that_moment(publisher):
@@ -56,4 +79,4 @@ def test_a_hang_up_ends_the_connection(publisher):
     here.close()
     assert numbers(inbox) == [1]
     with pytest.raises(TransportTerminated, match="hung up"):
-        inbox.take()
+        inbox.receive(limits_rate=False)

@@ -171,7 +171,7 @@ def test_of_a_flood_only_the_latest_is_taken(handle, warnings):
     assert warnings == ["more than 2000 messages a second on /flood"]
 
 
-def test_of_a_flood_of_transforms_each_counts(handle, process):
+def test_of_a_flood_of_transforms_lossless(handle, process):
     lookup = handle.listen_to_transforms()
     with HostilePublisher("/tf", TFMessage) as hostile:
         connected(hostile)
@@ -227,21 +227,6 @@ def test_transforms_that_nobody_looks_up_are_taken_all_the_same(handle, process)
         )
     # Who hangs up is noticed without a look-up, too.
     wait_until(lambda: not process.transforms._subscriber.has_publishers(), "the end")
-
-
-def test_where_only_the_latest_counts_others_are_not_delivered(handle):
-    numbers = []
-    subscriber = handle.subscribe(
-        "/latest", Int64, lambda message: numbers.append(message.data), latest_only=True
-    )
-    with HostilePublisher("/latest", Int64) as publisher:
-        connected(publisher)
-        publisher.send(frame(Int64(-1)))
-        wait_until(lambda: numbers == [-1], "the first one")
-        publisher.send(b"".join(frame(Int64(number)) for number in range(100)))
-        wait_until(lambda: len(numbers) > 1, "the last one")
-    wait_until(lambda: not subscriber.has_publishers(), "the end")
-    assert numbers == [-1, 99]
 
 
 def test_of_two_who_want_the_latest_one_may_leave(handle):

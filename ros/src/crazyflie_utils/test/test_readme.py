@@ -9,7 +9,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from crazyflie_utils import NodeHandle, parameter_types
+from crazyflie_utils import NodeHandle
+from crazyflie_utils.parameters import types as parameter_types
 
 README = (Path(__file__).resolve().parents[1] / "README.md").read_text()
 CONSTANTS = [name for name in vars(parameter_types) if name.isupper()]

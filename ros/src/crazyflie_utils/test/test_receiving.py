@@ -1,5 +1,6 @@
-"""What waits in the socket of a publisher, without a master."""
+"""What a publisher sends, cut into messages, without a master."""
 
+import io
 import socket
 from types import SimpleNamespace
 
@@ -7,7 +8,7 @@ import pytest
 from rospy.exceptions import TransportTerminated
 from std_msgs.msg import Int64
 
-from crazyflie_utils.ros1.receiving import _Inbox
+from crazyflie_utils.ros1.receiving import Inbox, RateLimiter
 from crazyflie_utils.testing.hostile_publisher import frame
 
 
@@ -17,25 +18,50 @@ def publisher():
     here, there = socket.socketpair()
     with here, there:
         protocol = SimpleNamespace(resolved_name="/t", recv_data_class=Int64, buff_size=65536)
-        yield here, SimpleNamespace(socket=there, protocol=protocol, header={}, stat_bytes=0)
+        yield (
+            here,
+            SimpleNamespace(
+                socket=there, protocol=protocol, header={}, stat_bytes=0, read_buff=io.BytesIO()
+            ),
+        )
 
 
 def inbox_of(connection):
-    return _Inbox(connection, b"", lambda text, key: None)
+    return Inbox(connection, lambda text, key: None)
 
 
-def numbers(messages):
-    return [message.data for message in messages]
+def numbers(inbox):
+    return [message.data for message in inbox.receive(limits_rate=False)]
 
 
-def test_nothing_is_waited_for(publisher):
+def test_messages_in_pieces(publisher):
     here, connection = publisher
     inbox = inbox_of(connection)
-    assert inbox.take_waiting(1) == []
     here.sendall(frame(Int64(1)) + frame(Int64(2))[:5])
-    assert numbers(inbox.take_waiting(1)) == [1]
-    here.sendall(frame(Int64(2))[5:])
-    assert numbers(inbox.take_waiting(1)) == [2]
+    assert numbers(inbox) == [1]
+    here.sendall(frame(Int64(2))[5:] + frame(Int64(3))[:2])
+    assert numbers(inbox) == [2]
+    here.sendall(frame(Int64(3))[2:])
+    assert numbers(inbox) == [3]
+
+
+def test_of_a_flood_the_last_message_is_decoded(publisher):
+    here, connection = publisher
+    inbox = inbox_of(connection)
+    here.sendall(b"".join(frame(Int64(number)) for number in range(500)))
+    assert [each.data for each in inbox.receive(limits_rate=True)] == [499]
+    connection.protocol.recv_data_class = type("Lossless", (Int64,), {"lossless": True})
+    here.sendall(b"".join(frame(Int64(number)) for number in range(500)))
+    assert [each.data for each in inbox.receive(limits_rate=True)] == list(range(500))
+
+
+def test_a_connection_recovers_from_a_flood(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    limiter = RateLimiter()
+    assert limiter.is_flooded(1_000_000)
+    now[0] = 0.2
+    assert not limiter.is_flooded(1)
 
 
 def test_a_connection_that_another_thread_closes_at_that_moment(publisher):
@@ -43,58 +69,14 @@ def test_a_connection_that_another_thread_closes_at_that_moment(publisher):
     inbox = inbox_of(connection)
     here.sendall(frame(Int64(1)))
     connection.protocol = None
-    assert numbers(inbox.take_waiting(1)) == [1]
+    assert numbers(inbox) == [1]
 
 
-def test_a_flood_is_read_in_turns(publisher):
-    here, connection = publisher
-    connection.protocol.buff_size = 120
-    inbox = inbox_of(connection)
-    for number in range(25):
-        here.sendall(frame(Int64(number)))
-    assert numbers(inbox.take_waiting(1)) == list(range(10))
-    assert numbers(inbox.take_waiting(16)) == list(range(10, 25))
-
-
-def test_where_only_the_latest_counts_others_are_not_read(publisher, monkeypatch):
-    here, connection = publisher
-    monkeypatch.setattr(_Inbox, "reminders", [lambda: None])
-    inbox = inbox_of(connection)
-    assert inbox.take_waiting(1) == []
-    here.sendall(b"".join(frame(Int64(number)) for number in range(5)) + frame(Int64(5))[:7])
-    assert numbers(inbox.take_waiting(1)) == [4]
-    here.sendall(frame(Int64(5))[7:])
-    assert numbers(inbox.take_waiting(1)) == [5]
-
-
-def test_who_collects_by_themselves_are_not_reminded(publisher, monkeypatch):
-    here, connection = publisher
-    inbox = inbox_of(connection)
-    assert inbox.take_waiting(1) == []
-    now = [10.0]
-    collected = []
-
-    def sleep(duration):
-        now[0] += duration
-        if len(collected) < 2:
-            here.sendall(frame(Int64(len(collected))))
-            collected.extend(numbers(inbox.take_waiting(1)))
-
-    clock = SimpleNamespace(sleep=sleep, monotonic=lambda: now[0])
-    monkeypatch.setattr("crazyflie_utils.ros1.receiving.time", clock)
-    assert [inbox.wait(), inbox.wait()] == [False, False]
-    assert collected == [0, 1]
-    here.sendall(frame(Int64(2)))
-    assert inbox.wait()
-    assert numbers(inbox.take_waiting(1)) == [2]
-
-
-def test_a_hang_up_is_left_to_the_thread_of_the_connection(publisher):
+def test_a_hang_up_ends_the_connection(publisher):
     here, connection = publisher
     inbox = inbox_of(connection)
     here.sendall(frame(Int64(1)))
     here.close()
-    assert numbers(inbox.take_waiting(16)) == [1]
-    assert inbox.take_waiting(1) == []
+    assert numbers(inbox) == [1]
     with pytest.raises(TransportTerminated, match="hung up"):
-        inbox.wait()
+        inbox.receive(limits_rate=False)

@@ -10,13 +10,21 @@ from concurrent.futures import Future
 from types import SimpleNamespace
 
 import pytest
-from rospy.impl import registration, tcpros_base
+from rospy.impl import tcpros_base
+from rospy.impl.tcpros_base import TCPROSTransport
+from rospy.impl.tcpros_pubsub import TCPROSSub
+from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from crazyflie_utils import ServiceError
-from crazyflie_utils.ros1 import internals as rospy_internals
+from crazyflie_utils.ros1 import patches
 from crazyflie_utils.ros1 import transport as ros_transport
+from crazyflie_utils.ros1.own_topics import OwnSubscription
 from crazyflie_utils.ros1.transport import RosTransport, wait_for_answer
+
+
+def ignore(text, key):
+    """Take no note of what a peer did wrong."""
 
 
 def test_an_answer_is_returned():
@@ -82,46 +90,31 @@ def test_calls_that_nobody_answers_do_not_pile_up(monkeypatch):
 # Connections.
 
 
-def test_a_publisher_is_connected_to_by_one_thread_at_a_time():
-    rospy_internals.connect_once()
-    entered, may_return = threading.Semaphore(0), threading.Semaphore(0)
-
-    def connect(topic, uri):
-        entered.release()
-        assert may_return.acquire(timeout=60.0)
-        return 1, "", 0
-
-    manager = registration.RegManager(SimpleNamespace(_connect_topic=connect, done=False))
-    threads = [
-        threading.Thread(target=manager._connect_topic_thread, args=("/a", uri), daemon=True)
-        for uri in ("http://x", "http://x", "http://y")
-    ]
-    for thread in threads:
-        thread.start()
-    assert entered.acquire(timeout=60.0)
-    assert entered.acquire(timeout=60.0)
-    # One to each publisher; the third waits.
-    assert not entered.acquire(timeout=0.2)
-    may_return.release(3)
-    for thread in threads:
-        thread.join(60.0)
-    assert entered.acquire(blocking=False)
+def test_the_first_of_two_connections_to_a_publisher_stays():
+    topic = OwnSubscription("/a", String, lambda: False, ignore, False, frozenset({"connect_once"}))
+    protocol = TCPROSSub("/a", String)
+    connections = [TCPROSTransport(protocol, "/a") for _ in range(4)]
+    for connection, uri in zip(
+        connections, ("http://x", "http://x", "http://y", "http://x"), strict=True
+    ):
+        connection.set_endpoint_id(uri)
+    assert [topic.add_connection(each) for each in connections[:3]] == [True, False, True]
+    # That of a publisher that has ended is not in the way of a new one.
+    connections[0].close()
+    assert topic.add_connection(connections[3])
 
 
 def test_connections_that_come_at_once_are_not_put_off(monkeypatch):
-    for owner, name in (
-        (tcpros_base.TCPROSServer, "_tcp_server_callback"),
-        (tcpros_base, "read_ros_handshake_header"),
-        (tcpros_base, "logwarn"),
-    ):
-        monkeypatch.setattr(owner, name, getattr(owner, name))
     with contextlib.ExitStack() as stack:
         # It is never asked for one: all have to find a place in its queue.
         server = stack.enter_context(socket.create_server(("127.0.0.1", 0), backlog=5))
         rospys = SimpleNamespace(server_sock=server, inbound_handler=None)
         node = SimpleNamespace(tcp_ros_server=rospys, _tcp_server_callback=None)
         monkeypatch.setattr(tcpros_base, "_tcpros_server", node)
-        rospy_internals.bear_hostile_newcomers.__wrapped__(lambda text, key: None)
+        patches.harden_tcp_server(ignore)
+        handler = rospys.inbound_handler
+        patches.harden_tcp_server(ignore)
+        assert node._tcp_server_callback is rospys.inbound_handler is handler
         for _ in range(32):
             # Beyond the queue, the second try comes after 1 s.
             stack.enter_context(socket.create_connection(server.getsockname(), timeout=0.9))
@@ -130,11 +123,11 @@ def test_connections_that_come_at_once_are_not_put_off(monkeypatch):
 def test_a_process_may_have_more_topics_than_a_shell_lets_it_have_files():
     program = """
 import resource
-from crazyflie_utils.ros1 import internals as rospy_internals
+from crazyflie_utils.ros1.transport import allow_many_topics
 
 _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
 resource.setrlimit(resource.RLIMIT_NOFILE, (100, most))
-rospy_internals.allow_many_topics()
+allow_many_topics()
 files = [open("/dev/null") for _ in range(200)]
 """
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60.0)

@@ -30,8 +30,8 @@ def holders_of_numbers(message):
             yield from holders_of_numbers(getattr(message, field))
 
 
-def test_there_are_twelve_messages():
-    assert len(MESSAGES) == 12
+def test_there_are_fifteen_messages():
+    assert len(MESSAGES) == 15
     assert len(FLAT) == 5
 
 

@@ -192,9 +192,8 @@ class NodeHandle(TimeHandle, TfHandle):
         on_invalid : callable, optional
             is called instead, without arguments.
         latest_only : bool, optional
-            Only the latest message counts, and not before the node's next timer, which it has to
-            have, or service call. Messages of other processes wait in their socket for that, at
-            most 150 ms of real time, so that the process does not wake up for each of them.
+            Only the latest message is delivered, before the node's next timer, which it has to
+            have, or service call.
         """
         if finite:
             callback = self._finite_only(self.resolve(topic), finite, callback, on_invalid)
@@ -205,8 +204,6 @@ class NodeHandle(TimeHandle, TfHandle):
         subscriber = topics.subscribe(self.resolve(topic), message_type, receive)
         self._undo.append(subscriber.close)
         if latest_only:
-            # Simulated time may pass too quickly to wait for it in a socket.
-            latest.begin(subscriber, submit, is_lazy=not self.uses_sim_time)
             self._to_deliver.append(latest.deliver)
         return subscriber
 

@@ -13,10 +13,6 @@ import traceback
 from collections.abc import Callable
 from typing import Any
 
-# Before all else that imports rospy.
-import crazyflie_utils.ros1.light_rospy  # noqa: F401
-
-# isort: split
 import rosgraph
 import rospy
 
@@ -27,7 +23,6 @@ from crazyflie_utils.node import Node
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, GraphName, ParameterType
 from crazyflie_utils.process import Process
-from crazyflie_utils.ros1 import internals as rospy_internals
 from crazyflie_utils.ros1.transport import RosTransport
 
 _MASTER_LIMIT = 10.0
@@ -60,8 +55,7 @@ def run(node_class: type | str, default_name: str) -> None:
     Parameters
     ----------
     node_class : type or str
-        Subclass of `Node`, or where it is, "package.module:Class": a process that has not
-        imported it yet begins sooner and is smaller by half, see `light_rospy`.
+        Subclass of `Node`, or its place, "package.module:Class".
     default_name : str
         Name of the node unless the launch file gives another.
     """
@@ -162,8 +156,6 @@ def _begin(default_name, signals):
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     _wait_for_master(signals)
-    rospy_internals.never_wait_long_to_begin()
-    rospy_internals.connect_once()
     rospy.init_node(default_name, disable_signals=signals is not None)
     return ros_process()
 
@@ -183,8 +175,6 @@ def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
     is_own = not rospy.core.is_initialized()
     if is_own:
         _wait_for_master()
-        rospy_internals.never_wait_long_to_begin()
-        rospy_internals.connect_once()
         rospy.init_node(default_name, anonymous=True, disable_signals=True)
     process = ros_process()
     rospy.on_shutdown(lambda: process.end(0))
@@ -200,18 +190,16 @@ def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
 
 def ros_process() -> Process:
     """Return what the nodes of this process share, when it is a ROS node already."""
-    transport = RosTransport()
-    try:
-        value = transport.get_param("/use_sim_time")
-    except KeyError:
-        value = False
+    value = rospy.get_param("/use_sim_time", False)
     try:
         use_sim_time = BOOLEAN(value)
     except ValueError:
-        transport.log("error", f"parameter /use_sim_time is {value!r}; expected {BOOLEAN}")
+        rospy.logerr(f"parameter /use_sim_time is {value!r}; expected {BOOLEAN}")
         _fail()
     # In simulated time there is no such thing as too many messages a second.
-    transport.receive(limits_rate=not use_sim_time)
+    transport = RosTransport(limits_rate=not use_sim_time)
+    if use_sim_time:
+        transport.follow_clock()
     return Process(transport, use_sim_time)
 
 

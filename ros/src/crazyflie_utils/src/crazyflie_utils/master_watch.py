@@ -6,7 +6,7 @@ import xmlrpc.client
 import rosgraph
 import rospy
 
-from crazyflie_utils.ros1 import internals as rospy_internals
+from crazyflie_utils.ros1 import registering
 
 _PERIOD = 2.0
 """How often the master is asked whether it knows this process, s."""
@@ -49,7 +49,7 @@ class MasterWatch:
                 rospy.logwarn("the ROS master does not know this node any more; registering again")
             else:
                 rospy.logwarn("the ROS master was started anew; registering with it")
-            rospy_internals.register()
+            registering.register()
         self._pid = pid
 
     def _run(self):

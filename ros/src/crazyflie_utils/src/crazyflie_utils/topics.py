@@ -124,14 +124,6 @@ class Subscriber:
         is_here = header.get("topic", self._topic.name) == self._topic.name
         return header.get("callerid", "") if is_here else ""
 
-    def read_lazily(self, is_lazy: bool, remind: Callable[[], None] | None = None) -> None:
-        """Let messages from outside wait for `collect`; see `ExternalSubscriber.read_lazily`."""
-        self._external.read_lazily(is_lazy, remind)
-
-    def collect(self) -> None:
-        """Deliver what has come from outside."""
-        self._external.collect()
-
     def close(self) -> None:
         """Receive no more."""
         # Not in place: a message may be on its way to the others.

@@ -40,21 +40,6 @@ class ExternalSubscriber(ABC):
     def has_publishers(self) -> bool:
         """Tell whether anyone outside this process is connected and may publish."""
 
-    # Where all messages are delivered as they come, there is nothing to do.
-
-    def read_lazily(  # noqa: B027
-        self, is_lazy: bool, remind: Callable[[], None] | None = None
-    ) -> None:
-        """Let messages wait for `collect`, though not for long; or be delivered as they come.
-
-        Nobody need wake up for one that waits. After a while they are delivered all the same; or,
-        if it is given, ``remind()`` is called, which has to see to it that they are collected, and
-        then only the last one is delivered.
-        """
-
-    def collect(self) -> None:  # noqa: B027
-        """Deliver what has come."""
-
     @abstractmethod
     def close(self) -> None:
         """Receive no more."""

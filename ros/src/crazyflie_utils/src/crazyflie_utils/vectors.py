@@ -9,14 +9,12 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import genpy
+import numpy as np
+from numpy.typing import NDArray
 from std_msgs.msg import Header
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
 
 M = TypeVar("M", bound=genpy.Message)
 
@@ -58,7 +56,7 @@ def _getter(message_type: Any) -> Callable[[genpy.Message], tuple[float, ...]]:
     return attrgetter(*message_type.__slots__)
 
 
-def to_vector(message: genpy.Message) -> "NDArray[np.float64]":
+def to_vector(message: genpy.Message) -> NDArray[np.float64]:
     """Return the fields of a flat message as a vector.
 
     Parameters
@@ -76,14 +74,11 @@ def to_vector(message: genpy.Message) -> "NDArray[np.float64]":
     TypeError
         A field is not a number but, say, a header.
     """
-    # Here, since many processes do without.
-    import numpy as np
-
     return np.array([getattr(message, field) for field in message.__slots__], dtype=float)
 
 
 def from_vector(
-    message_type: type[genpy.Message], vector: "Sequence[float] | NDArray[np.float64]"
+    message_type: type[genpy.Message], vector: Sequence[float] | NDArray[np.float64]
 ) -> genpy.Message:
     """Return a flat message with the entries of a vector.
 

@@ -1,13 +1,11 @@
-"""How messages leave a process: at once, and without ever waiting for who receives them.
+"""Connections to subscribers that are sent to at once and never waited for.
 
-rospy has the choice between sending in the publisher's thread, which a frozen subscriber stops, and
-a thread for every subscriber, which costs more than the message. Here a message is sent in the
-publisher's thread as far as the socket takes it; only who does not keep up gets a thread.
+rospy either sends in the publisher's thread, which a frozen subscriber stops, or gives every
+subscriber a thread, which costs more than the message. Here the publisher's thread sends as far as
+the socket takes it; only a subscriber that does not keep up gets a thread.
 """
 
-import functools
 import io
-import itertools
 import select
 import socket
 import struct
@@ -16,46 +14,15 @@ from collections import deque
 from typing import Any
 
 import genpy
-import rospy
 from rospy.exceptions import TransportTerminated
 
 _LENGTH = struct.Struct("<I")
 
-_AT_ONCE = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
+_NO_WAIT = socket.MSG_DONTWAIT | socket.MSG_NOSIGNAL
 
 
-@functools.cache
-def never_wait_for_subscribers() -> None:
-    """Have rospy's publishers with a queue send as above."""
-    rospy.topics.QueuedConnection = _PatientConnection
-
-
-def publish(publisher: rospy.Publisher, *messages: genpy.Message) -> None:
-    """Publish messages that are of the publisher's type, all at once.
-
-    It does what ``publisher.publish(message)`` does, without looking at them first.
-    """
-    implementation = publisher.impl
-    if implementation is None or implementation.closed:
-        publisher.publish(messages[-1])
-        return
-    with implementation.publock:
-        if implementation.is_latch:
-            implementation.latch = messages[-1]
-        if not implementation.connections:
-            return
-        first = implementation.seq + 1
-        implementation.seq += len(messages)
-        data = b"".join(map(_on_the_wire, messages, itertools.count(first)))
-        implementation.message_data_sent += len(data)
-        for connection in implementation.connections:
-            try:
-                connection.write_data(data)
-            except (OSError, TransportTerminated):
-                connection.close()
-
-
-def _on_the_wire(message, number):
+def serialized(message: genpy.Message, number: int) -> bytes:
+    """Return a message as it is on the wire, with a sequence number in its header, if any."""
     if message._has_header:
         header = message.header
         header.seq = number
@@ -67,7 +34,7 @@ def _on_the_wire(message, number):
     return _LENGTH.pack(len(body)) + body
 
 
-class _PatientConnection:
+class NonBlockingConnection:
     """A connection to a subscriber, in the place of rospy's ``QueuedConnection``.
 
     While the subscriber does not keep up, the last ``limit`` messages wait for it.
@@ -75,12 +42,11 @@ class _PatientConnection:
 
     def __init__(self, connection: Any, limit: int):
         self._connection = connection
-        self._limit = limit
         self._lock = threading.Lock()
-        self._waiting: deque[bytes] = deque()
+        self._waiting: deque[bytes] = deque(maxlen=limit)
         # The rest of a message that has begun; with it a thread is at work.
         self._rest = b""
-        # A message waits for no other one; whether the subscriber asks for that or not.
+        # Not only where the subscriber asks for it: messages above 490 bytes wait up to 40 ms.
         connection.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def __getattr__(self, name: str) -> Any:
@@ -98,8 +64,6 @@ class _PatientConnection:
         """
         with self._lock:
             if self._rest:
-                if len(self._waiting) == self._limit:
-                    self._waiting.popleft()
                 self._waiting.append(data)
                 return
             self._rest = self._send(data)
@@ -113,7 +77,7 @@ class _PatientConnection:
         if connection.done or sock is None:
             raise TransportTerminated("connection closed")
         try:
-            sent = sock.send(data, _AT_ONCE)
+            sent = sock.send(data, _NO_WAIT)
         except BlockingIOError:
             return data
         except OSError as error:

@@ -2,6 +2,7 @@
 
 import contextlib
 import math
+import resource
 import threading
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
@@ -13,11 +14,11 @@ from typing import Any
 import genpy
 import rosgraph
 import rospy
+from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.parameters.writer import ParameterWriter
-from crazyflie_utils.ros1 import internals as rospy_internals
-from crazyflie_utils.ros1 import receiving as rospy_receiving
-from crazyflie_utils.ros1 import sending as rospy_sending
+from crazyflie_utils.ros1 import patches
+from crazyflie_utils.ros1.own_topics import OwnCallback, publish
 from crazyflie_utils.throttle import Throttle
 from crazyflie_utils.transport import (
     ExternalPublisher,
@@ -42,17 +43,19 @@ a thread that nothing can end."""
 
 
 class _RosPublisher(ExternalPublisher):
-    def __init__(self, publisher: rospy.Publisher):
+    def __init__(self, publisher: rospy.Publisher, on_close: Callable[[], None]):
         self._publisher = publisher
+        self._on_close = on_close
 
     def has_subscribers(self) -> bool:
         implementation = self._publisher.impl
         return implementation is not None and bool(implementation.connections)
 
     def publish(self, *messages: genpy.Message) -> None:
-        rospy_sending.publish(self._publisher, *messages)
+        publish(self._publisher, messages)
 
     def close(self) -> None:
+        self._on_close()
         self._publisher.unregister()
 
 
@@ -62,12 +65,6 @@ class _RosSubscriber(ExternalSubscriber):
 
     def has_publishers(self) -> bool:
         return self._subscriber.get_num_connections() > 0
-
-    def read_lazily(self, is_lazy: bool, remind: Callable[[], None] | None = None) -> None:
-        rospy_receiving.read_lazily(self._subscriber, is_lazy, remind)
-
-    def collect(self) -> None:
-        rospy_receiving.collect(self._subscriber)
 
     def close(self) -> None:
         self._subscriber.unregister()
@@ -80,35 +77,41 @@ class RosTransport(Transport):
     ----------
     refused : collections.Counter
         How often peers did something wrong, by kind.
+
+    Parameters
+    ----------
+    limits_rate : bool, optional
+        Decode floods in part; not in simulated time, which may pass quickly.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, limits_rate: bool = True) -> None:
         self.refused: Counter[Hashable] = Counter()
         self._complaints = Throttle()
-        rospy_internals.bear_hostile_newcomers(self._refuse)
-        rospy_internals.allow_many_topics()
-        rospy_internals.never_connect_to_oneself()
-        rospy_sending.never_wait_for_subscribers()
-        rospy_internals.never_fail_to_log()
-        rospy_internals.check_topics_in_turns()
-        rospy_internals.connect_once()
-        self._remappings = rospy_internals.take_over_remappings()
+        self._limits_rate = limits_rate
+        patches.harden_tcp_server(self._refuse)
+        allow_many_topics()
+        self._remappings = dict(rospy.names.get_resolved_mappings())
+        self._before_remapping = {name: first for first, name in self._remappings.items()}
+        self._published: Counter[str] = Counter()
+        self._sets_clock = False
         self._calls: dict[str, threading.Semaphore] = {}
         self._own_services: dict[str, rospy.Service] = {}
         self._parameter_writer = ParameterWriter(_write_param, partial(self.log, "warn"))
         self._services_at_start: dict[str, str] | None = None
         self._is_starting = False
 
-    def receive(self, limits_rate: bool) -> None:
-        """Get ready for what publishers may send; see `rospy_receiving`."""
-        rospy_receiving.bear_hostile_publishers(self._refuse, limits_rate)
+    def follow_clock(self) -> None:
+        """Set rospy's clock by /clock, as this transport receives or publishes it."""
+        self._sets_clock = patches.take_over_clock()
+        if self._sets_clock:
+            self.subscribe("/clock", Clock, lambda message: patches.set_clock(message.clock))
 
     @contextlib.contextmanager
     def starting(self) -> Iterator[None]:
         """Register with the master in one request, and ask it for others' services once."""
         self._is_starting = True
         try:
-            with rospy_internals.registering_together():
+            with patches.registering_together():
                 yield
         finally:
             self._is_starting, self._services_at_start = False, None
@@ -125,13 +128,17 @@ class RosTransport(Transport):
         """Return what the command line maps the name to."""
         return self._remappings.get(name, name)
 
+    def _rospy_name(self, name):
+        """Return the name that rospy remaps to ``name``, which it must not remap once more."""
+        return self._before_remapping[name] if name in self._remappings else name
+
     def get_param(self, name: str) -> Any:
         """Return a parameter from the parameter server."""
-        return rospy.get_param(name)
+        return rospy.get_param(self._rospy_name(name))
 
     def set_param(self, name: str, value: Any) -> None:
         """Set a parameter on the parameter server."""
-        rospy.set_param(name, value)
+        rospy.set_param(self._rospy_name(name), value)
 
     def set_param_later(self, name: str, value: Any) -> None:
         """Set a parameter on the parameter server by a thread that may wait for it."""
@@ -139,15 +146,28 @@ class RosTransport(Transport):
 
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Register a publisher with the master."""
-        return _RosPublisher(
-            rospy.Publisher(topic, message_type, latch=latch, queue_size=_QUEUE_SIZE)
+        self._published[topic] += 1
+        patches.own_publication(topic, message_type)
+        publisher = rospy.Publisher(
+            self._rospy_name(topic), message_type, latch=latch, queue_size=_QUEUE_SIZE
         )
+        return _RosPublisher(publisher, lambda: self._published.subtract([topic]))
 
     def subscribe(
         self, topic: str, message_type: type, deliver: Callable[[Any], None]
     ) -> ExternalSubscriber:
         """Register a subscriber with the master."""
-        return _RosSubscriber(rospy.Subscriber(topic, message_type, deliver, tcp_nodelay=True))
+
+        def is_handed_over():
+            return self._published[topic] > 0
+
+        patches.own_subscription(
+            topic, message_type, is_handed_over, self._refuse, self._limits_rate
+        )
+        callback = OwnCallback(deliver, is_handed_over)
+        return _RosSubscriber(
+            rospy.Subscriber(self._rospy_name(topic), message_type, callback, tcp_nodelay=True)
+        )
 
     def advertise_service(
         self,
@@ -171,7 +191,7 @@ class RosTransport(Transport):
                 raise rospy.ServiceException(str(error)) from None
 
         try:
-            service = rospy.Service(name, service_type, answer)
+            service = rospy.Service(self._rospy_name(name), service_type, answer)
         except rospy.ServiceException as error:
             raise ServiceError(str(error)) from None
         self._own_services[name] = service
@@ -196,7 +216,9 @@ class RosTransport(Transport):
             _fail(future, f"{name} has not answered {_MOST_CALLS} earlier calls")
             return future
         threading.Thread(
-            target=_call, args=(name, service_type, request, limit, future, calls, own), daemon=True
+            target=_call,
+            args=(self._rospy_name(name), service_type, request, limit, future, calls, own),
+            daemon=True,
         ).start()
         timer = threading.Timer(
             limit, _fail, (future, f"{name} has not answered within {limit:g} s")
@@ -216,11 +238,26 @@ class RosTransport(Transport):
 
     def log(self, level: str, text: str) -> None:
         """Log to the screen, the node's log file and /rosout."""
-        _LOGGERS[level](text)
+        # The screen may be gone; rospy's handler lets the error out.
+        with contextlib.suppress(OSError):
+            _LOGGERS[level](text)
 
     def clock_was_set(self, stamp: genpy.Time) -> None:
         """Set rospy's own clock, which stamps the log."""
-        rospy_internals.set_time(stamp)
+        if self._sets_clock:
+            patches.set_clock(stamp)
+
+
+def allow_many_topics() -> None:
+    """Let this process have as many files open as the system lets it.
+
+    rospy holds one for each topic, and a shell allows 1024 unless told otherwise: too few for
+    forty vehicles.
+    """
+    _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    # Where it is refused, a process with few topics does not need it.
+    with contextlib.suppress(OSError, ValueError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 def _write_param(name, value):
@@ -259,7 +296,7 @@ def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -
 
 def _call(name, service_type, request, limit, future, calls, own):
     try:
-        if own is not None and _answers(own, name):
+        if own is not None and _answers(own):
             response = own.handler(request)
         else:
             rospy.wait_for_service(name, timeout=limit)
@@ -274,10 +311,10 @@ def _call(name, service_type, request, limit, future, calls, own):
         calls.release()
 
 
-def _answers(own, name):
+def _answers(own):
     """Return whether the master has no other service of this name, or is gone."""
     try:
-        return rosgraph.Master(rospy.get_name()).lookupService(name) == own.uri
+        return rosgraph.Master(rospy.get_name()).lookupService(own.resolved_name) == own.uri
     except rosgraph.MasterException:
         return False
     except OSError:

@@ -82,7 +82,7 @@ class RawTransforms(TFMessage):
     """
 
     __slots__ = ("raw",)
-    each_counts = True
+    lossless = True
 
     def __init__(self) -> None:
         self.raw = _LENGTH.pack(0)

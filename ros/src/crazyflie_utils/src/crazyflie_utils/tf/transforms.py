@@ -145,14 +145,11 @@ class Transforms:
             self._subscriber = self._topics.subscribe(
                 "/tf", TFMessage, self._on_transforms, RawTransforms
             )
-            self._subscriber.read_lazily(True)
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
     def on_pose(self, frame: str, period: float, tell: Callable[[], None]) -> None:
         """Have ``tell()`` called when a pose of a frame is new; once in ``period`` (s)."""
         self.listen()
-        if self._subscriber is not None:
-            self._subscriber.read_lazily(False)
         with self._lock:
             self._listeners.setdefault(frame, []).append(_Listener(period, tell))
             self._tree.follow(frame, self._now())
@@ -181,8 +178,6 @@ class Transforms:
         """Return the same as `lookup`, as a pose, which is quicker."""
         for refresh in self._sources:
             refresh()
-        if self._subscriber is not None:
-            self._subscriber.collect()
         tree = self._tree
         if target not in tree.followed or source not in tree.followed:
             with self._lock:

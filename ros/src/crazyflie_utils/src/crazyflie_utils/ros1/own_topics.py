@@ -1,0 +1,148 @@
+"""rospy's part of the topics of handles: derived from rospy's classes, for these topics only.
+
+A topic that rospy has subscribed or publishes in this process already stays as it is.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import genpy
+import rospy
+from typing_extensions import override
+
+from crazyflie_utils.ros1 import registering
+from crazyflie_utils.ros1.receiving import Report, harden
+from crazyflie_utils.ros1.sending import NonBlockingConnection, serialized
+
+
+class OwnCallback:
+    """A callback of a handle: not for messages that handles of this process publish.
+
+    Those are handed over. A message has come by a socket nevertheless where rospy subscribes to
+    the topic in this process, too, and without `skip_self_connections`.
+
+    Parameters
+    ----------
+    deliver : callable
+        ``deliver(message)``
+    is_handed_over : callable
+        Returns whether a handle of this process publishes the topic.
+    """
+
+    def __init__(self, deliver: Callable[[Any], None], is_handed_over: Callable[[], bool]):
+        self._deliver = deliver
+        self._is_handed_over = is_handed_over
+
+    def __call__(self, message: genpy.Message) -> None:
+        """Deliver a message."""
+        header: dict[str, str] = getattr(message, "_connection_header", None) or {}
+        if header.get("callerid") != rospy.get_name() or not self._is_handed_over():
+            self._deliver(message)
+
+
+class OwnSubscription(rospy.topics._SubscriberImpl):
+    """rospy's part of a topic that handles subscribe to.
+
+    Parameters
+    ----------
+    name : str
+        Absolute, remapped.
+    message_type : type
+    is_handed_over : callable
+        See `OwnCallback`.
+    report, limits_rate
+        See `receiving.harden`.
+    patches : frozenset of str
+        Which of its patches are on.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        message_type: type,
+        is_handed_over: Callable[[], bool],
+        report: Report,
+        limits_rate: bool,
+        patches: frozenset[str],
+    ):
+        super().__init__(name, message_type)
+        # It is remapped already; rospy would do it once more.
+        self.resolved_name = self.name = name
+        self.tcp_nodelay = True
+        self._is_handed_over = is_handed_over
+        self._report = report
+        self._limits_rate = limits_rate
+        self._patches = patches
+
+    def _is_own(self):
+        """Return whether only handles have subscribed."""
+        return all(isinstance(callback, OwnCallback) for callback, _ in self.callbacks or ())
+
+    @override
+    def has_connection(self, endpoint_id: str) -> bool:
+        if "skip_self_connections" in self._patches and endpoint_id == rospy.get_node_uri():
+            if self._is_own() and self._is_handed_over():
+                return True
+        return super().has_connection(endpoint_id)
+
+    @override
+    def add_callback(self, cb: Callable[..., None], cb_args: Any) -> None:
+        super().add_callback(cb, cb_args)
+        if not isinstance(cb, OwnCallback) and self._is_handed_over():
+            registering.update_publishers(self.resolved_name, [rospy.get_node_uri()])
+
+    @override
+    def add_connection(self, c: Any) -> bool:
+        with self.c_lock:
+            if "connect_once" in self._patches and any(
+                each.endpoint_id == c.endpoint_id and not each.done for each in self.connections
+            ):
+                return False
+            if "harden_subscribers" in self._patches and self._is_own():
+                harden(c, self._report, self._limits_rate)
+            return super().add_connection(c)
+
+
+class OwnPublication(rospy.topics._PublisherImpl):
+    """rospy's part of a topic that handles publish."""
+
+    def __init__(self, name: str, message_type: type):
+        super().__init__(name, message_type)
+        self.resolved_name = self.name = name
+        self._limit = 0
+
+    @override
+    def set_queue_size(self, queue_size: int) -> None:
+        # With rospy's own attribute, it would make a thread for each connection.
+        self._limit = queue_size
+
+    @override
+    def add_connection(self, c: Any) -> bool:
+        return super().add_connection(NonBlockingConnection(c, self._limit or None))
+
+    def send(self, messages: tuple[genpy.Message, ...]) -> None:
+        """Publish messages that are of the topic's type, all at once."""
+        with self.publock:
+            if self.is_latch:
+                self.latch = messages[-1]
+            if not self.connections:
+                return
+            first = self.seq + 1
+            self.seq += len(messages)
+            data = b"".join(serialized(each, first + k) for k, each in enumerate(messages))
+            self.message_data_sent += len(data)
+            for connection in self.connections:
+                try:
+                    connection.write_data(data)
+                except (OSError, rospy.exceptions.TransportTerminated):
+                    connection.close()
+
+
+def publish(publisher: rospy.Publisher, messages: tuple[genpy.Message, ...]) -> None:
+    """Publish messages that are of the publisher's type."""
+    own = publisher.impl
+    if isinstance(own, OwnPublication) and not own.closed:
+        own.send(messages)
+        return
+    for message in messages:
+        publisher.publish(message)

@@ -1,0 +1,253 @@
+"""All that is changed of rospy, which offers none of it: a table, and what it switches.
+
+The changes are to objects that handles own: their topics, and the process's server and clock.
+rospy's modules and classes, and topics that are subscribed or published by rospy alone, stay as
+they are. Where a target is not what a patch was written for, and where the environment variable
+CRAZYFLIE_ROSPY_PATCHES ("all", "none" or names such as "send_at_once,connect_once") leaves it out,
+rospy does the same in its own way, and the log has one line about it.
+
+The figures are those of
+
+    python3 ros/src/crazyflie_utils/bench/costs.py
+    ./run bench cpu start simulated
+
+with CRAZYFLIE_ROSPY_PATCHES set or not; see the README for how they were measured.
+"""
+
+import contextlib
+import functools
+import importlib
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import genpy
+import rospy
+from rospy import rostime
+from rospy.impl import registration, simtime, tcpros_base
+
+from crazyflie_utils.ros1 import registering
+from crazyflie_utils.ros1.accepting import MAX_PENDING, Acceptor
+from crazyflie_utils.ros1.own_topics import OwnPublication, OwnSubscription
+from crazyflie_utils.ros1.receiving import Report
+
+SWITCH = "CRAZYFLIE_ROSPY_PATCHES"
+
+_TOPICS = "rospy.topics:"
+_TCP = "rospy.impl.tcpros_base:"
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A change of rospy.
+
+    Attributes
+    ----------
+    replaces : str
+        What rospy does.
+    reason : str
+        What is done in its place, and why.
+    gain : str
+        Measured.
+    without : str
+        What is slower or missing without it, for the log.
+    targets : dict of str to str
+        "module:Class.function" to its parameters and, behind a colon, names that its code uses.
+    versions : str
+        Of rospy, in which it was seen to work.
+    """
+
+    replaces: str
+    reason: str
+    gain: str
+    without: str
+    targets: dict[str, str]
+    versions: str = "1.15.15"
+
+
+PATCHES = {
+    "skip_self_connections": Patch(
+        "a subscriber connects to the publisher of its own process by a socket",
+        "handles hand messages over by a call; what came by the connection would be dropped",
+        "140 us of CPU a message; 25 % of a core for sw_hover in one process",
+        "messages between nodes of this process go through a socket as well",
+        {
+            f"{_TOPICS}_SubscriberImpl.has_connection": "self endpoint_id: connections",
+            f"{_TOPICS}_SubscriberImpl.add_callback": "self cb cb_args: callbacks",
+        },
+    ),
+    "connect_once": Patch(
+        "each time that the master tells of a publisher makes a connection, and the last one stays",
+        "the first one stays: subscriber and publisher may differ about which came last, and then "
+        "both are closed and nothing is received any more",
+        "0 of 200 starts of five processes without a connection, of 3",
+        "a subscriber may miss a publisher that starts at the same moment",
+        {f"{_TOPICS}_SubscriberImpl.add_connection": "self c: connections c_lock endpoint_id"},
+    ),
+    "harden_subscribers": Patch(
+        "all that comes is decoded; if a message cannot be, rospy connects again, for ever",
+        "it is dropped and named once; a flood is decoded in part, so that control goes on",
+        "10 kHz on a topic: control keeps 95 % of its rate, and without it 20 to 60 %",
+        "publishers that send nonsense, or floods, delay the nodes of this process",
+        {
+            f"{_TCP}TCPROSTransport.receive_once": "self: read_buff protocol is_latched latch",
+            f"{_TCP}TCPROSTransport._validate_header": "self header: callerid_pub is_latched",
+            f"{_TOPICS}_SubscriberImpl.add_connection": "self c: connections c_lock",
+        },
+    ),
+    "send_at_once": Patch(
+        "each subscriber has a thread, which is woken up for each message",
+        "the publisher's thread sends, unless the subscriber does not keep up",
+        "40 us of CPU and 0.1 ms a message and subscriber",
+        "sending takes a thread for each subscriber",
+        {
+            f"{_TOPICS}_PublisherImpl.add_connection": "self c: queue_size latch publock",
+            f"{_TOPICS}_PublisherImpl.set_queue_size": "self queue_size: queue_size",
+            f"{_TOPICS}_PublisherImpl.publish": "self message connection_override: connections seq",
+            f"{_TOPICS}_PublisherImpl.close": "self: publock buff",
+        },
+    ),
+    "harden_tcp_server": Patch(
+        "headers of connections are read one after the other, without a limit of time",
+        "each in a thread, within 5 s: a peer that connects and is silent keeps /emergency waiting",
+        "a service call takes 3 ms beside a silent peer, and without it never ends",
+        "a peer that connects and says nothing blocks all others",
+        {
+            f"{_TCP}TCPROSServer._tcp_server_callback": "self sock client_addr: "
+            "topic_connection_handler service_connection_handler",
+            f"{_TCP}TCPROSServer.start_server": "self: tcp_ros_server _tcp_server_callback",
+        },
+    ),
+    "register_together": Patch(
+        "each topic and service is registered by a request of its own",
+        "those of the nodes that start are registered in one, when all of them are complete",
+        "3 ms a topic: 0.15 s of the start of sw_hover, 6 s of that of 40 vehicles",
+        "nodes register their topics and services one by one",
+        {
+            "rospy.impl.registration:RegistrationListeners.notify_added": "self resolved_name "
+            "data_type reg_type: listeners"
+        },
+    ),
+    "set_own_clock": Patch(
+        "rospy's clock listens to /clock, also in the process that publishes it",
+        "the process sets it by a call, when it sets its own",
+        "simulated time passes 1.5 times as quickly",
+        "the clock of this process's log goes through a socket",
+        {"rospy.rostime:_set_rostime": "t: Time notifyAll"},
+    ),
+}
+
+
+def _fits(target: str, expected: str) -> bool:
+    """Return whether a function has the parameters, and uses the names, that are expected."""
+    module, _, path = target.partition(":")
+    parameters, _, names = expected.partition(":")
+    try:
+        function = functools.reduce(getattr, path.split("."), importlib.import_module(module))
+        code = function.__code__  # type: ignore[attr-defined]
+    except (ImportError, AttributeError):
+        return False
+    # What a function calls may be in one within it.
+    known = {*code.co_names, *code.co_varnames}
+    return code.co_varnames[: code.co_argcount] == tuple(parameters.split()) and known >= set(
+        names.split()
+    )
+
+
+@functools.cache
+def active() -> frozenset[str]:
+    """Return the names of the patches that are on; the environment and rospy are looked at once."""
+    wanted = os.environ.get(SWITCH, "all")
+    names = set(PATCHES) if wanted == "all" else set(wanted.split(",")) - {"none", ""}
+    for unknown in sorted(names - set(PATCHES)):
+        rospy.logwarn(
+            f"{SWITCH}: there is no {unknown}; expected all, none or {', '.join(PATCHES)}"
+        )
+    on = set()
+    for name, patch in PATCHES.items():
+        misfits = [each for each, expected in patch.targets.items() if not _fits(each, expected)]
+        if name in names and not misfits:
+            on.add(name)
+        elif name in names:
+            rospy.logwarn(f"rospy is another one: {patch.without} ({', '.join(misfits)} changed)")
+        else:
+            rospy.loginfo(f"{SWITCH} leaves out {name}: {patch.without}")
+    return frozenset(on)
+
+
+def own_subscription(
+    name: str,
+    message_type: type,
+    is_handed_over: Callable[[], bool],
+    report: Report,
+    limits_rate: bool,
+) -> None:
+    """Make rospy's part of a topic that a handle is about to subscribe to, unless it is there."""
+    if {"skip_self_connections", "connect_once", "harden_subscribers"} & active():
+        manager = registration.get_topic_manager()
+        with manager.lock:
+            if name not in manager.subs:
+                own = OwnSubscription(
+                    name, message_type, is_handed_over, report, limits_rate, active()
+                )
+                manager._add(own, manager.subs, registration.Registration.SUB)
+
+
+def own_publication(name: str, message_type: type) -> None:
+    """Make rospy's part of a topic that a handle is about to publish, unless it is there."""
+    if "send_at_once" in active():
+        manager = registration.get_topic_manager()
+        with manager.lock:
+            if name not in manager.pubs:
+                own = OwnPublication(name, message_type)
+                manager._add(own, manager.pubs, registration.Registration.PUB)
+
+
+def harden_tcp_server(report: Report) -> None:
+    """Have the process's server answer each connection in a thread of its own."""
+    server = tcpros_base._tcpros_server
+    is_done = server is None or isinstance(server._tcp_server_callback, Acceptor)
+    if is_done or "harden_tcp_server" not in active():
+        return
+    server._tcp_server_callback = Acceptor(server, report)
+    if server.tcp_ros_server is not None:
+        # It holds the method that it was started with, and keeps five connections waiting: those
+        # beyond them try again after a second or two.
+        server.tcp_ros_server.inbound_handler = server._tcp_server_callback
+        server.tcp_ros_server.server_sock.listen(MAX_PENDING)
+
+
+@contextlib.contextmanager
+def registering_together() -> Iterator[None]:
+    """Register what is announced in a with block at its end; nothing of it if the block raises."""
+    if "register_together" not in active():
+        yield
+        return
+    listeners = registration.get_registration_listeners()
+    # What is announced is in rospy's tables by then, from where `register` takes it.
+    listeners.notify_added = lambda *_: None
+    try:
+        yield
+    finally:
+        del listeners.notify_added
+    registering.register()
+
+
+def take_over_clock() -> bool:
+    """Have rospy's clock listen to /clock no more; return whether `set_clock` is to set it."""
+    if "set_own_clock" not in active():
+        return False
+    subscriber = getattr(simtime, "_clock_sub", None)
+    if subscriber is not None:
+        subscriber.unregister()
+    return True
+
+
+def set_clock(stamp: genpy.Time) -> None:
+    """Set rospy's simulated clock, where `take_over_clock` has returned true."""
+    moment = rospy.Time.__new__(rospy.Time)
+    moment.secs, moment.nsecs = stamp.secs, stamp.nsecs
+    rostime._rostime_current = moment
+    # rospy notifies every time, which takes several times as long as all else here.
+    if rostime._rostime_cond._waiters:
+        rostime._set_rostime(moment)

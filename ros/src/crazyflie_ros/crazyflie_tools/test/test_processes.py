@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from crazyflie_dev.programs import running
+from crazyflie_utils.testing.programs import running
 from crazyflie_virtual.settings import FIRST_PORT
 from crazyflie_virtual.testing import virtual_vehicle
 

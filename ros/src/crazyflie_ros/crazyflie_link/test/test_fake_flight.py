@@ -6,11 +6,11 @@ import struct
 
 import pytest
 
-from crazyflie_dev.fake_flight import FakeFlight
+from crazyflie_link.testing.fake_flight import FakeFlight
 
 RECORDED = json.loads(
     (
-        pathlib.Path(__file__).parents[2] / "crazyflie_virtual/test/recorded/firmware_2026_08.json"
+        pathlib.Path(__file__).parents[3] / "crazyflie_virtual/test/recorded/firmware_2026_08.json"
     ).read_text()
 )["scenarios"]
 

@@ -1,7 +1,7 @@
 """Tables of parameters, from declarations."""
 
-from crazyflie_dev.parameter_tables import table, with_tables
 from crazyflie_utils.parameters.declaration import Parameters, group, parameter
+from crazyflie_utils.parameters.tables import table, with_tables
 from crazyflie_utils.parameters.types import BOOLEAN, TOPIC, Integer, Number, Text
 
 

@@ -1,6 +1,6 @@
 """What went wrong in a launch is told."""
 
-from crazyflie_dev.launching import complaints
+from crazyflie_utils.testing.launching import complaints
 
 
 def test_complaints_are_found_among_other_output(tmp_path):

@@ -5,7 +5,7 @@ below it is theirs::
 
     <!-- parameters: crazyflie_takeoff.takeoff_server_node:TakeoffServerParameters -->
 
-``python3 -m crazyflie_dev.parameter_tables PAGE...`` writes the tables anew.
+``python3 -m crazyflie_utils.parameters.tables PAGE...`` writes the tables anew.
 """
 
 import argparse

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from std_srvs.srv import Empty, EmptyRequest
 
-from crazyflie_dev.flight_record import FlightRecord
-from crazyflie_dev.flight_recorder_node import FlightRecorderNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_reports.flight_record import FlightRecord
+from crazyflie_reports.flight_recorder_node import FlightRecorderNode
 from crazyflie_utils.main import ros_process
 from crazyflie_utils.process import Process
 from crazyflie_utils.transport import ServiceError

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from crazyflie_dev.flight_record import GROUND_TOLERANCE, FlightRecord
+from crazyflie_reports.flight_record import GROUND_TOLERANCE, FlightRecord
 
 HOVER_TOLERANCE = 0.01
 """Largest distance from the hover point of a good flight, m."""

@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from crazyflie_dev.fake_flight import SUPERVISOR_PROTOCOL, FakeFlight
+from crazyflie_link.testing.fake_flight import SUPERVISOR_PROTOCOL, FakeFlight
 
 LOG_TYPES = {"B": 1, "H": 2, "I": 3, "b": 4, "h": 5, "i": 6, "f": 7, "e": 8}
 PARAMETER_TYPES = {"B": 8, "H": 9, "I": 10, "Q": 11, "b": 0, "h": 1, "i": 2, "f": 6}

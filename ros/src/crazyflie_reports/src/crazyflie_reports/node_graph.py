@@ -13,7 +13,7 @@ from pathlib import Path
 
 import rosgraph
 
-from crazyflie_dev.launching import roslaunch
+from crazyflie_utils.testing.launching import roslaunch
 
 Registrations = list[tuple[str, list[str]]]
 """Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them."""

@@ -1,6 +1,6 @@
 """The drawing of a node graph."""
 
-from crazyflie_dev.node_graph import dot, main
+from crazyflie_reports.node_graph import dot, main
 
 
 def test_draws_topics_that_connect_nodes_and_no_others():

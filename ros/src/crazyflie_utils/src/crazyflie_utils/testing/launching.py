@@ -12,7 +12,7 @@ from typing import Any
 
 import rosgraph
 
-from crazyflie_dev.programs import free_port, running
+from crazyflie_utils.testing.programs import free_port, running
 
 _START_LIMIT = 60.0
 """How long roslaunch may take until its master answers, s."""

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from crazyflie_dev.flight_record import FlightRecord
-from crazyflie_dev.flight_report import FlightReport
+from crazyflie_reports.flight_record import FlightRecord
+from crazyflie_reports.flight_report import FlightReport
 
 HOVER = (0.0, 0.0, 1.0)
 

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
-from crazyflie_dev.flight_record import FlightRecord
+from crazyflie_reports.flight_record import FlightRecord
 
 
 def save(record: FlightRecord, point: ArrayLike, path: Path) -> None:

@@ -5,12 +5,12 @@ import threading
 from std_msgs.msg import Empty
 from typing_extensions import override
 
-from crazyflie_dev.flight_record import FlightRecord
 from crazyflie_msgs.msg import (
     ControlStamped,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_reports.flight_record import FlightRecord
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC
 from crazyflie_utils.vectors import to_vector

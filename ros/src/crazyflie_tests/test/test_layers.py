@@ -38,6 +38,7 @@ LAYERS = [
     },
     {
         "crazyflie_batch",
+        "crazyflie_doctor",
         "crazyflie_driver",
         "crazyflie_teleop",
         "crazyflie_tools",

@@ -5,10 +5,10 @@ import dataclasses
 import pytest
 from doctor_findings import found, the_only
 
+from crazyflie_doctor import graph, running_graph, timing
+from crazyflie_doctor.graph import Graph
+from crazyflie_doctor.timing import Recording, Transform
 from crazyflie_lqr.models import near_hover
-from crazyflie_tools.doctor import graph, look, motion
-from crazyflie_tools.doctor.graph import Graph
-from crazyflie_tools.doctor.motion import Heard, Transform
 
 CONTROL = ("crazyflie_msgs/ControlStamped", "e85f24c467a6496a2e0c3b92ff0fe75d")
 REFERENCE = ("crazyflie_msgs/PositionVelocityStateStamped", "d7e2e75df27e542774773e0a516e76ff")
@@ -45,7 +45,7 @@ def but(**changes):
 
 def test_a_graph_that_is_well():
     assert not found(graph.check_nodes(WELL))
-    assert not found(graph.check_types(WELL, look.own_md5))
+    assert not found(graph.check_types(WELL, running_graph.own_md5))
     assert not found(graph.check_connections(WELL))
     assert not found(graph.check_publishers(WELL))
     assert not found(graph.check_drivers(WELL, {}))
@@ -67,14 +67,14 @@ def test_nodes_that_do_not_answer():
     ],
 )
 def test_types_that_differ(types, level, part):
-    found_level, text = the_only(graph.check_types(but(topic_types=types), look.own_md5))
+    found_level, text = the_only(graph.check_types(but(topic_types=types), running_graph.own_md5))
     assert found_level == level
     assert part in text
 
 
 def test_services_whose_types_differ():
     types = {"/takeoff": ("std_srvs/Empty", "0" * 32)}
-    level, text = the_only(graph.check_types(but(service_types=types), look.own_md5))
+    level, text = the_only(graph.check_types(but(service_types=types), running_graph.own_md5))
     assert level == "error"
     assert "/server offers /takeoff" in text
 
@@ -153,15 +153,17 @@ def stream(child="crazyflie", parent="world", node="/mocap", period=0.01, age=0.
 
 
 def test_motion_that_is_well(tmp_path):
-    heard = Heard(transforms=stream() + stream("crazyflie/base_link", "crazyflie", "/static", 0.1))
+    recording = Recording(
+        transforms=stream() + stream("crazyflie/base_link", "crazyflie", "/static", 0.1)
+    )
     for check in (
-        motion.check_clock,
-        motion.check_tf_tree,
-        motion.check_frames,
-        motion.check_tf_rate,
-        motion.check_gains,
+        timing.check_clock,
+        timing.check_tf_tree,
+        timing.check_frames,
+        timing.check_tf_rate,
+        timing.check_gains,
     ):
-        assert not found(check(WELL, heard))
+        assert not found(check(WELL, recording))
 
 
 @pytest.mark.parametrize(
@@ -175,18 +177,18 @@ def test_motion_that_is_well(tmp_path):
 )
 def test_clocks(simulated, sources, clocks, part):
     given = but(parameters={"/use_sim_time": simulated}, publishers={"/clock": sources})
-    level, text = the_only(motion.check_clock(given, Heard(clocks=clocks)))
+    level, text = the_only(timing.check_clock(given, Recording(clocks=clocks)))
     assert level == "error"
     assert part in text
 
 
 def test_simulated_time_that_goes():
     given = but(parameters={"/use_sim_time": True}, publishers={"/clock": {"/sim"}})
-    assert not found(motion.check_clock(given, Heard(clocks=[1.0, 2.0])))
+    assert not found(timing.check_clock(given, Recording(clocks=[1.0, 2.0])))
 
 
 def test_a_node_that_lives_by_another_clock():
-    level, text = the_only(motion.check_clock(WELL, Heard(transforms=stream(age=1.7e9))))
+    level, text = the_only(timing.check_clock(WELL, Recording(transforms=stream(age=1.7e9))))
     assert level == "error"
     assert "/mocap stamps transforms by another clock" in text
 
@@ -204,17 +206,17 @@ def test_a_node_that_lives_by_another_clock():
     ],
 )
 def test_no_tree(transforms, part):
-    level, text = the_only(motion.check_tf_tree(WELL, Heard(transforms=transforms)))
+    level, text = the_only(timing.check_tf_tree(WELL, Recording(transforms=transforms)))
     assert level == "error"
     assert part in text
 
 
 def test_frames_that_nobody_publishes():
-    level, text = the_only(motion.check_frames(WELL, Heard(transforms=stream("crazyfly"))))
+    level, text = the_only(timing.check_frames(WELL, Recording(transforms=stream("crazyfly"))))
     assert level == "error"
     assert "the frame crazyflie that /state_estimator needs (did you mean crazyfly?)" in text
-    apart = Heard(transforms=stream("a") + stream("crazyflie", "map"))
-    assert "does not connect world and crazyflie" in the_only(motion.check_frames(WELL, apart))[1]
+    apart = Recording(transforms=stream("a") + stream("crazyflie", "map"))
+    assert "does not connect world and crazyflie" in the_only(timing.check_frames(WELL, apart))[1]
 
 
 @pytest.mark.parametrize(
@@ -229,15 +231,15 @@ def test_frames_that_nobody_publishes():
     ],
 )
 def test_poor_poses(transforms, level, part):
-    found_level, text = the_only(motion.check_tf_rate(WELL, Heard(transforms=transforms)))
+    found_level, text = the_only(timing.check_tf_rate(WELL, Recording(transforms=transforms)))
     assert found_level == level
     assert part in text
 
 
 def test_a_constant_link_between_vehicle_and_world_may_be_slow():
     slow = stream("crazyflie", "vicon/cf7", "/static", 0.1, age=-0.1)
-    heard = Heard(transforms=stream("vicon/cf7") + slow)
-    assert not found(motion.check_tf_rate(WELL, heard))
+    recording = Recording(transforms=stream("vicon/cf7") + slow)
+    assert not found(timing.check_tf_rate(WELL, recording))
 
 
 @pytest.mark.parametrize(
@@ -246,20 +248,24 @@ def test_a_constant_link_between_vehicle_and_world_may_be_slow():
 def test_gains_and_delay(tmp_path, used, levels):
     file = tmp_path / "K.txt"
     file.write_text(SOFT)
-    margin, _ = motion.delay_margin(str(file), near_hover())
+    margin, _ = timing.delay_margin(str(file), near_hover())
     parameters = {**PARAMETERS, "/lqr_controller/K_file": str(file)}
     # Each control is held for a period: half of it counts.
     period = 0.01
     late = used * margin - 0.5 * period
     stamps = [k * period for k in range(100)]
-    heard = Heard(delays={"/control/lqr": [late] * 100}, control_stamps={"/control/lqr": stamps})
-    findings = found(motion.check_gains(but(parameters=parameters), heard))
+    recording = Recording(
+        delays={"/control/lqr": [late] * 100}, control_stamps={"/control/lqr": stamps}
+    )
+    findings = found(timing.check_gains(but(parameters=parameters), recording))
     assert [level for level, _ in findings] == levels
 
 
 def test_a_gain_file_that_is_gone():
     parameters = {**PARAMETERS, "/lqr_controller/K_file": "/nowhere/K.txt"}
-    heard = Heard(delays={"/control/lqr": [0.0, 0.0]}, control_stamps={"/control/lqr": [1.0, 1.01]})
-    level, text = the_only(motion.check_gains(but(parameters=parameters), heard))
+    recording = Recording(
+        delays={"/control/lqr": [0.0, 0.0]}, control_stamps={"/control/lqr": [1.0, 1.01]}
+    )
+    level, text = the_only(timing.check_gains(but(parameters=parameters), recording))
     assert level == "error"
     assert "cannot read /nowhere/K.txt" in text

@@ -6,9 +6,9 @@ import socket
 import pytest
 from doctor_findings import found, the_only
 
-from crazyflie_tools.doctor import installation, look
-from crazyflie_tools.doctor.finding import Check, error, lines, warn
-from crazyflie_tools.doctor.installation import Network, Python, Radio
+from crazyflie_doctor import computer, installation, running_graph
+from crazyflie_doctor.finding import Check, error, lines, warn
+from crazyflie_doctor.installation import Network, Python, Radio
 
 
 def test_a_line_for_each_finding_or_one_that_says_what_is_fine():
@@ -129,20 +129,20 @@ def usb(tmp_path, mode):
 
 
 def test_dongles_are_found(tmp_path):
-    assert look.radio(tmp_path).dongles == {}
+    assert computer.radio(tmp_path).dongles == {}
     file = usb(tmp_path, 0o660)
-    radio = look.radio(tmp_path)
+    radio = computer.radio(tmp_path)
     assert radio.dongles == {file: True}
     assert not radio.has_rules
     rules = tmp_path / "etc/udev/rules.d"
     rules.mkdir(parents=True)
     (rules / "99-crazyflie.rules").write_text('ATTRS{idVendor}=="1915"\n')
-    assert look.radio(tmp_path).has_rules
+    assert computer.radio(tmp_path).has_rules
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may do everything")
 def test_a_dongle_without_permission(tmp_path):
-    assert look.radio(tmp_path).dongles == {usb(tmp_path, 0o000): False}
+    assert computer.radio(tmp_path).dongles == {usb(tmp_path, 0o000): False}
 
 
 def test_radio():
@@ -163,4 +163,4 @@ def test_radio():
 def test_a_master_that_does_not_answer_keeps_nobody_waiting(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as frozen:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{frozen.getsockname()[1]}")
-        assert not look.is_master_online()
+        assert not running_graph.is_master_online()

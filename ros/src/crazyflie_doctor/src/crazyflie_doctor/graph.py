@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from crazyflie_tools.doctor.finding import Finding, error, listed, warn
+from crazyflie_doctor.finding import Finding, error, listed, warn
 
 Type = tuple[str, str]
 """Name and MD5 sum of a message or service type."""

@@ -1,4 +1,4 @@
-"""Listens to a running graph for some seconds."""
+"""Records tf, controls, clock and diagnostics of a running graph."""
 
 import os
 import time
@@ -7,20 +7,20 @@ from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Clock
 from tf2_msgs.msg import TFMessage
 
+from crazyflie_doctor.graph import Graph
+from crazyflie_doctor.timing import Recording, Transform
 from crazyflie_msgs.msg import ControlStamped
-from crazyflie_tools.doctor.graph import Graph
-from crazyflie_tools.doctor.motion import Heard, Transform
 from crazyflie_utils.main import begin
 
 
-def listen(graph: Graph, duration: float) -> Heard:
-    """Become a node, and return what is heard within ``duration`` seconds of the machine's clock.
+def record(graph: Graph, duration: float) -> Recording:
+    """Return what is published within ``duration`` seconds of the machine's clock.
 
-    Nothing is published. Only what is published already is subscribed to.
+    The node publishes nothing, and subscribes to topics of the graph that have a publisher.
     """
     process = begin(f"doctor_{os.getpid()}")
     handle = process.handle(f"/doctor_{os.getpid()}")
-    heard = Heard()
+    recording = Recording()
 
     def now():
         return handle.stamp().to_sec()
@@ -28,7 +28,7 @@ def listen(graph: Graph, duration: float) -> Heard:
     def on_transforms(message, is_static):
         source = message._connection_header["callerid"]
         for transform in message.transforms:
-            heard.transforms.append(
+            recording.transforms.append(
                 Transform(
                     transform.header.frame_id.strip("/"),
                     transform.child_frame_id.strip("/"),
@@ -43,14 +43,14 @@ def listen(graph: Graph, duration: float) -> Heard:
         stamp = message.header.stamp.to_sec()
         # A control without a stamp does not say how old the pose is.
         if stamp > 0.0:
-            heard.delays.setdefault(topic, []).append(now() - stamp)
-            heard.control_stamps.setdefault(topic, []).append(stamp)
+            recording.delays.setdefault(topic, []).append(now() - stamp)
+            recording.control_stamps.setdefault(topic, []).append(stamp)
 
     def on_diagnostics(message):
         source = message._connection_header["callerid"]
         for status in message.status:
             if "://" in status.hardware_id:
-                heard.reported.setdefault(status.hardware_id, set()).add(source)
+                recording.reported.setdefault(status.hardware_id, set()).add(source)
 
     def subscribe(topic, message_type, callback):
         if graph.publishers.get(topic):
@@ -58,7 +58,7 @@ def listen(graph: Graph, duration: float) -> Heard:
 
     subscribe("/tf", TFMessage, lambda message: on_transforms(message, False))
     subscribe("/tf_static", TFMessage, lambda message: on_transforms(message, True))
-    subscribe("/clock", Clock, lambda message: heard.clocks.append(message.clock.to_sec()))
+    subscribe("/clock", Clock, lambda message: recording.clocks.append(message.clock.to_sec()))
     subscribe("/diagnostics", DiagnosticArray, on_diagnostics)
     for topic in sorted({t for (_, t), (name, _) in graph.topic_types.items() if name == _CONTROL}):
         subscribe(topic, ControlStamped, lambda message, topic=topic: on_control(topic, message))
@@ -66,7 +66,7 @@ def listen(graph: Graph, duration: float) -> Heard:
     time.sleep(duration)
     process.stop()
     handle.close()
-    return heard
+    return recording
 
 
 _CONTROL = "crazyflie_msgs/ControlStamped"

@@ -12,7 +12,7 @@ def run_doctor(*arguments: str, may_warn: bool = False) -> tuple[int, list[str]]
     otherwise nothing else is said.
     """
     done = subprocess.run(
-        ["rosrun", "crazyflie_tools", "doctor", "--timeout", "80", *arguments],
+        ["rosrun", "crazyflie_doctor", "doctor", "--timeout", "80", *arguments],
         capture_output=True,
         text=True,
         timeout=_LIMIT,

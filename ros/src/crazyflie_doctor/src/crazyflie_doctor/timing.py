@@ -1,4 +1,4 @@
-"""Checks of what moves: time, tf, and the delay from a pose to the control."""
+"""Checks of time, tf, and the delay from a pose to the control."""
 
 import difflib
 import itertools
@@ -7,12 +7,12 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
+from crazyflie_doctor.finding import Finding, error, listed, warn
+from crazyflie_doctor.graph import Graph
 from crazyflie_lqr.design import Design
 from crazyflie_lqr.gain_file import GainFileError, load_matrix
 from crazyflie_lqr.margins import loop_margins
 from crazyflie_lqr.models import CONTROLS, LinearModel, full_state, near_hover
-from crazyflie_tools.doctor.finding import Finding, error, listed, warn
-from crazyflie_tools.doctor.graph import Graph
 
 LEAST_RATE = 50.0
 """Below this rate of poses, Hz, velocities are poor."""
@@ -57,8 +57,8 @@ class Transform:
 
 
 @dataclass
-class Heard:
-    """What was heard for some seconds.
+class Recording:
+    """What was published for some seconds.
 
     Attributes
     ----------
@@ -81,17 +81,17 @@ class Heard:
     reported: dict[str, set[str]] = field(default_factory=dict)
 
 
-def check_clock(graph: Graph, heard: Heard) -> Iterator[Finding]:
+def check_clock(graph: Graph, recording: Recording) -> Iterator[Finding]:
     """Check that all nodes live by one clock, and that it goes."""
     sources = graph.publishers.get("/clock", set())
     if graph.parameters.get("/use_sim_time", False):
-        if not heard.clocks:
+        if not recording.clocks:
             yield error(
                 "/use_sim_time is true, but nothing comes on /clock: time stands still",
                 "start a simulator with sim_time:=true, or rosparam set /use_sim_time false and "
                 "restart the nodes",
             )
-        elif heard.clocks[-1] == heard.clocks[0]:
+        elif recording.clocks[-1] == recording.clocks[0]:
             yield error("/clock stands still", "is the simulation or rosbag paused?")
         if len(sources) > 1:
             yield error(f"/clock comes from {listed(sources)}", "end all but one")
@@ -102,7 +102,7 @@ def check_clock(graph: Graph, heard: Heard) -> Iterator[Finding]:
         )
     strangers = {
         t.node
-        for t in heard.transforms
+        for t in recording.transforms
         if not t.is_static and abs(t.arrival - t.stamp) > OTHER_CLOCK
     }
     if strangers:
@@ -112,10 +112,10 @@ def check_clock(graph: Graph, heard: Heard) -> Iterator[Finding]:
         )
 
 
-def check_tf_tree(_: Graph, heard: Heard) -> Iterator[Finding]:
+def check_tf_tree(_: Graph, recording: Recording) -> Iterator[Finding]:
     """Find frames with two parents or two publishers, and loops."""
     parents, sources = defaultdict(set), defaultdict(set)
-    for t in heard.transforms:
+    for t in recording.transforms:
         parents[t.child].add(t.parent)
         sources[t.child].add(t.node)
     for child in sorted(parents):
@@ -125,7 +125,7 @@ def check_tf_tree(_: Graph, heard: Heard) -> Iterator[Finding]:
                 "end one of them, or rename its frame: tf takes whichever came last",
             )
         elif len(sources[child]) > 1:
-            kind = "static transform" if _is_static(heard, child) else "transform"
+            kind = "static transform" if _is_static(recording, child) else "transform"
             yield error(
                 f"the {kind} of {child} comes from {listed(sources[child])}", "end all but one"
             )
@@ -133,27 +133,27 @@ def check_tf_tree(_: Graph, heard: Heard) -> Iterator[Finding]:
         yield error(f"tf has a loop: {' -> '.join(loop)}", "turn one of these transforms round")
 
 
-def _is_static(heard, child):
-    return any(t.is_static for t in heard.transforms if t.child == child)
+def _is_static(recording, child):
+    return any(t.is_static for t in recording.transforms if t.child == child)
 
 
 def _loops(parents):
     done: set[str] = set()
     for start in sorted(parents):
-        way = [start]
-        while (parent := min(parents.get(way[-1], ()), default=None)) is not None:
-            if parent in way:
-                loop = way[way.index(parent) :]
+        path = [start]
+        while (parent := min(parents.get(path[-1], ()), default=None)) is not None:
+            if parent in path:
+                loop = path[path.index(parent) :]
                 if not done & set(loop):
                     yield [*loop, parent]
                 done |= set(loop)
                 break
-            way.append(parent)
+            path.append(parent)
 
 
-def check_frames(graph: Graph, heard: Heard) -> Iterator[Finding]:
+def check_frames(graph: Graph, recording: Recording) -> Iterator[Finding]:
     """Find frames, and pairs of frames, that nodes need but nobody publishes."""
-    known = {frame for t in heard.transforms for frame in (t.parent, t.child)}
+    known = {frame for t in recording.transforms for frame in (t.parent, t.child)}
     for node, (fixed, robot) in sorted(frames_of(graph).items()):
         missing = sorted({fixed, robot} - known)
         for frame in missing:
@@ -164,7 +164,7 @@ def check_frames(graph: Graph, heard: Heard) -> Iterator[Finding]:
                 "mend its parameter or the child_frame_id of the rigid body; does motion capture "
                 "see it?",
             )
-        if not missing and _chain(heard, fixed, robot) is None:
+        if not missing and _chain(recording, fixed, robot) is None:
             yield error(
                 f"tf does not connect {fixed} and {robot}, which {node} needs",
                 "publish what is missing between them",
@@ -185,28 +185,28 @@ def frames_of(graph: Graph) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _chain(heard, fixed, robot):
+def _chain(recording, fixed, robot):
     """Return the frames from the vehicle up to the fixed frame; None without a connection."""
-    parent = {t.child: t.parent for t in heard.transforms}
-    way = [robot]
-    while way[-1] != fixed:
-        if (up := parent.get(way[-1])) is None or up in way:
+    parent = {t.child: t.parent for t in recording.transforms}
+    path = [robot]
+    while path[-1] != fixed:
+        if (up := parent.get(path[-1])) is None or up in path:
             return None
-        way.append(up)
-    return way
+        path.append(up)
+    return path
 
 
-def check_tf_rate(graph: Graph, heard: Heard) -> Iterator[Finding]:
+def check_tf_rate(graph: Graph, recording: Recording) -> Iterator[Finding]:
     """Check rate, pauses and age of the poses of every vehicle."""
     streams = defaultdict(list)
-    for t in heard.transforms:
+    for t in recording.transforms:
         streams[t.child].append(t)
     # Of the links between vehicle and fixed frame the quickest is the pose; others may be
     # constant, as tf's static_transform_publisher repeats them ten times a second.
     poses = {
         max(chain[:-1], key=lambda child: _rate(streams[child]))
         for fixed, robot in frames_of(graph).values()
-        if len(chain := _chain(heard, fixed, robot) or []) > 1
+        if len(chain := _chain(recording, fixed, robot) or []) > 1
     }
     for child in sorted(poses):
         yield from _check_stream(child, streams[child])
@@ -241,7 +241,7 @@ def _check_stream(child, transforms):
         yield error(f"{what} is {-age:.2f} s ahead of the clock", "synchronise the clocks (chrony)")
 
 
-def check_gains(graph: Graph, heard: Heard) -> Iterator[Finding]:
+def check_gains(graph: Graph, recording: Recording) -> Iterator[Finding]:
     """Compare the delay from pose to control with what the gains in use can bear.
 
     The loop's delay is what was measured from the pose's stamp, and half a period for
@@ -249,8 +249,8 @@ def check_gains(graph: Graph, heard: Heard) -> Iterator[Finding]:
     """
     for node, path, x_dim, topic in _controllers(graph):
         model = {7: near_hover, 12: full_state}.get(x_dim)
-        delays = heard.delays.get(topic, [])
-        stamps = sorted(set(heard.control_stamps.get(topic, [])))
+        delays = recording.delays.get(topic, [])
+        stamps = sorted(set(recording.control_stamps.get(topic, [])))
         if model is None or len(stamps) < 2 or max(delays) > OTHER_CLOCK:
             continue
         period = statistics.median(b - a for a, b in itertools.pairwise(stamps))

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from urllib.parse import urlsplit
 
-from crazyflie_tools.doctor.finding import Finding, error, listed, warn
+from crazyflie_doctor.finding import Finding, error, listed, warn
 
 LEAST_FREE = 100e6
 """Below this much space the logs of a flight may not fit, bytes."""

@@ -19,13 +19,13 @@ import rosgraph
 from matplotlib.figure import Figure
 from PIL import Image
 
-from crazyflie_dev.flight_operator import FlightOperator
-from crazyflie_dev.flight_record import FlightRecord
-from crazyflie_dev.launching import roslaunch
-from crazyflie_dev.programs import running
 from crazyflie_dev.render_rviz import background_of, crop_to_scene
 from crazyflie_dev.virtual_display import screenshot, virtual_display
+from crazyflie_reports.flight_operator import FlightOperator
+from crazyflie_reports.flight_record import FlightRecord
 from crazyflie_utils.main import begin
+from crazyflie_utils.testing.launching import roslaunch
+from crazyflie_utils.testing.programs import running
 
 COURSE = Path(__file__).resolve().parent
 QUICK = "sim_time:=true real_time_factor:=2 composed:=true simulator_dt:=0.01".split()

@@ -4,7 +4,7 @@ import argparse
 
 import numpy as np
 
-from crazyflie_dev.flight_operator import FlightOperator
+from crazyflie_reports.flight_operator import FlightOperator
 from crazyflie_utils.main import begin
 
 HEIGHT = 1.0

@@ -2,8 +2,8 @@
 
 from concurrent.futures import ThreadPoolExecutor
 
-from crazyflie_dev.flight_operator import FlightOperator
-from crazyflie_dev.flight_record import FlightRecord
+from crazyflie_reports.flight_operator import FlightOperator
+from crazyflie_reports.flight_record import FlightRecord
 from crazyflie_utils.main import ros_process
 
 

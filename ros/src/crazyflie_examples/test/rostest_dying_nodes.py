@@ -7,7 +7,7 @@ from xmlrpc.client import ServerProxy
 import pytest
 import rosgraph
 
-from crazyflie_dev.flight_operator import ready_operator
+from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing.peer import wait_until
 
 NODES = ("/takeoff_control_filter", "/takeoff_server", "/lqr_controller", "/state_estimator")

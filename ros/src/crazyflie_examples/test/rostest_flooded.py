@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from crazyflie_dev.flight_operator import ready_operator
+from crazyflie_reports.flight_operator import ready_operator
 
 FLOOD = (sys.executable, "-m", "crazyflie_utils.testing.hostile_publisher")
 FREEZE = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "bench" / "hostile.py"

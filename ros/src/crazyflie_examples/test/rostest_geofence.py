@@ -8,12 +8,12 @@ import pytest
 import rospy
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_dev.flight_operator import FlightOperator
-from crazyflie_dev.flight_record import CONTROL_FIELDS, Series
 from crazyflie_geofence.geofence import MAX_HORIZONTAL, MAX_VERTICAL_BRAKING
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import ControlStamped
+from crazyflie_reports.flight_operator import FlightOperator
+from crazyflie_reports.flight_record import CONTROL_FIELDS, Series
 from crazyflie_utils.main import ros_process
 from crazyflie_utils.vectors import to_vector
 

@@ -6,8 +6,8 @@ import pytest
 import rospy
 from std_srvs.srv import Empty
 
-from crazyflie_dev.flight_operator import ready_operator
-from crazyflie_dev.flight_record import GROUND_TOLERANCE
+from crazyflie_reports.flight_operator import ready_operator
+from crazyflie_reports.flight_record import GROUND_TOLERANCE
 
 POINTS = [(0.4, 0.0, 1.0), (0.4, 0.3, 1.3), (-0.2, 0.0, 0.6)]
 TOLERANCE = 0.02

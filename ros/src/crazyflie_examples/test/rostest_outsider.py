@@ -7,8 +7,8 @@ import rosgraph
 import rospy
 import rosservice
 
-from crazyflie_dev.flight_operator import ready_operator
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_reports.flight_operator import ready_operator
 
 LIMIT = 20.0
 TOPICS = {

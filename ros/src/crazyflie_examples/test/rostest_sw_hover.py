@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import rospy
 
-from crazyflie_dev.flight_operator import FlightError, ready_operator
-from crazyflie_dev.flight_report import FlightReport
 from crazyflie_model.units import GRAVITY
+from crazyflie_reports.flight_operator import FlightError, ready_operator
+from crazyflie_reports.flight_report import FlightReport
 
 HOVER = (0.0, 0.0, 1.0)
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from crazyflie_dev.flight_operator import ready_operator
-from crazyflie_dev.flight_report import OVERSHOOT_LIMIT, TOUCHDOWN_LIMIT
+from crazyflie_reports.flight_operator import ready_operator
+from crazyflie_reports.flight_report import OVERSHOOT_LIMIT, TOUCHDOWN_LIMIT
 
 HOVER = (0.0, 0.0, 1.0)
 SETTLING = 10.0

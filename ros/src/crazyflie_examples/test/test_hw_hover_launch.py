@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from crazyflie_dev import launch_files
+from crazyflie_utils.testing import launch_files
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch"
 

@@ -9,11 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from std_srvs.srv import EmptyRequest, EmptyResponse
 
-from crazyflie_dev import launch_files
 from crazyflie_examples.move_server_node import MoveServerNode
 from crazyflie_examples.route import DEFAULT_POINTS, Points, Route
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch" / "move.launch"

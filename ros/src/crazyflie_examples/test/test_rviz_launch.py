@@ -8,9 +8,8 @@ import rospkg
 import yaml
 
 from crazyflie_description.visualizer_node import VisualizerNode
-from crazyflie_dev import launch_files
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 
 PACKAGES = rospkg.RosPack()
 FRAGMENT = Path(PACKAGES.get_path("launch_shared")) / "launch" / "rviz.launch"

@@ -6,7 +6,6 @@ import pytest
 import rospkg
 from roslaunch.core import RLException
 
-from crazyflie_dev import launch_files
 from crazyflie_examples.reference_converter_node import ReferenceConverterNode
 from crazyflie_lqr.full_state_lqr_node import FullStateLqrNode
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
@@ -15,7 +14,7 @@ from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
 from crazyflie_lqr.position_velocity_yaw_state_lqr_node import PositionVelocityYawStateLqrNode
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_utils.vectors import to_vector
 
 PACKAGES = rospkg.RosPack()

@@ -7,10 +7,9 @@ import pytest
 import rospkg
 from roslaunch.core import RLException
 
-from crazyflie_dev import launch_files
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 
 PACKAGES = rospkg.RosPack()
 LAUNCH = Path(PACKAGES.get_path("crazyflie_examples")) / "launch"

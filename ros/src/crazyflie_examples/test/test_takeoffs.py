@@ -6,10 +6,10 @@ import pytest
 from rospkg import RosPack
 from std_srvs.srv import EmptyRequest
 
-from crazyflie_dev.flight_report import OVERSHOOT_LIMIT
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
 )
+from crazyflie_reports.flight_report import OVERSHOOT_LIMIT
 from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_state_estimator.estimator_node import PositionVelocityYawStateEstimatorNode
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode

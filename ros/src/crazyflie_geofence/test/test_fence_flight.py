@@ -8,10 +8,10 @@ from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 from std_srvs.srv import EmptyRequest
 
-from crazyflie_dev.launch_files import composed_nodes, expand
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeGraph
+from crazyflie_utils.testing.launch_files import composed_nodes, expand
 from crazyflie_utils.transport import ServiceError
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "launch/sw_geofence.launch"

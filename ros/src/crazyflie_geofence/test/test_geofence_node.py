@@ -10,7 +10,6 @@ from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_control_merger.regular_control_merger_node import RegularControlMergerNode
-from crazyflie_dev import launch_files
 from crazyflie_geofence.geofence import Braking, Geofence
 from crazyflie_geofence.geofence_node import GeofenceNode
 from crazyflie_msgs.msg import (
@@ -20,7 +19,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_utils.transport import ServiceError
 from crazyflie_utils.vectors import to_vector
 

@@ -19,11 +19,11 @@ import socket
 import statistics
 import time
 
-from crazyflie_dev.fake_vehicle import FakeVehicle
-from crazyflie_dev.programs import free_port, running
 from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest
+from crazyflie_link.testing.fake_vehicle import FakeVehicle
 from crazyflie_mission_api.connection import RosVehicle
 from crazyflie_utils.main import begin_script
+from crazyflie_utils.testing.programs import free_port, running
 from crazyflie_utils.testing.waiting import wait_until
 
 COMMANDS = (8, 0, b"\x0c")

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from crazyflie_dev.parameter_tables import with_tables
 from crazyflie_package_generator.command import main
 from crazyflie_package_generator.generator import GeneratorError, Package, check_name
+from crazyflie_utils.parameters.tables import with_tables
 
 BUILD_LIMIT = 900.0
 PACKAGES = (("wall_follower", "follower", False), ("an_apple", "pear_tree", True))

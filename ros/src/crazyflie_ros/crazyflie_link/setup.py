@@ -3,4 +3,6 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(**generate_distutils_setup(packages=["crazyflie_link"], package_dir={"": "src"}))
+PACKAGES = ["crazyflie_link", "crazyflie_link.testing"]
+
+setup(**generate_distutils_setup(packages=PACKAGES, package_dir={"": "src"}))

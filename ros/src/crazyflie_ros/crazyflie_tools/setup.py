@@ -3,8 +3,4 @@
 from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import setup
 
-setup(
-    **generate_distutils_setup(
-        packages=["crazyflie_tools", "crazyflie_tools.doctor"], package_dir={"": "src"}
-    )
-)
+setup(**generate_distutils_setup(packages=["crazyflie_tools"], package_dir={"": "src"}))

@@ -16,11 +16,11 @@ from xmlrpc.client import ServerProxy
 import numpy as np
 import rosgraph
 
-from crazyflie_dev.flight_operator import FlightOperator
-from crazyflie_dev.launching import complaints
-from crazyflie_dev.programs import free_port, running
+from crazyflie_reports.flight_operator import FlightOperator
 from crazyflie_utils.main import begin
+from crazyflie_utils.testing.launching import complaints
 from crazyflie_utils.testing.peer import wait_until
+from crazyflie_utils.testing.programs import free_port, running
 
 LIMIT = 60.0
 

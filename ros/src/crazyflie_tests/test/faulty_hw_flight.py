@@ -21,14 +21,14 @@ from faulty_flight import LIMIT, Observer, node_process
 from std_msgs.msg import Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
 
-from crazyflie_dev.flight_operator import FlightError
-from crazyflie_dev.flight_record import Series
-from crazyflie_dev.programs import free_port, running
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_driver.srv import RemoveCrazyflie
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_reports.flight_operator import FlightError
+from crazyflie_reports.flight_record import Series
 from crazyflie_utils.testing.peer import wait_until
+from crazyflie_utils.testing.programs import free_port, running
 
 _VARIABLES = ("stateEstimate.z", "stateEstimate.vz", "motor.m1", "motor.m2", "motor.m3", "motor.m4")
 _LOG = "genericLogTopic_truth_Variables: [" + ", ".join((*_VARIABLES, "supervisor.info")) + "]"

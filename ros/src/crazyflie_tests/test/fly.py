@@ -7,10 +7,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-from crazyflie_dev.flight_operator import FlightError, FlightOperator
-from crazyflie_dev.flight_report import FlightReport
-from crazyflie_dev.launching import roslaunch
+from crazyflie_reports.flight_operator import FlightError, FlightOperator
+from crazyflie_reports.flight_report import FlightReport
 from crazyflie_utils.main import begin
+from crazyflie_utils.testing.launching import roslaunch
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from crazyflie_dev.flight_operator import ready_operator
-from crazyflie_dev.flight_report import HOVER_TOLERANCE, FlightReport
 from crazyflie_model.units import GRAVITY
+from crazyflie_reports.flight_operator import ready_operator
+from crazyflie_reports.flight_report import HOVER_TOLERANCE, FlightReport
 
 HOVER = (0.0, 0.0, 1.0)
 

@@ -14,7 +14,7 @@ from roslaunch.rlutil import resolve_launch_arguments
 from roslib.packages import find_node
 from workspaces import TOP
 
-from crazyflie_dev import launch_files
+from crazyflie_utils.testing import launch_files
 
 TEST = Path(__file__).parent
 DOCUMENTED = yaml.safe_load((TEST / "launch_files.yaml").read_text())

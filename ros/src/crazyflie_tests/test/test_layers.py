@@ -29,6 +29,7 @@ LAYERS = [
         "crazyflie_description",
         "crazyflie_controller",
         "crazyflie_link",
+        "crazyflie_reports",
         "crazyflie_sweep",
         "crazyflie_package_generator",
         "crazyflie_spawner",
@@ -37,6 +38,7 @@ LAYERS = [
     },
     {
         "crazyflie_batch",
+        "crazyflie_doctor",
         "crazyflie_driver",
         "crazyflie_teleop",
         "crazyflie_tools",

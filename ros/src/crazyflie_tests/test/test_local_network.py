@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from workspaces import FAST, clean_environment
 
-from crazyflie_dev.programs import free_port, running
+from crazyflie_utils.testing.programs import free_port, running
 from crazyflie_utils.testing.waiting import wait_until
 
 LISTEN = "0A"

@@ -8,7 +8,7 @@ import pytest
 from pages import PACKAGE_PAGES, PAGES
 from workspaces import TOP
 
-from crazyflie_dev.parameter_tables import with_tables
+from crazyflie_utils.parameters.tables import with_tables
 
 COMMENT = re.compile(r"<!-- parameters: (.+?) -->")
 
@@ -76,7 +76,7 @@ def ancestry(name):
 @pytest.mark.parametrize("page", documented()[0], ids=lambda page: str(page.relative_to(TOP)))
 def test_tables_are_as_declared(page):
     text = page.read_text()
-    hint = f"run python3 -m crazyflie_dev.parameter_tables {page}"
+    hint = f"run python3 -m crazyflie_utils.parameters.tables {page}"
     assert text == with_tables(text), hint
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from terminal import Terminal
 
-from crazyflie_dev.programs import free_port
+from crazyflie_utils.testing.programs import free_port
 
 TOP = Path(__file__).resolve().parents[4]
 """Top of the repository."""
@@ -15,10 +15,8 @@ TOP = Path(__file__).resolve().parents[4]
 INSTALLATION = TOP / "docs" / "installation.md"
 """The page that tells how a workspace is built and installed."""
 
-_TOOLS = TOP / "ros" / "src" / "crazyflie_dev" / "src"
-
-FLY = f"PYTHONPATH={_TOOLS}:$PYTHONPATH python3 {Path(__file__).with_name('fly.py')}"
-"""Command that flies a launch file and judges the flight; an install space has no such tool."""
+FLY = f"python3 {Path(__file__).with_name('fly.py')}"
+"""Command that flies a launch file and checks the flight."""
 
 FAST = "rviz:=false sim_time:=true real_time_factor:=0 simulator_dt:=0.01 composed:=true"
 """Arguments of sw_hover.launch that fly it in seconds."""

@@ -5,7 +5,7 @@ import logging
 
 import pytest
 
-from crazyflie_dev.fixtures import time_limit  # noqa: F401
+from crazyflie_utils.testing.fixtures import time_limit  # noqa: F401
 from crazyflie_virtual.testing import virtual_vehicle
 
 

@@ -6,8 +6,12 @@ import pytest
 import rospkg
 from hypothesis import HealthCheck, given, settings
 
-from crazyflie_dev.wrong_files import assert_refused, assert_taken_or_refused, with_an_odd_word
 from crazyflie_utils import ParameterError
+from crazyflie_utils.testing.wrong_files import (
+    assert_refused,
+    assert_taken_or_refused,
+    with_an_odd_word,
+)
 from crazyflie_world import world_file
 from crazyflie_world.paths import Circle, Waypoints
 from crazyflie_world.shapes import Ball, Box, Cylinder

@@ -7,8 +7,7 @@ import rospkg
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker
 
-from crazyflie_dev import launch_files
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_world.world_node import WorldNode
 
 PACKAGE = Path(rospkg.RosPack().get_path("crazyflie_world"))

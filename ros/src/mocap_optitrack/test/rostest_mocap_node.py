@@ -11,8 +11,8 @@ from geometry_msgs.msg import Pose2D, PoseStamped
 from tf2_msgs.msg import TFMessage
 from virtual_capture import LIMIT, MovingVehicles, mocap_launch, virtual_mocap
 
-from crazyflie_dev.programs import free_port
 from crazyflie_utils.testing.peer import listening
+from crazyflie_utils.testing.programs import free_port
 
 HALF = 0.5**0.5
 

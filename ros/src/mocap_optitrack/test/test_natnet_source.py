@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from crazyflie_dev.programs import free_port
+from crazyflie_utils.testing.programs import free_port
 from crazyflie_virtual.mocap import natnet
 from crazyflie_virtual.mocap.natnet import VERSIONS
 from crazyflie_virtual.mocap.server import MocapServer

@@ -6,7 +6,7 @@ import time
 
 import yaml
 
-from crazyflie_dev.programs import running
+from crazyflie_utils.testing.programs import running
 from crazyflie_virtual.observer import Observation
 
 LIMIT = 60.0

@@ -5,10 +5,10 @@ import os
 import sys
 from pathlib import Path
 
-from crazyflie_dev import flight_plot, flight_report
-from crazyflie_dev.flight_operator import FlightError, FlightOperator
-from crazyflie_dev.launching import LaunchError, complaints, roslaunch
+from crazyflie_reports import flight_plot, flight_report
+from crazyflie_reports.flight_operator import FlightError, FlightOperator
 from crazyflie_utils.main import begin
+from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 6.0

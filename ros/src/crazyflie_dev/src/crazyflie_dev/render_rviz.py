@@ -17,11 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_description.visualizer_node import PATH_COLOUR, REFERENCE_COLOUR
 from crazyflie_dev.demo import HOVER
-from crazyflie_dev.flight_operator import FlightError, FlightOperator
-from crazyflie_dev.flight_report import HOVER_TOLERANCE
-from crazyflie_dev.launching import roslaunch
 from crazyflie_dev.virtual_display import DisplayError, screenshot, virtual_display
+from crazyflie_reports.flight_operator import FlightError, FlightOperator
+from crazyflie_reports.flight_report import HOVER_TOLERANCE
 from crazyflie_utils.main import begin
+from crazyflie_utils.testing.launching import roslaunch
 
 SCREEN = (1400, 900)
 """Width and height in pixels of the screen, and of RViz's window in its configuration."""

@@ -22,12 +22,12 @@ from std_srvs.srv import EmptyRequest
 from tqdm import tqdm
 
 from crazyflie_dev import soak_faults, soak_intruders, soak_operator
-from crazyflie_dev.launch_files import composed_nodes, expand
 from crazyflie_dev.soak_faults import EMERGENCY, STARVATION, Fault, Flight, Undo
 from crazyflie_dev.soak_watch import Watch
 from crazyflie_msgs.msg import PositionVelocityStateStamped
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeGraph
+from crazyflie_utils.testing.launch_files import composed_nodes, expand
 
 HOVER_HEIGHT = 1.0
 """Of the launch file, m."""

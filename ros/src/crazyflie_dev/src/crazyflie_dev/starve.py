@@ -18,10 +18,10 @@ from xmlrpc.client import ServerProxy
 
 import rosgraph
 
-from crazyflie_dev.flight_operator import FlightError, FlightOperator
-from crazyflie_dev.launching import roslaunch
 from crazyflie_dev.soak_faults import NODES
+from crazyflie_reports.flight_operator import FlightError, FlightOperator
 from crazyflie_utils.main import begin
+from crazyflie_utils.testing.launching import roslaunch
 
 HOVER_HEIGHT = 1.0
 """Of the launch file, m."""

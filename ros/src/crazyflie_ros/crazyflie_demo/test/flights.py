@@ -8,7 +8,7 @@ import time
 import rospy
 
 from crazyflie_demo.joystick import AXIS, BUTTON, EVENT
-from crazyflie_dev.programs import free_port, running
+from crazyflie_utils.testing.programs import free_port, running
 from crazyflie_virtual.observer import decode
 
 LIMIT = 60.0

@@ -11,9 +11,9 @@ from flights import LIMIT, Observer, Stick, launched, virtual_vehicle, wait_for_
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.gamepad import EMERGENCY, HEADLIGHT, PITCH, ROLL, TAKEOFF, THRUST, YAW
-from crazyflie_dev.programs import running
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.testing.peer import listening, wait_until
+from crazyflie_utils.testing.programs import running
 
 CLIMB, HOVER = 0.78, 0.7
 """Of the thrust stick's way; 60000 PWM at the end, and a dead zone at the beginning."""

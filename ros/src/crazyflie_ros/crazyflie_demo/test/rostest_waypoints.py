@@ -7,7 +7,7 @@ from rostest_hover import Positions, config, virtual_mocap
 
 from crazyflie_demo.gamepad import LAND, TAKEOFF
 from crazyflie_demo.waypoint_node import Demo1Node, Demo2Node
-from crazyflie_dev.programs import free_port
+from crazyflie_utils.testing.programs import free_port
 
 VISITED = 3
 """Waypoints of each tour that are waited for."""

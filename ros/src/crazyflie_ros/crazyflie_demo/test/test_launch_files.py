@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from crazyflie_dev import launch_files
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from mocap_optitrack.mocap_node import MocapNode
 
 PACKAGE = Path(__file__).parents[1]

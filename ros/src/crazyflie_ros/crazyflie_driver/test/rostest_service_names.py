@@ -9,9 +9,9 @@ import rospy
 import rosservice
 from std_srvs.srv import Empty
 
-from crazyflie_dev.programs import running
 from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest, RemoveCrazyflie
 from crazyflie_utils.testing.peer import LIMIT, wait_until
+from crazyflie_utils.testing.programs import running
 from crazyflie_virtual.testing import virtual_vehicle
 
 CONTROLLERS = "std_srvs/Empty"

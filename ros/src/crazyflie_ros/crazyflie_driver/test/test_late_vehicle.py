@@ -5,11 +5,11 @@ from conftest import LIMIT
 from safety_helpers import wait_for_words
 from std_msgs.msg import Bool
 
-from crazyflie_dev.programs import free_port
 from crazyflie_driver.connecting import connect_within
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_link.errors import AddressError, NoAnswerError, NoDongleError, SetupError
 from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.programs import free_port
 from crazyflie_utils.testing.waiting import wait_until
 
 DEFAULT_LIMIT = CrazyflieServerParameters().connect_limit

@@ -14,9 +14,9 @@ from safety_helpers import (
     wait_for_words,
 )
 
-from crazyflie_dev.fake_vehicle import READ_ONLY
 from crazyflie_driver.srv import UpdateParamsRequest
 from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.testing.fake_vehicle import READ_ONLY
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils.testing.waiting import wait_until
 from crazyflie_virtual.testing import virtual_vehicle

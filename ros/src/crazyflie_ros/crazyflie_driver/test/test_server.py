@@ -7,10 +7,10 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from genpy import Duration
 from geometry_msgs.msg import Twist, Vector3
 
-from crazyflie_dev.programs import free_port
 from crazyflie_driver.srv import TakeoffRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.peer import wait_until
+from crazyflie_utils.testing.programs import free_port
 
 LIMIT = 60.0
 ZERO = struct.pack("<fffH", 0, 0, 0, 0)

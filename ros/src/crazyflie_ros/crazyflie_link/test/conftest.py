@@ -4,9 +4,9 @@ import queue
 
 import pytest
 
-from crazyflie_dev.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
-from crazyflie_dev.fixtures import own_cache  # noqa: F401
 from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.testing.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
+from crazyflie_utils.testing.fixtures import own_cache  # noqa: F401
 
 LIMIT = 60.0
 

@@ -10,9 +10,9 @@ import usb
 from cflib.crtp.radiodriver import RadioManager
 from cflib.drivers import crazyradio
 
-from crazyflie_dev.fake_vehicle import FakeVehicle
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import NoDongleError
+from crazyflie_link.testing.fake_vehicle import FakeVehicle
 from crazyflie_utils.testing.waiting import LIMIT, wait_until
 
 # The thread of cflib that ends is what these tests are about.

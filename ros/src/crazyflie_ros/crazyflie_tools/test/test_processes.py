@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from crazyflie_dev.programs import running
+from crazyflie_utils.testing.programs import running
 from crazyflie_virtual.settings import FIRST_PORT
 from crazyflie_virtual.testing import virtual_vehicle
 
@@ -183,15 +183,7 @@ def test_it_is_no_error_when_nobody_reads_the_output(uri):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_doctor_without_a_master():
-    status, out, err = run("doctor")
-    assert err == ""
-    assert "no ROS master at http://127.0.0.1:1, the graph was not checked" in out
-    # Of this computer, on which the tests pass.
-    assert status == 0, out
-
-
-def test_doctor_with_a_wrong_network():
-    status, out, _ = run("doctor", ROS_IP="192.0.2.77")
-    assert status == 1
-    assert "ROS_IP '192.0.2.77' is 192.0.2.77, no address of this computer" in out
+def test_the_doctor_still_runs_from_here():
+    status, out, err = run("doctor", "--help")
+    assert (status, err) == (0, "")
+    assert out.startswith("usage: doctor")

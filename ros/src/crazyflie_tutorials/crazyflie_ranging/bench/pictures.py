@@ -17,10 +17,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Polygon, Wedge
 from std_srvs.srv import EmptyRequest
 
-from crazyflie_dev import launch_files
 from crazyflie_ranging.range_sensors import DIRECTIONS
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_world import world_file
 from crazyflie_world.shapes import Box
 from crazyflie_world.world import World

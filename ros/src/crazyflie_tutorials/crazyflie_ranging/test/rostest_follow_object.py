@@ -7,7 +7,7 @@ from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import Reconfigure
 from geometry_msgs.msg import PoseStamped
 
-from crazyflie_dev.flight_operator import ready_operator
+from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
 BOX_FRONT = 0.15

@@ -4,8 +4,8 @@ import pytest
 from sensor_msgs.msg import Joy
 from std_msgs.msg import String
 
-from crazyflie_dev.flight_operator import ready_operator
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
 WALL = 1.5

@@ -6,13 +6,12 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from crazyflie_dev import launch_files, launching
 from crazyflie_ranging.deck_ranger_node import DeckRangerNode
 from crazyflie_ranging.follow_object_node import FollowObjectNode
 from crazyflie_ranging.obstacle_stop_node import ObstacleStopNode
 from crazyflie_ranging.simulated_ranger_node import SimulatedRangerNode
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files, launching
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_ranging")) / "launch"
 

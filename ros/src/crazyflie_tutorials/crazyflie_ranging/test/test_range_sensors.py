@@ -10,12 +10,16 @@ import rospkg
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from crazyflie_dev.wrong_files import assert_refused, assert_taken_or_refused, with_an_odd_word
 from crazyflie_model.angles import quaternion_from_rpy, rotate
 from crazyflie_ranging import range_sensors
 from crazyflie_ranging.range_sensors import DIRECTIONS
 from crazyflie_ranging.ranger import Ranger, cone
 from crazyflie_utils import ParameterError
+from crazyflie_utils.testing.wrong_files import (
+    assert_refused,
+    assert_taken_or_refused,
+    with_an_odd_word,
+)
 from crazyflie_world.shapes import Ball, Box
 from crazyflie_world.world import Floor, World
 

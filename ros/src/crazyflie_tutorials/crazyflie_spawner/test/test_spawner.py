@@ -7,14 +7,13 @@ from pathlib import Path
 import pytest
 import rospkg
 
-from crazyflie_dev import launch_files
 from crazyflie_spawner.names import vehicle_name
 from crazyflie_spawner.spawner_node import SpawnerNode
 from crazyflie_spawner.vehicle_process import VehicleProcess
 from crazyflie_tutorial_msgs.srv import RemoveVehicleRequest, SpawnVehicleRequest
 from crazyflie_utils import ServiceError
 from crazyflie_utils.refusal import RefusalError
-from crazyflie_utils.testing import FakeProcess, peer
+from crazyflie_utils.testing import FakeProcess, launch_files, peer
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_spawner")) / "launch"
 

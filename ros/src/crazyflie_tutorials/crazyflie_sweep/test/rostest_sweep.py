@@ -5,7 +5,7 @@ import math
 import pytest
 import rospy
 
-from crazyflie_dev.flight_operator import ready_operator
+from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_tutorial_msgs.msg import SweepReport
 from crazyflie_tutorial_msgs.srv import VelocityAt
 from crazyflie_utils.testing import peer

@@ -10,7 +10,6 @@ import rospkg
 from std_msgs.msg import String
 from std_srvs.srv import EmptyResponse, TriggerRequest
 
-from crazyflie_dev import launch_files
 from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
 from crazyflie_sweep.sweep_node import SweepNode
 from crazyflie_sweep.velocity_server_node import VelocityServerNode
@@ -18,7 +17,7 @@ from crazyflie_tutorial_msgs.msg import SweepReport
 from crazyflie_tutorial_msgs.srv import VelocityAtResponse
 from crazyflie_utils import ServiceError
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_sweep")) / "launch" / "sweep.launch"
 PARAMETERS = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from std_msgs.msg import String
 
-from crazyflie_dev.flight_operator import ready_operator
+from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
 RADIUS, SPEED = 0.5, 0.3

@@ -11,7 +11,6 @@ from sensor_msgs.msg import Joy
 from std_msgs.msg import String
 from std_srvs.srv import EmptyResponse
 
-from crazyflie_dev import launch_files
 from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,
@@ -24,7 +23,7 @@ from crazyflie_teleop.joy_velocity_node import JoyVelocityNode
 from crazyflie_teleop.takeoff_caller_node import TakeoffCallerNode
 from crazyflie_teleop.velocity_reference_node import VelocityReferenceNode
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_utils.vectors import to_vector
 
 LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_teleop")) / "launch"

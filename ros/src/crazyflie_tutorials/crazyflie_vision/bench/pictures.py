@@ -17,9 +17,8 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from std_srvs.srv import EmptyRequest
 
-from crazyflie_dev import launch_files
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_vision.images import to_array
 
 STEP = 0.1

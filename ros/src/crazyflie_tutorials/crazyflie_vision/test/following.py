@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import CameraInfo
 from std_msgs.msg import String
 
-from crazyflie_dev.flight_operator import ready_operator
+from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing import peer
 
 

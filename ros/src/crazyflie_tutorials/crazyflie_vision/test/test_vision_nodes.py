@@ -9,10 +9,9 @@ from sensor_msgs.msg import CameraInfo, Image
 from test_camera import CONFIG
 from tf2_msgs.msg import TFMessage
 
-from crazyflie_dev import launch_files
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_vision.blur_node import BlurNode
 from crazyflie_vision.camera_node import CameraNode
 from crazyflie_vision.colour_tracker_node import ColourTrackerNode

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from test_camera import CONFIG
 
-from crazyflie_dev import launch_files
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_vision.frame_source import FrameSource, open_source
 from crazyflie_vision.images import to_array
 from crazyflie_vision.webcam_node import WebcamNode

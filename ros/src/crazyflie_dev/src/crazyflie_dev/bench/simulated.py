@@ -11,9 +11,9 @@ import rospkg
 
 from crazyflie_dev.bench import graph
 from crazyflie_dev.bench.row import NotMeasuredError, Row
-from crazyflie_dev.launch_files import expand
-from crazyflie_dev.launching import master
-from crazyflie_dev.programs import running
+from crazyflie_utils.testing.launch_files import expand
+from crazyflie_utils.testing.launching import master
+from crazyflie_utils.testing.programs import running
 
 DURATION = 10.0
 """For how long it is measured, s of the machine's clock."""

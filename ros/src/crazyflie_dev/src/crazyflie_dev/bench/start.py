@@ -7,7 +7,7 @@ from pathlib import Path
 
 from crazyflie_dev.bench import graph
 from crazyflie_dev.bench.row import Row
-from crazyflie_dev.launching import roslaunch
+from crazyflie_utils.testing.launching import roslaunch
 
 REPEATS = 3
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from crazyflie_dev.bench import graph
 from crazyflie_dev.bench.row import NotMeasuredError, Row
-from crazyflie_dev.launching import roslaunch
+from crazyflie_utils.testing.launching import roslaunch
 
 DURATION = 20.0
 """For how long it is measured, s."""

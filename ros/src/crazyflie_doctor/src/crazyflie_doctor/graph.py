@@ -1,0 +1,212 @@
+"""Checks of a graph: nodes, message types, connections, publishers."""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from crazyflie_doctor.finding import Finding, error, listed, warn
+
+Type = tuple[str, str]
+"""Name and MD5 sum of a message or service type."""
+
+CONTROLS = {
+    "crazyflie_msgs/ControlStamped",
+    "crazyflie_msgs/NoYawControlStamped",
+    "crazyflie_msgs/PrioritizedControlStamped",
+    "geometry_msgs/Twist",
+}
+STATES_AND_REFERENCES = {
+    "crazyflie_msgs/FullStateStamped",
+    "crazyflie_msgs/PositionVelocityStateStamped",
+    "crazyflie_msgs/PositionVelocityYawStateStamped",
+}
+
+_OPTIONAL = {"prioritized_control"}
+"""Inputs, by the ends of their parameters' names, without which a node does its work."""
+
+_BUILD = "build the workspace anew (./run build), source it in every shell, and restart the nodes"
+
+
+@dataclass(frozen=True)
+class Graph:
+    """What master and nodes say.
+
+    Attributes
+    ----------
+    publishers, subscribers : dict
+        Topic -> names of nodes.
+    services : dict
+        Service -> name of its node.
+    parameters : dict
+        Full name -> value; no dictionaries.
+    silent : dict
+        Node that does not answer -> why.
+    topic_types : dict
+        (node, topic) -> the `Type` that this publisher offers.
+    service_types : dict
+        Service -> `Type`.
+    connections : set
+        (publisher, topic, subscriber) that are connected.
+    """
+
+    publishers: Mapping[str, set[str]] = field(default_factory=dict)
+    subscribers: Mapping[str, set[str]] = field(default_factory=dict)
+    services: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    silent: Mapping[str, str] = field(default_factory=dict)
+    topic_types: Mapping[tuple[str, str], Type] = field(default_factory=dict)
+    service_types: Mapping[str, Type] = field(default_factory=dict)
+    connections: set[tuple[str, str, str]] = field(default_factory=set)
+
+    @property
+    def topics(self) -> dict[str, set[str]]:
+        """Topic named by a parameter such as /lqr_controller/topics/state -> such parameters."""
+        named = defaultdict(set)
+        for name, value in self.parameters.items():
+            if "/topics/" in name and isinstance(value, str):
+                named["/" + value.strip("/")].add(name)
+        return dict(named)
+
+    @property
+    def uris(self) -> dict[str, list[str]]:
+        """Address of a vehicle -> parameters that name it."""
+        named = defaultdict(list)
+        for name, value in sorted(self.parameters.items()):
+            if name.endswith("/uri") and isinstance(value, str) and "://" in value:
+                named[value].append(name)
+        return dict(named)
+
+
+def check_nodes(graph: Graph) -> Iterator[Finding]:
+    """Find nodes that the master knows but that do not answer."""
+    for node, why in sorted(graph.silent.items()):
+        yield error(
+            f"{node} does not answer ({why})",
+            "dead: rosnode cleanup, and launch it again; on another computer: see ROS_IP there; "
+            "frozen: kill it",
+        )
+
+
+def check_types(graph: Graph, ours: Callable[[str, str], str | None]) -> Iterator[Finding]:
+    """Compare the types of all publishers and services with those of this workspace.
+
+    Parameters
+    ----------
+    graph : Graph
+    ours : callable
+        ``ours(kind, type name)`` returns the MD5 sum that the type has here, None if it is
+        unknown here; the kind is "msg" or "srv".
+    """
+    for (node, topic), offered in sorted(graph.topic_types.items()):
+        yield from _compare(f"{node} publishes {topic}", offered, ours("msg", offered[0]))
+    for service, offered in sorted(graph.service_types.items()):
+        node = graph.services[service]
+        yield from _compare(f"{node} offers {service}", offered, ours("srv", offered[0]))
+    by_topic = defaultdict(set)
+    for (_, topic), offered in graph.topic_types.items():
+        by_topic[topic].add(offered)
+    for topic, types in sorted(by_topic.items()):
+        if len({name for name, _ in types}) > 1:
+            yield error(
+                f"{topic} has publishers of {listed(name for name, _ in types)}",
+                "rename one of the topics",
+            )
+
+
+def _compare(what, offered, own):
+    name, md5 = offered
+    if own is None:
+        yield warn(f"{what} as {name}, which is unknown here", "source the workspace that has it")
+    elif own != md5:
+        yield error(f"{what} as {name} with MD5 {md5}, here it is {own}", _BUILD)
+
+
+def check_connections(graph: Graph) -> Iterator[Finding]:
+    """Find subscribers that are not connected with a publisher of their topic."""
+    for topic, publishers in sorted(graph.publishers.items()):
+        for publisher in sorted(publishers - graph.silent.keys()):
+            missing = {
+                subscriber
+                for subscriber in graph.subscribers.get(topic, set()) - graph.silent.keys()
+                if subscriber != publisher
+                and (publisher, topic, subscriber) not in graph.connections
+            }
+            if missing:
+                yield error(
+                    f"{listed(missing)} cannot hear {publisher} on {topic}",
+                    "message types differ, or one cannot reach the other's ROS_IP: see its log; "
+                    + _BUILD,
+                )
+
+
+def check_publishers(graph: Graph) -> Iterator[Finding]:
+    """Find topics that nobody publishes, and controls and references from two sources."""
+    for topic, parameters in sorted(graph.topics.items()):
+        listeners = graph.subscribers.get(topic, set())
+        if listeners and not graph.publishers.get(topic):
+            is_optional = {name.rpartition("/")[2] for name in parameters} <= _OPTIONAL
+            yield (warn if is_optional else error)(
+                f"{topic} has no publisher, {listed(listeners)} waits for it",
+                f"launch what publishes it, or mend {listed(parameters)}",
+            )
+    if graph.subscribers.get("/tf") and not graph.publishers.get("/tf"):
+        yield error("nobody publishes /tf", "start the simulator or mocap_optitrack")
+    yield from _doubled(graph)
+
+
+def _doubled(graph):
+    references = {
+        topic
+        for topic, names in graph.topics.items()
+        if any(name.endswith("/reference") for name in names)
+    }
+    by_topic = {topic: name for (_, topic), (name, _) in graph.topic_types.items()}
+    for topic, publishers in sorted(graph.publishers.items()):
+        if len(publishers) < 2:
+            continue
+        if topic in references:
+            servers = publishers & _takeoff_servers(graph, topic)
+            others = publishers - servers
+            # A takeoff server leaves the vehicle to one other between takeoff and landing.
+            doubled = others if len(servers) == 1 else publishers
+            if len(doubled) > 1:
+                yield warn(
+                    f"the reference {topic} comes from {listed(doubled)}",
+                    "end all but one: the vehicle jumps between them",
+                )
+        elif by_topic.get(topic) in CONTROLS | STATES_AND_REFERENCES:
+            yield error(
+                f"{topic} comes from {listed(publishers)}",
+                "end all but one: each undoes what the other does",
+            )
+
+
+def _takeoff_servers(graph, reference):
+    """Return the nodes that publish the references of descents, too."""
+    topics = {f"{reference}_descent"}
+    for name, value in graph.parameters.items():
+        node, _, key = name.rpartition("/topics/")
+        if key == "descent_reference" and f"{node}/topics/reference" in graph.topics[reference]:
+            topics.add("/" + str(value).strip("/"))
+    return {node for topic in topics for node in graph.publishers.get(topic, ())}
+
+
+def check_drivers(graph: Graph, reported: Mapping[str, set[str]]) -> Iterator[Finding]:
+    """Find vehicles that several drivers, or several launches, are to fly.
+
+    Parameters
+    ----------
+    graph : Graph
+    reported : dict
+        Address of a vehicle -> nodes whose diagnostics speak of it.
+    """
+    for uri, nodes in sorted(reported.items()):
+        if len(nodes) > 1:
+            yield error(f"{uri} is flown by {listed(nodes)}", "end all but one driver")
+    for uri, parameters in graph.uris.items():
+        if len(parameters) > 1:
+            yield error(
+                f"{uri} is added by {listed(name.rpartition('/')[0] for name in parameters)}",
+                "give each vehicle its own uri; rosparam delete what an earlier launch has left",
+            )

@@ -1,0 +1,134 @@
+"""The command `doctor`: prints a line for each finding."""
+
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from functools import partial
+
+import rosgraph
+
+from crazyflie_doctor import computer, graph, installation, running_graph, timing
+from crazyflie_doctor.finding import ERROR, WARN, Check, Finding, lines, warn
+from crazyflie_doctor.recorder import record
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.command_line import parse_arguments
+from crazyflie_utils.parameters.types import Number
+
+_SECONDS = Number(unit="s", above=0.0)
+
+
+class DoctorParameters(Parameters):
+    """Options of the command line."""
+
+    duration: float = parameter(_SECONDS, "how long to record tf, controls and diagnostics", 3.0)
+    timeout: float = parameter(_SECONDS, "when to give up", 40.0)
+
+
+def doctor(arguments: list[str] | None = None) -> int:
+    """Check the installation and the running graph; return 1 if there are errors, otherwise 0."""
+    given = sys.argv[1:] if arguments is None else arguments
+    options = parse_arguments(
+        DoctorParameters,
+        [each for each in given if ":=" not in each],
+        "doctor",
+        "Check this computer and the graph that runs, print a line for each finding and what to do "
+        "about it. It connects to no vehicle and publishes nothing. Exit status: 0 without errors, "
+        "1 with errors, 2 wrong usage.",
+    )
+    watchdog = threading.Timer(options.timeout, _give_up, [options.timeout])
+    watchdog.daemon = True
+    watchdog.start()
+    count = {WARN: 0, ERROR: 0}
+    for check in _checks(options.duration):
+        for level, line in lines(check):
+            print(line, flush=True)
+            count[level] = count.get(level, 0) + 1
+    print(f"{count[ERROR]} errors, {count[WARN]} warnings", flush=True)
+    watchdog.cancel()
+    return 1 if count[ERROR] else 0
+
+
+def _give_up(limit):
+    print(f"error  doctor: not done within {limit:g} s; is something overloaded or frozen?")
+    sys.stdout.flush()
+    # Any thread may be blocked.
+    os._exit(1)
+
+
+def _checks(duration: float) -> Iterator[Check]:
+    yield from _of_the_computer()
+    if not running_graph.is_master_online():
+        yield Check("master", "", partial(_no_master, rosgraph.get_master_uri()))
+        yield _radio([])
+        return
+    running = running_graph.graph()
+    if not set(running.publishers.get("/rosout", ())) - {"/rosout"}:
+        yield Check("master", "", lambda: [warn("no node runs", "roslaunch what is to be checked")])
+    yield Check("nodes", "all answer", lambda: graph.check_nodes(running))
+    yield Check("types", "all are ours", lambda: graph.check_types(running, running_graph.own_md5))
+    yield Check("connections", "complete", partial(_connections, running))
+    yield Check("publishers", "one of each", lambda: graph.check_publishers(running))
+    recording = record(running, duration)
+    for name, fine, find in (
+        ("clock", "one for all", timing.check_clock),
+        ("tf tree", "is a tree", timing.check_tf_tree),
+        ("frames", "all are published", timing.check_frames),
+        ("tf rate", "poses come often and fresh", timing.check_tf_rate),
+        ("gains", "fit the delay", timing.check_gains),
+    ):
+        # Each check is made before the next is yielded.
+        yield Check(name, fine, partial(find, running, recording))
+    yield Check(
+        "drivers", "one for a vehicle", lambda: graph.check_drivers(running, recording.reported)
+    )
+    yield _radio([*running.uris, *recording.reported])
+
+
+def _of_the_computer() -> Iterator[Check]:
+    first, of_ros = computer.first_python(), computer.python_of_ros()
+    yield Check(
+        "Python",
+        f"{first.path}, {first.version}",
+        lambda: installation.check_python(first, of_ros),
+    )
+    debian = dict.fromkeys(computer.package_list("debian.txt"), "")
+    yield Check(
+        "Debian packages",
+        f"all {len(debian)} are installed" if debian else "no list here (an install space)",
+        lambda: installation.check_packages(debian, computer.debian_packages(), "./run install"),
+    )
+    wanted, installed = computer.python_packages(computer.package_list("requirements.txt"))
+    yield Check(
+        "PyPI packages",
+        f"all {len(wanted)} are installed" if wanted else "no list here (an install space)",
+        lambda: installation.check_packages(wanted, installed, "./run install"),
+    )
+    yield Check("network", "can be reached", lambda: installation.check_network(computer.network()))
+    path, is_writable, free = computer.log_directory()
+    yield Check(
+        "logs",
+        f"{path}, {free / 1e9:.0f} GB free",
+        lambda: installation.check_log_directory(path, is_writable, free),
+    )
+
+
+def _no_master(uri: str) -> list[Finding]:
+    return [
+        warn(
+            f"no ROS master at {uri}, the graph was not checked",
+            "start one with roslaunch or roscore, or mend ROS_MASTER_URI",
+        )
+    ]
+
+
+def _radio(uris: list[str]) -> Check:
+    found = computer.radio()
+    fine = f"{len(found.dongles)} that may be used" if found.dongles else "none, and none needed"
+    return Check("Crazyradio", fine, lambda: installation.check_radio(found, uris))
+
+
+def _connections(running: graph.Graph) -> list[Finding]:
+    findings = list(graph.check_connections(running))
+    # A subscriber may just have been connecting.
+    return list(graph.check_connections(running_graph.graph())) if findings else findings

@@ -1,0 +1,284 @@
+"""Checks of time, tf, and the delay from a pose to the control."""
+
+import difflib
+import itertools
+import statistics
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from crazyflie_doctor.finding import Finding, error, listed, warn
+from crazyflie_doctor.graph import Graph
+from crazyflie_lqr.design import Design
+from crazyflie_lqr.gain_file import GainFileError, load_matrix
+from crazyflie_lqr.margins import loop_margins
+from crazyflie_lqr.models import CONTROLS, LinearModel, full_state, near_hover
+
+LEAST_RATE = 50.0
+"""Below this rate of poses, Hz, velocities are poor."""
+
+LONGEST_PAUSE = 0.1
+"""Without a new pose for longer than this the vehicle is no longer controlled, s."""
+
+LONGEST_AGE = 0.1
+"""Older poses, s, are too late for a controller."""
+
+FUTURE = 0.5
+"""Stamps further ahead of the clock than this, s, are no foresight: tf's own
+static_transform_publisher is ahead by its period."""
+
+OTHER_CLOCK = 1e6
+"""Clocks that differ by more than this, s, are different clocks: simulated and real time."""
+
+USED_MARGIN = 2.0 / 3.0
+"""Of the delay margin; what is left is for the vehicle and for jitter."""
+
+
+@dataclass(frozen=True)
+class Transform:
+    """A transform that was received.
+
+    Attributes
+    ----------
+    parent, child, node : str
+        Frames, and who has published it.
+    stamp, arrival : float
+        ROS time, s.
+    is_static : bool
+        It came on /tf_static.
+    """
+
+    parent: str
+    child: str
+    node: str
+    stamp: float
+    arrival: float
+    is_static: bool = False
+
+
+@dataclass
+class Recording:
+    """What was published for some seconds.
+
+    Attributes
+    ----------
+    transforms : list of Transform
+        In the order in which they came.
+    clocks : list of float
+        Of /clock, s.
+    delays : dict
+        Topic of controls -> times from stamp to arrival, s.
+    control_stamps : dict
+        Topic of controls -> stamps, s.
+    reported : dict
+        Address of a vehicle -> nodes whose diagnostics speak of it.
+    """
+
+    transforms: list[Transform] = field(default_factory=list)
+    clocks: list[float] = field(default_factory=list)
+    delays: dict[str, list[float]] = field(default_factory=dict)
+    control_stamps: dict[str, list[float]] = field(default_factory=dict)
+    reported: dict[str, set[str]] = field(default_factory=dict)
+
+
+def check_clock(graph: Graph, recording: Recording) -> Iterator[Finding]:
+    """Check that all nodes live by one clock, and that it goes."""
+    sources = graph.publishers.get("/clock", set())
+    if graph.parameters.get("/use_sim_time", False):
+        if not recording.clocks:
+            yield error(
+                "/use_sim_time is true, but nothing comes on /clock: time stands still",
+                "start a simulator with sim_time:=true, or rosparam set /use_sim_time false and "
+                "restart the nodes",
+            )
+        elif recording.clocks[-1] == recording.clocks[0]:
+            yield error("/clock stands still", "is the simulation or rosbag paused?")
+        if len(sources) > 1:
+            yield error(f"/clock comes from {listed(sources)}", "end all but one")
+    elif sources:
+        yield error(
+            f"{listed(sources)} publishes /clock, but /use_sim_time is not true",
+            "rosparam set /use_sim_time true and restart the nodes, or end the simulation",
+        )
+    strangers = {
+        t.node
+        for t in recording.transforms
+        if not t.is_static and abs(t.arrival - t.stamp) > OTHER_CLOCK
+    }
+    if strangers:
+        yield error(
+            f"{listed(strangers)} stamps transforms by another clock than this graph's",
+            "restart it: nodes read /use_sim_time when they start",
+        )
+
+
+def check_tf_tree(_: Graph, recording: Recording) -> Iterator[Finding]:
+    """Find frames with two parents or two publishers, and loops."""
+    parents, sources = defaultdict(set), defaultdict(set)
+    for t in recording.transforms:
+        parents[t.child].add(t.parent)
+        sources[t.child].add(t.node)
+    for child in sorted(parents):
+        if len(parents[child]) > 1:
+            yield error(
+                f"{child} has the parents {listed(parents[child])}, from {listed(sources[child])}",
+                "end one of them, or rename its frame: tf takes whichever came last",
+            )
+        elif len(sources[child]) > 1:
+            kind = "static transform" if _is_static(recording, child) else "transform"
+            yield error(
+                f"the {kind} of {child} comes from {listed(sources[child])}", "end all but one"
+            )
+    for loop in _loops(parents):
+        yield error(f"tf has a loop: {' -> '.join(loop)}", "turn one of these transforms round")
+
+
+def _is_static(recording, child):
+    return any(t.is_static for t in recording.transforms if t.child == child)
+
+
+def _loops(parents):
+    done: set[str] = set()
+    for start in sorted(parents):
+        path = [start]
+        while (parent := min(parents.get(path[-1], ()), default=None)) is not None:
+            if parent in path:
+                loop = path[path.index(parent) :]
+                if not done & set(loop):
+                    yield [*loop, parent]
+                done |= set(loop)
+                break
+            path.append(parent)
+
+
+def check_frames(graph: Graph, recording: Recording) -> Iterator[Finding]:
+    """Find frames, and pairs of frames, that nodes need but nobody publishes."""
+    known = {frame for t in recording.transforms for frame in (t.parent, t.child)}
+    for node, (fixed, robot) in sorted(frames_of(graph).items()):
+        missing = sorted({fixed, robot} - known)
+        for frame in missing:
+            near = difflib.get_close_matches(frame, known, 1, 0.5)
+            hint = f"did you mean {near[0]}?" if near else f"there are {listed(known) or 'none'}"
+            yield error(
+                f"nobody publishes the frame {frame} that {node} needs ({hint})",
+                "mend its parameter or the child_frame_id of the rigid body; does motion capture "
+                "see it?",
+            )
+        if not missing and _chain(recording, fixed, robot) is None:
+            yield error(
+                f"tf does not connect {fixed} and {robot}, which {node} needs",
+                "publish what is missing between them",
+            )
+
+
+def frames_of(graph: Graph) -> dict[str, tuple[str, str]]:
+    """Return node -> (fixed frame, frame of its vehicle), as its parameters say."""
+    pairs = (("frames/fixed", "frames/robot"), ("worldFrame", "frame"))
+    found = {}
+    for fixed_name, robot_name in pairs:
+        for name, value in graph.parameters.items():
+            node = name.removesuffix(f"/{robot_name}")
+            fixed = graph.parameters.get(f"{node}/{fixed_name}")
+            # What an ended launch has left needs nothing.
+            if node != name and isinstance(fixed, str) and isinstance(value, str):
+                found[node] = (fixed.strip("/"), value.strip("/"))
+    return found
+
+
+def _chain(recording, fixed, robot):
+    """Return the frames from the vehicle up to the fixed frame; None without a connection."""
+    parent = {t.child: t.parent for t in recording.transforms}
+    path = [robot]
+    while path[-1] != fixed:
+        if (up := parent.get(path[-1])) is None or up in path:
+            return None
+        path.append(up)
+    return path
+
+
+def check_tf_rate(graph: Graph, recording: Recording) -> Iterator[Finding]:
+    """Check rate, pauses and age of the poses of every vehicle."""
+    streams = defaultdict(list)
+    for t in recording.transforms:
+        streams[t.child].append(t)
+    # Of the links between vehicle and fixed frame the quickest is the pose; others may be
+    # constant, as tf's static_transform_publisher repeats them ten times a second.
+    poses = {
+        max(chain[:-1], key=lambda child: _rate(streams[child]))
+        for fixed, robot in frames_of(graph).values()
+        if len(chain := _chain(recording, fixed, robot) or []) > 1
+    }
+    for child in sorted(poses):
+        yield from _check_stream(child, streams[child])
+
+
+def _rate(transforms):
+    stamps = {t.stamp for t in transforms if not t.is_static}
+    return (len(stamps) - 1) / (max(stamps) - min(stamps)) if len(stamps) > 1 else 0.0
+
+
+def _check_stream(child, transforms):
+    what = f"{child}, from {listed({t.node for t in transforms})},"
+    mend = "look at motion capture's rate, its view of the vehicle, and the network"
+    stamps = sorted({t.stamp for t in transforms if not t.is_static})
+    pauses = [after - before for before, after in itertools.pairwise(stamps)]
+    if not pauses:
+        yield error(f"{what} stands still: one stamp only", mend)
+        return
+    rate = _rate(transforms)
+    if rate < LEAST_RATE:
+        level = error if rate < 1.0 / LONGEST_PAUSE else warn
+        yield level(f"{what} comes at {rate:.1f} Hz, needed are {LEAST_RATE:g}", mend)
+    elif max(pauses) > LONGEST_PAUSE:
+        yield warn(f"{what} pauses for {max(pauses):.2f} s", mend)
+    age = statistics.median(t.arrival - t.stamp for t in transforms)
+    if LONGEST_AGE < age < OTHER_CLOCK:
+        yield error(
+            f"{what} is {age:.2f} s old when it comes",
+            "synchronise the computers' clocks (chrony), or stamp poses on arrival",
+        )
+    elif -OTHER_CLOCK < age < -FUTURE:
+        yield error(f"{what} is {-age:.2f} s ahead of the clock", "synchronise the clocks (chrony)")
+
+
+def check_gains(graph: Graph, recording: Recording) -> Iterator[Finding]:
+    """Compare the delay from pose to control with what the gains in use can bear.
+
+    The loop's delay is what was measured from the pose's stamp, and half a period for
+    which each control is held.
+    """
+    for node, path, x_dim, topic in _controllers(graph):
+        model = {7: near_hover, 12: full_state}.get(x_dim)
+        delays = recording.delays.get(topic, [])
+        stamps = sorted(set(recording.control_stamps.get(topic, [])))
+        if model is None or len(stamps) < 2 or max(delays) > OTHER_CLOCK:
+            continue
+        period = statistics.median(b - a for a, b in itertools.pairwise(stamps))
+        delay = statistics.median(delays) + 0.5 * period
+        try:
+            margin, loop = delay_margin(path, model())
+        except GainFileError as complaint:
+            yield error(f"{node}: {complaint}", "restart the controller with a good K_file")
+            continue
+        if delay > USED_MARGIN * margin:
+            yield (error if delay > margin else warn)(
+                f"{node} acts {delay * 1e3:.1f} ms after the pose; with {path} {loop} is unstable "
+                f"at {margin * 1e3:.1f} ms",
+                "design gains for this delay (rosrun crazyflie_lqr design_gains --help) or take "
+                "softer ones; a busy computer, too, makes controls late",
+            )
+
+
+def _controllers(graph):
+    for name, path in sorted(graph.parameters.items()):
+        node = name.removesuffix("/K_file")
+        x_dim = graph.parameters.get(f"{node}/x_dim")
+        topic = graph.parameters.get(f"{node}/topics/control")
+        if node != name and isinstance(topic, str):
+            yield node, path, x_dim, "/" + topic.strip("/")
+
+
+def delay_margin(path: str, model: LinearModel) -> tuple[float, str]:
+    """Return the delay, s, at which the gains in a file make a loop unstable, and that loop."""
+    design = Design(load_matrix(path, model.u_dim, model.x_dim), model.A, model.B, 0.0)
+    return min((loop_margins(design, k).delay, name) for k, name in enumerate(CONTROLS))

@@ -1,0 +1,1 @@
+"""Records of flights, reports and pictures of them."""

@@ -1,0 +1,88 @@
+"""The figures of a flight, on flights that are known in closed form."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from crazyflie_reports.flight_record import FlightRecord
+from crazyflie_reports.flight_report import FlightReport
+
+HOVER = (0.0, 0.0, 1.0)
+
+
+def flight(hover_offset=0.0, sink=0.3, overshoot=0.0):
+    """Return a record: 2 s of rise, 8 s of hover, then down at ``sink`` m/s."""
+    record = FlightRecord()
+    record.events = {"takeoff": 10.0, "flying": 14.0, "land": 20.0, "landed": 26.0}
+    for time in np.arange(9.0, 26.0, 0.01):
+        height, speed = 0.0, 0.0
+        if 10.0 <= time < 12.0:
+            height, speed = 0.5 * (time - 10.0), 0.5
+        elif 12.0 <= time < 20.0:
+            height = 1.0 + hover_offset + (overshoot if time < 12.5 else 0.0)
+        elif time >= 20.0:
+            height = max(0.0, 1.0 + hover_offset - sink * (time - 20.0))
+            speed = -sink if height > 0.0 else 0.0
+        record.state.append(time, [0.0, 0.0, height, 0.0, 0.0, speed, 0.0])
+        record.final_control.append(time, [0.0, 0.0, 0.0, 9.81 if 10.0 < time < 25.0 else 0.0])
+    return record
+
+
+def test_time_to_hover():
+    assert flight().time_to_hover(HOVER, 0.01) == pytest.approx(1.98, abs=0.02)
+    assert flight(overshoot=0.1).time_to_hover(HOVER, 0.01) == pytest.approx(2.5, abs=0.02)
+    assert flight(hover_offset=0.1).time_to_hover(HOVER, 0.01) == float("inf")
+
+
+def test_overshoot():
+    assert flight(overshoot=0.1).overshoot(1.0) == pytest.approx(0.1)
+    assert flight(hover_offset=-0.2).overshoot(1.0) == 0.0
+
+
+def test_hover_error():
+    assert flight(hover_offset=0.004).hover_error(HOVER, 5.0) == pytest.approx((0.004, 0.004))
+
+
+def test_touchdown_speed():
+    assert flight(sink=0.3).touchdown_speed() == pytest.approx(0.3)
+    with pytest.raises(ValueError, match="did not reach the ground"):
+        flight(sink=0.01).touchdown_speed()
+
+
+@pytest.mark.parametrize("overshoot", [0.0, 0.09])
+def test_a_good_flight_has_no_complaints(overshoot):
+    report = FlightReport.of(flight(overshoot=overshoot), HOVER)
+    assert report.complaints() == []
+    assert "touchdown speed" in report.table()
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ({"hover_offset": 0.02}, "strayed 20.0 mm"),
+        ({"overshoot": 0.12}, "rose 120 mm above the hover point"),
+        ({"sink": 0.8}, "touched down at 0.80 m/s"),
+        ({"sink": 0.01}, "above the ground"),
+    ],
+)
+def test_a_bad_flight_is_called_so(change, complaint):
+    complaints = FlightReport.of(flight(**change), HOVER).complaints()
+    assert any(complaint in text for text in complaints)
+
+
+def test_thrust_after_landing_is_bad():
+    record = flight()
+    record.final_control.append(26.0, [0.0, 0.0, 0.0, 5.0])
+    assert "thrust is 5.00 m/s^2 after landing" in FlightReport.of(record, HOVER).complaints()
+
+
+def test_csv_has_a_row_for_every_state(tmp_path):
+    record = flight()
+    path = tmp_path / "flight.csv"
+    record.save_csv(path)
+    with path.open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(record.state)
+    assert float(rows[-1]["z"]) == record.state.last[2]
+    assert float(rows[300]["thrust"]) == 9.81

@@ -1,0 +1,313 @@
+"""A vehicle for tests, which answers over UDP as a test lets it and has no dynamics.
+
+It knows the set-up of a connection, log blocks, parameters and replies, and keeps
+every packet that it gets. Commands and the supervisor are those of `FakeFlight`.
+`crazyflie_virtual` is a vehicle that flies.
+"""
+
+import socket
+import struct
+import threading
+import time
+from collections.abc import Callable
+
+from crazyflie_link.testing.fake_flight import SUPERVISOR_PROTOCOL, FakeFlight
+
+LOG_TYPES = {"B": 1, "H": 2, "I": 3, "b": 4, "h": 5, "i": 6, "f": 7, "e": 8}
+PARAMETER_TYPES = {"B": 8, "H": 9, "I": 10, "Q": 11, "b": 0, "h": 1, "i": 2, "f": 6}
+READ_ONLY, EXTENDED = 0x40, 0x10
+
+TRAJECTORY_MEMORY = (1, 0x12, 4096)
+"""Number, type and size in bytes of the only memory."""
+
+_ATTITUDE = struct.Struct("<fffH")
+_EMERGENCY_STOP = 0x03
+
+
+class FakeVehicle:
+    """A vehicle on a UDP port of this machine.
+
+    Parameters
+    ----------
+    log : dict
+        Log variables: "group.name" -> (struct format of the type, value).
+    parameters : dict
+        "group.name" -> (struct format of the type, value, flags).
+    protocol : int
+        Version of the protocol.
+    port : int
+        By default any free one.
+    clock : callable
+        Returns the time of the flight, s.
+
+    Attributes
+    ----------
+    flight : FakeFlight
+        What is answered to commands and reported by the supervisor, also as the log variable
+        supervisor.info if ``log`` has it.
+    received : list of (port, channel, bytes)
+        All packets, oldest first.
+    deaf : set of (port, channel, bytes)
+        Packets that begin like this get no answer.
+    answers : dict
+        (port, channel, first byte) -> data to answer with, in the place of its own.
+    lose : callable
+        ``lose(count)`` tells whether to lose the reply with this number.
+    is_frozen : bool
+        Whether it neither receives nor sends anything.
+    """
+
+    def __init__(
+        self,
+        log: dict[str, tuple[str, float]] | None = None,
+        parameters: dict[str, tuple[str, float, int]] | None = None,
+        protocol: int = 12,
+        port: int = 0,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        self.flight = FakeFlight(protocol, clock)
+        self.log = log if log is not None else {"pm.vbat": ("f", 3.9)}
+        self.parameters = parameters if parameters is not None else {"ring.effect": ("B", 1, 0)}
+        self.protocol = protocol
+        self.received: list[tuple[int, int, bytes]] = []
+        self.deaf: set[tuple[int, int, bytes]] = set()
+        self.answers: dict[tuple[int, int, int | None], bytes] = {}
+        self.lose: Callable[[int], bool] = lambda count: False
+        self.is_frozen = False
+        self._changed = threading.Condition()
+        self._replies = 0
+        self._blocks: dict[int, list[str]] = {}
+        self._started: dict[int, tuple[float, float]] = {}
+        self._forgets_logs = threading.Event()
+        self._peer: tuple[str, int] | None = None
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(("127.0.0.1", port))
+        self._socket.settimeout(0.01)
+        self.port = self._socket.getsockname()[1]
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="fake-vehicle", daemon=True)
+        self._thread.start()
+
+    @property
+    def uri(self) -> str:
+        """Address of the vehicle."""
+        return f"udp://127.0.0.1:{self.port}"
+
+    def __enter__(self) -> "FakeVehicle":
+        """Return the vehicle."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the port."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the port: the vehicle is gone."""
+        self._stopped.set()
+        self._thread.join(timeout=2.0)
+        self._socket.close()
+
+    def say(self, port: int, channel: int, data: bytes) -> None:
+        """Send a packet without being asked."""
+        self.say_datagram(bytes([port << 4 | 3 << 2 | channel]) + data)
+
+    def say_datagram(self, datagram: bytes) -> None:
+        """Send any datagram."""
+        if self._peer is not None and not self.is_frozen:
+            self._socket.sendto(datagram, self._peer)
+
+    def packets(self, port: int, channel: int) -> list[bytes]:
+        """Return the data of all packets received on a port and channel, oldest first."""
+        return [data for p, c, data in list(self.received) if (p, c) == (port, channel)]
+
+    def wait_for(self, condition: Callable[[], bool], limit: float = 60.0) -> bool:
+        """Wait until ``condition()`` holds, looking after every packet; tell whether it does."""
+        with self._changed:
+            return self._changed.wait_for(condition, limit)
+
+    def wait_for_packets(
+        self, port: int, channel: int, count: int = 1, limit: float = 60.0
+    ) -> list[bytes]:
+        """Wait for so many packets on a port and channel, and return all of them.
+
+        Raises
+        ------
+        AssertionError
+            They have not come within the limit (s).
+        """
+        is_there = self.wait_for(lambda: len(self.packets(port, channel)) >= count, limit)
+        assert is_there, (
+            f"{len(self.packets(port, channel))} of {count} packets on {port}/{channel}"
+        )
+        return self.packets(port, channel)
+
+    def _run(self):
+        while not self._stopped.is_set():
+            self._send_logs()
+            try:
+                datagram, peer = self._socket.recvfrom(64)
+            except TimeoutError:
+                continue
+            except OSError:
+                # Nobody listened to what was sent.
+                continue
+            if self.is_frozen or not datagram:
+                continue
+            self._peer = peer
+            port, channel, data = datagram[0] >> 4, datagram[0] & 3, datagram[1:]
+            with self._changed:
+                self.received.append((port, channel, data))
+                self._changed.notify_all()
+            for deaf_port, deaf_channel, prefix in self.deaf:
+                if (port, channel) == (deaf_port, deaf_channel) and data.startswith(prefix):
+                    break
+            else:
+                self._reply(port, channel, data)
+
+    def _reply(self, port, channel, data):
+        if datagram_is_null(port, channel):
+            self.say(15, 3, b"")
+            return
+        answer = self.answers.get((port, channel, data[0] if data else None))
+        if answer is None:
+            method = getattr(self, f"_on_{port}_{channel}", None)
+            answer = method(data) if method is not None else None
+        if answer is None:
+            return
+        self._replies += 1
+        if not self.lose(self._replies):
+            self.say(port, channel, answer)
+
+    # Link and platform.
+
+    def _on_15_0(self, data):
+        return data
+
+    def _on_15_1(self, data):
+        return b"Bitcraze Crazyflie".ljust(30, b"\0")
+
+    def _on_13_1(self, data):
+        return b"\0" + struct.pack("<i", self.protocol)
+
+    # Log.
+
+    def _on_5_0(self, data):
+        items = [(LOG_TYPES[code], name) for name, (code, _) in self.log.items()]
+        return _table(data, items, 0x10000000, b"\x10\x80")
+
+    def _on_5_1(self, data):
+        command, block = data[0], data[1] if len(data) > 1 else 0
+        if command == 5:
+            self._blocks, self._started = {}, {}
+        elif command in (6, 7):
+            names = list(self.log)
+            wanted = [
+                names[struct.unpack_from("<H", data, i + 1)[0]] for i in range(2, len(data), 3)
+            ]
+            self._blocks[block] = (self._blocks.get(block, []) if command == 7 else []) + wanted
+        elif command == 3:
+            self._started[block] = (data[2] * 0.01, time.monotonic())
+        elif command in (2, 4):
+            self._started.pop(block, None)
+        return bytes([command, block, 0])
+
+    def forget_logs(self) -> None:
+        """Send no log data any more, as after a restart between two pings."""
+        self._forgets_logs.set()
+
+    def _send_logs(self):
+        if self._forgets_logs.is_set():
+            self._forgets_logs.clear()
+            self._started.clear()
+        now = time.monotonic()
+        for block, (period, due) in list(self._started.items()):
+            if now < due:
+                continue
+            self._started[block] = (period, max(due + period, now))
+            values = [self._log_value(name) for name in self._blocks[block]]
+            packed = struct.pack("<" + "".join(code for code, _ in values), *(v for _, v in values))
+            stamp = (int(now * 1000) & 0xFFFFFF).to_bytes(3, "little")
+            self.say(5, 2, bytes([block]) + stamp + packed)
+
+    def _log_value(self, name):
+        code, value = self.log[name]
+        return code, int(self.flight.state) if name == "supervisor.info" else value
+
+    # Memory.
+
+    def _on_4_0(self, data):
+        number, code, size = TRAJECTORY_MEMORY
+        if data[0] == 1:
+            return b"\x01\x02"
+        # The first is one that nobody asks for anything.
+        details = (number, code, size) if data[1] == number else (data[1], 0x18, 0)
+        return b"\x02" + struct.pack("<BBI", *details) + bytes(8)
+
+    def _on_4_2(self, data):
+        return data[:5] + b"\0"
+
+    # Parameters.
+
+    def _on_2_0(self, data):
+        items = [
+            (PARAMETER_TYPES[code] | flags, name)
+            for name, (code, _, flags) in self.parameters.items()
+        ]
+        return _table(data, items, 0x20000000, b"")
+
+    def _on_2_1(self, data):
+        code, value, _ = list(self.parameters.values())[struct.unpack("<H", data)[0]]
+        return data + b"\0" + struct.pack("<" + code, value)
+
+    def _on_2_2(self, data):
+        name = list(self.parameters)[struct.unpack_from("<H", data)[0]]
+        code, _, flags = self.parameters[name]
+        self.parameters[name] = (code, struct.unpack("<" + code, data[2:])[0], flags)
+        return data
+
+    def _on_2_3(self, data):
+        return data[:3] + b"\0\x01"
+
+    # Setpoints and commands.
+
+    def _on_3_0(self, data):
+        if len(data) == _ATTITUDE.size:
+            self.flight.stream(_ATTITUDE.unpack(data)[3] > 0)
+
+    def _on_7_0(self, data):
+        self.flight.stream(data[:1] != b"\0")
+
+    def _on_7_1(self, data):
+        self.flight.end_stream()
+
+    def _on_8_0(self, data):
+        return data[:3].ljust(3, b"\0") + bytes([self.flight.command(data)])
+
+    def _on_9_0(self, data):
+        if self.protocol < SUPERVISOR_PROTOCOL:
+            return None
+        return bytes([0x80 | data[0]]) + struct.pack("<H", self.flight.state)
+
+    def _on_9_1(self, data):
+        if data[0] == _EMERGENCY_STOP:
+            self.flight.stop_for_good()
+        return bytes([0x80 | data[0], 1, data[1] if len(data) > 1 else 1])
+
+
+def datagram_is_null(port: int, channel: int) -> bool:
+    """Tell whether a packet is the null packet by which vehicles are searched."""
+    return (port, channel) == (15, 3)
+
+
+def _table(data, items, seed, tail):
+    if data[0] == 3:
+        # Tables are cached by their checksum: it must change with the contents.
+        checksum = seed
+        for code, name in items:
+            for byte in (code, *name.encode()):
+                checksum = (checksum * 31 + byte) & 0x0FFFFFFF
+        return b"\x03" + struct.pack("<HI", len(items), seed | checksum) + tail
+    if data[0] != 2:
+        return None
+    code, name = items[struct.unpack_from("<H", data, 1)[0]]
+    return data[:3] + bytes([code]) + name.replace(".", "\0").encode() + b"\0"

@@ -1,0 +1,92 @@
+"""Launch files for the time of a with block, each on a ROS master of its own."""
+
+import contextlib
+import os
+import re
+import socket
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import rosgraph
+
+from crazyflie_utils.testing.programs import free_port, running
+
+_START_LIMIT = 60.0
+"""How long roslaunch may take until its master answers, s."""
+
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
+_COMPLAINT = re.compile(r"\[(ERROR|FATAL)\]|RLException|process has died")
+
+
+class LaunchError(Exception):
+    """roslaunch has ended before anything ran; the text says what it complained of."""
+
+
+def complaints(log: Path) -> list[str]:
+    """Return the lines of a roslaunch's output that say what is wrong."""
+    lines = [_COLOUR.sub("", line) for line in log.read_text(errors="replace").splitlines()]
+    return [line for line in lines if _COMPLAINT.search(line)]
+
+
+@contextlib.contextmanager
+def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen[Any]]:
+    """Run roslaunch on a master of its own for the time of a with block.
+
+    Parameters
+    ----------
+    arguments : list of str
+        Package, launch file and its arguments.
+    log : Path
+        Receives what roslaunch and the nodes print.
+
+    Raises
+    ------
+    LaunchError
+        There is no master, because roslaunch refused its arguments for instance.
+    """
+    port = _set_master()
+    command = ["roslaunch", "-p", port, *arguments]
+    with (
+        log.open("w") as output,
+        running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
+    ):
+        _wait_for_master(process, log)
+        yield process
+
+
+@contextlib.contextmanager
+def master(log: Path) -> Iterator[None]:
+    """Run a master, and nothing else, for the time of a with block.
+
+    Parameters
+    ----------
+    log : Path
+        Receives what it prints.
+    """
+    command = ["rosmaster", "--core", "-p", _set_master()]
+    with (
+        log.open("w") as output,
+        running(*command, stdout=output, stderr=subprocess.STDOUT) as process,
+    ):
+        _wait_for_master(process, log)
+        yield
+
+
+def _set_master():
+    """Let this process, and what it starts, have a master on a free port; return the port."""
+    port = free_port(socket.SOCK_STREAM)
+    os.environ["ROS_MASTER_URI"] = f"http://127.0.0.1:{port}"
+    os.environ["ROS_IP"] = "127.0.0.1"
+    return port
+
+
+def _wait_for_master(process, log):
+    deadline = time.monotonic() + _START_LIMIT
+    while not rosgraph.is_master_online():
+        if process.poll() is not None or time.monotonic() > deadline:
+            reasons = complaints(log) or log.read_text(errors="replace").splitlines()[-3:]
+            raise LaunchError("\n".join(["roslaunch has not started anything:", *reasons]))
+        time.sleep(0.02)

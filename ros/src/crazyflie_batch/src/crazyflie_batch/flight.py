@@ -15,7 +15,7 @@ from typing import Any
 
 from crazyflie_batch.elementwise import turn, yaw_from_quaternion
 from crazyflie_batch.estimators import Estimator
-from crazyflie_lqr import componentwise
+from crazyflie_lqr import control_law
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector, functions, where
@@ -73,7 +73,7 @@ class Plan:
         """Return what a flight remembers, and how many numbers that are."""
         return {
             "x": self.make_model(**dict.fromkeys(self.model_parameters, 0.0)).x_dim,
-            "u": componentwise.U_DIM,
+            "u": control_law.U_DIM,
             "age": 1,
             "is_commanded": 1,
             "has_crashed": 1,
@@ -89,11 +89,11 @@ class Plan:
         return {
             "model": len(self.model_parameters),
             "estimator": self.estimator.parameter_dim,
-            "K": componentwise.X_DIM * componentwise.U_DIM,
-            "u_ref": componentwise.U_DIM,
+            "K": control_law.X_DIM * control_law.U_DIM,
+            "u_ref": control_law.U_DIM,
             "integrator_k": 3,
             "integrator_limit": 3,
-            "goal": componentwise.X_DIM,
+            "goal": control_law.X_DIM,
             "noise": 2,
             "delay": 1,
             "dropout": 1,
@@ -108,7 +108,7 @@ class Plan:
         """Return what is remembered of a flight that begins at a state of the model."""
         return {
             "x": x,
-            "u": [0.0] * componentwise.U_DIM,
+            "u": [0.0] * control_law.U_DIM,
             "age": [0.0],
             "is_commanded": [0.0],
             "has_crashed": [0.0],
@@ -174,12 +174,17 @@ def answer(
 
     k = parameters["integrator_k"]
     dt = where(control_stamp >= 0.0, tick * plan.period - control_stamp * plan.period, 0.0)
-    error = componentwise.heading_error(state, parameters["goal"])
-    linear = componentwise.linear_control(parameters["K"], parameters["u_ref"], error)
-    integral = componentwise.integrate(
-        memory["integral"], error, dt, linear, k, parameters["integrator_limit"]
-    )
-    u = componentwise.limited_control(linear, integral, k)
+    dt = where(dt <= control_law.MAX_GAP, dt, 0.0)
+    error = control_law.heading_error(state, parameters["goal"])
+    rows = [parameters["K"][i : i + control_law.X_DIM] for i in range(0, 28, control_law.X_DIM)]
+    linear = control_law.linear_control(rows, parameters["u_ref"], error)
+    integral = [
+        control_law.integrate(axis, before, error[axis], dt, linear, k[axis], limit)
+        for axis, (before, limit) in enumerate(
+            zip(memory["integral"], parameters["integrator_limit"], strict=True)
+        )
+    ]
+    u = control_law.limited(control_law.with_integrals(linear, integral, k))
     first = _choose(has_arrived, {"estimator": begun, "stamp": [tick]}, memory)
     return _choose(
         is_second,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_batch.batch import Batch
-from crazyflie_lqr import componentwise
+from crazyflie_lqr import control_law
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_simulator.motion_capture import MotionCapture
@@ -33,7 +33,7 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
     filter_ = plan.estimator.scalar(own["estimator"])
     estimator = MotionEstimator(filter_, FiniteDifference())
     controller = IntegralStateFeedback(
-        np.reshape(own["K"], (componentwise.U_DIM, componentwise.X_DIM)),
+        np.reshape(own["K"], (control_law.U_DIM, control_law.X_DIM)),
         np.array(own["u_ref"]),
         _YAW,
         own["integrator_k"],
@@ -46,7 +46,7 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
     )
     goal = np.array(own["goal"])
     states, controls = [vehicle.state], []
-    control: NDArray[np.float64] = np.zeros(componentwise.U_DIM)
+    control: NDArray[np.float64] = np.zeros(control_law.U_DIM)
     for tick in range(batch.ticks):
         moment = tick * period
         random.begin(tick)

@@ -18,7 +18,7 @@ from crazyflie_batch.per_vehicle import (
     columns,
     together,
 )
-from crazyflie_lqr import componentwise
+from crazyflie_lqr import control_law
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Coupled7D, Dynamics, NearHover
 from crazyflie_model.limits import CRASH_TILT
@@ -268,11 +268,11 @@ def prepare(
     parameters = {
         "model": together(model.parameters, n),
         "estimator": together(estimator.parameters, n),
-        "K": columns("K", controller.K, (componentwise.U_DIM, componentwise.X_DIM), n),
-        "u_ref": columns("u_ref", controller.u_ref, (componentwise.U_DIM,), n),
+        "K": columns("K", controller.K, (control_law.U_DIM, control_law.X_DIM), n),
+        "u_ref": columns("u_ref", controller.u_ref, (control_law.U_DIM,), n),
         "integrator_k": columns("integrator_k", controller.integrator_k, (3,), n),
         "integrator_limit": columns("integrator_limit", controller.integrator_limit, (3,), n),
-        "goal": columns("goal", goal, (componentwise.X_DIM,), n),
+        "goal": columns("goal", goal, (control_law.X_DIM,), n),
         "noise": together(noise, n),
         "delay": columns("latency", delay, (), n),
         "dropout": columns("dropout", measurement.dropout, (), n),

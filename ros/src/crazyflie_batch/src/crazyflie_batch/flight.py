@@ -1,16 +1,17 @@
 """One vehicle's flight, tick by tick, by components: for floats or a batch.
 
-A tick is what happens once in a control period, as in a graph of nodes without delays of its own:
-motion capture measures the pose, a pose arrives, the estimator and the controller answer it, and
-the vehicle flies on with what it was told last.
+A tick is one control period of a graph of nodes without delays of its own: motion capture measures
+the pose, a pose arrives, estimator and controller compute a control, and the vehicle flies with the
+last control.
 
-What is remembered, and what differs between vehicles, are dictionaries of names to lists of
-components; `memory_dims` and `parameter_dims` tell which.
+Memory and parameters of a vehicle are dictionaries of names to lists of components; see
+`Plan.memory_dims` and `Plan.parameter_dims`.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from crazyflie_batch.elementwise import turn, yaw_from_quaternion
@@ -21,9 +22,9 @@ from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector, functions, where
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 
-ERRORS_DIM = 7
-"""Random numbers of a tick: errors of position (3) and attitude (3), of standard deviation 1; what
-decides whether the pose is lost, in [0, 1)."""
+NOISE_DIM = 7
+"""Random numbers of a tick: noise of position (3) and attitude (3), of standard deviation 1; and
+one in [0, 1), by which a pose is lost."""
 
 SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
 """Steps of the model from one sample of the inner loops to the next."""
@@ -39,6 +40,12 @@ largest speed, m/s."""
 _LEVEL_STEPS, _OFF_STEPS = round(LEVEL_AGE / STEP), round(OFF_AGE / STEP)
 
 Components = dict[str, Vector[Any]]
+
+
+def components(rows: Iterable[Any], dims: Mapping[str, int]) -> Components:
+    """Return rows by name; ``dims`` are the numbers of rows that follow each other."""
+    rest = iter(rows)
+    return {name: list(islice(rest, dim)) for name, dim in dims.items()}
 
 
 @dataclass(frozen=True)
@@ -133,7 +140,7 @@ def effective_control(memory: Components) -> Vector[Any]:
 
 
 def measure(
-    plan: Plan, memory: Components, parameters: Components, errors: Vector[Any]
+    plan: Plan, memory: Components, parameters: Components, noise: Vector[Any]
 ) -> Vector[Any]:
     """Return the pose that motion capture sends off, `POSE_DIM` components.
 
@@ -142,16 +149,16 @@ def measure(
     position, attitude = plan.model(parameters).pose(memory["x"], effective_control(memory))
     position_noise, attitude_noise = parameters["noise"]
     (dropout,) = parameters["dropout"]
-    measured = [a + position_noise * b for a, b in zip(position, errors[:3], strict=True)]
-    turned = turn(attitude, [attitude_noise * part for part in errors[3:6]])
-    is_lost = errors[6] < dropout
+    measured = [a + position_noise * b for a, b in zip(position, noise[:3], strict=True)]
+    turned = turn(attitude, [attitude_noise * part for part in noise[3:6]])
+    is_lost = noise[6] < dropout
     return [*measured, yaw_from_quaternion(turned), where(is_lost, 0.0, 1.0)]
 
 
-def answer(
+def run_controller(
     plan: Plan, memory: Components, parameters: Components, pose: Vector[Any], tick: Any
 ) -> Components:
-    """Return the memory after estimator and controller have answered a pose, if it has arrived.
+    """Return the memory after estimator and controller have processed a pose, if one has arrived.
 
     Parameters
     ----------
@@ -214,7 +221,7 @@ def step(plan: Plan, memory: Components, parameters: Components, count: int) -> 
     return _choose(is_tilted, {"has_crashed": [1.0]}, memory)
 
 
-def judge(plan: Plan, memory: Components, parameters: Components, tick: Any) -> Components:
+def update_metrics(plan: Plan, memory: Components, parameters: Components, tick: Any) -> Components:
     """Return the memory with the metrics as they are after this tick; see `METRICS`."""
     largest, squares, upright, fastest = memory["metrics"]
     (settled,) = parameters["settled"]

@@ -2,8 +2,7 @@
 
 Usage: python3 bench/steps_per_second.py [--json FILE], in a sourced workspace.
 
-What a step is says `crazyflie_batch.bench`. "Noise" has every pose drawn with errors of its own;
-"one by one" flies by the classes that the nodes have.
+Steps are defined in `crazyflie_batch.bench`. With noise, random numbers are drawn for every pose.
 """
 
 import argparse
@@ -12,7 +11,7 @@ import os
 from pathlib import Path
 
 from crazyflie_batch import Measurement
-from crazyflie_batch.bench import DURATIONS, MANY, ONE, one_by_one, steps_per_second
+from crazyflie_batch.bench import DURATIONS, MANY, ONE, steps_per_second
 
 GOALS = {ONE: 0.5e6, MANY: 10e6}
 """Steps per second on two processors."""
@@ -42,7 +41,6 @@ def main() -> None:
         "processors": len(os.sched_getaffinity(0)),
         "load": os.getloadavg()[0],
         "batch": rows,
-        "one_by_one": one_by_one(),
     }
     print(f"{'':>12}{'steps per second':>28}{'of one processor':>28}")
     print(f"{'vehicles':>12}{'':>14}{'with noise':>14}{'':>14}{'with noise':>14}{'goal':>12}")
@@ -50,7 +48,6 @@ def main() -> None:
         n, goal, *values = row.values()
         numbers = "".join(f"{value:>14,.0f}" for value in values)
         print(f"{n:>12,}{numbers}{f'{goal:,.0f}' if goal else '-':>12}")
-    print(f"{'one by one':>12}{result['one_by_one']:>14,.0f}")
     print(f"on {result['processors']} processors, load {result['load']:.1f}")
     if options.json:
         Path(options.json).write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

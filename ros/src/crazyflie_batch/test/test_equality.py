@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
+from one_by_one import fly_one, prepare
 from rospkg import RosPack
 
 from crazyflie_batch import Controller, FiniteDifferences, Kalman, Measurement
 from crazyflie_batch.batch import fly
-from crazyflie_batch.scalar import fly_one
-from crazyflie_batch.simulation import coupled_7d, near_hover, prepare, quadrotor
+from crazyflie_batch.simulation import coupled_7d, near_hover, quadrotor
 from crazyflie_lqr.gain_file import load_matrix
 
 SOFT = load_matrix(str(Path(RosPack().get_path("crazyflie_lqr"), "config", "K_soft.txt")), 4, 7)
@@ -108,7 +108,7 @@ def test_a_long_flight_stays_the_same_through_gaps_and_a_crash(estimator):
     )
     flights = fly(batch, record=True, threads=1)
     assert flights.has_crashed.tolist() == [False, False, True]
-    arrivals = np.flatnonzero(batch.errors(1)[:, 6] >= 0.985)
+    arrivals = np.flatnonzero(batch.noise_samples(1)[:, 6] >= 0.985)
     assert arrivals[:4].tolist() == [5, 19, 288, 377]
     for index in range(3):
         states, controls = fly_one(batch, index)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from one_by_one import fly_one, prepare
 
 from crazyflie_batch import Controller, FiniteDifferences, Measurement
 from crazyflie_batch.batch import fly
-from crazyflie_batch.scalar import fly_one
-from crazyflie_batch.simulation import coupled_7d, near_hover, prepare
+from crazyflie_batch.simulation import coupled_7d, near_hover
 
 FALLING = np.zeros((4, 7))
 FALLING[1, [0, 3]] = -0.25, -1.0

@@ -1,4 +1,4 @@
-"""The command: what it answers, that it goes on where it was interrupted, and on a cluster."""
+"""The command: what it answers, that it continues where it was interrupted, and on a cluster."""
 
 import csv
 import json
@@ -31,7 +31,7 @@ sweep:
 def command(tmp_path, monkeypatch, capsys):
     """Return a function that runs the command in an empty folder: exit status, both outputs."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(monte_carlo, "PIECE", 16)
+    monkeypatch.setattr(monte_carlo, "CHUNK_SIZE", 16)
     monkeypatch.setattr(figure, "save_figure", lambda found, path: None)
     (tmp_path / "settings.yaml").write_text(SETTINGS)
 
@@ -90,28 +90,28 @@ def test_a_flight_is_that_of_the_settings_whatever_flies_beside_it(command, tmp_
     assert row["largest_error"] == pytest.approx(alone.largest_error[0], rel=1e-8)
 
 
-def test_an_interrupted_run_goes_on(command, tmp_path, monkeypatch):
+def test_an_interrupted_run_continues(command, tmp_path, monkeypatch):
     _, whole, _ = command("--out", "whole")
-    fly_piece = monte_carlo.fly_piece
+    fly_chunk = monte_carlo.fly_chunk
 
     def interrupt(settings, first, values, code):
         if first == 16:
             raise KeyboardInterrupt
-        return fly_piece(settings, first, values, code)
+        return fly_chunk(settings, first, values, code)
 
-    monkeypatch.setattr(monte_carlo, "fly_piece", interrupt)
+    monkeypatch.setattr(monte_carlo, "fly_chunk", interrupt)
     status, _, errors = command("--out", "half")
     assert status == 130
-    assert "the same command goes on" in errors
+    assert "the same command continues" in errors
 
     flown = []
 
     def note(settings, first, values, code):
         flown.append(first)
-        return fly_piece(settings, first, values, code)
+        return fly_chunk(settings, first, values, code)
 
-    monkeypatch.setattr(monte_carlo, "fly_piece", note)
-    kept = [path.name for path in (tmp_path / "half" / "pieces").glob("0*.npy")]
+    monkeypatch.setattr(monte_carlo, "fly_chunk", note)
+    kept = [path.name for path in (tmp_path / "half" / "chunks").glob("0*.npy")]
     status, output, _ = command("--out", "half")
     assert status == 0
     assert set(flown) == {0, 16, 32} - {int(name[:-4]) for name in kept}
@@ -170,13 +170,13 @@ def test_a_worker_with_another_version_of_the_code_does_not_fly(command, monkeyp
     assert "a worker has another version of the code" in errors
 
 
-def test_a_damaged_piece_is_flown_anew(command, tmp_path):
+def test_a_damaged_chunk_is_flown_anew(command, tmp_path):
     _, whole, _ = command()
-    piece = next((tmp_path / "settings" / "pieces").glob("0*.npy"))
-    piece.write_bytes(piece.read_bytes()[:20])
+    chunk = next((tmp_path / "settings" / "chunks").glob("0*.npy"))
+    chunk.write_bytes(chunk.read_bytes()[:20])
     status, _, errors = command()
     assert status == 1
-    assert f"{piece.name} was damaged, and is gone" in errors
+    assert f"{chunk.name} was damaged, and is gone" in errors
     assert command()[:2] == (0, whole)
 
 

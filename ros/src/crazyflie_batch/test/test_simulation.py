@@ -1,5 +1,6 @@
 """What `simulate` takes and refuses, what it returns, and its README."""
 
+import math
 import re
 from pathlib import Path
 
@@ -162,8 +163,31 @@ def test_a_model_of_ones_own_flies():
 
 
 def test_a_model_that_branches_is_refused():
-    with pytest.raises(TypeError, match="must not branch"):
+    words = r"Branching\.rates \(.*test_simulation\.py, line \d+\) .*must not branch"
+    with pytest.raises(TypeError, match=words):
         simulate(Model(Branching), CONTROLLER)
+
+
+class Libm(Coupled7D):
+    """A model of a user that calls math instead of `crazyflie_model.elementwise`."""
+
+    def rates(self, t, x, u):
+        """See `Dynamics.rates`."""
+        return [math.sin(x[0]), *super().rates(t, x, u)[1:]]
+
+
+class Remainder(Coupled7D):
+    """A model of a user with an operator that symbols do not have."""
+
+    def rates(self, t, x, u):
+        """See `Dynamics.rates`."""
+        return [divmod(x[0], 1.0)[1], *super().rates(t, x, u)[1:]]
+
+
+@pytest.mark.parametrize("make", [Libm, Remainder])
+def test_a_formula_that_cannot_be_traced_is_named(make):
+    with pytest.raises(TypeError, match=rf"the formula {make.__name__}\.rates \(.*cannot be"):
+        simulate(Model(make), CONTROLLER)
 
 
 def test_the_code_of_the_readme_runs(capsys):

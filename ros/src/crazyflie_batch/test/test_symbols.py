@@ -17,6 +17,7 @@ from crazyflie_batch import (
     FiniteDifferences,
     Measurement,
     Model,
+    machine_code,
     program,
     quadrotor,
     simulate,
@@ -58,7 +59,7 @@ def test_all_processors_fly_the_same(monkeypatch, expected, lanes, has_vector_fu
     features = SimpleNamespace(get=wanted.get, flatten=present.flatten)
     monkeypatch.setattr(binding, "get_host_cpu_features", lambda: features)
     if not has_vector_functions:
-        monkeypatch.setattr(program, "_load", lambda library: library != "libmvec.so.1")
+        monkeypatch.setattr(machine_code, "_load", lambda library: library != "libmvec.so.1")
     try:
         assert fly() == pytest.approx(expected, rel=1e-9, abs=1e-9)
     finally:
@@ -89,14 +90,14 @@ def test_threads_that_need_the_same_program_compile_it_once(monkeypatch):
     compiled = []
     begun = threading.Barrier(4)
 
-    class Slow(program.Program):
+    class Slow:
         def __init__(self, plan):
             compiled.append(plan)
             # Time for the others to begin, too, if nothing stops them.
             with contextlib.suppress(threading.BrokenBarrierError):
                 begun.wait(0.2)
 
-    monkeypatch.setattr(program, "Program", Slow)
+    monkeypatch.setattr(program, "MachineCode", Slow)
     plan = Plan(NearHover, (), math.inf, FiniteDifferences, 10)
     program.clear()
     try:

@@ -42,16 +42,16 @@ class Batch:
         """Number of vehicles."""
         return self.x.shape[1]
 
-    def errors(self, index: int) -> NDArray[np.float64]:
-        """Return the random numbers of a vehicle's flight, shape (ticks, ERRORS_DIM)."""
+    def noise_samples(self, index: int) -> NDArray[np.float64]:
+        """Return the random numbers of a vehicle's flight, shape (ticks, NOISE_DIM)."""
         random = np.random.default_rng((self.seed, self.first + index))
-        normal = random.standard_normal((self.ticks, flight.ERRORS_DIM - 1))
+        normal = random.standard_normal((self.ticks, flight.NOISE_DIM - 1))
         return np.column_stack([normal, random.random(self.ticks)])
 
 
 @dataclass(frozen=True)
 class Flights:
-    """What has become of n vehicles.
+    """Outcomes of n flights.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class Flights:
 
 
 def fly(batch: Batch, record: bool, threads: int) -> Flights:
-    """Fly them; ``record`` says whether all ticks are to be kept."""
+    """Return the flights; ``record`` keeps the states of all ticks."""
     plan, lanes = batch.plan, program(batch.plan).lanes
     start = plan.initial_memory(list(batch.x))
     memory = _grouped([part for name in plan.memory_dims() for part in start[name]], batch.n, lanes)
@@ -91,31 +91,25 @@ def fly(batch: Batch, record: bool, threads: int) -> Flights:
     rows = batch.ticks if record else 0
     records = np.empty((len(memory), rows, *memory.shape[1:]))
     slots = int(batch.parameters["delay"].max()) + 1
-    no_errors = np.zeros((batch.ticks, flight.ERRORS_DIM, lanes))
-    no_errors[:, -1] = 1.0
+    no_noise = np.zeros((batch.ticks, flight.NOISE_DIM, lanes))
+    no_noise[:, -1] = 1.0
     is_random = batch.parameters["noise"].any() or batch.parameters["dropout"].any()
 
     def fly_group(group):
-        errors = _errors(batch, group, lanes) if is_random else no_errors
+        noise = _noise_samples(batch, group, lanes) if is_random else no_noise
         rows = records[group] if record else np.empty((1, *memory.shape[1:]))
-        program(plan).fly(memory[group], parameters[group], errors, rows, slots)
+        program(plan).fly(memory[group], parameters[group], noise, rows, slots)
 
-    groups = range(len(memory))
-    if threads == 1 or len(groups) == 1:
-        for group in groups:
-            fly_group(group)
-    else:
-        with ThreadPoolExecutor(threads) as executor:
-            for _ in executor.map(fly_group, groups):
-                pass
+    with ThreadPoolExecutor(threads) as executor:
+        for _ in executor.map(fly_group, range(len(memory))):
+            pass
     return _flights(batch, memory, records)
 
 
-def _errors(batch, group, lanes):
-    errors = np.empty((batch.ticks, flight.ERRORS_DIM, lanes))
-    for lane in range(lanes):
-        errors[:, :, lane] = batch.errors(min(group * lanes + lane, batch.n - 1))
-    return errors
+def _noise_samples(batch, group, lanes):
+    numbers = np.minimum(group * lanes + np.arange(lanes), batch.n - 1)
+    samples = [batch.noise_samples(number) for number in numbers.tolist()]
+    return np.ascontiguousarray(np.stack(samples, axis=-1))
 
 
 def _grouped(rows, n, lanes):
@@ -129,11 +123,8 @@ def _grouped(rows, n, lanes):
 
 
 def _flights(batch, memory, records):
-    at = {}
-    count = 0
-    for name, dim in batch.plan.memory_dims().items():
-        at[name] = slice(count, count + dim)
-        count += dim
+    dims = batch.plan.memory_dims()
+    at = flight.components(range(sum(dims.values())), dims)
 
     def vehicles(array, name):
         """Return (groups, ..., rows, lanes) as (..., n, dim)."""

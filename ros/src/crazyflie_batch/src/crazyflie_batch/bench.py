@@ -10,9 +10,7 @@ from pathlib import Path
 import numpy as np
 from rospkg import RosPack
 
-from crazyflie_batch import Controller, FiniteDifferences, Measurement, quadrotor, simulate
-from crazyflie_batch.scalar import fly_one
-from crazyflie_batch.simulation import prepare
+from crazyflie_batch import Controller, Measurement, quadrotor, simulate
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_model.dynamics import STEP
 
@@ -28,7 +26,7 @@ REPEATS = 5
 def steps_per_second(n: int, measurement: Measurement | None = None) -> tuple[float, float]:
     """Return the best of some repeats: by the clock, and by one processor's time.
 
-    What is compiled is compiled before. On a busy machine only the latter says something.
+    Without the time to compile. On a busy machine only the latter is meaningful.
 
     Parameters
     ----------
@@ -57,28 +55,6 @@ def steps_of_one() -> float:
 def steps_of_many() -> float:
     """Return the steps of `MANY` vehicles in a second of the clock, on all processors."""
     return steps_per_second(MANY)[0]
-
-
-def one_by_one() -> float:
-    """Return the steps of a single vehicle that flies by the classes that the nodes have."""
-    duration = 2.0
-    batch = prepare(
-        quadrotor(),
-        Controller(_gains()),
-        FiniteDifferences(),
-        (0.0, 0.0, 1.0),
-        1,
-        goal=(0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0),
-        duration=duration,
-        period=0.01,
-        settle_time=0.0,
-        measurement=Measurement(),
-        seed=0,
-        first=0,
-    )
-    start = time.perf_counter()
-    fly_one(batch, 0)
-    return duration / STEP / (time.perf_counter() - start)
 
 
 def _gains():

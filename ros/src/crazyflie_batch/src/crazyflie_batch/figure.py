@@ -1,4 +1,4 @@
-"""The findings of a Monte-Carlo run as a picture."""
+"""Figure of a Monte-Carlo run."""
 
 import math
 from pathlib import Path
@@ -84,8 +84,8 @@ def _draw_parameter(axes, found, sweep, is_first):
     axes.set_xlabel(f"{sweep.name}, {sweep.unit}" if sweep.unit else sweep.name)
     if is_first:
         axes.set_ylabel("largest error, m")
-    shares = axes.twinx()
-    shares.plot(*found.shares(sweep.name), color=_LINE, marker="o", markersize=3)
-    shares.set_ylim(0.0, 1.05)
-    shares.yaxis.set_major_formatter(PercentFormatter(1.0))
-    shares.set_ylabel("within limits (line)")
+    fractions = axes.twinx()
+    fractions.plot(*found.quintiles(sweep.name), color=_LINE, marker="o", markersize=3)
+    fractions.set_ylim(0.0, 1.05)
+    fractions.yaxis.set_major_formatter(PercentFormatter(1.0))
+    fractions.set_ylabel("within limits (line)")

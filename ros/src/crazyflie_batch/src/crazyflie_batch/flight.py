@@ -1,29 +1,30 @@
 """One vehicle's flight, tick by tick, by components: for floats or a batch.
 
-A tick is what happens once in a control period, as in a graph of nodes without delays of its own:
-motion capture measures the pose, a pose arrives, the estimator and the controller answer it, and
-the vehicle flies on with what it was told last.
+A tick is one control period of a graph of nodes without delays of its own: motion capture measures
+the pose, a pose arrives, estimator and controller compute a control, and the vehicle flies with the
+last control.
 
-What is remembered, and what differs between vehicles, are dictionaries of names to lists of
-components; `memory_dims` and `parameter_dims` tell which.
+Memory and parameters of a vehicle are dictionaries of names to lists of components; see
+`Plan.memory_dims` and `Plan.parameter_dims`.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 from crazyflie_batch.elementwise import turn, yaw_from_quaternion
 from crazyflie_batch.estimators import Estimator
-from crazyflie_lqr import componentwise
+from crazyflie_lqr import control_law
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector, functions, where
 from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
 
-ERRORS_DIM = 7
-"""Random numbers of a tick: errors of position (3) and attitude (3), of standard deviation 1; what
-decides whether the pose is lost, in [0, 1)."""
+NOISE_DIM = 7
+"""Random numbers of a tick: noise of position (3) and attitude (3), of standard deviation 1; and
+one in [0, 1), by which a pose is lost."""
 
 SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
 """Steps of the model from one sample of the inner loops to the next."""
@@ -39,6 +40,12 @@ largest speed, m/s."""
 _LEVEL_STEPS, _OFF_STEPS = round(LEVEL_AGE / STEP), round(OFF_AGE / STEP)
 
 Components = dict[str, Vector[Any]]
+
+
+def components(rows: Iterable[Any], dims: Mapping[str, int]) -> Components:
+    """Return rows by name; ``dims`` are the numbers of rows that follow each other."""
+    rest = iter(rows)
+    return {name: list(islice(rest, dim)) for name, dim in dims.items()}
 
 
 @dataclass(frozen=True)
@@ -73,7 +80,7 @@ class Plan:
         """Return what a flight remembers, and how many numbers that are."""
         return {
             "x": self.make_model(**dict.fromkeys(self.model_parameters, 0.0)).x_dim,
-            "u": componentwise.U_DIM,
+            "u": control_law.U_DIM,
             "age": 1,
             "is_commanded": 1,
             "has_crashed": 1,
@@ -89,11 +96,11 @@ class Plan:
         return {
             "model": len(self.model_parameters),
             "estimator": self.estimator.parameter_dim,
-            "K": componentwise.X_DIM * componentwise.U_DIM,
-            "u_ref": componentwise.U_DIM,
+            "K": control_law.X_DIM * control_law.U_DIM,
+            "u_ref": control_law.U_DIM,
             "integrator_k": 3,
             "integrator_limit": 3,
-            "goal": componentwise.X_DIM,
+            "goal": control_law.X_DIM,
             "noise": 2,
             "delay": 1,
             "dropout": 1,
@@ -108,7 +115,7 @@ class Plan:
         """Return what is remembered of a flight that begins at a state of the model."""
         return {
             "x": x,
-            "u": [0.0] * componentwise.U_DIM,
+            "u": [0.0] * control_law.U_DIM,
             "age": [0.0],
             "is_commanded": [0.0],
             "has_crashed": [0.0],
@@ -133,7 +140,7 @@ def effective_control(memory: Components) -> Vector[Any]:
 
 
 def measure(
-    plan: Plan, memory: Components, parameters: Components, errors: Vector[Any]
+    plan: Plan, memory: Components, parameters: Components, noise: Vector[Any]
 ) -> Vector[Any]:
     """Return the pose that motion capture sends off, `POSE_DIM` components.
 
@@ -142,16 +149,16 @@ def measure(
     position, attitude = plan.model(parameters).pose(memory["x"], effective_control(memory))
     position_noise, attitude_noise = parameters["noise"]
     (dropout,) = parameters["dropout"]
-    measured = [a + position_noise * b for a, b in zip(position, errors[:3], strict=True)]
-    turned = turn(attitude, [attitude_noise * part for part in errors[3:6]])
-    is_lost = errors[6] < dropout
+    measured = [a + position_noise * b for a, b in zip(position, noise[:3], strict=True)]
+    turned = turn(attitude, [attitude_noise * part for part in noise[3:6]])
+    is_lost = noise[6] < dropout
     return [*measured, yaw_from_quaternion(turned), where(is_lost, 0.0, 1.0)]
 
 
-def answer(
+def run_controller(
     plan: Plan, memory: Components, parameters: Components, pose: Vector[Any], tick: Any
 ) -> Components:
-    """Return the memory after estimator and controller have answered a pose, if it has arrived.
+    """Return the memory after estimator and controller have processed a pose, if one has arrived.
 
     Parameters
     ----------
@@ -174,12 +181,17 @@ def answer(
 
     k = parameters["integrator_k"]
     dt = where(control_stamp >= 0.0, tick * plan.period - control_stamp * plan.period, 0.0)
-    error = componentwise.heading_error(state, parameters["goal"])
-    linear = componentwise.linear_control(parameters["K"], parameters["u_ref"], error)
-    integral = componentwise.integrate(
-        memory["integral"], error, dt, linear, k, parameters["integrator_limit"]
-    )
-    u = componentwise.limited_control(linear, integral, k)
+    dt = where(dt <= control_law.MAX_GAP, dt, 0.0)
+    error = control_law.heading_error(state, parameters["goal"])
+    rows = [parameters["K"][i : i + control_law.X_DIM] for i in range(0, 28, control_law.X_DIM)]
+    linear = control_law.linear_control(rows, parameters["u_ref"], error)
+    integral = [
+        control_law.integrate(axis, before, error[axis], dt, linear, k[axis], limit)
+        for axis, (before, limit) in enumerate(
+            zip(memory["integral"], parameters["integrator_limit"], strict=True)
+        )
+    ]
+    u = control_law.limited(control_law.with_integrals(linear, integral, k))
     first = _choose(has_arrived, {"estimator": begun, "stamp": [tick]}, memory)
     return _choose(
         is_second,
@@ -209,7 +221,7 @@ def step(plan: Plan, memory: Components, parameters: Components, count: int) -> 
     return _choose(is_tilted, {"has_crashed": [1.0]}, memory)
 
 
-def judge(plan: Plan, memory: Components, parameters: Components, tick: Any) -> Components:
+def update_metrics(plan: Plan, memory: Components, parameters: Components, tick: Any) -> Components:
     """Return the memory with the metrics as they are after this tick; see `METRICS`."""
     largest, squares, upright, fastest = memory["metrics"]
     (settled,) = parameters["settled"]

@@ -1,4 +1,4 @@
-"""Flights with parameters drawn at random, piece by piece: what is flown is kept."""
+"""Flights with parameters drawn at random, in chunks whose outcomes are kept on disk."""
 
 import dataclasses
 import json
@@ -17,11 +17,11 @@ from crazyflie_batch.code_version import OtherCodeError, code_version
 from crazyflie_batch.estimators import Estimator, FiniteDifferences, Kalman
 from crazyflie_batch.settings import Settings
 
-PIECE = 256
-"""Flights in a piece: some tenths of a second on one processor."""
+CHUNK_SIZE = 256
+"""Flights in a chunk: some tenths of a second on one processor."""
 
-PATIENCE = 600.0
-"""How long to wait for the next piece, s: some workers of a cluster may be slow, or gone."""
+CHUNK_TIMEOUT = 600.0
+"""Longest time without a finished chunk, s: workers of a cluster may be slow, or gone."""
 
 OUTCOMES = ("largest_error", "rms_error", "largest_tilt", "largest_speed", "has_crashed")
 """Columns of results; see `crazyflie_batch.Flights`."""
@@ -32,14 +32,14 @@ class OtherSettingsError(Exception):
 
 
 class Results:
-    """The folder where flights are kept, from which an interrupted run goes on.
+    """A folder with the outcomes of flights, from which an interrupted run continues.
 
-    It also keeps the settings and the `code_version`, without which flights mean nothing.
+    It also has the settings and the `code_version` of the flights.
 
     Parameters
     ----------
     folder : Path
-        Is made.
+        Created if missing.
     settings : Settings
 
     Raises
@@ -51,9 +51,9 @@ class Results:
 
     def __init__(self, folder: Path, settings: Settings):
         self.folder = folder
-        self._pieces = folder / "pieces"
+        self._chunks = folder / "chunks"
         self._flights = settings.run.flights
-        self._pieces.mkdir(parents=True, exist_ok=True)
+        self._chunks.mkdir(parents=True, exist_ok=True)
         present = {**dataclasses.asdict(settings), "code": code_version()}
         text = json.dumps(present, indent=1, sort_keys=True)
         noted = folder / "settings.json"
@@ -62,22 +62,25 @@ class Results:
         noted.write_text(text, encoding="utf-8")
 
     def missing(self) -> list[int]:
-        """Return the numbers of the first flights of the pieces that have not been flown."""
-        return [first for first in range(0, self._flights, PIECE) if not self._path(first).exists()]
+        """Return the numbers of the first flights of missing chunks."""
+        firsts = range(0, self._flights, CHUNK_SIZE)
+        return [first for first in firsts if not self._path(first).exists()]
 
     def flown(self) -> int:
-        """Return how many flights have been flown."""
-        return self._flights - sum(min(PIECE, self._flights - first) for first in self.missing())
+        """Return the number of flights that have outcomes."""
+        return self._flights - sum(
+            min(CHUNK_SIZE, self._flights - first) for first in self.missing()
+        )
 
     def keep(self, first: int, outcomes: NDArray[np.float64]) -> None:
-        """Keep the outcomes of a piece, shape (flights, len(OUTCOMES))."""
-        unfinished = self._pieces / "unfinished.npy"
+        """Write the outcomes of a chunk, shape (flights, len(OUTCOMES))."""
+        unfinished = self._chunks / "unfinished.npy"
         np.save(unfinished, outcomes)
         os.replace(unfinished, self._path(first))
 
     def outcomes(self) -> NDArray[np.float64]:
-        """Return what is kept of all flights, shape (flights, len(OUTCOMES))."""
-        return np.concatenate([self._load(i) for i in range(0, self._flights, PIECE)])
+        """Return the outcomes of all flights, shape (flights, len(OUTCOMES))."""
+        return np.concatenate([self._load(i) for i in range(0, self._flights, CHUNK_SIZE)])
 
     def _load(self, first):
         path = self._path(first)
@@ -88,7 +91,7 @@ class Results:
             raise OSError(f"{path} was damaged, and is gone; call again to fly it anew") from None
 
     def _path(self, first):
-        return self._pieces / f"{first:08d}.npy"
+        return self._chunks / f"{first:08d}.npy"
 
 
 def _parsed(text):
@@ -111,62 +114,61 @@ def _check(folder, present, noted):
 def run(
     settings: Settings, results: Results, executor: Executor, report: Callable[[int], object]
 ) -> None:
-    """Fly what is missing.
+    """Simulate the missing chunks.
 
     Parameters
     ----------
     settings : Settings
     results : Results
     executor : Executor
-        Flies the pieces.
     report : callable
-        ``report(count)`` is told of flights that have been flown.
+        ``report(count)`` is called with the number of flights of every finished chunk.
 
     Raises
     ------
     TimeoutError
-        No piece has been flown for `PATIENCE`.
+        No chunk was finished for `CHUNK_TIMEOUT`.
     """
     values = settings.values()
     futures: dict[Any, int] = {}
     done: Queue[Any] = Queue()
     for first in results.missing():
-        own = {name: part[first : first + PIECE] for name, part in values.items()}
-        future = executor.submit(fly_piece, settings, first, own, code_version())
+        own = {name: part[first : first + CHUNK_SIZE] for name, part in values.items()}
+        future = executor.submit(fly_chunk, settings, first, own, code_version())
         futures[future] = first
         future.add_done_callback(done.put)
     try:
         for _ in range(len(futures)):
-            future = done.get(timeout=PATIENCE)
+            future = done.get(timeout=CHUNK_TIMEOUT)
             outcomes = future.result()
             results.keep(futures[future], outcomes)
             report(len(outcomes))
     except Empty:
-        raise TimeoutError(f"no flight has ended for {PATIENCE:g} s") from None
+        raise TimeoutError(f"no flight has ended for {CHUNK_TIMEOUT:g} s") from None
     finally:
         for future in futures:
             future.cancel()
 
 
-def fly_piece(
+def fly_chunk(
     settings: Settings, first: int, values: dict[str, NDArray[np.float64]], code: str
 ) -> NDArray[np.float64]:
-    """Return the outcomes of some flights, shape (flights, len(OUTCOMES)).
+    """Return the outcomes of a chunk, shape (flights, len(OUTCOMES)).
 
     Parameters
     ----------
     settings : Settings
     first : int
-        Number of the first one.
+        Number of the first flight.
     values : dict
-        What is swept, arrays of these flights; see `Settings.values`.
+        Swept parameters of these flights; see `Settings.values`.
     code : str
         The `code_version` of the other flights.
 
     Raises
     ------
     OtherCodeError
-        That of this process is another one.
+        This process has another `code_version`.
     """
     if code != code_version():
         raise OtherCodeError("a worker has another version of the code")
@@ -180,9 +182,8 @@ def simulate(
     values: dict[str, NDArray[np.float64]],
     record: bool = False,
 ) -> simulation.Flights:
-    """Return some flights; see `fly_piece`."""
+    """Return the flights of a chunk; see `fly_chunk`."""
     run, n = settings.run, len(next(iter(values.values())))
-    # Numbers of all of them, and arrays.
     swept: dict[str, Any] = dict(values)
     vehicle = dataclasses.replace(settings.vehicle, **swept)
     return simulation.simulate(

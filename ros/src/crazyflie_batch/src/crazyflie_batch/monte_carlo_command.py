@@ -18,11 +18,11 @@ from crazyflie_batch.settings import read_settings
 from crazyflie_utils import ParameterError
 
 SCHEDULER_LIMIT = 10.0
-"""How long to wait for a scheduler, and for its workers, s."""
+"""Longest time to connect to a scheduler, and to its workers, s."""
 
 _DESCRIPTION = """
-Fly a vehicle many times with parameters drawn at random, and tell how many flights stay within
-limits, which is the worst, and what it depends on.
+Fly a vehicle many times with parameters drawn at random. Report how many flights stay within
+limits, the worst flight, and the sensitivity to each parameter.
 """
 
 
@@ -43,7 +43,7 @@ def main(arguments: list[str] | None = None) -> int:
         settings = read_settings(options.settings)
         folder = Path(options.out or settings.name)
         if options.restart:
-            shutil.rmtree(folder / "pieces", ignore_errors=True)
+            shutil.rmtree(folder / "chunks", ignore_errors=True)
             (folder / "settings.json").unlink(missing_ok=True)
         results = _results(folder, settings)
         with _executor(options.scheduler) as executor:
@@ -52,7 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
         text = table(found)
         (folder / "report.txt").write_text(text + "\n", encoding="utf-8")
         write_csv(found, folder / "flights.csv")
-        # matplotlib takes its time, which nobody should wait for who made a mistake.
+        # Here, since importing matplotlib takes long: errors are reported before.
         from crazyflie_batch.figure import save_figure
 
         save_figure(found, folder / "figure.png")
@@ -60,7 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"monte_carlo: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("monte_carlo: interrupted; the same command goes on from here", file=sys.stderr)
+        print("monte_carlo: interrupted; the same command continues from here", file=sys.stderr)
         return 130
     print(text)
     print(f"\nwrote report.txt, flights.csv and figure.png in {folder}")
@@ -82,10 +82,10 @@ def _parser():
     parser.add_argument(
         "--out",
         metavar="FOLDER",
-        help="of the results, from which an interrupted run goes on (default: the settings' name)",
+        help="of the results; an interrupted run continues there (default: the settings' name)",
     )
     parser.add_argument(
-        "--restart", action="store_true", help="forget the flights that are in the folder"
+        "--restart", action="store_true", help="delete the flights that are in the folder"
     )
     parser.add_argument(
         "--scheduler",
@@ -110,11 +110,11 @@ def _executor(address: str | None) -> Iterator[Executor]:
         with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as threads:
             yield threads
         return
-    # As long to import as all the rest; many never need it.
+    # Here, since it takes as long to import as all the rest.
     from distributed import Client
 
     try:
-        # A client of something that is no address complains again when the process ends.
+        # A client of something that is no address reports another error when the process ends.
         if ":" not in address:
             raise ValueError("that is no address")
         client = Client(address, timeout=SCHEDULER_LIMIT, set_as_default=False)

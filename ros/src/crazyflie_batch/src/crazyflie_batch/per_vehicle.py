@@ -1,5 +1,6 @@
-"""Numbers that vehicles may differ by: their ranges and shapes."""
+"""Ranges and shapes of numbers that may differ between vehicles."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -7,25 +8,25 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
-def check_at_least(name: str, values: ArrayLike, minimum: float) -> None:
-    """Raise ValueError with the number that is too small; NaN is left to others."""
+def check_range(name: str, values: ArrayLike, low: float, high: float = math.inf) -> None:
+    """Raise ValueError with the first number outside [low, high]; `columns` refuses NaN."""
+    expected = f"at least {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
     array = np.asarray(values, dtype=float)
-    _refuse(name, array[array < minimum], f"at least {minimum:g}")
+    _refuse(name, array[(array < low) | (array > high)], expected)
 
 
 def check_above(name: str, values: ArrayLike, limit: float) -> None:
-    """Raise ValueError with the number that is too small; NaN is left to others."""
+    """Raise ValueError with the first number that is not above a limit; `columns` refuses NaN."""
     array = np.asarray(values, dtype=float)
     _refuse(name, array[array <= limit], f"more than {limit:g}")
 
 
-def check_probability(name: str, values: ArrayLike) -> None:
-    """Raise ValueError with the number that is none; NaN is left to others."""
-    array = np.asarray(values, dtype=float)
-    _refuse(name, array[(array < 0.0) | (array > 1.0)], "0 to 1")
+def _refuse(name, wrong, expected):
+    if len(wrong):
+        raise ValueError(f"{name} is {wrong[0]:g}; expected {expected}")
 
 
-def together(values: Mapping[str, ArrayLike], n: int) -> NDArray[np.float64]:
+def stacked_columns(values: Mapping[str, ArrayLike], n: int) -> NDArray[np.float64]:
     """Return numbers or arrays of shape (n,), by name, as one of shape (len(values), n).
 
     Raises
@@ -51,8 +52,3 @@ def columns(name: str, values: Any, shape: tuple[int, ...], n: int) -> NDArray[n
     if not np.isfinite(array).all():
         raise ValueError(f"{name} is not finite")
     return np.broadcast_to(array, (n, *shape)).reshape(n, -1).T
-
-
-def _refuse(name, wrong, expected):
-    if len(wrong):
-        raise ValueError(f"{name} is {wrong[0]:g}; expected {expected}")

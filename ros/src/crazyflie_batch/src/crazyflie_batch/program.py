@@ -1,233 +1,125 @@
-"""The machine code that flies a group of vehicles, made from the formulas of `flight`."""
+"""What flies a group of vehicles with one plan: machine code, or numpy without llvmlite."""
 
-import ctypes
+import logging
 import threading
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
 from functools import lru_cache
-from typing import Any
+from typing import Protocol
 
 import numpy as np
-from llvmlite import binding, ir
+from numpy.typing import NDArray
 
 from crazyflie_batch import flight
-from crazyflie_batch.flight import Components, Plan
-from crazyflie_batch.symbols import DOUBLE, Emitter
+from crazyflie_batch.flight import Plan
+from crazyflie_batch.formula_errors import naming_the_formula
 
-_INTEGER = ir.IntType(64)
-_BYTES = 8
-"""Of a number."""
+try:
+    from crazyflie_batch.machine_code import MachineCode
+except (ImportError, OSError) as error:
+    MachineCode = None  # type: ignore[assignment, misc]
+    _MISSING = str(error)
+else:
+    _MISSING = ""
+
+Array = NDArray[np.float64]
+
+_log = logging.getLogger(__name__)
 
 
-class Program:
-    """Flies groups of vehicles that have a plan in common.
-
-    Arrays are of floats and end with an axis of `lanes`, the vehicles of a group. Several threads
-    may fly groups at the same time.
+class Program(Protocol):
+    """Flies groups of vehicles that have a plan in common, in several threads at a time.
 
     Attributes
     ----------
     lanes : int
-        Vehicles in a group.
+        Vehicles in a group, the last axis of all arrays.
     """
 
-    def __init__(self, plan: Plan):
-        self.lanes, self._machine, vector_functions = _machine()
-        module = ir.Module()
-        _Writer(plan, module, self.lanes, vector_functions).write()
-        # Kept, since the code lives as long as it does.
-        self._engine = binding.create_mcjit_compiler(
-            binding.parse_assembly(str(module)), self._machine
-        )
-        self._engine.finalize_object()
-        signature = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5, *[ctypes.c_int64] * 3)
-        self._fly = signature(self._engine.get_function_address("fly"))
+    lanes: int
 
-    def fly(self, memory: Any, parameters: Any, errors: Any, record: Any, slots: int) -> None:
+    def fly(
+        self, memory: Array, parameters: Array, noise_samples: Array, record: Array, slots: int
+    ) -> None:
         """Fly a group.
 
         Parameters
         ----------
         memory : ndarray, shape (sum of memory_dims, lanes)
-            Becomes that at the end.
+            At the beginning; replaced by that at the end.
         parameters : ndarray, shape (sum of parameter_dims, lanes)
-        errors : ndarray, shape (ticks, ERRORS_DIM, lanes)
+        noise_samples : ndarray, shape (ticks, NOISE_DIM, lanes)
         record : ndarray, shape (ticks or 1, sum of memory_dims, lanes)
-            Becomes the memory of every tick, when its controls have been given; with one row,
-            that of the last tick.
+            Replaced by the memory of every tick, when its controls have been given; with one
+            row, by that of the last tick.
         slots : int
             The longest delay, in ticks, and 1.
         """
+
+
+class ArrayProgram:
+    """Computes the formulas with numpy's arrays: slower than machine code."""
+
+    lanes = 256
+
+    def __init__(self, plan: Plan):
+        self._plan = plan
+
+    def fly(
+        self, memory: Array, parameters: Array, noise_samples: Array, record: Array, slots: int
+    ) -> None:
+        """See `Program.fly`."""
+        plan, dims = self._plan, self._plan.memory_dims()
+        values = flight.components(parameters, plan.parameter_dims())
+        state = flight.components(memory.copy(), dims)
+        delay, lanes = values["delay"][0], np.arange(self.lanes)
         transit = np.zeros((slots, flight.POSE_DIM, self.lanes))
-        arrays = (memory, parameters, transit, errors, record)
-        self._fly(
-            *(array.ctypes.data for array in arrays),
-            len(errors),
-            slots,
-            0 if len(record) == 1 else record[0].size,
-        )
+        # States may overflow, and what `where` does not choose may be divided by zero.
+        with naming_the_formula(), np.errstate(all="ignore"):
+            for tick, noise in enumerate(noise_samples):
+                state = flight.update_metrics(plan, state, values, tick)
+                transit[tick % slots] = flight.measure(plan, state, values, [*noise])
+                sent = (tick + slots - delay.astype(int)) % slots
+                arrived = [*transit[sent, :, lanes].T]
+                state = flight.run_controller(plan, state, values, arrived, tick - delay)
+                _store(record[tick % len(record)], state, dims)
+                for count in range(plan.steps):
+                    state = flight.step(plan, state, values, count % flight.SAMPLE_STEPS)
+        _store(memory, state, dims)
+
+
+def _store(rows, state, dims):
+    for row, part in zip(rows, (part for name in dims for part in state[name]), strict=True):
+        row[:] = part
 
 
 _compiling = threading.Lock()
 
 
 def program(plan: Plan) -> Program:
-    """Return the program for a plan, made once in a process, whatever thread asks first."""
+    """Return the program of a plan, made once in a process for all threads.
+
+    Raises
+    ------
+    TypeError
+        A formula cannot be traced; the text names it.
+    """
     with _compiling:
-        return _compiled(plan)
+        return _program(plan)
 
 
 @lru_cache(maxsize=16)
-def _compiled(plan):
-    return Program(plan)
+def _program(plan):
+    if MachineCode is None:
+        _warn_of_numpy()
+        return ArrayProgram(plan)
+    with naming_the_formula():
+        return MachineCode(plan)
+
+
+@lru_cache(maxsize=1)
+def _warn_of_numpy():
+    _log.warning("llvmlite is missing (%s): flights are computed with numpy, more slowly", _MISSING)
 
 
 def clear() -> None:
-    """Forget all programs, so that they are compiled anew."""
-    _compiled.cache_clear()
-
-
-def _machine() -> tuple[int, Any, bool]:
-    """Return lanes and target of this processor, and whether there are functions of vectors."""
-    # Later versions than Debian 12's initialize themselves: theirs raises, or is gone.
-    with suppress(AttributeError, RuntimeError):
-        binding.initialize()
-    binding.initialize_native_target()
-    binding.initialize_native_asmprinter()
-    features = binding.get_host_cpu_features()
-    lanes = 8 if features.get("avx512f") else 4 if features.get("avx2") else 2
-    target = binding.Target.from_default_triple().create_target_machine(
-        cpu=binding.get_host_cpu_name(), features=features.flatten(), opt=2, jit=True
-    )
-    has_functions = "x86_64" in binding.get_process_triple() and _load("libmvec.so.1")
-    if not has_functions:
-        _load("libm.so.6")
-    return lanes, target, has_functions
-
-
-def _load(library: str) -> bool:
-    try:
-        binding.load_library_permanently(library)
-    except RuntimeError:
-        return False
-    return True
-
-
-class _Writer:
-    """Writes the function ``fly`` into a module."""
-
-    def __init__(self, plan: Plan, module: ir.Module, lanes: int, vector_functions: bool):
-        pointer = ir.PointerType(ir.VectorType(DOUBLE, lanes))
-        type_ = ir.FunctionType(ir.VoidType(), [pointer] * 5 + [_INTEGER] * 3)
-        self._function = ir.Function(module, type_, "fly")
-        self._builder = ir.IRBuilder(self._function.append_basic_block())
-        self._emitter = Emitter(self._builder, lanes, vector_functions)
-        self._plan = plan
-        self._lanes = lanes
-
-    def write(self) -> None:
-        builder, plan = self._builder, self._plan
-        memory, parameters, transit, errors, record, ticks, slots, row = self._function.args
-        dims = plan.memory_dims()
-        with self._loop(ticks) as tick:
-            values = self._load(parameters, plan.parameter_dims())
-            state = self._load(memory, dims)
-            now = self._number(tick)
-            drawn = builder.gep(errors, [builder.mul(tick, self._integer(flight.ERRORS_DIM))])
-            noise = self._load(drawn, {"errors": flight.ERRORS_DIM})["errors"]
-            state = flight.judge(plan, state, values, now)
-            pose = flight.measure(plan, state, values, noise)
-            self._send(transit, pose, tick, slots)
-            (delay,) = values["delay"]
-            arrived = self._receive(transit, delay, tick, slots)
-            state = flight.answer(plan, state, values, arrived, now - delay)
-            self._store(memory, dims, state)
-            offset = builder.sdiv(builder.mul(tick, row), self._integer(self._lanes))
-            self._store(builder.gep(record, [offset]), dims, state)
-            with self._loop(self._integer(plan.steps // flight.SAMPLE_STEPS)):
-                values = self._load(parameters, plan.parameter_dims())
-                state = self._load(memory, dims)
-                for count in range(flight.SAMPLE_STEPS):
-                    state = flight.step(plan, state, values, count)
-                self._store(memory, dims, state)
-        builder.ret_void()
-
-    def _send(self, transit, pose, tick, slots):
-        slot = self._builder.srem(tick, slots)
-        place = self._builder.gep(transit, [self._times(slot, flight.POSE_DIM)])
-        self._store(place, {"pose": flight.POSE_DIM}, {"pose": pose})
-
-    def _receive(self, transit, delay, tick, slots):
-        """Return the pose that was sent ``delay`` ticks ago: another one for each lane."""
-        builder = self._builder
-        numbers = builder.bitcast(transit, ir.PointerType(DOUBLE))
-        delays = builder.fptosi(delay.value, ir.VectorType(_INTEGER, self._lanes))
-        undefined = ir.Constant(self._emitter.type, ir.Undefined)
-        pose = [undefined] * flight.POSE_DIM
-        for lane in range(self._lanes):
-            index = ir.Constant(ir.IntType(32), lane)
-            sent = builder.sub(builder.add(tick, slots), builder.extract_element(delays, index))
-            slot = self._times(builder.srem(sent, slots), flight.POSE_DIM * self._lanes)
-            for part in range(flight.POSE_DIM):
-                offset = builder.add(slot, self._integer(part * self._lanes + lane))
-                number = builder.load(builder.gep(numbers, [offset]))
-                pose[part] = builder.insert_element(pose[part], number, index)
-        return [self._emitter.symbol(value) for value in pose]
-
-    def _load(self, pointer: ir.Value, dims: Mapping[str, int]) -> Components:
-        components: Components = {}
-        index = 0
-        for name, dim in dims.items():
-            components[name] = [
-                self._emitter.symbol(self._aligned(self._builder.load, pointer, index + i))
-                for i in range(dim)
-            ]
-            index += dim
-        return components
-
-    def _aligned(self, action, pointer, index, *value):
-        place = self._builder.gep(pointer, [self._integer(index)])
-        return action(*value, place, align=_BYTES)
-
-    def _store(self, pointer, dims, components):
-        index = 0
-        for name, dim in dims.items():
-            assert len(components[name]) == dim, name
-            for part in components[name]:
-                value = self._emitter.value(part)
-                self._aligned(self._builder.store, pointer, index, value)
-                index += 1
-
-    def _number(self, integer):
-        """Return the symbol of an integer."""
-        builder = self._builder
-        number = builder.sitofp(integer, DOUBLE)
-        vector = ir.Constant(self._emitter.type, ir.Undefined)
-        for lane in range(self._lanes):
-            index = ir.Constant(ir.IntType(32), lane)
-            vector = builder.insert_element(vector, number, index)
-        return self._emitter.symbol(vector)
-
-    def _times(self, integer, factor):
-        return self._builder.mul(integer, self._integer(factor))
-
-    @staticmethod
-    def _integer(value: Any) -> Any:
-        return ir.Constant(_INTEGER, value)
-
-    @contextmanager
-    def _loop(self, count: ir.Value) -> Iterator[ir.Value]:
-        """Write a loop around what is written meanwhile; the value counts from 0."""
-        builder = self._builder
-        before = builder.block
-        body = builder.append_basic_block()
-        builder.branch(body)
-        builder.position_at_end(body)
-        index = builder.phi(_INTEGER)
-        index.add_incoming(self._integer(0), before)
-        yield index
-        following = builder.add(index, self._integer(1))
-        index.add_incoming(following, builder.block)
-        after = builder.append_basic_block()
-        builder.cbranch(builder.icmp_signed("<", following, count), body, after)
-        builder.position_at_end(after)
+    """Drop all programs, so that they are made anew."""
+    _program.cache_clear()

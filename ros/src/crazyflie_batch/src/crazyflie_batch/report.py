@@ -1,4 +1,4 @@
-"""What a Monte-Carlo run has found out: shares, worst case, sensitivities."""
+"""Results of a Monte-Carlo run: flights within limits, worst case, sensitivities."""
 
 import csv
 import math
@@ -12,8 +12,8 @@ from scipy.stats import rankdata
 from crazyflie_batch.monte_carlo import OUTCOMES
 from crazyflie_batch.settings import Settings
 
-FIFTHS = 5
-"""Into so many parts the flights are divided by a parameter."""
+QUINTILES = 5
+"""Groups of equal size into which flights are divided by a parameter."""
 
 _CONFIDENCE = 1.96
 """95 %, in standard deviations."""
@@ -21,13 +21,13 @@ _CONFIDENCE = 1.96
 
 @dataclass(frozen=True)
 class Findings:
-    """Flights, and what they are judged by.
+    """Parameters and outcomes of all flights.
 
     Attributes
     ----------
     settings : Settings
     values : dict
-        What was swept; see `Settings.values`.
+        Swept parameters; see `Settings.values`.
     outcomes : dict
         By the names of `crazyflie_batch.Flights`, arrays of all flights.
     is_within : ndarray of bool, shape (flights,)
@@ -48,18 +48,18 @@ class Findings:
     def sensitivities(self) -> dict[str, float]:
         """Return the rank correlation of each parameter with the largest error, in [-1, 1].
 
-        Spearman's; a crash ranks behind all others. What makes matters worse in both directions
-        has one of about 0: see `shares`.
+        Spearman's; a crash ranks behind all others. It is about 0 for a parameter that increases
+        the error in both directions: see `quintiles`.
         """
         error = _finite(self.outcomes["largest_error"])
         crashed = self.outcomes["has_crashed"] > 0.0
         ranks = rankdata(np.where(crashed, error.max() + 1.0, error))
         return {name: _correlation(rankdata(part), ranks) for name, part in self.values.items()}
 
-    def shares(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return the mean of a parameter, and the share within limits, of each fifth of it."""
+    def quintiles(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return, for each quintile of a parameter, its mean and the fraction within limits."""
         order = np.argsort(self.values[name], kind="stable")
-        parts = [part for part in np.array_split(order, FIFTHS) if len(part)]
+        parts = [part for part in np.array_split(order, QUINTILES) if len(part)]
         means = [self.values[name][part].mean() for part in parts]
         return np.array(means), np.array([self.is_within[part].mean() for part in parts])
 
@@ -78,7 +78,7 @@ def findings(settings: Settings, outcomes: NDArray[np.float64]) -> Findings:
 def table(found: Findings) -> str:
     """Return the findings as text."""
     run, flights = found.settings.run, len(found.is_within)
-    low, high = share_interval(int(found.is_within.sum()), flights)
+    low, high = wilson_interval(int(found.is_within.sum()), flights)
     confidence = f"{low:.1%} to {high:.1%} with 95 % confidence"
     limits = f"error at most {run.largest_error:g} m after {run.settle_time:g} s"
     lines = [
@@ -106,13 +106,13 @@ def table(found: Findings) -> str:
         lines.append(f"                {sweep.name} {value:.4g} {sweep.unit}".rstrip())
     lines += [
         "",
-        "sensitivity of the largest error (rank correlation, -1 to 1), and the share within limits",
-        "in each fifth of the flights, from the lowest values of the parameter to the highest",
+        "sensitivity of the largest error (rank correlation, -1 to 1), and the fraction within",
+        "limits in each quintile of the parameter, from the lowest values to the highest",
     ]
     sensitivities = found.sensitivities()
     for name in sorted(sensitivities, key=lambda each: -abs(sensitivities[each])):
-        shares = "".join(f"{share:8.0%}" for share in found.shares(name)[1])
-        lines.append(f"{name:22}{sensitivities[name]:10.2f}  {shares}")
+        fractions = "".join(f"{fraction:8.0%}" for fraction in found.quintiles(name)[1])
+        lines.append(f"{name:22}{sensitivities[name]:10.2f}  {fractions}")
     return "\n".join(lines)
 
 
@@ -128,11 +128,11 @@ def write_csv(found: Findings, path: Path) -> None:
         )
 
 
-def share_interval(count: int, total: int) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a share (E. B. Wilson, 1927)."""
-    share, z2 = count / total, _CONFIDENCE**2
-    middle = (share + z2 / (2 * total)) / (1 + z2 / total)
-    half = _CONFIDENCE * math.sqrt(share * (1 - share) / total + z2 / (4 * total**2))
+def wilson_interval(count: int, total: int) -> tuple[float, float]:
+    """Return the 95 % confidence interval of a fraction (E. B. Wilson, 1927)."""
+    fraction, z2 = count / total, _CONFIDENCE**2
+    middle = (fraction + z2 / (2 * total)) / (1 + z2 / total)
+    half = _CONFIDENCE * math.sqrt(fraction * (1 - fraction) / total + z2 / (4 * total**2))
     half /= 1 + z2 / total
     return max(0.0, middle - half), min(1.0, middle + half)
 

@@ -1,4 +1,4 @@
-"""What a Monte-Carlo run is told: a YAML file, checked before anything flies."""
+"""Settings of a Monte-Carlo run: a YAML file, checked before anything flies."""
 
 import os
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ _SPEED = Number("m/s")
 
 
 class FlightParameters(Parameters):
-    """What may differ between flights, and what it is where it does not: keys of ``vehicle``."""
+    """Parameters that may differ between flights, with those of all others: keys of ``vehicle``."""
 
     mass_error: float = parameter(_FRACTION, "how much heavier than nominal the vehicle is", 0.0)
     thrust_error: float = parameter(_FRACTION, "how much more than nominal its rotors lift", 0.0)
@@ -63,7 +63,7 @@ _DEFAULTS = FlightParameters.from_mapping({})
 
 
 class RunParameters(Parameters):
-    """What all flights have in common: the other keys."""
+    """Parameters of all flights: the other keys."""
 
     flights: int = parameter(Integer(1, 10**7), "how many")
     seed: int = parameter(Integer(0, 2**32 - 1), "of everything random", 0)
@@ -143,7 +143,7 @@ _EXPECTED = (
 
 @dataclass(frozen=True)
 class Sweep:
-    """How a parameter is spread over the flights.
+    """Distribution of a parameter over the flights.
 
     Attributes
     ----------
@@ -163,15 +163,15 @@ class Sweep:
     low: float
     high: float
 
-    def quantiles(self, shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values below which these shares, in [0, 1), of the flights are."""
+    def quantiles(self, fractions: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values below which these fractions, in [0, 1), of the flights are."""
         if self.kind == VALUES:
-            index = (shares * len(self.numbers)).astype(int)
+            index = (fractions * len(self.numbers)).astype(int)
             return np.sort(self.numbers)[index]
         first, second = self.numbers
         if self.kind == UNIFORM:
-            return first + (second - first) * shares
-        return np.clip(first + second * ndtri(shares), self.low, self.high)
+            return first + (second - first) * fractions
+        return np.clip(first + second * ndtri(fractions), self.low, self.high)
 
 
 @dataclass(frozen=True)
@@ -195,12 +195,11 @@ class Settings:
     K: tuple[tuple[float, ...], ...]
 
     def values(self) -> dict[str, NDArray[np.float64]]:
-        """Return what the flights have, by name of a `FlightParameters`, arrays of all flights."""
-        shares = np.random.default_rng(self.run.seed).random((len(self.sweeps), self.run.flights))
-        return {
-            sweep.name: sweep.quantiles(part)
-            for sweep, part in zip(self.sweeps, shares, strict=True)
-        }
+        """Return the swept parameters by name, arrays of all flights."""
+        random = np.random.default_rng(self.run.seed)
+        fractions = random.random((len(self.sweeps), self.run.flights))
+        pairs = zip(self.sweeps, fractions, strict=True)
+        return {sweep.name: sweep.quantiles(part) for sweep, part in pairs}
 
 
 def read_settings(path: str | Path) -> Settings:
@@ -209,7 +208,7 @@ def read_settings(path: str | Path) -> Settings:
     Raises
     ------
     ParameterError
-        About everything that is wrong, with file and line.
+        Names all errors with file and line.
     """
     file = load(path)
     run = file.read(RunParameters, besides=("vehicle", "sweep"))

@@ -1,4 +1,4 @@
-"""Flights of many vehicles at once: `simulate`, and what it is told."""
+"""Flights of many vehicles at once: `simulate` and its arguments."""
 
 import math
 import os
@@ -11,14 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from crazyflie_batch.batch import Batch, Flights, fly
 from crazyflie_batch.estimators import Estimator, FiniteDifferences
 from crazyflie_batch.flight import SAMPLE_STEPS, Plan
-from crazyflie_batch.per_vehicle import (
-    check_above,
-    check_at_least,
-    check_probability,
-    columns,
-    together,
-)
-from crazyflie_lqr import componentwise
+from crazyflie_batch.per_vehicle import check_above, check_range, columns, stacked_columns
+from crazyflie_lqr import control_law
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Coupled7D, Dynamics, NearHover
 from crazyflie_model.limits import CRASH_TILT
@@ -39,9 +33,9 @@ class Model:
     Attributes
     ----------
     make : callable
-        ``make(**parameters)`` returns the `Dynamics` of one vehicle. It is also given symbols
-        (see `symbols`), so it calculates by `crazyflie_model.elementwise`. What it makes is
-        compiled once for each function, so this should not be a lambda.
+        ``make(**parameters)`` returns the `Dynamics` of one vehicle, computed by
+        `crazyflie_model.elementwise` since it is traced with `symbols`. Compiled once for each
+        function: no lambda.
     parameters : mapping
         Each a float, or an array of shape (n,).
     max_tilt : float
@@ -78,7 +72,7 @@ def quadrotor(
     Raises
     ------
     ValueError
-        Something is out of its range.
+        An argument is out of its range.
     """
     check_above("mass_error", mass_error, -1.0)
     check_above("thrust_error", thrust_error, -1.0)
@@ -126,7 +120,7 @@ class Controller:
     integrator_limit: ArrayLike = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        check_at_least("integrator_limit", self.integrator_limit, 0.0)
+        check_range("integrator_limit", self.integrator_limit, 0.0)
 
 
 @dataclass(frozen=True)
@@ -141,7 +135,7 @@ class Measurement:
     Raises
     ------
     ValueError
-        Something is out of its range.
+        An argument is out of its range.
     """
 
     position_noise: ArrayLike = 0.0
@@ -150,10 +144,10 @@ class Measurement:
     dropout: ArrayLike = 0.0
 
     def __post_init__(self) -> None:
-        check_at_least("position_noise", self.position_noise, 0.0)
-        check_at_least("attitude_noise", self.attitude_noise, 0.0)
-        check_at_least("latency", self.latency, 0.0)
-        check_probability("dropout", self.dropout)
+        check_range("position_noise", self.position_noise, 0.0)
+        check_range("attitude_noise", self.attitude_noise, 0.0)
+        check_range("latency", self.latency, 0.0)
+        check_range("dropout", self.dropout, 0.0, 1.0)
 
 
 def simulate(
@@ -175,8 +169,8 @@ def simulate(
 ) -> Flights:
     """Fly n vehicles in closed loop, each on its own.
 
-    Every vehicle flies as the workspace's classes have it fly one by one, to within rounding.
-    What it does depends on its number and the seed, not on how many there are.
+    Every vehicle flies as with the nodes' own classes, to within rounding. Its flight depends on
+    its number and the seed, not on how many there are.
 
     Parameters
     ----------
@@ -201,7 +195,7 @@ def simulate(
     seed : int
         Of the errors of measurement.
     first : int
-        Number of the first vehicle; for who flies them piece by piece.
+        Number of the first vehicle, where flights are simulated in several calls.
     record : bool
         Whether to return the states of every tick.
     threads : int, optional
@@ -210,41 +204,11 @@ def simulate(
     Raises
     ------
     ValueError
-        Something is out of its range, or an array has not one entry for every vehicle.
+        An argument is out of its range, or an array has not one entry for every vehicle.
+    TypeError
+        A formula of the model cannot be computed for many vehicles; the text names it.
     """
-    batch = prepare(
-        model,
-        controller,
-        estimator or FiniteDifferences(),
-        x0,
-        n,
-        goal=goal,
-        duration=duration,
-        period=period,
-        settle_time=settle_time,
-        measurement=measurement or Measurement(),
-        seed=seed,
-        first=first,
-    )
-    return fly(batch, record, threads or len(os.sched_getaffinity(0)))
-
-
-def prepare(
-    model: Model,
-    controller: Controller,
-    estimator: Estimator,
-    x0: ArrayLike,
-    n: int,
-    *,
-    goal: ArrayLike,
-    duration: float,
-    period: float,
-    settle_time: float,
-    measurement: Measurement,
-    seed: int,
-    first: int,
-) -> Batch:
-    """Return the flights of `simulate` before they are flown."""
+    estimator, measurement = estimator or FiniteDifferences(), measurement or Measurement()
     if n <= 0:
         raise ValueError(f"n is {n}; expected at least one vehicle")
     steps = round(period / STEP) if math.isfinite(period) else 0
@@ -263,23 +227,24 @@ def prepare(
         "position_noise": measurement.position_noise,
         "attitude_noise": measurement.attitude_noise,
     }
-    # What would arrive after the end need not be on its way for longer.
+    # A longer delay makes no difference: the pose arrives after the end.
     delay = np.minimum(delay_ticks(measurement.latency, plan.period), ticks)
     parameters = {
-        "model": together(model.parameters, n),
-        "estimator": together(estimator.parameters, n),
-        "K": columns("K", controller.K, (componentwise.U_DIM, componentwise.X_DIM), n),
-        "u_ref": columns("u_ref", controller.u_ref, (componentwise.U_DIM,), n),
+        "model": stacked_columns(model.parameters, n),
+        "estimator": stacked_columns(estimator.parameters, n),
+        "K": columns("K", controller.K, (control_law.U_DIM, control_law.X_DIM), n),
+        "u_ref": columns("u_ref", controller.u_ref, (control_law.U_DIM,), n),
         "integrator_k": columns("integrator_k", controller.integrator_k, (3,), n),
         "integrator_limit": columns("integrator_limit", controller.integrator_limit, (3,), n),
-        "goal": columns("goal", goal, (componentwise.X_DIM,), n),
-        "noise": together(noise, n),
+        "goal": columns("goal", goal, (control_law.X_DIM,), n),
+        "noise": stacked_columns(noise, n),
         "delay": columns("latency", delay, (), n),
         "dropout": columns("dropout", measurement.dropout, (), n),
         "settled": columns("settle_time", math.ceil(settle_time / period - _ROUNDING), (), n),
     }
     positions = columns("x0", x0, (3,), n)
-    return Batch(plan, parameters, _initial_states(model, positions), ticks, seed, first)
+    batch = Batch(plan, parameters, _initial_states(model, positions), ticks, seed, first)
+    return fly(batch, record, threads or len(os.sched_getaffinity(0)))
 
 
 def delay_ticks(latency: ArrayLike, period: float) -> NDArray[np.float64]:

@@ -15,7 +15,7 @@ from crazyflie_fleet.batch_vehicles import BatchVehicles
 from crazyflie_fleet.fleet import Vehicle
 from crazyflie_fleet.messages import array_message, control_message, state_message
 from crazyflie_fleet.stack import FINAL_CONTROL, LQR_CONTROL, REFERENCE, SAFE_REFERENCE, STATE
-from crazyflie_lqr.componentwise import heading_error, limited_control, linear_control
+from crazyflie_lqr.control_law import heading_error, limited, linear_control
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_lqr.reference import GuardedReference
@@ -61,7 +61,7 @@ def batch_control(
         States and references.
     """
     error = heading_error(split(x), split(x_ref))
-    return join(limited_control(linear_control(K.ravel().tolist(), u_ref.tolist(), error)))
+    return join(limited(linear_control(K.tolist(), u_ref.tolist(), error)))
 
 
 def is_memoryless(K: NDArray[np.float64], u_ref: NDArray[np.float64]) -> bool:

@@ -3,66 +3,49 @@
 States begin with x, y, z, x_dot, y_dot, z_dot in the fixed frame (m, m/s; z up)
 and have the yaw (rad) at some later index. The control is u = (roll, pitch,
 yaw_dot, thrust) in rad, rad/s and m/s^2 (mass-normalised): positive roll
-accelerates to the right of the heading, positive pitch along it.
+accelerates to the right of the heading, positive pitch along it. The formulas are in
+`control_law`.
 """
 
 import math
 from collections.abc import Iterable, Sequence
-from operator import mul
 from typing import TYPE_CHECKING, Self
 
 from typing_extensions import override
 
 from crazyflie_lqr.climb import Climb
-from crazyflie_model.angles import wrap_to_pi
-from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+from crazyflie_lqr.control_law import (
+    MAX_GAP,
+    PITCH,
+    ROLL,
+    THRUST,
+    YAW_DOT,
+    heading_error,
+    integrate,
+    limited,
+    linear_control,
+    with_integrals,
+)
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-ROLL, PITCH, YAW_DOT, THRUST = range(4)
-
-_LEAST = (-MAX_TILT, -MAX_TILT, -math.inf, MIN_THRUST)
-_MOST = (MAX_TILT, MAX_TILT, math.inf, MAX_THRUST)
+__all__ = [
+    "PITCH",
+    "ROLL",
+    "THRUST",
+    "YAW_DOT",
+    "IntegralStateFeedback",
+    "LinearFeedback",
+    "heading_error",
+]
 
 _LEAST_DAMPING = 0.7
 """A height loop with this damping ratio overshoots a step by 5 %."""
 
-INTEGRATED = (PITCH, ROLL, THRUST)
-"""The controls that the integrals of x, y and z act on."""
-
-MAX_GAP = 0.5
-"""Longest time between two states over which `IntegralStateFeedback` integrates, s."""
-
-
 Components = Sequence[float]
 """A state or a control; of so few numbers, plain floats are several times quicker than arrays."""
-
-
-def heading_error(x: Components, x_ref: Components, yaw_index: int) -> list[float]:
-    """Return the error of a state in the heading frame.
-
-    Parameters
-    ----------
-    x, x_ref : sequence, x_dim components
-        State and reference.
-    yaw_index : int
-        Where the yaw is in the state.
-
-    Returns
-    -------
-    list of float, x_dim components
-        ``x - x_ref``, with the horizontal position and velocity turned by
-        ``-yaw`` into the heading frame (x forward, y left), and the yaw error
-        wrapped to [-pi, pi].
-    """
-    e = [float(a - b) for a, b in zip(x, x_ref, strict=True)]
-    c, s = math.cos(x[yaw_index]), math.sin(x[yaw_index])
-    e[0], e[1] = c * e[0] + s * e[1], c * e[1] - s * e[0]
-    e[3], e[4] = c * e[3] + s * e[4], c * e[4] - s * e[3]
-    e[yaw_index] = wrap_to_pi(e[yaw_index])
-    return e
 
 
 def at_rest(x: Components, yaw_index: int) -> list[float]:
@@ -131,13 +114,8 @@ class LinearFeedback:
 
     def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
         """Return the same as `control`, from floats and in floats."""
-        return self._linear(heading_error(x, x_ref, self.yaw_index))
-
-    def _linear(self, error):
-        return [
-            reference + sum(map(mul, row, error))
-            for reference, row in zip(self._u_ref, self._rows, strict=True)
-        ]
+        error = heading_error(x, x_ref, self.yaw_index)
+        return linear_control(self._rows, self._u_ref, error)
 
     def take_over(self, previous: Self) -> None:
         """Continue in flight where a controller with other parameters ends."""
@@ -161,8 +139,7 @@ class IntegralStateFeedback(LinearFeedback):
     the same when the vehicle turns. Roll and pitch are then limited to
     `MAX_TILT`, thrust to `MIN_THRUST` ... `MAX_THRUST`.
 
-    While a control is at its limit, its integral does not grow into the limit
-    (conditional integration: Astrom and Hagglund, Advanced PID Control, 2006, 3.5). Between
+    While a control is at its limit, its integral does not grow into the limit. Between
     `rest` and the next flight it is zero. After `take_off`, height reference and height
     integral are those of a `Climb` until the vehicle has arrived; but not where a step of the
     reference does no harm, with a height loop that is well damped and has no integrator.
@@ -223,13 +200,12 @@ class IntegralStateFeedback(LinearFeedback):
         dt = self._time_since_last(time)
         reference, climb_thrust = self._follow_climb(x, x_ref, dt)
         error = heading_error(x, reference, self.yaw_index)
-        u = self._linear(error)
+        u = linear_control(self._rows, self._u_ref, error)
         if not self._is_resting:
             self._integrate(error[:3], dt, u)
-        for index, k, integral in zip(INTEGRATED, self._integrator_k, self._integral, strict=True):
-            u[index] += k * integral
+        u = with_integrals(u, self._integral, self._integrator_k)
         u[THRUST] += climb_thrust
-        u = [min(max(a, b), c) for a, b, c in zip(u, _LEAST, _MOST, strict=True)]
+        u = limited(u)
         self._thrust = u[THRUST]
         return u
 
@@ -284,15 +260,11 @@ class IntegralStateFeedback(LinearFeedback):
         # An error that overflowed must not stay in the integral.
         if dt == 0.0 or not all(map(math.isfinite, error)):
             return
-        for axis, (index, k) in enumerate(zip(INTEGRATED, self._integrator_k, strict=True)):
-            if axis == 2 and self._climb is not None:
-                continue
-            integral = self._within_limit(axis, self._integral[axis] + error[axis] * dt)
-            u = linear[index] + k * integral
-            growth = k * (integral - self._integral[axis])
-            at_limit = (u > _MOST[index] and growth > 0.0) or (u < _LEAST[index] and growth < 0.0)
-            if not at_limit:
-                self._integral[axis] = integral
+        # The climb has an integral of its own for the height.
+        for axis in range(3 if self._climb is None else 2):
+            k, limit = self._integrator_k[axis], self._integrator_limit[axis]
+            integral = self._integral[axis]
+            self._integral[axis] = integrate(axis, integral, error[axis], dt, linear, k, limit)
 
     def _within_limit(self, axis, integral):
         limit = self._integrator_limit[axis]

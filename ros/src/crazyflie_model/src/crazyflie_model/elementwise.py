@@ -107,10 +107,10 @@ def clip(value: float, low: float, high: float) -> float: ...
 
 
 @overload
-def clip(value: Many, low: float, high: float) -> Many: ...
+def clip(value: Many, low: Many, high: Many) -> Many: ...
 
 
-def clip(value: Many, low: float, high: float) -> Many:
+def clip(value: Many, low: Many, high: Many) -> Many:
     """Return ``value`` limited to [low, high]."""
     if isinstance(value, float):
         return low if value < low else high if value > high else value

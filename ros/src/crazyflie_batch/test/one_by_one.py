@@ -1,12 +1,14 @@
-"""One flight of a batch by the classes that the nodes have: the reference, or a closer look."""
+"""One flight of a batch by the classes that the nodes have: the reference."""
 
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
 
+from crazyflie_batch import simulation
 from crazyflie_batch.batch import Batch
-from crazyflie_lqr import componentwise
+from crazyflie_lqr import control_law
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_simulator.motion_capture import MotionCapture
@@ -17,8 +19,14 @@ from crazyflie_state_estimator.rate_filter import FiniteDifference
 _YAW = 6
 
 
+def prepare(*args: Any, **kwargs: Any) -> Batch:
+    """Return the flights of `simulate` before they are flown."""
+    with mock.patch.object(simulation, "fly", lambda batch, record, threads: batch):
+        return simulation.simulate(*args, **kwargs)
+
+
 def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Fly one vehicle of a batch, which takes about a thousand times as long.
+    """Return the flight of one vehicle of a batch.
 
     Returns
     -------
@@ -33,20 +41,20 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
     filter_ = plan.estimator.scalar(own["estimator"])
     estimator = MotionEstimator(filter_, FiniteDifference())
     controller = IntegralStateFeedback(
-        np.reshape(own["K"], (componentwise.U_DIM, componentwise.X_DIM)),
+        np.reshape(own["K"], (control_law.U_DIM, control_law.X_DIM)),
         np.array(own["u_ref"]),
         _YAW,
         own["integrator_k"],
         own["integrator_limit"],
     )
     (position_noise, attitude_noise), (dropout,) = own["noise"], own["dropout"]
-    random: Any = _Replay(batch.errors(index), has_position_noise=position_noise > 0.0)
+    random: Any = _Replay(batch.noise_samples(index), has_position_noise=position_noise > 0.0)
     motion_capture = MotionCapture(
         position_noise, attitude_noise, own["delay"][0] * period, dropout, random
     )
     goal = np.array(own["goal"])
     states, controls = [vehicle.state], []
-    control: NDArray[np.float64] = np.zeros(componentwise.U_DIM)
+    control: NDArray[np.float64] = np.zeros(control_law.U_DIM)
     for tick in range(batch.ticks):
         moment = tick * period
         random.begin(tick)
@@ -68,21 +76,21 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
 class _Replay(np.random.Generator):
     """Has `MotionCapture` draw the random numbers that the batch has drawn."""
 
-    def __init__(self, errors: NDArray[np.float64], has_position_noise: bool):
+    def __init__(self, samples: NDArray[np.float64], has_position_noise: bool):
         super().__init__(np.random.PCG64())
-        self._errors = errors
+        self._samples = samples
         self._has_position_noise = has_position_noise
 
     def begin(self, tick: int) -> None:
-        """Go on with the numbers of a tick."""
+        """Draw the numbers of a tick from now on."""
         self._tick = tick
-        errors = self._errors[tick]
-        self._next = [errors[:3], errors[3:6]] if self._has_position_noise else [errors[3:6]]
+        noise = self._samples[tick]
+        self._next = [noise[:3], noise[3:6]] if self._has_position_noise else [noise[3:6]]
 
     def random(self) -> Any:  # type: ignore[override]
-        """Return what decides whether the pose is lost."""
-        return self._errors[self._tick, 6]
+        """Return the number by which the pose is lost."""
+        return self._samples[self._tick, 6]
 
     def normal(self, mean: float, deviation: float, size: int) -> Any:  # type: ignore[override]
-        """Return errors of the position, then those of the attitude."""
+        """Return the noise of the position, then that of the attitude."""
         return deviation * self._next.pop(0)

@@ -1,0 +1,123 @@
+"""The formulas of the control law, elementwise: for floats, arrays, and what is traced.
+
+Nodes compute with floats, `crazyflie_batch` and vectorized fleets with one array per component;
+see `crazyflie_model.elementwise`. States, errors and controls are lists of components as
+described in `linear_feedback`. Nothing is changed in place.
+"""
+
+import math
+from collections.abc import Sequence
+from operator import mul
+
+from crazyflie_model.angles import wrap_to_pi
+from crazyflie_model.elementwise import Number, Vector, clip, functions, where
+from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
+
+ROLL, PITCH, YAW_DOT, THRUST = range(4)
+
+YAW = 6
+"""Index of the yaw in states with position, velocity and yaw."""
+
+X_DIM, U_DIM = 7, 4
+"""Of these states, and of controls."""
+
+LIMITS = (
+    (-MAX_TILT, MAX_TILT),
+    (-MAX_TILT, MAX_TILT),
+    (-math.inf, math.inf),
+    (MIN_THRUST, MAX_THRUST),
+)
+"""Least and most of each control."""
+
+INTEGRATED = (PITCH, ROLL, THRUST)
+"""The controls that the integrals of x, y and z act on."""
+
+MAX_GAP = 0.5
+"""Longest time between two states over which the position error is integrated, s."""
+
+
+def heading_error(
+    x: Sequence[Number], x_ref: Sequence[Number], yaw_index: int = YAW
+) -> Vector[Number]:
+    """Return the error of a state in the heading frame.
+
+    Parameters
+    ----------
+    x, x_ref : sequence, x_dim components
+        State and reference.
+    yaw_index : int
+        Where the yaw is in the state.
+
+    Returns
+    -------
+    list, x_dim components
+        ``x - x_ref``, with the horizontal position and velocity turned by
+        ``-yaw`` into the heading frame (x forward, y left), and the yaw error
+        wrapped to [-pi, pi].
+    """
+    e = [a - b for a, b in zip(x, x_ref, strict=True)]
+    yaw = x[yaw_index]
+    c, s = functions(yaw).cos(yaw), functions(yaw).sin(yaw)
+    e[0], e[1] = c * e[0] + s * e[1], c * e[1] - s * e[0]
+    e[3], e[4] = c * e[3] + s * e[4], c * e[4] - s * e[3]
+    e[yaw_index] = wrap_to_pi(e[yaw_index])
+    return e
+
+
+def linear_control(
+    K: Sequence[Sequence[Number]], u_ref: Sequence[Number], error: Sequence[Number]
+) -> Vector[Number]:
+    """Return u_ref + K e; K is a sequence of rows."""
+    return [reference + sum(map(mul, row, error)) for reference, row in zip(u_ref, K, strict=True)]
+
+
+def integrate(
+    axis: int,
+    integral: Number,
+    error: Number,
+    dt: Number,
+    linear: Sequence[Number],
+    k: Number,
+    limit: Number,
+) -> Number:
+    """Return the integral of the position error along an axis after ``dt``, m s.
+
+    Does not grow while it drives the control further into its limit (conditional integration:
+    Astrom and Hagglund, Advanced PID Control, 2006, 3.5).
+
+    Parameters
+    ----------
+    axis : int
+        0, 1 or 2: x, y or z in the heading frame.
+    integral : float or ndarray
+        Before, m s.
+    error : float or ndarray
+        m.
+    dt : float or ndarray
+        Since the last state, s.
+    linear : sequence, 4 components
+        Of `linear_control`.
+    k, limit : float or ndarray
+        Gain and largest absolute value of this integral; see `linear_feedback`.
+    """
+    grown = clip(integral + error * dt, -limit, limit)
+    low, high = LIMITS[INTEGRATED[axis]]
+    u = linear[INTEGRATED[axis]] + k * grown
+    growth = k * (grown - integral)
+    is_into_limit = ((u > high) & (growth > 0.0)) | ((u < low) & (growth < 0.0))
+    return where(is_into_limit, integral, grown)
+
+
+def with_integrals(
+    linear: Sequence[Number], integral: Sequence[Number], k: Sequence[Number]
+) -> Vector[Number]:
+    """Return a control with its integral part added."""
+    u = list(linear)
+    for control, gain, part in zip(INTEGRATED, k, integral, strict=True):
+        u[control] = u[control] + gain * part
+    return u
+
+
+def limited(u: Sequence[Number]) -> Vector[Number]:
+    """Return a control within `LIMITS`."""
+    return [clip(part, low, high) for part, (low, high) in zip(u, LIMITS, strict=True)]

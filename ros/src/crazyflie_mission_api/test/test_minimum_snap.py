@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 from crazyflie_mission_api import Limits, MissionError, plan
 from crazyflie_mission_api.minimum_snap import best_times
 from crazyflie_mission_api.trajectories import Samples, duration, excess
-from crazyflie_model.hermite import hermite
+from crazyflie_model.polynomials import hermite
 
 SQUARE = [(0, 0, 1), (1, 0, 1), (1, 1, 1.5), (0, 1, 1), (0, 0, 1)]
 LIMITS = Limits(speed=1.0, acceleration=2.0)

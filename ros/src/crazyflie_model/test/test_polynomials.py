@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
-from crazyflie_model.hermite import hermite
-from crazyflie_model.polynomials import PIECE_SIZE, PolynomialPiece
+from crazyflie_model.polynomials import PIECE_SIZE, PolynomialPiece, bezier, evaluate, hermite
 
 NUMBERS = st.floats(-2.0, 2.0)
 ENDS = st.tuples(NUMBERS, NUMBERS, NUMBERS, NUMBERS)
@@ -47,7 +46,7 @@ def test_short_polynomials_are_filled_with_zeros():
     assert struct.unpack("<33f", data) == tuple(expected)
 
 
-@pytest.mark.parametrize(("position", "bad"), [(0, math.nan), (31, math.inf), (32, 0.0)])
+@pytest.mark.parametrize(("position", "bad"), [(0, math.nan), (31, math.inf), (32, -1.0)])
 def test_memory_that_holds_no_piece_is_refused(position, bad):
     numbers = list(struct.unpack("<33f", random_piece(3, 1.0).pack()))
     numbers[position] = bad
@@ -62,3 +61,20 @@ def test_the_polynomial_between_two_ends(start, end, duration):
     orders = [polynomial.deriv(order) if order else polynomial for order in range(4)]
     np.testing.assert_allclose([f(0.0) for f in orders], start, atol=1e-9)
     np.testing.assert_allclose([f(duration) for f in orders], end, atol=1e-5)
+
+
+@given(ENDS, st.floats(0.3, 3.0), st.floats(0.0, 1.0))
+def test_the_bezier_curve_of_control_points(points, duration, s):
+    # De Casteljau's construction.
+    rest = np.array(points)
+    while len(rest) > 1:
+        rest = (1.0 - s) * rest[:-1] + s * rest[1:]
+    (value,) = evaluate(bezier(points, duration), s * duration, 0)
+    assert value == pytest.approx(rest[0], abs=1e-9)
+
+
+def test_derivatives():
+    coefficients = np.random.default_rng(4).normal(size=8).tolist()
+    polynomial = Polynomial(coefficients)
+    expected = [polynomial(0.7), *(polynomial.deriv(k)(0.7) for k in range(1, 5))]
+    np.testing.assert_allclose(evaluate(coefficients, 0.7, 4), expected)

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
+from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal
-from crazyflie_model.trajectory import Trajectory, smooth_piece
+from crazyflie_model.trajectory import Trajectory
 from crazyflie_utils.refusal import RefusalError
 
 NEAR = 0.5

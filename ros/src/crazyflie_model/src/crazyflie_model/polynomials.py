@@ -1,12 +1,21 @@
-"""Pieces of trajectories: polynomials of the 7th degree in x, y, z and yaw."""
+"""Polynomials of time: evaluation, interpolation, and the pieces that trajectories are made of.
+
+numpy and scipy are imported where a polynomial is interpolated: they take 40 MiB.
+"""
+
+from __future__ import annotations
 
 import math
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Generic, NamedTuple
+from typing import TYPE_CHECKING, Generic, NamedTuple, Self
 
 from crazyflie_model.elementwise import Number
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import ArrayLike, NDArray
 
 COEFFICIENTS = 8
 """Most coefficients of a polynomial, the constant first."""
@@ -17,8 +26,65 @@ PIECE_SIZE = 132
 _PIECE = struct.Struct("<33f")
 
 
+def evaluate(
+    coefficients: Sequence[Number] | NDArray[np.float64], t: Number, derivatives: int = 2
+) -> list[Number]:
+    """Return the value at t and as many derivatives of a polynomial, by Horner's scheme.
+
+    Parameters
+    ----------
+    coefficients : sequence of float
+        The constant first.
+    t : float or ndarray
+    derivatives : int
+    """
+    terms = [0.0 * t] * (derivatives + 1)
+    for c in reversed(coefficients):
+        for k in range(derivatives, 0, -1):
+            terms[k] = terms[k] * t + terms[k - 1]
+        terms[0] = terms[0] * t + c
+    return [math.factorial(k) * term for k, term in enumerate(terms)]
+
+
+def hermite(start: ArrayLike, end: ArrayLike, duration: float) -> tuple[float, ...]:
+    """Return the coefficients, the constant first, of the polynomial between two ends.
+
+    Parameters
+    ----------
+    start, end : array_like, shape (n,)
+        Value and derivatives by time; four at both ends make a polynomial of the
+        7th degree.
+    duration : float
+        Time between them, s, > 0.
+    """
+    from scipy.interpolate import BPoly
+
+    return _power_basis(BPoly.from_derivatives([0.0, duration], [start, end]))
+
+
+def bezier(points: Sequence[float], duration: float) -> tuple[float, ...]:
+    """Return the coefficients, the constant first, of the Bezier curve of control points.
+
+    Parameters
+    ----------
+    points : sequence of float
+        n points make a polynomial of degree n - 1.
+    duration : float
+        Time between the first and the last point, s, > 0.
+    """
+    from scipy.interpolate import BPoly
+
+    return _power_basis(BPoly([[point] for point in points], [0.0, duration]))
+
+
+def _power_basis(bernstein):
+    from scipy.interpolate import PPoly
+
+    return tuple(PPoly.from_bernstein_basis(bernstein).c[::-1, 0].tolist())
+
+
 class Goal(NamedTuple, Generic[Number]):
-    """Where a trajectory is at some moment, or at many.
+    """Where a trajectory is at one time, or at many.
 
     Attributes
     ----------
@@ -33,6 +99,12 @@ class Goal(NamedTuple, Generic[Number]):
     acceleration: tuple[Number, Number, Number]
     yaw: Number
     yaw_rate: Number
+
+
+def at_rest(position: Sequence[float], yaw: float = 0.0) -> Goal[float]:
+    """Return the goal of a vehicle that stays at a position (m) and heading (rad)."""
+    x, y, z = position
+    return Goal((x, y, z), (0.0,) * 3, (0.0,) * 3, yaw, 0.0)
 
 
 @dataclass(frozen=True)
@@ -58,37 +130,33 @@ class PolynomialPiece:
         """The coefficients of x, y, z and yaw."""
         return (self.x, self.y, self.z, self.yaw)
 
+    @property
+    def padded_axes(self) -> list[list[float]]:
+        """The coefficients of x, y, z and yaw, `COEFFICIENTS` of each."""
+        return [[*axis, *[0.0] * (COEFFICIENTS - len(axis))] for axis in self.axes]
+
     @classmethod
-    def unpack(cls, data: bytes) -> "PolynomialPiece":
+    def unpack(cls, data: bytes) -> Self:
         """Return the piece in `PIECE_SIZE` bytes of the vehicle's memory.
+
+        Memory that was never written is a piece without duration, at the origin.
 
         Raises
         ------
         ValueError
-            It holds numbers that are not finite, or no positive duration.
+            It holds numbers that are not finite, or a negative duration.
         """
-        numbers = _PIECE.unpack(data)
-        if not all(map(math.isfinite, numbers)) or numbers[-1] <= 0.0:
-            raise ValueError("a piece of a trajectory must be finite and last longer than 0 s")
-        return cls(numbers[-1], *(numbers[i : i + COEFFICIENTS] for i in range(0, 32, 8)))
+        *numbers, duration = _PIECE.unpack(data)
+        if not all(map(math.isfinite, numbers)) or not 0.0 <= duration < math.inf:
+            raise ValueError("it holds numbers that are not finite, or a negative duration")
+        return cls(duration, *(numbers[i : i + COEFFICIENTS] for i in range(0, 32, 8)))
 
     def pack(self) -> bytes:
         """Return the piece as the vehicle's memory holds it."""
-        padded = (c for axis in self.axes for c in [*axis, *[0.0] * (COEFFICIENTS - len(axis))])
-        return _PIECE.pack(*padded, self.duration)
+        return _PIECE.pack(*(c for axis in self.padded_axes for c in axis), self.duration)
 
     def evaluate(self, time: Number) -> Goal[Number]:
         """Return the goal ``time`` (s) after the beginning, which is not limited."""
-        values = [_evaluate(axis, time) for axis in self.axes]
-        position, velocity, acceleration = zip(*values[:3], strict=True)
-        return Goal(position, velocity, acceleration, values[3][0], values[3][1])
-
-
-def _evaluate(coefficients, t):
-    # Horner's scheme for the value and its first two derivatives.
-    value = first = second = 0.0 * t
-    for c in reversed(coefficients):
-        second = second * t + first
-        first = first * t + value
-        value = value * t + c
-    return value, first, 2.0 * second
+        *axes, yaw = (evaluate(axis, time) for axis in self.axes)
+        position, velocity, acceleration = zip(*axes, strict=True)
+        return Goal(position, velocity, acceleration, yaw[0], yaw[1])

@@ -1,197 +1,138 @@
-"""What the firmware's high-level commander flies: smooth and straight pieces, and trajectories."""
+"""Trajectories of polynomial pieces, and the curve from rest to rest with the least jerk."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.hermite import hermite
+from crazyflie_model.elementwise import Number, clip, where
 from crazyflie_model.polynomials import Goal, PolynomialPiece
 
+Pieces = Sequence[PolynomialPiece]
+"""Flown one after the other: as in the CSV files of crazyflie_demo and in a vehicle's memory."""
 
-def smooth_piece(
-    start: Goal[float], position: Triple, yaw: float, duration: float
-) -> PolynomialPiece:
-    """Return the piece from a goal to rest at a position (m) and heading (rad).
 
-    Each axis is the polynomial of the 7th degree that meets position, velocity,
-    acceleration and jerk (zero) at both ends, heading without acceleration. From
-    rest to rest this is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7 of the way.
+def minimum_jerk(s: Number) -> tuple[Number, Number]:
+    """Return 10 s^3 - 15 s^4 + 6 s^5 and its derivative, for s from 0 to 1.
 
-    Parameters
-    ----------
-    start : Goal
-    position : tuple, 3 components
-    yaw : float
-        The turn is the shorter one.
-    duration : float
-        s, > 0.
+    Of all curves from 0 to 1 that begin and end at rest without acceleration, the one with
+    the least jerk (Flash and Hogan, The coordination of arm movements, 1985). The derivative
+    is `MINIMUM_JERK_SPEED` at most, the second `MINIMUM_JERK_ACCELERATION`.
     """
-    turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
-    axes = [
-        hermite((p, v, a, 0.0), (end, 0.0, 0.0, 0.0), duration)
-        for p, v, a, end in zip(
-            (*start.position, start.yaw),
-            (*start.velocity, start.yaw_rate),
-            (*start.acceleration, 0.0),
-            (*position, start.yaw + turn),
-            strict=True,
+    value = s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
+    return value, 30.0 * s * s * (1.0 - s) ** 2
+
+
+MINIMUM_JERK_SPEED = 15.0 / 8.0
+MINIMUM_JERK_ACCELERATION = 10.0 / math.sqrt(3.0)
+
+
+def duration(pieces: Pieces) -> float:
+    """Return how long pieces take, s."""
+    return sum(piece.duration for piece in pieces)
+
+
+def stretched(pieces: Pieces, factor: float) -> list[PolynomialPiece]:
+    """Return the same path in ``factor`` times the time, as other pieces."""
+    return [
+        PolynomialPiece(
+            piece.duration * factor,
+            *([c / factor**k for k, c in enumerate(axis)] for axis in piece.axes),
         )
+        for piece in pieces
     ]
-    return PolynomialPiece(duration, *axes)
 
 
-def straight_piece(
-    start: Goal[float], position: Triple, yaw: float, duration: float
-) -> PolynomialPiece:
-    """Return the piece that goes there at constant speed; see `smooth_piece`."""
-    turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
-    ends = (*position, start.yaw + turn)
-    starts = (*start.position, start.yaw)
-    axes = ((a, (b - a) / duration) for a, b in zip(starts, ends, strict=True))
-    return PolynomialPiece(duration, *axes)
+def moved(pieces: Pieces, offset: Triple) -> list[PolynomialPiece]:
+    """Return pieces with an offset (x, y, z), m, added to all positions."""
+
+    def move(piece):
+        *axes, yaw = piece.padded_axes
+        x, y, z = ([axis[0] + d, *axis[1:]] for axis, d in zip(axes, offset, strict=True))
+        return PolynomialPiece(piece.duration, x, y, z, yaw)
+
+    return [move(piece) for piece in pieces]
 
 
-def spiral_piece(
-    start: Goal[float],
-    angle: float,
-    radii: tuple[float, float],
-    ascent: float,
-    duration: float,
-    sideways: bool,
-    clockwise: bool,
-) -> PolynomialPiece:
-    """Return the piece that approximates a spiral about a vertical axis.
+def turned(pieces: Pieces, pivot: Triple, angle: float) -> list[PolynomialPiece]:
+    """Return pieces turned by an angle (rad) about the vertical through a point (m)."""
+    c, s = math.cos(angle), math.sin(angle)
 
-    On the spiral, angle, radius, height and heading change evenly. Each axis is the
-    polynomial of the 7th degree that meets its position, velocity and acceleration
-    at both ends, without jerk: close up to a quarter of a turn, and not far beyond.
+    def turn(piece):
+        x, y, z, yaw = piece.padded_axes
+        turned_x = [c * a - s * b for a, b in zip(x, y, strict=True)]
+        turned_y = [s * a + c * b for a, b in zip(x, y, strict=True)]
+        return PolynomialPiece(piece.duration, turned_x, turned_y, z, [yaw[0] + angle, *yaw[1:]])
 
-    Parameters
-    ----------
-    start : Goal
-        Its position and heading tell where the axis is.
-    angle : float
-        rad; negative to fly backwards.
-    radii : tuple, 2 components
-        Distance from the axis at the beginning and at the end, m.
-    ascent : float
-        m.
-    duration : float
-        s, > 0.
-    sideways : bool
-        With the axis ahead and not to the side.
-    clockwise : bool
-        Seen from above; then the axis is to the right, otherwise to the left.
-    """
-    sense = -1.0 if clockwise else 1.0
-    rate = sense * angle / duration
-    # From the axis to the vehicle.
-    direction = start.yaw + (math.pi if sideways else -sense * math.pi / 2.0)
-    growth = (radii[1] - radii[0]) / duration
-    x, y, z = start.position
-    center = (x - radii[0] * math.cos(direction), y - radii[0] * math.sin(direction))
-
-    def end(time):
-        # Value, velocity, acceleration and jerk of each axis.
-        radius, around = radii[0] + growth * time, direction + rate * time
-        c, s = math.cos(around), math.sin(around)
-        tangential, normal = 2.0 * growth * rate, radius * rate**2
-        return (
-            (
-                center[0] + radius * c,
-                growth * c - radius * rate * s,
-                -tangential * s - normal * c,
-                0.0,
-            ),
-            (
-                center[1] + radius * s,
-                growth * s + radius * rate * c,
-                tangential * c - normal * s,
-                0.0,
-            ),
-            (z + ascent * time / duration, ascent / duration, 0.0, 0.0),
-            (start.yaw + rate * time, rate, 0.0, 0.0),
-        )
-
-    axes = (hermite(a, b, duration) for a, b in zip(end(0.0), end(duration), strict=True))
-    return PolynomialPiece(duration, *axes)
+    x, y, z = pivot
+    about_origin = [turn(piece) for piece in moved(pieces, (-x, -y, -z))]
+    return moved(about_origin, pivot)
 
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Pieces flown one after the other, then the last position.
+    """Pieces flown one after the other, then rest at the last position.
 
     Attributes
     ----------
-    pieces : tuple of PolynomialPiece
+    pieces : sequence of PolynomialPiece
         At least one.
     time_scale : float
         > 0; 2 is half as fast.
     backwards : bool
         From the end to the beginning.
-    shift : tuple, 3 components
-        Added to all positions, m.
-    turn : float
-        By which all is turned about the first position, rad.
     """
 
-    pieces: tuple[PolynomialPiece, ...]
+    pieces: Pieces
     time_scale: float = 1.0
     backwards: bool = False
-    shift: Triple = (0.0, 0.0, 0.0)
-    turn: float = 0.0
 
     @property
     def duration(self) -> float:
-        """How long it takes, s."""
-        return self.time_scale * sum(piece.duration for piece in self.pieces)
+        """Time from the beginning to the end, s."""
+        return self.time_scale * duration(self.pieces)
 
     def moved_to(self, position: Triple, yaw: float | None) -> "Trajectory":
         """Return the trajectory beginning at a position (m) and, unless None, heading (rad)."""
-        start = self._unmoved(0.0)
-        shift = tuple(a - b for a, b in zip(position, start.position, strict=True))
-        turn = 0.0 if yaw is None else math.remainder(yaw - start.yaw, 2.0 * math.pi)
-        return Trajectory(self.pieces, self.time_scale, self.backwards, shift, turn)
+        start = self.evaluate(0.0)
+        pieces = self.pieces
+        if yaw is not None:
+            turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
+            pieces = turned(pieces, start.position, turn)
+        x, y, z = (a - b for a, b in zip(position, start.position, strict=True))
+        return replace(self, pieces=moved(pieces, (x, y, z)))
 
-    def evaluate(self, time: float) -> Goal[float]:
-        """Return the goal ``time`` (s) after the beginning."""
-        goal = self._unmoved(time)
-        pivot = self._unmoved(0.0).position if self.turn else (0.0, 0.0, 0.0)
-        offset = tuple(a - b for a, b in zip(goal.position, pivot, strict=True))
-        position = tuple(
-            a + b + c for a, b, c in zip(self._turned(offset), pivot, self.shift, strict=True)
-        )
-        return Goal(
-            position,
-            self._turned(goal.velocity),
-            self._turned(goal.acceleration),
-            goal.yaw + self.turn,
-            goal.yaw_rate,
-        )
-
-    def _turned(self, vector):
-        c, s = math.cos(self.turn), math.sin(self.turn)
-        return (c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2])
-
-    def _unmoved(self, time):
+    def evaluate(self, time: Number) -> Goal[Number]:
+        """Return the goal ``time`` (s) after the beginning, at rest from the end on."""
         total = self.duration
-        over = time >= total
-        time = min(max(time, 0.0), total)
-        local = (total - time if self.backwards else time) / self.time_scale
-        for piece in self.pieces[:-1]:
-            if local <= piece.duration:
-                break
-            local -= piece.duration
-        else:
-            piece = self.pieces[-1]
-        goal = piece.evaluate(min(local, piece.duration))
-        if over:
-            return Goal(goal.position, (0.0,) * 3, (0.0,) * 3, goal.yaw, 0.0)
+        is_over = time >= total
+        time = clip(time, 0.0, total)
+        piece, local = self._piece_at((total - time if self.backwards else time) / self.time_scale)
+        goal = piece.evaluate(local)
         rate = (-1.0 if self.backwards else 1.0) / self.time_scale
-        return Goal(
-            goal.position,
-            tuple(rate * v for v in goal.velocity),
-            tuple(rate * rate * a for a in goal.acceleration),
-            goal.yaw,
-            rate * goal.yaw_rate,
-        )
+        vx, vy, vz = (where(is_over, 0.0, rate * v) for v in goal.velocity)
+        ax, ay, az = (where(is_over, 0.0, rate * rate * a) for a in goal.acceleration)
+        yaw_rate = where(is_over, 0.0, rate * goal.yaw_rate)
+        return Goal(goal.position, (vx, vy, vz), (ax, ay, az), goal.yaw, yaw_rate)
+
+    def _piece_at(self, time):
+        """Return the piece of a time since the beginning and the time in it.
+
+        For n times it is one piece with coefficients of shape (n,).
+        """
+        if isinstance(time, float):
+            for piece in self.pieces[:-1]:
+                if time <= piece.duration:
+                    break
+                time -= piece.duration
+            else:
+                piece = self.pieces[-1]
+            return piece, min(time, piece.duration)
+        import numpy as np
+
+        durations = np.array([piece.duration for piece in self.pieces])
+        begins = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
+        index = np.searchsorted(begins[1:], time)
+        axes = np.array([piece.padded_axes for piece in self.pieces])[index]
+        piece = PolynomialPiece(durations[index], *np.moveaxis(axes, 0, -1))
+        return piece, np.minimum(time - begins[index], piece.duration)

@@ -9,8 +9,7 @@ import pytest
 from flights import LIMIT, node, observed_vehicle
 
 from crazyflie_demo.trajectory_file import save
-from crazyflie_model.hermite import hermite
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.polynomials import PolynomialPiece, hermite
 
 # Plays a script as users write it: a command returns at once, so the script sleeps as long as
 # the command takes. That is what users' scripts do, so it is what has to work.

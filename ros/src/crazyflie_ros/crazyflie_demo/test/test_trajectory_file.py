@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from crazyflie_demo.trajectory_file import COLUMNS, TrajectoryError, load, save, summary
-from crazyflie_model.hermite import hermite
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.polynomials import PolynomialPiece, hermite
 
 FIGURE8 = Path(__file__).parents[1] / "data" / "figure8.csv"
 LINE = ["1.5"] + ["0"] * (COLUMNS - 1)

@@ -2,7 +2,7 @@
 
 A curve of Lissajous, x = WIDTH sin(phase), y = HEIGHT sin(2 phase), z = 0, yaw = 0, run
 through once. The phase begins at rest, reaches a constant rate after `RAMP`, and ends at
-rest; its rate follows 10 s^3 - 15 s^4 + 6 s^5, so that position, velocity, acceleration and jerk
+rest; its rate follows `minimum_jerk`, so that position, velocity, acceleration and jerk
 are continuous, and the last three zero at both ends. Between knots `PIECE` apart the
 curve is the polynomial of the 7th degree that shares all four with it at both knots.
 
@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_demo.trajectory_file import save
-from crazyflie_model.hermite import hermite
-from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
+from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece, evaluate, hermite
 
 WIDTH, HEIGHT = 0.75, 0.375
 """Amplitudes along x and y, m."""
@@ -28,6 +27,9 @@ DURATION, RAMP, PIECE = 10.0, 2.0, 1.0
 _RATE = 2.0 * math.pi / (DURATION - RAMP)
 """Of the phase between the ramps, rad/s."""
 
+_RAMP_INTEGRAL = (0.0, 0.0, 0.0, 0.0, 2.5, -3.0, 1.0)
+"""Of `crazyflie_model.trajectory.minimum_jerk`, by powers of s."""
+
 
 def phase(time: float) -> NDArray[np.float64]:
     """Return the phase and its first three derivatives, shape (4,), at a time (s)."""
@@ -36,13 +38,8 @@ def phase(time: float) -> NDArray[np.float64]:
         mirrored = phase(DURATION - time)
         return np.array([2.0 * math.pi, 0.0, 0.0, 0.0]) - [1.0, -1.0, 1.0, -1.0] * mirrored
     s = min(time / RAMP, 1.0)
-    ramp = [
-        RAMP * (2.5 * s**4 - 3.0 * s**5 + s**6),
-        10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5,
-        (30.0 * s**2 - 60.0 * s**3 + 30.0 * s**4) / RAMP,
-        (60.0 * s - 180.0 * s**2 + 120.0 * s**3) / RAMP**2,
-    ]
-    return _RATE * np.array(ramp) + [_RATE * max(time - RAMP, 0.0), 0.0, 0.0, 0.0]
+    ramp = np.array(evaluate(_RAMP_INTEGRAL, s, 3)) * RAMP ** np.array([1.0, 0.0, -1.0, -2.0])
+    return _RATE * ramp + [_RATE * max(time - RAMP, 0.0), 0.0, 0.0, 0.0]
 
 
 def sine(amplitude: float, multiple: int, time: float) -> NDArray[np.float64]:

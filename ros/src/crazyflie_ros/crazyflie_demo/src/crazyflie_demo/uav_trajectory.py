@@ -12,7 +12,7 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_demo.trajectory_file import load
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.polynomials import evaluate
 from crazyflie_model.units import GRAVITY
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ class Polynomial:
 
     def eval(self, t: float) -> float:
         """Return its value at t."""
-        return float(polynomial.polyval(t, self.p))
+        return float(evaluate(self.p, t, 0)[0])
 
     def derivative(self) -> "Polynomial":
         """Return its derivative."""
@@ -80,20 +80,11 @@ class Polynomial4D:
 
     def eval(self, t: float) -> TrajectoryOutput:
         """Return what the piece asks for ``t`` (s) after its beginning."""
-        goal = self._piece().evaluate(t)
-        acceleration = np.array(goal.acceleration)
-        jerk = np.array(self.derivative()._piece().evaluate(t).acceleration)
-        return TrajectoryOutput(
-            np.array(goal.position),
-            np.array(goal.velocity),
-            acceleration,
-            angular_velocity(acceleration, jerk, float(goal.yaw), float(goal.yaw_rate)),
-            float(goal.yaw),
-        )
-
-    def _piece(self):
-        axes = (self.px, self.py, self.pz, self.pyaw)
-        return PolynomialPiece(self.duration, *(axis.p.tolist() for axis in axes))
+        axes = [evaluate(axis.p, t, 3) for axis in (self.px, self.py, self.pz)]
+        position, velocity, acceleration, jerk = np.array(axes).T
+        yaw, yaw_rate = map(float, evaluate(self.pyaw.p, t, 1))
+        omega = angular_velocity(acceleration, jerk, yaw, yaw_rate)
+        return TrajectoryOutput(position, velocity, acceleration, omega, yaw)
 
 
 class Trajectory:

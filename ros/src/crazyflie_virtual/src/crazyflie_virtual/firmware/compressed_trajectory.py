@@ -4,12 +4,10 @@ Each axis of a segment is a Bezier curve of degree 0, 1, 3 or 7. The format is
 described in the firmware's documentation, "Trajectory formats".
 """
 
+import math
 import struct
 
-import numpy as np
-from scipy.interpolate import BPoly, PPoly
-
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.polynomials import PolynomialPiece, bezier
 
 _START = struct.Struct("<4h")
 _HEADER = struct.Struct("<BH")
@@ -18,7 +16,7 @@ _POINTS = (0, 1, 3, 7)
 """Control points that are stored for each type of curve: all but the first."""
 
 _MILLI = 1e-3
-_TENTH_DEGREE = np.pi / 1800.0
+_TENTH_DEGREE = math.pi / 1800.0
 _UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)
 """Of x, y, z and yaw: m and rad."""
 
@@ -64,13 +62,7 @@ def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:
             numbers = struct.unpack_from(f"<{count}h", memory, at)
             at += 2 * count
             points = [ends[axis], *(_UNITS[axis] * n for n in numbers)]
-            axes.append(_bezier(points, duration))
+            axes.append(bezier(points, duration))
             ends[axis] = points[-1]
         pieces.append(PolynomialPiece(duration, *axes))
     return tuple(pieces) or (PolynomialPiece(0.0, *((end,) for end in ends)),)
-
-
-def _bezier(points, duration):
-    # Coefficients, the constant first, of the curve over 0 to duration.
-    bernstein = BPoly(np.reshape(points, (-1, 1)), [0.0, duration])
-    return tuple(PPoly.from_bernstein_basis(bernstein).c[::-1, 0].tolist())

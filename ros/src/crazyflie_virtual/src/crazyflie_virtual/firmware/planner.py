@@ -2,17 +2,12 @@
 
 import errno
 import math
-import struct
 from enum import Enum
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, Goal, PolynomialPiece
-from crazyflie_model.trajectory import (
-    Trajectory,
-    smooth_piece,
-    spiral_piece,
-    straight_piece,
-)
+from crazyflie_model.planner import smooth_piece, spiral_piece, straight_piece
+from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece, at_rest
+from crazyflie_model.trajectory import Trajectory
 from crazyflie_virtual.firmware.compressed_trajectory import read_compressed
 from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Modes, Setpoint
 
@@ -36,8 +31,6 @@ _SHORTEST = 0.01
 
 _NOWHERE = PolynomialPiece(1.0, *[(math.nan,)] * 4)
 """What the firmware's arithmetic makes of a plan with infinite numbers."""
-
-_PIECE = struct.Struct("<33f")
 
 _LEAST_SPEED = 0.001
 """Of a climb, m/s: clients may set the speed to 0."""
@@ -83,7 +76,7 @@ class Planner:
         self._definitions: dict[int, tuple[int, int, int, int]] = {}
         self._trajectory: Trajectory | None = None
         self._begin = 0.0
-        self._last = Goal((0.0,) * 3, (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
+        self._last = at_rest((0.0, 0.0, 0.0))
 
     def is_finished(self, time: float) -> bool:
         """Return whether what was planned last has come to its end."""
@@ -256,11 +249,11 @@ class Planner:
         if not 0 < count * PIECE_SIZE <= len(data):
             raise ValueError(f"{count} pieces at byte {offset} are not in the memory")
         chunks = (data[i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
-        return tuple(map(_read_piece, chunks)), False
+        return tuple(map(PolynomialPiece.unpack, chunks)), False
 
     def _move_vertically(self, time, height, yaw, duration, phase):
         x, y, z = self._last.position
-        start = Goal((x, y, z), (0.0,) * 3, (0.0,) * 3, self._last.yaw, 0.0)
+        start = at_rest((x, y, z), self._last.yaw)
         yaw = start.yaw if yaw is None else yaw
         way = (start, (x, y, height), yaw, max(duration, _SHORTEST))
         return self._fly(time, phase, smooth_piece, *way)
@@ -277,11 +270,3 @@ class Planner:
         self._trajectory = trajectory
         self._begin = time
         self.phase = phase
-
-
-def _read_piece(data):
-    # Memory that was never written is a piece too: no time at all, at the origin.
-    *coefficients, duration = _PIECE.unpack(data)
-    if not all(map(math.isfinite, coefficients)) or not 0.0 <= duration < math.inf:
-        raise ValueError("it holds numbers that are not finite, or a negative duration")
-    return PolynomialPiece(duration, *(coefficients[i : i + COEFFICIENTS] for i in (0, 8, 16, 24)))

@@ -1,0 +1,115 @@
+"""The pieces that the firmware's high-level commander plans: smooth, straight, spiral."""
+
+import math
+
+from crazyflie_model.angles import Triple
+from crazyflie_model.polynomials import Goal, PolynomialPiece, hermite
+
+
+def smooth_piece(
+    start: Goal[float], position: Triple, yaw: float, duration: float
+) -> PolynomialPiece:
+    """Return the piece from a goal to rest at a position (m) and heading (rad).
+
+    Each axis is the polynomial of the 7th degree that meets position, velocity,
+    acceleration and jerk (zero) at both ends, heading without acceleration. From
+    rest to rest this is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7 of the way.
+
+    Parameters
+    ----------
+    start : Goal
+    position : tuple, 3 components
+    yaw : float
+        The turn is the shorter one.
+    duration : float
+        s, > 0.
+    """
+    turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
+    axes = [
+        hermite((p, v, a, 0.0), (end, 0.0, 0.0, 0.0), duration)
+        for p, v, a, end in zip(
+            (*start.position, start.yaw),
+            (*start.velocity, start.yaw_rate),
+            (*start.acceleration, 0.0),
+            (*position, start.yaw + turn),
+            strict=True,
+        )
+    ]
+    return PolynomialPiece(duration, *axes)
+
+
+def straight_piece(
+    start: Goal[float], position: Triple, yaw: float, duration: float
+) -> PolynomialPiece:
+    """Return the piece that goes there at constant speed; see `smooth_piece`."""
+    turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
+    ends = (*position, start.yaw + turn)
+    starts = (*start.position, start.yaw)
+    axes = ((a, (b - a) / duration) for a, b in zip(starts, ends, strict=True))
+    return PolynomialPiece(duration, *axes)
+
+
+def spiral_piece(
+    start: Goal[float],
+    angle: float,
+    radii: tuple[float, float],
+    ascent: float,
+    duration: float,
+    sideways: bool,
+    clockwise: bool,
+) -> PolynomialPiece:
+    """Return the piece that approximates a spiral about a vertical axis.
+
+    On the spiral, angle, radius, height and heading change evenly. Each axis is the
+    polynomial of the 7th degree that meets its position, velocity and acceleration
+    at both ends, without jerk: close up to a quarter of a turn, and not far beyond.
+
+    Parameters
+    ----------
+    start : Goal
+        Its position and heading tell where the axis is.
+    angle : float
+        rad; negative to fly backwards.
+    radii : tuple, 2 components
+        Distance from the axis at the beginning and at the end, m.
+    ascent : float
+        m.
+    duration : float
+        s, > 0.
+    sideways : bool
+        With the axis ahead and not to the side.
+    clockwise : bool
+        Seen from above; then the axis is to the right, otherwise to the left.
+    """
+    sense = -1.0 if clockwise else 1.0
+    rate = sense * angle / duration
+    # From the axis to the vehicle.
+    direction = start.yaw + (math.pi if sideways else -sense * math.pi / 2.0)
+    growth = (radii[1] - radii[0]) / duration
+    x, y, z = start.position
+    center = (x - radii[0] * math.cos(direction), y - radii[0] * math.sin(direction))
+
+    def end(time):
+        # Value, velocity, acceleration and jerk of each axis.
+        radius, around = radii[0] + growth * time, direction + rate * time
+        c, s = math.cos(around), math.sin(around)
+        tangential, normal = 2.0 * growth * rate, radius * rate**2
+        return (
+            (
+                center[0] + radius * c,
+                growth * c - radius * rate * s,
+                -tangential * s - normal * c,
+                0.0,
+            ),
+            (
+                center[1] + radius * s,
+                growth * s + radius * rate * c,
+                tangential * c - normal * s,
+                0.0,
+            ),
+            (z + ascent * time / duration, ascent / duration, 0.0, 0.0),
+            (start.yaw + rate * time, rate, 0.0, 0.0),
+        )
+
+    axes = (hermite(a, b, duration) for a, b in zip(end(0.0), end(duration), strict=True))
+    return PolynomialPiece(duration, *axes)

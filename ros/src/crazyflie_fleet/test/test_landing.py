@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
-from crazyflie_fleet.landing import _Picture, next_round
+from crazyflie_fleet.landing import MAX_DETOUR, _Picture, free_place, next_round
 
 SCALE = np.array([1.0, 1.0, 0.5])
 
@@ -159,3 +159,26 @@ def test_a_place_behind_another_vehicle_is_the_last_resort():
     # Only behind the other one there is room: it is the place, though the way is not clear.
     found = next_round(places, flags, stands, limits, *box)
     assert found == {0: pytest.approx((0.75, 0.0))}
+
+
+def test_who_descends_already_lands_where_it_is_or_beside_what_is_beneath():
+    places = np.array([(0.0, 0.0, 2.0), (0.1, 0.0, 1.0), (2.0, 0.0, 0.0)])
+    stands, limits = np.array([False, False, True]), np.full((3, 3), 0.3)
+    assert free_place(1, places, stands, limits) == (0.1, 0.0)
+    x, y = free_place(0, places, stands, limits)
+    assert 0.3 < np.hypot(x - 0.1, y) < 0.5
+    # Between others on all sides it cannot leave.
+    angles = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    ring = np.stack([0.35 * np.cos(angles), 0.35 * np.sin(angles), np.full(12, 2.0)], axis=-1)
+    places = np.vstack([places[:2], ring])
+    stands, limits = np.zeros(14, dtype=bool), np.full((14, 14), 0.3)
+    assert free_place(0, places, stands, limits) == (0.0, 0.0)
+
+
+def test_a_descent_at_once_goes_only_so_far_aside():
+    axis = 0.4 * np.arange(-10, 11)
+    floor = np.stack(np.meshgrid(axis, axis, [0.0]), axis=-1).reshape(-1, 3)
+    places = np.vstack([[(0.0, 0.0, 2.0)], floor])
+    stands, limits = np.arange(len(places)) > 0, np.full((len(places),) * 2, 0.3)
+    assert abs(axis).max() > MAX_DETOUR
+    assert free_place(0, places, stands, limits) == (0.0, 0.0)

@@ -8,7 +8,7 @@ import pytest
 import rospkg
 import rospy
 from geometry_msgs.msg import Point
-from std_msgs.msg import String
+from std_msgs.msg import Float32, String
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver.srv import GoToRequest
@@ -123,12 +123,10 @@ def test_one_message_on_tf_for_all(tmp_path, models):
 class Tower(Swarm):
     """Vehicles above each other, with one beside them."""
 
-    HEIGHTS = (1.0, 2.0, 3.0)
-
-    def __init__(self):
+    def __init__(self, heights=(1.0, 2.0, 3.0)):
         super().__init__(fleet={"n": 4, "spacing": 1.0})
         self.call("/all/takeoff")
-        for name, z in zip(("cf1", "cf2", "cf3"), self.HEIGHTS, strict=True):
+        for name, z in zip(("cf1", "cf2", "cf3"), heights, strict=True):
             self.go_to(name, (-0.5, -0.5, z))
 
     def go_to(self, name, goal):
@@ -173,6 +171,39 @@ def test_vehicles_above_each_other_do_not_land_on_each_other():
     # Buffers are 0.15 m.
     assert tower.nearest() > 0.3
     assert tower.position("cf1") == pytest.approx((-0.5, -0.5, 0.0), abs=0.05)
+
+
+def end_launch(tower):
+    tower.process.leave(tower.nodes)
+    # A process lives on for 10 s.
+    tower.process.advance(10.0)
+
+
+def land_the_upper_ones(tower):
+    for name in ("cf3", "cf2"):
+        tower.process.call(f"/{name}/land", EmptyRequest())
+        tower.process.advance(1.0)
+    tower.process.advance(25.0)
+
+
+def empty_the_batteries(tower):
+    for _ in range(80):
+        for name in ("cf2", "cf3"):
+            tower.process.publish(f"/{name}/battery", Float32(2.8))
+        tower.process.advance(0.25)
+
+
+@pytest.mark.parametrize("end", [end_launch, land_the_upper_ones, empty_the_batteries])
+def test_a_vehicle_that_lands_by_itself_lands_beside_those_beneath_it(end):
+    # As near to each other as their buffers allow.
+    tower = Tower((0.7, 1.35, 2.0))
+    tower.mark()
+    end(tower)
+    states = [tower.process.published(f"/cf{k}/in_flight_state")[-1].data for k in (1, 2, 3)]
+    down = ["on_ground" if end is end_launch else "flying", "on_ground", "on_ground"]
+    assert states == down
+    assert tower.nearest() > 0.3
+    assert tower.position("cf1")[:2] == pytest.approx((-0.5, -0.5), abs=0.05)
 
 
 def test_references_of_others_do_not_disturb_a_landing():

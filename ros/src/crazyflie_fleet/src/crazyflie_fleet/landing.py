@@ -19,6 +19,9 @@ Flags = NDArray[np.bool_]
 SIDE_SPEED = 0.5
 """Mean speed at which vehicles fly to free places, m/s."""
 
+MAX_DETOUR = 3.0
+"""How far aside along x and y a vehicle lands that descends already, m."""
+
 _MARGIN = 1.05
 """How much farther than it must be a free place is from others: vehicles are not exactly where they
 were told to be."""
@@ -74,6 +77,31 @@ def next_round(
     return chosen
 
 
+def free_place(i: int, places: Array, stands: Flags, limits: Array) -> tuple[float, float]:
+    """Return where a vehicle lands that descends already.
+
+    Parameters
+    ----------
+    i : int
+        Its number.
+    places, stands, limits
+        As of `next_round`; vehicles that descend count as on the ground, at their landing places.
+
+    Returns
+    -------
+    x, y : float
+        m. Where it is, if nothing is beneath, or no free place within `MAX_DETOUR` can be reached
+        straight.
+    """
+    lands = np.arange(len(places)) == i
+    everywhere = np.full((len(places), 2), np.inf)
+    picture = _Picture(places, lands, stands & ~lands, limits, -everywhere, everywhere)
+    if not picture.is_obstructed[i]:
+        return _pair(places[i])
+    free = picture.free_places(i, {}, MAX_DETOUR)[:_MOST_WAYS]
+    return _pair([*free[picture.are_clear(i, free, {})], places[i]][0])
+
+
 class _Picture:
     """The vehicles at one moment; see `next_round`."""
 
@@ -99,10 +127,10 @@ class _Picture:
         self.is_obstructed = (is_near & stands | beneath & ~lands & ~stands).any(axis=1)
         self.is_lowest = lands & ~(beneath & lands).any(axis=1)
 
-    def free_places(self, i, chosen):
+    def free_places(self, i, chosen, reach=math.inf):
         """Return places to land for vehicle i, the nearest first, shape (m, 2)."""
         step = _PITCH * self._limits[i].max()
-        count = math.ceil(2.0 * (math.sqrt(len(self._z)) + 1.0) / _PITCH)
+        count = math.ceil(min(2.0 * (math.sqrt(len(self._z)) + 1.0) / _PITCH, reach / step))
         axis = step * np.arange(-count, count + 1)
         grid = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
         grid = self._xy[i] + grid[np.hypot(*grid.T).argsort(kind="stable")]

@@ -13,9 +13,10 @@ from typing_extensions import override
 from crazyflie_driver.srv import GoTo, GoToResponse
 from crazyflie_fleet.fleet import Vehicle
 from crazyflie_fleet.lander import LANDING_TOPIC
+from crazyflie_fleet.safe_descent import SafeDescents
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.sightings import FLYING, STATE_LIMIT, Sightings
-from crazyflie_fleet.stack import REFERENCE, SAFE_REFERENCE
+from crazyflie_fleet.sightings import DESCENDING, FLYING, STATE_LIMIT, Sightings
+from crazyflie_fleet.stack import DESCENT, REFERENCE, SAFE_DESCENT, SAFE_REFERENCE
 from crazyflie_fleet.way import Way, along
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
@@ -83,7 +84,9 @@ class ReferencesNode(Node):
         # Own ones first.
         everybody = (*vehicles, *others)
         self.sightings = Sightings(everybody, swarms or {})
-        self._separation = Separation([vehicle.buffer for vehicle in everybody])
+        buffers = [vehicle.buffer for vehicle in everybody]
+        self._separation = Separation(buffers)
+        self._descents = SafeDescents(buffers)
         self._led: list[_Led] = []
         self._told = ""
 
@@ -111,6 +114,10 @@ class ReferencesNode(Node):
         handle.advertise_service(below + "go_to", GoTo, partial(self._on_go_to, led))
         handle.subscribe(
             below + REFERENCE, PositionVelocityStateStamped, partial(self._on_reference, led)
+        )
+        descent = handle.publisher(below + SAFE_DESCENT, PositionVelocityStateStamped)
+        handle.subscribe(
+            below + DESCENT, PositionVelocityStateStamped, partial(self._on_descent, led, descent)
         )
 
     def _publish_mocap_frames(self, handle):
@@ -146,6 +153,21 @@ class ReferencesNode(Node):
             return
         led.way = None
         self._want(led, message)
+
+    def _on_descent(self, led, publisher, message):
+        number, now = led.number, self._handle.time()
+        if number not in self._descents:
+            flight_states = np.array(self.sightings.flight_states)
+            is_landing = ~self.sightings.are_in_flight() | (flight_states == DESCENDING)
+            distance = self._descents.begin(number, now, self.sightings.positions, is_landing)
+            if distance > 0.0:
+                self._handle.warn(
+                    f"{led.vehicle.name} lands {distance:.2f} m aside: another is beneath it"
+                )
+        aside = self._descents.reference(number, now, message.state.z, message.state.z_dot)
+        if aside is not None:
+            message = PositionVelocityStateStamped(message.header, PositionVelocityState(*aside))
+        publisher.publish(message)
 
     def _want(self, led, message):
         led.wanted = message
@@ -193,6 +215,8 @@ class ReferencesNode(Node):
         for led in self._led:
             if not self._is_flying(led):
                 led.way = None
+            if self.sightings.flight_states[led.number] != DESCENDING:
+                self._descents.end(led.number)
         ways = {led.number: led.way for led in self._led if led.way is not None and not led.waits}
         if not ways:
             return

@@ -16,8 +16,8 @@ from crazyflie_utils.vectors import to_tuple
 STATE_LIMIT = 0.5
 """A state older than this says nothing about where its vehicle is, s."""
 
-FLYING = "flying"
-IN_FLIGHT = ("taking_off", FLYING, "descending")
+FLYING, DESCENDING = "flying", "descending"
+IN_FLIGHT = ("taking_off", FLYING, DESCENDING)
 """Flight states of vehicles that others have to keep apart from."""
 
 

@@ -22,6 +22,7 @@ Tree = dict[str, Any]
 """Parameters as the parameter server has them."""
 
 REFERENCE, SAFE_REFERENCE = "ref", "ref_safe"
+DESCENT, SAFE_DESCENT = f"{REFERENCE}_descent", f"{REFERENCE}_descent_safe"
 STATE, LQR_CONTROL = "state", "control/lqr"
 TAKEOFF_CONTROL, FINAL_CONTROL = "control/takeoff", "control/final"
 IN_FLIGHT = "in_flight"
@@ -81,7 +82,7 @@ def parameters(vehicle: Vehicle, frames: Mapping[str, str], common: Mapping[str,
             "u_dim": 4,
             "topics": {
                 "reference": SAFE_REFERENCE,
-                "descent_reference": f"{REFERENCE}_descent",
+                "descent_reference": SAFE_DESCENT,
                 "state": STATE,
                 "control": LQR_CONTROL,
                 "flight_state": FLIGHT_STATE,

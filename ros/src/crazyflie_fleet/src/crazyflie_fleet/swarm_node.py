@@ -14,7 +14,7 @@ from typing_extensions import override
 from crazyflie_fleet.batch_vehicles import BatchVehicles
 from crazyflie_fleet.fleet import Vehicle
 from crazyflie_fleet.messages import array_message, control_message, state_message
-from crazyflie_fleet.stack import FINAL_CONTROL, LQR_CONTROL, REFERENCE, SAFE_REFERENCE, STATE
+from crazyflie_fleet.stack import FINAL_CONTROL, LQR_CONTROL, SAFE_DESCENT, SAFE_REFERENCE, STATE
 from crazyflie_lqr.control_law import heading_error, limited, linear_control
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
@@ -187,7 +187,7 @@ class SwarmNode(Node):
             on_invalid=lambda: reference.invalidate(handle.time()),
         )
         handle.subscribe(
-            f"{below}{REFERENCE}_descent",
+            below + SAFE_DESCENT,
             PositionVelocityStateStamped,
             partial(self._on_descent, reference),
             finite="state",

@@ -50,7 +50,7 @@ def take_leave(vehicle: "DriverVehicle", duration: float, limit: float) -> bool:
     if vehicle.commands.flight.is_flight(state) or on_setpoints:
         end = time.monotonic() + limit
         if setpoints.is_streaming:
-            setpoints.hand_over()
+            setpoints.notify_setpoints_stop()
         with contextlib.suppress(AlreadyLandingError):
             vehicle.crazyflie.high_level.land(0.0, duration)
         if not _has_landed(vehicle, end):
@@ -58,7 +58,7 @@ def take_leave(vehicle: "DriverVehicle", duration: float, limit: float) -> bool:
     elif is_flying and not setpoints.is_streaming:
         # It has landed less than 2 s ago, and is not locked by silence; or it is another client's.
         return True
-    setpoints.zeros()
+    setpoints.send_zero_thrust()
     return True
 
 

@@ -149,7 +149,7 @@ class FlightCommands:
         state = self._vehicle.supervisor
         may_fly = state is None or SupervisorState.FLYING in state
         if not (may_fly and self._setpoints.is_flight):
-            self._setpoints.hand_over(remain_valid_ms)
+            self._setpoints.notify_setpoints_stop(remain_valid_ms)
             return
         # Without a link nothing could be sent later, either.
         self._crazyflie.link()
@@ -263,7 +263,7 @@ class FlightCommands:
             return False
         if self._setpoints.is_streaming:
             try:
-                self._setpoints.hand_over_now(self._held or 0)
+                self._setpoints.notify_setpoints_stop_now(self._held or 0)
             except LinkLostError:
                 return False
         self._held = None

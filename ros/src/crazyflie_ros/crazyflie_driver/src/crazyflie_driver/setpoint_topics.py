@@ -106,9 +106,9 @@ class SetpointTopics:
         """Return how many setpoints were sent in the last second."""
         return sum(1 for time in self._times if now - time <= _RATE_WINDOW) / _RATE_WINDOW
 
-    def zeros(self) -> None:
+    def send_zero_thrust(self) -> None:
         """Send zero thrust a hundred times, and that setpoints end; blocks."""
-        self._crazyflie.setpoints.zeros()
+        self._crazyflie.setpoints.send_zero_thrust()
         self.is_streaming = False
         self._lift.end()
 
@@ -117,15 +117,15 @@ class SetpointTopics:
         """When the last setpoint was sent, s; -inf if none was."""
         return self._times[-1] if self._times else -math.inf
 
-    def hand_over_now(self, remain_valid_ms: int = 0) -> None:
+    def notify_setpoints_stop_now(self, remain_valid_ms: int = 0) -> None:
         """Do the same as `hand_over`, in the thread that sends: see crazyflie_link's `guarded`."""
-        self._crazyflie.setpoints.hand_over_now(remain_valid_ms)
+        self._crazyflie.setpoints.notify_setpoints_stop_now(remain_valid_ms)
         self.is_streaming = False
         self._lift.end()
 
-    def hand_over(self, remain_valid_ms: int = 0) -> None:
+    def notify_setpoints_stop(self, remain_valid_ms: int = 0) -> None:
         """Announce that setpoints end, so that the vehicle accepts high-level commands."""
-        self._crazyflie.setpoints.hand_over(remain_valid_ms)
+        self._crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms)
         self.is_streaming = False
         self._lift.end()
 
@@ -153,7 +153,7 @@ class SetpointTopics:
             self.gate.not_lifted()
             # Without a link, which is said by its state, the firmware stops the motors.
             with contextlib.suppress(CrazyflieError):
-                self.hand_over()
+                self.notify_setpoints_stop()
             advice += " Its motors are stopped, since it might leap; pause the stream to try again"
         self._handle.warn(
             f"{self._parameters.name}: was told to fly ({told}), and has not lifted off within "
@@ -219,7 +219,7 @@ class SetpointTopics:
         if self._handle.time() - self._times[-1] > _REST:
             # Without a link, which is said by its state; it is tried again.
             with contextlib.suppress(CrazyflieError):
-                self.hand_over()
+                self.notify_setpoints_stop()
 
     def _warn(self, text, key):
         name = self._parameters.name

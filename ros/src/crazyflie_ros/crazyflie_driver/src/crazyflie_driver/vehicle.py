@@ -117,7 +117,7 @@ class DriverVehicle:
         self._connected = ConnectedTopic(self._handle, f"{parameters.prefix}/{CONNECTED_TOPIC}")
         self._publish_status()
 
-    # Life.
+    # LinkHealth.
 
     def connect(self) -> Future[None]:
         """Connect and announce all topics and services; the result is None.
@@ -194,7 +194,7 @@ class DriverVehicle:
                     self._mirror.publish()
                 if not self.is_emergency:
                     self._open_thrust_lock()
-                self._links = self.crazyflie.links
+                self._links = self.crazyflie.connection_count
                 self._services.advertise()
                 self.setpoints.subscribe()
                 self.commands.start()
@@ -212,7 +212,7 @@ class DriverVehicle:
                 wait = self.crazyflie.supervisor.wait_for_emergency_stop
                 if not wait(min(limit, _EMERGENCY_LIMIT)):
                     problem = "the emergency stop is not confirmed"
-            elif self.crazyflie.links and not take_leave(
+            elif self.crazyflie.connection_count and not take_leave(
                 self, self._safety.landing_duration, limit
             ):
                 # Unless it is the link that has been lost meanwhile.
@@ -246,7 +246,7 @@ class DriverVehicle:
                 "until a setpoint of zero thrust comes"
             )
         else:
-            self.setpoints.zeros()
+            self.setpoints.send_zero_thrust()
 
     # What is asked of it.
 
@@ -379,9 +379,9 @@ class DriverVehicle:
 
     def _resume(self):
         # Without a set-up it is the link of before.
-        if self.is_emergency or self._links == self.crazyflie.links:
+        if self.is_emergency or self._links == self.crazyflie.connection_count:
             return
-        self._links = self.crazyflie.links
+        self._links = self.crazyflie.connection_count
         for problem in self._mirror.write_again():
             self._server.warn(f"{self.parameters.name}: not written again: {problem}")
         if self.parameters.enable_parameters:

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from takeoff_helpers import PointMass
 
@@ -15,6 +15,7 @@ from crazyflie_takeoff.safe_control import (
     MAX_BRAKING,
     MAX_SAFE_TILT,
     MOTORS_OFF,
+    SINK_SPEED,
     HoverThrust,
     SafeControl,
     Setpoint,
@@ -124,10 +125,26 @@ def test_holds_after_a_tenth_of_a_second_and_goes_on_without_a_step():
 def test_comes_down_blindly(height, impact):
     flight = Flight(height).run(3.0).lose()
     duration = flight.run_until_off()
-    assert duration == pytest.approx(5.6, abs=0.1)
+    assert duration == pytest.approx(5.6 + height / SINK_SPEED, abs=0.1)
     assert 0.3 < flight.vehicle.touchdown_speed < impact
     assert flight.vehicle.z == 0.0
     assert flight.flown[-1] == 0.0
+
+
+def test_a_height_that_was_never_known_makes_no_descent_longer():
+    flight = Flight()
+    flight.sees = False
+    assert flight.run(3.0).lose().run_until_off() == pytest.approx(5.6, abs=0.1)
+
+
+@pytest.mark.parametrize("height", [2.0, 2.5, 2.9])
+def test_a_blind_descent_lasts_for_the_last_known_height(height):
+    flight = Flight(height).run(3.0).lose()
+    # It has learned too much for the thrust of hover, and so sinks at half the rate.
+    flight.hover -= 0.15
+    flight.run_until_off()
+    assert 0.3 < flight.vehicle.touchdown_speed < 1.1
+    assert flight.vehicle.z == 0.0
 
 
 @settings(max_examples=60, deadline=None)
@@ -157,6 +174,16 @@ def test_with_a_known_height_it_comes_down_at_a_known_speed_also_from_high_up():
     assert 0.3 < flight.vehicle.touchdown_speed < 0.5
     assert duration > 7.0
     assert flight.flown[-1] == 0.0
+
+
+@pytest.mark.parametrize("speed", [0.3, 0.6, 1.0])
+def test_a_climb_without_a_controller_ends_within_its_braking_distance(speed):
+    flight = Flight().run(3.0)
+    flight.vehicle.z_dot = flight.target = speed
+    begin = flight.run(0.01).lose(pose=False).vehicle.z
+    top = max(flight.run(0.01).vehicle.z for _ in range(200)) - begin
+    # 0.1 s until the filter takes over, then the speed is led to zero in 0.3 s.
+    assert top < 0.42 * speed
 
 
 def test_the_pose_that_comes_back_starts_nothing():
@@ -230,6 +257,20 @@ def test_learns_the_thrust_of_hover_also_from_a_climb():
     for _ in range(1000):
         hover.update(0.01, level(16.0), None)
     assert hover.value == 1.25 * G
+
+
+def test_takes_no_drag_for_weight():
+    hover = HoverThrust()
+    z_dot = 0.0
+    for k in range(1000):
+        target = 1.0 if 600 <= k < 800 else 0.0
+        thrust = min(max(G + 5.0 * (target - z_dot), 4.0), 16.0)
+        hover.update(0.01, level(thrust), z_dot)
+        z_dot += 0.01 * (thrust - G - 0.2 * z_dot)
+        assert hover.value == pytest.approx(G, abs=0.06)
+
+
+def test_learns_the_vertical_part_of_a_tilted_thrust():
     tilted = HoverThrust()
     for _ in range(2000):
         tilted.update(0.01, Setpoint(0.2, 0.0, 0.0, G / math.cos(0.2)), 0.0)
@@ -329,6 +370,7 @@ EVENTS = st.lists(
 
 @settings(max_examples=300, deadline=None)
 @given(EVENTS)
+@example(["toggle", (0.0, 0.0), (0.0, -2.0), 6, 0.5])
 def test_whatever_happens_when(events):
     """Random messages, services and clocks: what must hold of all that is published."""
     control_filter = SafeFilter(PATIENCE, LIMITS)

@@ -13,6 +13,7 @@ from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.relay import Relay
 from crazyflie_takeoff.safe_control import (
     LONGEST_STEP,
+    MAX_SUBSTITUTE,
     MOTORS_OFF,
     RETURN_TIME,
     SafeControl,
@@ -70,6 +71,7 @@ class SafeFilter(Generic[Control]):
         self._silence = 0.0
         self._lacks_control = False
         self._safe = SafeControl(self._relay.hover, None)
+        self._last_motion: Motion | None = None
         self._descent_limit = 0.0
         self._cause = ""
         self._own = MOTORS_OFF
@@ -270,7 +272,8 @@ class SafeFilter(Generic[Control]):
         # The step before it took over is reckoned then; after a longest one the clock was set.
         step = min(elapsed, LAST_STATE) if self._in_mode > 0.0 else 0.0
         own = self._safe.advance(step, self._measured.fresh, self.mode is Mode.SINKING)
-        self._own = self._watch.gaps.apply(own, self._relay.hover, self._safe.climb)
+        own = self._watch.gaps.apply(own, self._relay.hover, self._safe.climb)
+        self._own = own._replace(thrust=min(own.thrust, MAX_SUBSTITUTE))
         return self._own
 
     def _step_until(self, time):
@@ -338,16 +341,18 @@ class SafeFilter(Generic[Control]):
 
     def _sink(self, cause, reason):
         self._cause = cause
-        self._descent_limit = self._patience.descent
-        if (motion := self._measured.fresh) is not None:
-            self._descent_limit += descent_time(motion, self._relay.ground)
         if self.mode is Mode.PASSING:
             self._take_over(Mode.SINKING, reason)
+        self._descent_limit = self._patience.descent
+        # Too late the motors stop on the ground, too early the vehicle falls.
+        if (motion := self._measured.fresh or self._last_motion) is not None:
+            self._descent_limit += descent_time(motion, self._relay.ground)
         self._enter(Mode.SINKING, reason)
 
     def _take_over(self, mode, reason):
         # The state stops before the control does: the last one is what there is.
         motion, age = self._measured.within(LAST_STATE), self._measured.age
+        self._last_motion = motion
         self._safe = SafeControl(self._relay.hover, motion, age, self._relay.passed)
         self._enter(mode, reason)
 

@@ -23,10 +23,13 @@ from crazyflie_utils.testing import FakeProcess
 class Flight:
     """Two vehicles, cf1 and cf2, 1 m apart along y."""
 
-    def __init__(self, own=2, swarms=None):
+    def __init__(self, own=2, vectorized=None):
         self.process = FakeProcess()
         node = ReferencesNode(
-            fleet_file.grid(2).vehicles[:own], fleet_file.grid(2).vehicles[own:], "world", swarms
+            fleet_file.grid(2).vehicles[:own],
+            fleet_file.grid(2).vehicles[own:],
+            "world",
+            vectorized,
         )
         assert self.process.launch(node, "/fleet/references")
         self.states = {}
@@ -88,7 +91,7 @@ def test_who_would_come_too_close_waits_where_it_is(flight):
     assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
     assert flight.process.logged("warn") == [
         "/fleet/references: cf1 and cf2 are 0.20 m apart and must not come closer than 0.30 m: "
-        "whom its reference leads nearer waits"
+        "a vehicle whose reference approaches the other is held"
     ]
 
 
@@ -110,8 +113,8 @@ def test_a_vehicle_in_flight_that_is_not_seen_any_more_is_said(flight):
     assert flight.process.logged("warn") == []
     flight.process.advance(1.0)
     assert flight.process.logged("warn") == [
-        "/fleet/references: cf2 is flying, and no state of it has come for 0.5 s: where it is, is "
-        "not known; the others keep apart from where it was last, (0.00, 1.00, 1.00)"
+        "/fleet/references: cf2 is in flight, and no state of it has come for 0.5 s: its position "
+        "is not known; the others keep apart from its last place, (0.00, 1.00, 1.00)"
     ]
     # They do, and do not take it for one that goes on with its last speed.
     flight.see("cf1", 0.4)
@@ -144,7 +147,7 @@ def test_a_vehicle_that_was_never_seen_is_said():
     process.publish("/cf1/in_flight_state", String("taking_off"))
     process.advance(0.1)
     (text,) = process.logged("warn")
-    assert text.startswith("/references: cf1 is taking off, and no state of it has come for")
+    assert text.startswith("/references: cf1 is in flight, and no state of it has come for")
     assert text.endswith("the others cannot keep apart from it")
 
 
@@ -162,7 +165,7 @@ def test_a_way_stands_still_while_its_vehicle_is_not_seen(flight):
 
 def test_states_of_many_come_in_one_message():
     _, second = fleet_file.grid(2).vehicles
-    flight = Flight(swarms={"/swarm/states": (second,)})
+    flight = Flight(vectorized={"/swarm/states": (second,)})
     flight.process.publish("/swarm/states", Float64MultiArray(data=[0.0, 1.5, 1.0, 0, 0, 0, 0]))
     flight.process.publish("/swarm/states", Float64MultiArray(data=[0.0] * 8))
     assert flight.process.logged("warn") == [

@@ -12,14 +12,14 @@ from crazyflie_utils import ServiceError
 from crazyflie_utils.tf.poses import StampedPose
 
 
-class Stack:
+class ControllerVehicle:
     """A vehicle that is at once where its reference is."""
 
     def __init__(self, process, name, position):
         self.position = list(position)
         self.yaw = 0.0
         self.refusal = ""
-        handle = process.handle(f"/{name}/stack")
+        handle = process.handle(f"/{name}/controller")
         self._state = handle.publisher("state", PositionVelocityYawStateStamped)
         self._flight_state = handle.publisher("in_flight_state", String, latch=True)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
@@ -59,7 +59,7 @@ class Stack:
         self._state.publish(message)
 
 
-class Driven:
+class DriverVehicle:
     """A vehicle that is at once where it was told to be, behind the driver's services.
 
     With a ``frame`` its position is that of tf's frame ``name`` in it, else it comes as a pose.

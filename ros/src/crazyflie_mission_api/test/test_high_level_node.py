@@ -289,7 +289,7 @@ def test_who_does_not_fly_does_not_begin(bench):
     bench.be("on_ground", (0.0, 0.0, 0.0))
     bench.process.publish("/all/start_trajectory", String(TOP))
     assert len(bench.fly(0.5)) == 0
-    assert bench.process.logged("error") == [f"{TOP}: not started: the vehicle is on_ground"]
+    assert bench.process.logged("error") == [f"{TOP}: not started: the vehicle is on ground"]
 
 
 def test_the_servers_hover_point_is_replaced_by_one_above_the_vehicle(bench):

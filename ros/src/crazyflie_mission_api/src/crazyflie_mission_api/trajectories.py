@@ -1,21 +1,21 @@
-"""Trajectories of polynomials: what they ask of a vehicle, and how they are changed."""
+"""Trajectories of polynomials: their demands on a vehicle, and checks of them."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from crazyflie_mission_api.limits import Array, Bounds, Limits, MissionError
 from crazyflie_model.angles import Triple
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.planner import smooth_piece
+from crazyflie_model.polynomials import PolynomialPiece, at_rest
+from crazyflie_model.trajectory import Pieces, duration, moved, stretched
 from crazyflie_model.units import GRAVITY
 
-Pieces = Sequence[PolynomialPiece]
-"""A trajectory: as in the CSV files of crazyflie_demo and in a vehicle's memory."""
+__all__ = ["Pieces", "check", "moved", "straight", "stretched", "within_limits"]
 
 SAMPLES = 30
-"""Points of a piece at which it is looked at."""
+"""Points of a piece that are evaluated."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Samples:
         return cls(*map(np.concatenate, columns))
 
     def demands(self) -> dict[str, Array]:
-        """Return what is asked of the vehicle at each moment, by the name of the limit.
+        """Return the demands on the vehicle at each time, by the name of the limit.
 
         Thrust points along acceleration minus gravity (Mellinger and Kumar, Minimum Snap
         Trajectory Generation and Control for Quadrotors, ICRA 2011).
@@ -143,52 +143,15 @@ def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str, slower: str
         )
 
 
-_REST_TO_REST = (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0)
-"""From 0 to 1 in 1 s, with three derivatives that are 0 at both ends: as the firmware goes."""
-
-
 def straight(
     start: Triple, goal: Triple, start_yaw: float = 0.0, yaw: float = 0.0, seconds: float = 1.0
 ) -> list[PolynomialPiece]:
-    """Return the way from rest to rest, m; the turn, rad, is the shorter one."""
-    turn = math.remainder(yaw - start_yaw, 2.0 * math.pi)
-    ways = [b - a for a, b in zip(start, goal, strict=True)]
-    axes = (
-        [begin, *(way * c for c in _REST_TO_REST[1:])]
-        for begin, way in zip((*start, start_yaw), (*ways, turn), strict=True)
-    )
-    return stretched([PolynomialPiece(1.0, *axes)], seconds)
-
-
-def stretched(pieces: Pieces, factor: float) -> list[PolynomialPiece]:
-    """Return the same path in ``factor`` times the time."""
-    return [
-        PolynomialPiece(
-            piece.duration * factor,
-            *([c / factor**k for k, c in enumerate(axis)] for axis in piece.axes),
-        )
-        for piece in pieces
-    ]
-
-
-def moved(pieces: Pieces, offset: Sequence[float]) -> list[PolynomialPiece]:
-    """Return the trajectory with an offset (x, y, z), m, added to all positions."""
-    by_axis = (*offset, 0.0)
-
-    def move(piece):
-        axes = ([axis[0] + d, *axis[1:]] for axis, d in zip(piece.axes, by_axis, strict=True))
-        return PolynomialPiece(piece.duration, *axes)
-
-    return [move(piece) for piece in pieces]
-
-
-def duration(pieces: Pieces) -> float:
-    """Return how long a trajectory takes, s."""
-    return sum(piece.duration for piece in pieces)
+    """Return the straight move from rest to rest, m; the turn, rad, is the shorter one."""
+    return [smooth_piece(at_rest(start, start_yaw), goal, yaw, seconds)]
 
 
 _SHORTEST = 1e-3
-"""No trajectory is made shorter than this, s: one that goes nowhere asks for nothing."""
+"""Of a trajectory, s: one that does not move has no demands."""
 
 
 def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:

@@ -1,57 +1,62 @@
-"""A mission without vehicles: everything is checked as in flight, and takes no time."""
+"""Dry runs: missions of ideal vehicles, with the checks of a flight, in no time."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from typing import Any
 
-from crazyflie_mission_api.course import Course
+from typing_extensions import override
+
+from crazyflie_mission_api.futures import done
+from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, MissionError
-from crazyflie_mission_api.roster import Rules
-from crazyflie_mission_api.team import Team
-from crazyflie_mission_api.trajectories import Pieces, straight
+from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle
+from crazyflie_mission_api.timed_trajectory import TimedTrajectory
+from crazyflie_mission_api.trajectories import straight
+from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.angles import Triple
+from crazyflie_model.trajectory import Pieces
 
 _STEP = 0.05
 """Of time, s."""
 
 
-class RehearsalClock:
-    """Time that passes when somebody waits."""
+class DryRunClock(Clock):
+    """Time that passes during waits only."""
 
     def __init__(self) -> None:
         self._time = 0.0
 
+    @override
     def time(self) -> float:
-        """Return the time, s."""
         return self._time
 
+    @override
     def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
-        """Let time pass until ``condition()`` or ``deadline`` (s); return the condition."""
-        while not (done := condition()) and self._time < deadline:
+        while not (is_met := condition()) and self._time < deadline:
             self._time = min(self._time + _STEP, deadline)
-        return done
+        return is_met
 
 
-class RehearsedVehicle:
-    """A vehicle that is always where it was told to be.
+class IdealVehicle(MissionVehicle):
+    """A vehicle that is always at its commanded position.
 
     Parameters
     ----------
     name : str
     clock : Clock
     position : tuple, 3 components
-        Where it stands, m.
+        Before takeoff, m.
     bounds : Bounds
     heading : float
         rad.
     start_skew : float
-        Of the vehicle whose flight is rehearsed, s.
+        Of the real vehicle, s.
     """
 
     def __init__(
         self,
         name: str,
-        clock: RehearsalClock,
+        clock: Clock,
         position: Triple,
         bounds: Bounds = EVERYWHERE,
         heading: float = 0.0,
@@ -61,87 +66,85 @@ class RehearsedVehicle:
         self.bounds = bounds
         self.start_skew = start_skew
         self._clock = clock
-        self._course = Course.rest(position, heading)
+        self._trajectory = TimedTrajectory.hover(position, heading)
         self._prepared: Pieces = ()
         self._flies = False
 
+    def _goal(self):
+        return self._trajectory.goal(self._clock.time())
+
+    @override
     def position(self) -> Triple:
-        """Return where it is, m."""
-        return self._course.goal(self._clock.time()).position
+        return self._goal().position
 
+    @override
     def heading(self) -> float:
-        """Return its heading, rad."""
-        return self._course.goal(self._clock.time()).yaw
+        return self._goal().yaw
 
-    def trouble(self) -> str:
-        """Return an empty text."""
+    @override
+    def fault(self) -> str:
         return ""
 
+    @override
     def has_landed(self) -> bool:
-        """Return whether it stands."""
-        return not self._flies and self._clock.time() >= self._course.end
+        return not self._flies and self._clock.time() >= self._trajectory.end
 
+    @override
     def take_off(self, height: float, duration: float) -> "Future[Any]":
-        """Climb straight up."""
         self._flies = True
         x, y, _ = self.position()
         return self.go_to((x, y, height), self.heading(), duration)
 
+    @override
     def land(self, duration: float) -> "Future[Any]":
-        """Sink straight down."""
-        x, y, _ = self.position()
         self._flies = False
+        x, y, _ = self.position()
         return self.go_to((x, y, 0.0), self.heading(), duration)
 
-    def rest(self) -> None:
-        """Do nothing."""
+    @override
+    def stop_motors(self) -> None:
+        pass
 
+    @override
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
-        """Fly to a point."""
-        start = self._course.goal(self._clock.time())
+        start = self._goal()
         return self._fly(straight(start.position, goal, start.yaw, yaw, duration))
 
+    @override
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
-        """Take a trajectory."""
         self._prepared = pieces
-        return _done()
+        return done(None)
 
+    @override
     def start(self) -> "Future[Any]":
-        """Fly it."""
         return self._fly(self._prepared)
 
+    @override
     def emergency(self) -> "Future[Any]":
-        """Fall."""
         x, y, _ = self.position()
         self._flies = False
-        self._course = Course.rest((x, y, 0.0))
-        return _done()
+        self._trajectory = TimedTrajectory.hover((x, y, 0.0))
+        return done(None)
 
     def _fly(self, pieces):
-        self._course = Course(pieces, self._clock.time())
-        return _done()
+        self._trajectory = TimedTrajectory(pieces, self._clock.time())
+        return done(None)
 
 
-def _done():
-    future: Future[Any] = Future()
-    future.set_result(None)
-    return future
-
-
-class Rehearsal(Team):
-    """A team whose vehicles only do as if.
+class DryRun(VehicleGroup):
+    """A group of ideal vehicles.
 
     Parameters
     ----------
     starts : mapping of str to x, y, z
-        Where each vehicle stands, m.
+        Position of each vehicle before takeoff, m.
     rules : Rules, optional
     bounds : mapping of str to Bounds, optional
-        The fences that vehicles have of their own.
+        Fences of vehicles.
     headings : mapping of str to float, optional
         rad; 0 by default.
     start_skews : mapping of str to float, optional
-        s; 0 by default: vehicles begin together.
+        s; 0 by default.
     """
 
     def __init__(
@@ -152,10 +155,10 @@ class Rehearsal(Team):
         headings: Mapping[str, float] | None = None,
         start_skews: Mapping[str, float] | None = None,
     ):
-        clock = RehearsalClock()
+        clock = DryRunClock()
         fences, yaws, skews = bounds or {}, headings or {}, start_skews or {}
         vehicles = [
-            RehearsedVehicle(
+            IdealVehicle(
                 name,
                 clock,
                 position,
@@ -168,28 +171,30 @@ class Rehearsal(Team):
         super().__init__(vehicles, clock, rules)
 
 
-def rehearse(team: Team, mission: Callable[[Team], Any]) -> float:
-    """Fly ``mission(team)`` with vehicles that only do as if; return how long it takes, s.
+def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> float:
+    """Fly ``mission(group)`` with ideal vehicles; return its duration, s.
 
     Parameters
     ----------
-    team : Team
+    group : VehicleGroup
         On the ground.
     mission : callable
-        It must decide nothing by what cannot be known before.
+        Its commands must not depend on measurements.
 
     Raises
     ------
     MissionError
-        What the mission would have run into.
+        The mission fails, or a vehicle is in flight.
     """
-    if team.flying:
-        raise MissionError(f"{', '.join(team.flying)}: in flight; expected to be on the ground")
-    starts = {name: team.position(name) for name in team.names}
-    headings = {name: vehicle.heading() for name, vehicle in team._vehicles.items()}
-    skews = {name: vehicle.start_skew for name, vehicle in team._vehicles.items()}
-    fences = {name: team.fence(name) for name in team.names}
-    rehearsal = Rehearsal(starts, team.rules, fences, headings, skews)
-    with rehearsal:
-        mission(rehearsal)
-    return rehearsal.time()
+    if group.flying:
+        raise MissionError(f"{', '.join(group.flying)}: in flight; expected to be on the ground")
+    run = DryRun(
+        {name: group.position(name) for name in group.names},
+        group.rules,
+        {name: group.fence(name) for name in group.names},
+        {name: vehicle.heading() for name, vehicle in group._vehicles.items()},
+        {name: vehicle.start_skew for name, vehicle in group._vehicles.items()},
+    )
+    with run:
+        mission(run)
+    return run.time()

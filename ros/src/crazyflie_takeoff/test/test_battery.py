@@ -6,6 +6,7 @@ from std_msgs.msg import Bool, Float32, String
 from std_srvs.srv import EmptyRequest
 from takeoff_helpers import SERVER, state
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff.battery import Battery, Charge
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.testing import FakeProcess
@@ -89,9 +90,31 @@ def test_status_in_words():
     process.publish("/state", state(0.0))
     process.advance(0.3)
     said = [message.data for message in process.published("/in_flight_status")]
-    assert said[0] == "looking where the flight stands"
+    assert said[0] == "looking for the state of the flight"
     assert said[1].startswith("on ground: takeoff refused: no state has come on /state")
     assert said[2] == "on ground"
+
+
+def test_status_in_a_message(network):
+    network.advance(0.2)
+    network.kill("controller")
+    network.advance(1.0)
+    status = network.on("/in_flight_flight_status")[-1][1]
+    assert status.state == FlightStatus.FLYING
+    assert status.reason == "no control comes, the filter keeps the vehicle in place"
+    assert status.takeoff_refusal == "the vehicle is in flight; land first"
+    until_on_ground(network)
+    states = [message.state for _, message in network.on("/in_flight_flight_status")]
+    assert list(dict.fromkeys(states)) == [
+        FlightStatus.ON_GROUND,
+        FlightStatus.TAKING_OFF,
+        FlightStatus.FLYING,
+        FlightStatus.LANDING,
+    ]
+    status = network.on("/in_flight_flight_status")[-1][1]
+    assert status.takeoff_refusal == "no commanded controls come; is the controller running?"
+    assert "no control came" in status.reason
+    assert status.ground == pytest.approx(0.0, abs=1e-6)
 
 
 def test_diagnostics(network):

@@ -1,68 +1,97 @@
-"""The state machine of takeoff and landing under random calls at random times."""
+"""The server's state machine under random events at random times."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from crazyflie_takeoff.flight import FlightStateMachine, Plan
+from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_utils.refusal import RefusalError
+from crazyflie_takeoff.server_states import TAKEOVERS, Event, FilterReport, ServerState
+from crazyflie_takeoff.server_table import TABLE, Plan
 
 G = 9.81
 PLAN = Plan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.3)
 BARE = Plan(hover=(0.1, 0.2, 1.0), open_loop=1.0, settle=5.0, descent_speed=0.0)
 
-ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
-
-STEPS = st.lists(
-    st.one_of(
-        st.sampled_from(["takeoff", "land", "abort"]),
-        st.tuples(
-            st.floats(0.0, 2.5),
-            st.one_of(st.none(), st.tuples(st.just(0.0), st.just(0.0), st.floats(-0.1, 2.0))),
-        ),
-    ),
-    max_size=40,
-)
+POSITIONS = st.none() | st.tuples(st.just(0.0), st.just(0.0), st.floats(-0.1, 2.0))
+CALLS = st.sampled_from([Event.TAKEOFF, Event.LAND])
+TICKS = st.tuples(st.floats(0.0, 2.5), POSITIONS)
+FILTER = st.sampled_from([Event.FILTER_PASSES, Event.FILTER_HOLDS, *TAKEOVERS])
 
 
 @settings(max_examples=200, deadline=None)
-@given(STEPS, st.sampled_from([PLAN, BARE]))
-def test_whatever_is_called_when(steps, plan):
-    """Random calls and times: what must hold at every tick of every flight."""
-    flight = FlightStateMachine(plan)
-    time, in_flight, ramp, last = 0.0, False, None, ON_GROUND
+@given(st.lists(CALLS | TICKS, max_size=40), st.sampled_from([PLAN, BARE]))
+def test_flights_that_the_filter_does_not_end(steps, plan):
+    """Holds at every tick of every flight."""
+    flight = FlightStateMachine(plan, ServerState.ON_GROUND)
+    time, in_flight, ramp, last = 0.0, False, None, FlightState.ON_GROUND
     for step in steps:
-        before = flight.state
-        if step == "abort":
-            flight.abort()
-            assert before is TAKING_OFF or flight.state is before
-        elif isinstance(step, str):
-            allowed = before in ((ON_GROUND,) if step == "takeoff" else (TAKING_OFF, FLYING))
-            try:
-                getattr(flight, step)()
-                assert allowed
-            except RefusalError:
-                assert not allowed
-                assert flight.state is before
-        else:
-            time += step[0]
-            output = flight.tick(time, step[1])
-            in_flight ^= output.toggle
-            assert output.state is flight.state
-            assert in_flight == flight.state.in_flight
-            # The controller's vehicle is left alone; references are its alone.
-            assert not (in_flight and output.thrust is not None)
-            assert output.reference is None or flight.state in (TAKING_OFF, FLYING, DESCENDING)
-            if flight.state is LANDING and last is not LANDING:
-                ramp = time
-            # Zero thrust comes on the ground, or when a whole ramp has gone by.
-            if output.thrust == 0.0 and last is not ON_GROUND:
-                assert last is LANDING
-                assert time - ramp >= 1.0 - 1e-5
-            last = flight.state
-            if output.thrust is not None:
-                assert 0.0 <= output.thrust <= G + 0.2
+        if isinstance(step, Event):
+            accepted = flight.accepts(step)
+            starts = (ServerState.ON_GROUND,)
+            if step is Event.LAND:
+                starts = (ServerState.LIFTING_OFF, ServerState.CLIMBING, ServerState.FLYING)
+            assert accepted == (flight.state in starts)
+            flight.handle(step)
+            continue
+        time += step[0]
+        output, state = flight.tick(time, step[1]), flight.flight_state
+        in_flight ^= output.toggle
+        assert in_flight == state.in_flight
+        # The controller has the vehicle; only it follows references.
+        assert not (in_flight and output.thrust is not None)
+        assert output.reference is None or state.in_flight or state is FlightState.TAKING_OFF
+        if state is FlightState.LANDING and last is not FlightState.LANDING:
+            ramp = time
+        # Zero thrust comes on the ground, or when a whole ramp has gone by.
+        if output.thrust == 0.0 and last is not FlightState.ON_GROUND:
+            assert last is FlightState.LANDING
+            assert time - ramp >= 1.0 - 1e-5
+        last = state
+        if output.thrust is not None:
+            assert 0.0 <= output.thrust <= G + 0.2
     for _ in range(20):
         time += 1.0
         flight.tick(time)
-    assert flight.state.is_settled
+    assert flight.state in (ServerState.ON_GROUND, ServerState.FLYING)
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.sampled_from([None, *FlightState]),
+    POSITIONS,
+    st.lists(CALLS | TICKS | FILTER, max_size=40),
+    st.sampled_from([PLAN, BARE]),
+)
+def test_walks_through_the_table(remembered, position, steps, plan):
+    """Every change is a row; a vehicle that the filter has is left to it; walks end at rest."""
+    rows = {(row.state, row.next) for row in TABLE}
+    flight = FlightStateMachine(plan)
+    flight.set_filter(FilterReport(remembered=remembered))
+    flight.recover(position, 0.0)
+    assert (ServerState.RECOVERING, flight.state) in rows
+    time = 0.0
+    for step in steps:
+        before = flight.state
+        if isinstance(step, tuple):
+            time += step[0]
+            output = flight.tick(time, step[1])
+            if flight.state is ServerState.YIELDED:
+                assert output.thrust is output.reference is None
+            continue
+        if step in (Event.TAKEOFF, Event.LAND):
+            flight.handle(step)
+        else:
+            flight.set_filter(FilterReport(step))
+        assert before is flight.state or (before, flight.state) in rows
+        takes_off = before in (ServerState.LIFTING_OFF, ServerState.CLIMBING)
+        if step in TAKEOVERS and not (takes_off and step is Event.FILTER_DOWN):
+            assert flight.state in (ServerState.ON_GROUND, ServerState.YIELDED)
+    for _ in range(80):
+        time += 1.0
+        flight.tick(time)
+    assert flight.state in (ServerState.ON_GROUND, ServerState.FLYING)
+
+
+def test_every_state_is_reached_and_left():
+    assert {row.next for row in TABLE} == set(ServerState) - {ServerState.RECOVERING}
+    assert {row.state for row in TABLE} == set(ServerState)

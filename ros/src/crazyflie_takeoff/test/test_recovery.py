@@ -1,11 +1,21 @@
-"""What a server that has just started makes of what it is told."""
+"""What a server that has just started concludes from the filter's report and the position."""
 
 import pytest
 
+from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.flight_state import FlightState
-from crazyflie_takeoff.recovery import recover_state
+from crazyflie_takeoff.server_states import TAKEOVERS, Event, FilterReport, ServerState
+from crazyflie_takeoff.server_table import Plan
 
 ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
+
+
+def recovered(remembered, height, descent_speed=0.3, ground=0.0, **report):
+    flight = FlightStateMachine(Plan((0.0, 0.0, 1.0), 1.0, 5.0, descent_speed))
+    flight.set_filter(FilterReport(remembered=remembered, **report))
+    assert flight.state is ServerState.RECOVERING
+    flight.recover(None if height is None else (0.0, 0.0, height), ground)
+    return flight
 
 
 @pytest.mark.parametrize(
@@ -27,32 +37,52 @@ ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
         *[(unsettled, 1.0, DESCENDING) for unsettled in (TAKING_OFF, DESCENDING, LANDING)],
     ],
 )
-def test_where_the_flight_stands(remembered, height, state):
-    assert recover_state(remembered, height).state is state
+def test_state_by_memory_and_height(remembered, height, state):
+    assert recovered(remembered, height).flight_state is state
 
 
 @pytest.mark.parametrize("remembered", [TAKING_OFF, DESCENDING, LANDING])
 def test_does_not_drop_a_vehicle_that_cannot_descend(remembered):
-    assert recover_state(remembered, 1.0, can_descend=False).state is FLYING
-    assert recover_state(remembered, 0.04, can_descend=False).state is LANDING
+    assert recovered(remembered, 1.0, descent_speed=0.0).flight_state is FLYING
+    assert recovered(remembered, 0.04, descent_speed=0.0).flight_state is LANDING
 
 
 @pytest.mark.parametrize("remembered", FlightState)
 @pytest.mark.parametrize("height", [None, 0.0, 1.0])
-def test_knows_what_has_been_announced(remembered, height):
-    assert recover_state(remembered, height).announced == remembered.in_flight
+def test_toggles_only_what_the_former_server_has_not(remembered, height):
+    flight = recovered(remembered, height)
+    is_changed = flight.flight_state.in_flight != remembered.in_flight
+    position = None if height is None else (0.0, 0.0, height)
+    assert flight.tick(0.0, position).toggle == is_changed
+
+
+@pytest.mark.parametrize("event", TAKEOVERS)
+@pytest.mark.parametrize("remembered", [None, FLYING, LANDING])
+def test_a_filter_that_has_the_vehicle_keeps_it(event, remembered):
+    flight = recovered(remembered, 1.0, event=event)
+    sinks = event is Event.FILTER_SINKS
+    assert flight.state is (ServerState.YIELDED if sinks else ServerState.ON_GROUND)
+    assert flight.tick(0.0).toggle == (remembered is FLYING)
+
+
+def test_the_ground_of_a_former_server_counts_only_for_its_flight():
+    assert recovered(LANDING, 0.72, ground=0.7).flight_state is LANDING
+    assert recovered(None, 0.72, ground=0.7).flight_state is FLYING
+    assert recovered(None, 0.72, ground=0.7).ground == 0.0
 
 
 @pytest.mark.parametrize("remembered", [None, TAKING_OFF, FLYING, DESCENDING, LANDING])
 def test_never_on_the_ground_when_it_may_be_in_flight(remembered):
-    assert recover_state(remembered, 0.16).state is not ON_GROUND
+    assert recovered(remembered, 0.16).flight_state is not ON_GROUND
 
 
-def test_stands_on_a_table_when_no_controller_speaks():
-    assert recover_state(None, 0.7, is_commanded=False).state is ON_GROUND
-    assert recover_state(FLYING, 0.7, is_commanded=False).state is FLYING
+def test_is_on_a_table_when_no_controller_sends_commands():
+    assert recovered(None, 0.7, is_commanded=False).flight_state is ON_GROUND
+    assert recovered(FLYING, 0.7, is_commanded=False).flight_state is FLYING
 
 
-def test_says_why():
-    assert recover_state(None, None).reason == "nothing is remembered, the height is not known"
-    assert recover_state(FLYING, 1.0).reason == "flying is remembered, the height is 1.00 m"
+def test_a_recovered_descent_waits_while_the_filter_holds_the_vehicle():
+    flight = recovered(DESCENDING, 1.0, event=Event.FILTER_HOLDS)
+    for k in range(100):
+        output = flight.tick(k / 100, (0.0, 0.0, 1.0))
+    assert output.reference[2] == 1.0

@@ -5,8 +5,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from takeoff_helpers import PointMass, feedback
 
-from crazyflie_takeoff.flight import FlightStateMachine, Plan
-from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.flight import FlightStateMachine
+from crazyflie_takeoff.server_states import Event, ServerState
+from crazyflie_takeoff.server_table import Plan
 
 STIFF, SOFT = (20.0, 20.98), (1.5, 1.0)
 """Height gains of the simulation's and of the hardware's controller."""
@@ -18,21 +19,21 @@ def land(height, gains, speed=0.3, miscalibration=0.0):
     ``miscalibration`` is how much more thrust the vehicle gives than it is
     told, m/s^2; the hover begins in its equilibrium.
     """
-    flight = FlightStateMachine(Plan((0.0, 0.0, height), 1.0, 5.0, speed), FlightState.FLYING)
+    flight = FlightStateMachine(Plan((0.0, 0.0, height), 1.0, 5.0, speed), ServerState.FLYING)
     vehicle = PointMass(height)
     reference = (height - miscalibration / gains[0], 0.0)
-    flight.land()
+    flight.request(Event.LAND)
     for tick in range(6000):
         output = flight.tick(tick / 100, (0.0, 0.0, vehicle.z))
         if output.reference is not None:
             reference = (output.reference[2], output.reference[5])
         if output.thrust is not None:
             vehicle.command(output.thrust + miscalibration * (output.thrust > 0.0))
-        elif flight.state.in_flight:
+        elif flight.flight_state.in_flight:
             thrust = feedback(reference, vehicle.z, vehicle.z_dot, gains)
             vehicle.command(thrust + miscalibration)
         vehicle.advance(0.01)
-        if flight.state is FlightState.ON_GROUND and vehicle.z == 0.0:
+        if flight.state is ServerState.ON_GROUND and vehicle.z == 0.0:
             return vehicle, tick / 100
     raise AssertionError("the landing did not end")
 

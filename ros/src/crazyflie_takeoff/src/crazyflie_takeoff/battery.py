@@ -13,7 +13,7 @@ class Charge(enum.Enum):
     CRITICAL = enum.auto()
 
 
-FRESHNESS = 5.0
+MAX_VOLTAGE_AGE = 5.0
 """A voltage that is older does not count, s; the driver sends one a second."""
 
 _LONGEST_STEP = 1.5
@@ -55,7 +55,7 @@ class Battery:
 
     def charge(self, time: float) -> Charge:
         """Return what is left at ``time`` (s)."""
-        if not abs(time - self._time) < FRESHNESS:
+        if not abs(time - self._time) < MAX_VOLTAGE_AGE:
             return Charge.UNKNOWN
         critical, low = (lasted >= self._duration for lasted in self._lasted)
         if critical:

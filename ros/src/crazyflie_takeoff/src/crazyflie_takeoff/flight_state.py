@@ -22,15 +22,9 @@ class FlightState(enum.Enum):
         """Whether the vehicle is the controller's: what the topic in_flight toggles."""
         return self in _IN_FLIGHT
 
-    @property
-    def is_settled(self) -> bool:
-        """Whether no takeoff or landing is under way."""
-        return self in _SETTLED
-
 
 # Found here once: an enumeration takes its time to look a member up.
 _IN_FLIGHT = (FlightState.FLYING, FlightState.DESCENDING)
-_SETTLED = (FlightState.ON_GROUND, FlightState.FLYING)
 
 
 UNKNOWN = "unknown"

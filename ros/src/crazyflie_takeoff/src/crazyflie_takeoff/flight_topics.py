@@ -32,6 +32,12 @@ class FlightTopicParameters(Parameters):
     own_filter_state_topic: str | None = parameter(
         TOPIC, "by default the name of in_flight + `_filter`", None, "topics/filter_state"
     )
+    own_flight_status_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_flight_status`", None, "topics/flight_status"
+    )
+    own_filter_status_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_filter_status`", None, "topics/filter_status"
+    )
     own_controller_topic: str | None = parameter(
         TOPIC, "by default the name of in_flight + `_controller`", None, "topics/controller"
     )
@@ -62,6 +68,16 @@ class FlightTopicParameters(Parameters):
     def filter_state_topic(self) -> str:
         """What the filter remembers."""
         return self.own_filter_state_topic or f"{self.in_flight_topic}_filter"
+
+    @property
+    def flight_status_topic(self) -> str:
+        """The server's flight state and what it knows, typed."""
+        return self.own_flight_status_topic or f"{self.in_flight_topic}_flight_status"
+
+    @property
+    def filter_status_topic(self) -> str:
+        """What the filter does, typed."""
+        return self.own_filter_status_topic or f"{self.in_flight_topic}_filter_status"
 
     @property
     def controller_topic(self) -> str:

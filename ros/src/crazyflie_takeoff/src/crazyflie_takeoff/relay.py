@@ -5,12 +5,12 @@ from typing import Generic
 
 from crazyflie_model.limits import MIN_THRUST
 from crazyflie_takeoff.control_filter import TAKEOFF_CONTROL_LIMIT, Control, ControlFilter
-from crazyflie_takeoff.flight import TOUCHDOWN_HEIGHT
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.flight_watch import FlightWatch
 from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Measurement, Motion
 from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, Setpoint
+from crazyflie_takeoff.server_table import TOUCHDOWN_HEIGHT
 
 LEARNING_STEP = 0.2
 """Controls that are further apart, s, do not tell the thrust of hover."""

@@ -6,7 +6,6 @@ from typing import Generic
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.control_filter import Control
 from crazyflie_takeoff.filter_mode import SHORTEST_HOLD, Mode, Patience
-from crazyflie_takeoff.flight import TOUCHDOWN_HEIGHT
 from crazyflie_takeoff.flight_state import SEPARATOR, FlightState, Takeover
 from crazyflie_takeoff.limits import Box, Limits
 from crazyflie_takeoff.motion import Motion
@@ -19,6 +18,7 @@ from crazyflie_takeoff.safe_control import (
     Setpoint,
     descent_time,
 )
+from crazyflie_takeoff.server_table import TOUCHDOWN_HEIGHT
 from crazyflie_utils.refusal import RefusalError
 
 LAST_STATE = 0.7

@@ -6,9 +6,9 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_takeoff.battery import Battery
-from crazyflie_takeoff.flight import Plan
 from crazyflie_takeoff.flight_topics import FlightTopicParameters
 from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.server_table import Plan
 from crazyflie_utils import parameter
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
 

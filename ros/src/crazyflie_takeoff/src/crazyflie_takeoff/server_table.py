@@ -1,0 +1,248 @@
+"""The state machine of takeoff and landing as a table: what runs, and what the diagram shows.
+
+Heights and positions are in the fixed frame (z up), m; times are s.
+"""
+
+import math
+from dataclasses import dataclass
+
+from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.descent import Descent, Position
+from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.server_states import NO_FILTER, STOPS, Event, FilterReport, ServerState
+from crazyflie_takeoff.transition_table import Table, Transition
+
+LIFT_OFF_THRUST = GRAVITY + 0.2
+"""Thrust of the open-loop part of a takeoff, m/s^2."""
+
+LIFT_OFF_TIME = 3.0
+"""A vehicle that a controller has not lifted off in this time, s, cannot fly."""
+
+RAMP_DURATION = 1.0
+"""How long the thrust of a landing goes down, s; zero thrust follows."""
+
+TOUCHDOWN_LIMIT = 2.0
+"""How long after the ramp a vehicle may take to come down, s."""
+
+TOUCHDOWN_HEIGHT = 0.05
+"""A vehicle less than this above the ground counts as down, m."""
+
+FLYING_HEIGHT = 0.15
+"""A vehicle above this height is in flight if no flight state is remembered, m."""
+
+FILTER_LIMIT = 60.0
+"""How long the filter may take to bring a vehicle down, or hold it, s."""
+
+ROUNDING = 1e-6
+"""Tolerance of comparisons between times, s."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How to take off and land.
+
+    Attributes
+    ----------
+    hover : tuple of float
+        Hover point x, y, z, m.
+    open_loop : float
+        How long `LIFT_OFF_THRUST` is given, s.
+    settle : float
+        How long the controller has to reach the hover point, s.
+    descent_speed : float
+        Speed of the descent, m/s; 0 for none: a landing is the bare ramp.
+    """
+
+    hover: Position
+    open_loop: float
+    settle: float
+    descent_speed: float
+
+
+@dataclass
+class FlightContext:
+    """What the guards look at, and the actions change.
+
+    Attributes
+    ----------
+    plan : Plan
+        May be replaced at any time; what has begun already goes on as it was planned.
+    filter : FilterReport
+        The latest.
+    ground : float
+        Height (z) of the ground, where the vehicle was last seen on it, m.
+    time : float
+        Of the latest tick, s.
+    begun : float or None
+        When the present activity began, s; None until the next tick.
+    measured : tuple of float or None
+        Position, m; None when it is not known at present.
+    reference : tuple of float or None
+        What the present tick publishes: x, y, z in m and x_dot, y_dot, z_dot in m/s.
+    descent : Descent or None
+    descent_speed : float
+        Of the plan, when the activity began, m/s.
+    descent_end : float
+        When a descent has to be over, s after it began.
+    zero_sent : float
+        When zero thrust was sent last, s.
+    """
+
+    plan: Plan
+    filter: FilterReport = NO_FILTER
+    ground: float = 0.0
+    time: float = -math.inf
+    begun: float | None = None
+    measured: Position | None = None
+    reference: tuple[float, ...] | None = None
+    descent: Descent | None = None
+    descent_speed: float = 0.0
+    descent_end: float = math.inf
+    zero_sent: float = -math.inf
+
+    @property
+    def elapsed(self) -> float:
+        """Time since the present activity began, s."""
+        return 0.0 if self.begun is None else self.time - self.begun
+
+    @property
+    def is_down(self) -> bool:
+        """Whether the vehicle is seen on the ground."""
+        return self.measured is not None and self.measured[2] - self.ground < TOUCHDOWN_HEIGHT
+
+
+# Actions.
+
+
+def _begin(flight):
+    flight.begun = flight.descent = None
+    flight.descent_speed = flight.plan.descent_speed
+    flight.descent_end = math.inf
+    flight.zero_sent = -math.inf
+
+
+def _begin_at_once(flight):
+    _begin(flight)
+    flight.begun = flight.time
+
+
+def _send_hover_point(flight):
+    flight.reference = (*flight.plan.hover, 0.0, 0.0, 0.0)
+
+
+# Guards.
+
+
+def _filter_sinks(flight):
+    return flight.filter.event is Event.FILTER_SINKS
+
+
+def _filter_has_stopped_motors(flight):
+    return flight.filter.event in (Event.FILTER_DOWN, *STOPS)
+
+
+def _high_and_commanded_but_not_remembered(flight):
+    is_high = flight.measured is not None and flight.measured[2] > FLYING_HEIGHT
+    return flight.filter.remembered is None and is_high and flight.filter.is_commanded
+
+
+def _no_flight_remembered(flight):
+    return flight.filter.remembered in (None, FlightState.ON_GROUND)
+
+
+def _flying_remembered(flight):
+    return flight.filter.remembered is FlightState.FLYING
+
+
+def _down(flight):
+    return flight.is_down
+
+
+def _seen_and_landings_have_a_descent(flight):
+    return flight.measured is not None and _landings_have_a_descent(flight)
+
+
+def _landings_have_a_descent(flight):
+    return flight.plan.descent_speed > 0.0
+
+
+def _open_loop_over(flight):
+    return flight.elapsed + ROUNDING >= flight.plan.open_loop
+
+
+def _takeoff_over(flight):
+    return flight.elapsed + ROUNDING >= flight.plan.open_loop + flight.plan.settle
+
+
+def _takeoff_over_but_still_down(flight):
+    return _takeoff_over(flight) and flight.plan.settle >= LIFT_OFF_TIME and flight.is_down
+
+
+def _down_or_descent_over(flight):
+    descent = flight.descent
+    return descent is None or flight.is_down or descent.is_over(flight.elapsed)
+
+
+def _ramp_over(flight):
+    return flight.elapsed + ROUNDING >= RAMP_DURATION
+
+
+def _down_or_not_seen_or_too_late(flight):
+    is_late = flight.elapsed + ROUNDING > RAMP_DURATION + TOUCHDOWN_LIMIT
+    # The motors are off already: without a height there is nothing to wait for.
+    return flight.measured is None or flight.is_down or is_late
+
+
+def _filter_too_late(flight):
+    return flight.elapsed + ROUNDING >= FILTER_LIMIT
+
+
+_S, _E = ServerState, Event
+_TAKEOFF = (_S.LIFTING_OFF, _S.CLIMBING)
+_AIRBORNE_OR_LANDING = (_S.FLYING, _S.DESCENDING, _S.RAMPING_DOWN, _S.TOUCHING_DOWN)
+
+TABLE: Table[ServerState, FlightContext] = (
+    # In doubt the vehicle is flying: the controller keeps it, and the operator can land.
+    Transition(_S.RECOVERING, _E.RECOVER, _filter_sinks, _S.YIELDED),
+    Transition(_S.RECOVERING, _E.RECOVER, _filter_has_stopped_motors, _S.ON_GROUND),
+    Transition(_S.RECOVERING, _E.RECOVER, _high_and_commanded_but_not_remembered, _S.FLYING),
+    Transition(_S.RECOVERING, _E.RECOVER, _no_flight_remembered, _S.ON_GROUND),
+    Transition(_S.RECOVERING, _E.RECOVER, _flying_remembered, _S.FLYING),
+    # The caller of an interrupted takeoff or landing, who got an error, expects safety.
+    Transition(_S.RECOVERING, _E.RECOVER, _down, _S.RAMPING_DOWN, _begin),
+    Transition(_S.RECOVERING, _E.RECOVER, _seen_and_landings_have_a_descent, _S.DESCENDING, _begin),
+    Transition(_S.RECOVERING, _E.RECOVER, None, _S.FLYING),
+    Transition(_S.ON_GROUND, _E.TAKEOFF, None, _S.LIFTING_OFF, _begin),
+    Transition(_S.LIFTING_OFF, _E.TICK, _open_loop_over, _S.CLIMBING, _send_hover_point),
+    Transition(_S.CLIMBING, _E.TICK, _takeoff_over_but_still_down, _S.RAMPING_DOWN, _begin),
+    Transition(_S.CLIMBING, _E.TICK, _takeoff_over, _S.FLYING),
+    *(
+        row
+        for state in (*_TAKEOFF, _S.FLYING)
+        for row in (
+            Transition(state, _E.LAND, _landings_have_a_descent, _S.DESCENDING, _begin),
+            Transition(state, _E.LAND, None, _S.RAMPING_DOWN, _begin),
+        )
+    ),
+    Transition(_S.DESCENDING, _E.TICK, _down_or_descent_over, _S.RAMPING_DOWN, _begin_at_once),
+    Transition(_S.RAMPING_DOWN, _E.TICK, _ramp_over, _S.TOUCHING_DOWN),
+    Transition(_S.TOUCHING_DOWN, _E.TICK, _down_or_not_seen_or_too_late, _S.ON_GROUND, _begin),
+    *(
+        Transition(state, _E.FILTER_SINKS, None, _S.YIELDED, _begin)
+        for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING)
+    ),
+    Transition(_S.YIELDED, _E.FILTER_SINKS, None, _S.YIELDED),
+    Transition(_S.YIELDED, _E.FILTER_PASSES, None, _S.RAMPING_DOWN, _begin),
+    Transition(_S.YIELDED, _E.FILTER_HOLDS, None, _S.RAMPING_DOWN, _begin),
+    Transition(_S.YIELDED, _E.TICK, _filter_too_late, _S.ON_GROUND, _begin),
+    # In a takeoff the filter may not have seen it yet, and still be down from the last flight.
+    *(
+        Transition(state, _E.FILTER_DOWN, None, _S.ON_GROUND, _begin)
+        for state in (*_AIRBORNE_OR_LANDING, _S.YIELDED)
+    ),
+    *(
+        Transition(state, event, None, _S.ON_GROUND, _begin)
+        for state in (*_TAKEOFF, *_AIRBORNE_OR_LANDING, _S.YIELDED)
+        for event in STOPS
+    ),
+)

@@ -1,0 +1,69 @@
+"""State machines as data: what runs is the table that the documentation draws.
+
+A table is a sequence of `Transition`; guards and actions are functions of one context, and their
+names are the words of the diagram.
+"""
+
+import enum
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+State = TypeVar("State", bound=enum.Enum)
+Context = TypeVar("Context")
+
+
+@dataclass(frozen=True)
+class Transition(Generic[State, Context]):
+    """A row of a table.
+
+    Attributes
+    ----------
+    state : enum.Enum
+        In which the row counts.
+    event : enum.Enum
+    guard : callable or None
+        ``guard(context)`` returns whether the transition is taken, and changes nothing;
+        None: always.
+    next : enum.Enum
+        State after the transition; may be the same.
+    action : callable or None
+        ``action(context)`` is called before the state changes.
+    """
+
+    state: State
+    event: enum.Enum
+    guard: Callable[[Context], bool] | None
+    next: State
+    action: Callable[[Context], object] | None = None
+
+
+Table = Sequence[Transition[State, Context]]
+
+
+def find(
+    table: Table[State, Context], state: State, event: enum.Enum, context: Context
+) -> Transition[State, Context] | None:
+    """Return the first row of a table that counts and whose guard holds, or None."""
+    for row in table:
+        if row.state is state and row.event is event and (row.guard is None or row.guard(context)):
+            return row
+    return None
+
+
+def step(table: Table[State, Context], state: State, event: enum.Enum, context: Context) -> State:
+    """Call the action of the row that `find` returns; return the next state.
+
+    Without such a row the event is ignored: the state stays.
+    """
+    row = find(table, state, event, context)
+    if row is None:
+        return state
+    if row.action is not None:
+        row.action(context)
+    return row.next
+
+
+def words(function: Callable[..., object] | None) -> str:
+    """Return the name of a guard or an action in words; empty for None."""
+    return "" if function is None else function.__name__.strip("_").replace("_", " ")

@@ -1,0 +1,194 @@
+"""The descent of a landing, with a clock moved by hand."""
+
+import pytest
+from flight_clock import (
+    BARE,
+    DESCENDING,
+    FLYING,
+    LANDING,
+    ON_GROUND,
+    TAKING_OFF,
+    Clock,
+    G,
+    flying,
+    grounded,
+    in_state,
+)
+
+from crazyflie_takeoff.server_states import Event, FilterReport
+
+
+def test_landing_descends_first():
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.5, -0.5, 1.0))
+    clock.run(1.0)
+    assert clock.thrusts() == []
+    assert clock.toggles() == []
+    assert flight.flight_state is DESCENDING
+    expected = [
+        (pytest.approx(k / 100), pytest.approx((0.5, -0.5, 1.0 - 0.003 * k, 0.0, 0.0, -0.3)))
+        for k in range(100)
+    ]
+    assert clock.references() == expected
+    clock.position = (0.5, -0.5, 0.051)
+    clock.run(0.5)
+    assert clock.thrusts() == []
+    clock.position = (0.5, -0.5, 0.049)
+    clock.run(2.0)
+    assert clock.thrusts()[0] == (1.5, G)
+    assert clock.toggles() == [1.5]
+    assert flight.flight_state is ON_GROUND
+    assert clock.thrusts()[100] == (2.5, 0.0)
+
+
+def test_the_ground_is_where_the_vehicle_took_off():
+    flight = grounded()
+    Clock(flight, position=(0.0, 0.0, 0.7), start=0.0).run(0.1)
+    flight.request(Event.TAKEOFF)
+    Clock(flight, position=(0.0, 0.0, 1.5), start=1.0).run(6.01)
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 0.76)).run(0.1)
+    assert flight.flight_state is DESCENDING
+    clock.position = (0.0, 0.0, 0.74)
+    clock.run(0.01)
+    assert flight.flight_state is LANDING
+
+
+def test_the_reference_presses_only_a_little_below_the_ground():
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 0.5)).run(4.5)
+    heights = [reference[2] for _, reference in clock.references()]
+    assert min(heights) == pytest.approx(-0.3)
+    assert clock.references()[-1][1] == pytest.approx((0.0, 0.0, -0.3, 0.0, 0.0, 0.0))
+
+
+def test_a_vehicle_that_does_not_descend_is_landed_all_the_same():
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 1.0))
+    assert clock.run_until(LANDING) == pytest.approx(1.0 / 0.3 + 3.0, abs=0.011)
+    # Zero thrust for at most two seconds until it counts as down.
+    assert clock.run_until(ON_GROUND) == pytest.approx(1.0 / 0.3 + 6.0, abs=0.03)
+    assert clock.thrusts()[-1][1] == 0.0
+
+
+def test_waits_for_the_touchdown_when_the_height_is_known():
+    flight = flying(BARE)
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 0.2)).run(1.5)
+    assert flight.flight_state is LANDING
+    assert [thrust for _, thrust in clock.thrusts()[100:]] == [0.0] * 5
+    clock.position = (0.0, 0.0, 0.01)
+    assert clock.run_until(ON_GROUND) == pytest.approx(1.5)
+    assert clock.said[-1][1].thrust == 0.0
+
+
+def test_a_descent_without_a_state_goes_on_by_dead_reckoning():
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
+    clock.position = None
+    clock.run(1.0)
+    expected = [
+        (pytest.approx(k / 100), pytest.approx((0.0, 0.0, 1.0 - 0.003 * k, 0.0, 0.0, -0.3)))
+        for k in range(200)
+    ]
+    assert clock.references() == expected
+    # The motors are stopped when there has been time enough to sink.
+    assert clock.run_until(LANDING) == pytest.approx(1.0 / 0.3 + 3.0, abs=0.011)
+    assert clock.thrusts() == [(pytest.approx(1.0 / 0.3 + 3.0, abs=0.011), G)]
+    assert clock.run_until(ON_GROUND) == pytest.approx(1.0 / 0.3 + 4.0, abs=0.03)
+
+
+def test_a_descent_goes_on_from_where_the_vehicle_is_seen_again():
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 2.0)).run(1.0)
+    clock.position = None
+    clock.run(2.0)
+    clock.position = (0.1, -0.1, 1.9)
+    clock.said.clear()
+    clock.run(1.0)
+    expected = [pytest.approx((0.1, -0.1, 1.9 - 0.003 * k, 0.0, 0.0, -0.3)) for k in range(100)]
+    assert [reference for _, reference in clock.references()] == expected
+    # It has as long as if it had begun there.
+    assert clock.run_until(LANDING) == pytest.approx(3.0 + 1.9 / 0.3 + 3.0, abs=0.011)
+
+
+def test_a_descent_that_begins_without_a_state_begins_where_the_vehicle_was_seen_last():
+    flight = flying()
+    Clock(flight, position=(0.5, -0.5, 0.8), start=6.01).run(0.1)
+    clock = Clock(flight, start=6.11).run(1.0)
+    flight.request(Event.LAND)
+    clock.said.clear()
+    clock.run(0.5)
+    assert flight.flight_state is DESCENDING
+    expected = [pytest.approx((0.5, -0.5, 0.8 - 0.003 * k, 0.0, 0.0, -0.3)) for k in range(50)]
+    assert [reference for _, reference in clock.references()] == expected
+
+
+@pytest.mark.parametrize("seen", [0.7, None])
+def test_a_descent_waits_while_the_filter_holds_the_vehicle(seen):
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
+    clock.position = None if seen is None else (0.0, 0.0, seen)
+    height = seen or 1.0
+    flight.set_filter(FilterReport(Event.FILTER_HOLDS))
+    clock.run(2.0)
+    assert clock.references()[-1][1] == pytest.approx((0, 0, height, 0, 0, -0.3), abs=0.005)
+    flight.set_filter(FilterReport())
+    clock.run(1.0)
+    assert clock.references()[-1][1] == pytest.approx((0, 0, height - 0.3, 0, 0, -0.3), abs=0.01)
+    assert clock.run_until(LANDING) == pytest.approx(3.0 + height / 0.3 + 3.0, abs=0.05)
+
+
+def test_a_descent_that_is_held_for_ever_ends():
+    flight = flying()
+    flight.request(Event.LAND)
+    flight.set_filter(FilterReport(Event.FILTER_HOLDS))
+    clock = Clock(flight, position=(0.0, 0.0, 1.0))
+    assert clock.run_until(LANDING, 100.0) == pytest.approx(60.0 + 1.0 / 0.3 + 3.0, abs=0.05)
+
+
+def test_a_descent_keeps_its_speed_when_the_plan_changes():
+    flight = flying()
+    flight.request(Event.LAND)
+    flight.set_plan(BARE)
+    clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
+    assert clock.references()[-1][1] == pytest.approx((0.0, 0.0, 0.703, 0.0, 0.0, -0.3))
+
+
+@pytest.mark.parametrize("sees", [True, False])
+def test_a_descent_under_way_is_made_faster(sees):
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 4.0)).run(1.0)
+    clock.position = (0.0, 0.0, 3.7) if sees else None
+    clock.run(0.01)
+    clock.said.clear()
+    flight.limit_descent(7.0)
+    clock.run(1.0)
+    (_, first), (_, last) = clock.references()[0], clock.references()[-1]
+    assert first == pytest.approx((0.0, 0.0, 3.7, 0.0, 0.0, -3.7 / 7.0), abs=0.01)
+    assert last[2] == pytest.approx(3.7 - 0.99 * 3.7 / 7.0, abs=0.01)
+
+
+def test_a_descent_that_is_fast_enough_is_not_made_slower():
+    flight = flying()
+    flight.request(Event.LAND)
+    clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(1.0)
+    flight.limit_descent(7.0)
+    clock.run(0.01)
+    assert clock.references()[-1][1][5] == -0.3
+
+
+@pytest.mark.parametrize("state", [ON_GROUND, TAKING_OFF, FLYING, LANDING])
+def test_only_a_descent_is_made_faster(state):
+    flight, untouched = in_state(state), in_state(state)
+    flight.limit_descent(7.0)
+    for k in range(1500):
+        moment, position = 6.03 + k / 100, (0.0, 0.0, 1.0)
+        assert flight.tick(moment, position) == untouched.tick(moment, position)

@@ -5,12 +5,13 @@ import math
 import pytest
 import rospy
 from geometry_msgs.msg import Point
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Float64MultiArray
 
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_msgs.msg import (
+    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
@@ -18,6 +19,10 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
+
+
+def flight_status(state):
+    return FlightStatus(state=getattr(FlightStatus, state))
 
 
 class Flight:
@@ -34,7 +39,7 @@ class Flight:
         assert self.process.launch(node, "/fleet/references")
         self.states = {}
         for name, y in (("cf1", 0.0), ("cf2", 1.0)):
-            self.process.publish(f"/{name}/in_flight_state", String("flying"))
+            self.process.publish(f"/{name}/in_flight_flight_status", flight_status("FLYING"))
             if f"/{name}/state" in self.process.transport.subscribers:
                 self.see(name, y)
         self.process.add_timer(0.05, self.repeat_states)
@@ -127,7 +132,7 @@ def test_a_vehicle_in_flight_that_is_not_seen_any_more_is_said(flight):
 
 
 def test_a_vehicle_on_the_ground_may_be_silent(flight):
-    flight.process.publish("/cf2/in_flight_state", String("on_ground"))
+    flight.process.publish("/cf2/in_flight_flight_status", flight_status("ON_GROUND"))
     flight.silence("cf2")
     flight.process.advance(2.0)
     assert flight.process.logged("warn") == []
@@ -144,7 +149,7 @@ def test_a_way_begins_where_the_vehicle_was(flight):
 def test_a_vehicle_that_was_never_seen_is_said():
     process = FakeProcess()
     assert process.launch(ReferencesNode(fleet_file.grid(1).vehicles, (), "world"), "/references")
-    process.publish("/cf1/in_flight_state", String("taking_off"))
+    process.publish("/cf1/in_flight_flight_status", flight_status("TAKING_OFF"))
     process.advance(0.1)
     (text,) = process.logged("warn")
     assert text.startswith("/references: cf1 is in flight, and no state of it has come for")
@@ -271,7 +276,7 @@ def test_go_to_relative_and_another_reference_ends_it(flight):
 def test_a_landing_ends_a_way(flight):
     flight.go_to()
     flight.process.advance(0.1)
-    flight.process.publish("/cf1/in_flight_state", String("descending"))
+    flight.process.publish("/cf1/in_flight_flight_status", flight_status("DESCENDING"))
     count = len(flight.followed("cf1"))
     flight.process.advance(1.0)
     assert len(flight.followed("cf1")) == count
@@ -288,7 +293,7 @@ def test_go_to_is_refused(flight):
     flight.process.advance(0.6)
     with pytest.raises(ServiceError, match="/cf1/go_to refused: the vehicle is not in flight"):
         flight.go_to()
-    flight.process.publish("/cf2/in_flight_state", String("on_ground"))
+    flight.process.publish("/cf2/in_flight_flight_status", flight_status("ON_GROUND"))
     flight.see("cf2", 1.0)
     with pytest.raises(ServiceError, match="/cf2/go_to refused: the vehicle is not in flight"):
         flight.go_to("cf2")

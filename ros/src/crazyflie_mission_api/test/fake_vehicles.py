@@ -7,7 +7,11 @@ from std_srvs.srv import Empty, EmptyResponse
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState
 from crazyflie_model.angles import quaternion_from_rpy
-from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    FlightStatus,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils import ServiceError
 from crazyflie_utils.tf.poses import StampedPose
 
@@ -21,7 +25,7 @@ class ControllerVehicle:
         self.refusal = ""
         handle = process.handle(f"/{name}/controller")
         self._state = handle.publisher("state", PositionVelocityYawStateStamped)
-        self._flight_state = handle.publisher("in_flight_state", String, latch=True)
+        self._flight_state = handle.publisher("in_flight_flight_status", FlightStatus, latch=True)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)
         handle.advertise_service("emergency", Empty, self._on_land)
@@ -31,7 +35,7 @@ class ControllerVehicle:
 
     def be(self, state):
         """Tell a flight state."""
-        self._flight_state.publish(String(state))
+        self._flight_state.publish(FlightStatus(state=getattr(FlightStatus, state.upper())))
 
     def _on_takeoff(self, _):
         if self.refusal:

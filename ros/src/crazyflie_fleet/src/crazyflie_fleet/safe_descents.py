@@ -69,7 +69,7 @@ class SafeDescents:
         for other, descent in self._descents.items():
             if self.is_under_way(other, time):
                 places[other, :2] = descent.move.goal[:2]
-        known: NDArray[np.bool_] = np.isfinite(places).all(axis=1)
+        known = np.asarray(np.isfinite(places).all(axis=1))
         start = goal = np.nan_to_num(positions[number])
         if known[number]:
             index = int(known[:number].sum())

@@ -5,10 +5,10 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Float64MultiArray
 
 from crazyflie_fleet.fleet_config import VehicleConfig
-from crazyflie_fleet.vehicle_nodes import FLIGHT_STATE, STATE
+from crazyflie_fleet.vehicle_nodes import FLIGHT_STATUS, STATE
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.vectors import to_tuple
@@ -17,14 +17,6 @@ MAX_STATE_AGE = 0.5
 """Of a state that says where its vehicle is, s."""
 
 _IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCENDING)
-
-_NAMES = {
-    "on_ground": FlightStatus.ON_GROUND,
-    "taking_off": FlightStatus.TAKING_OFF,
-    "flying": FlightStatus.FLYING,
-    "descending": FlightStatus.DESCENDING,
-    "landing": FlightStatus.LANDING,
-}
 
 
 class VehicleStates:
@@ -68,8 +60,8 @@ class VehicleStates:
         """Subscribe to the topics of all vehicles through the handle of a node."""
         self._handle = handle
         for number, name in enumerate(self.names):
-            on_flight_state = partial(self._on_flight_state, number)
-            handle.subscribe(f"/{name}/{FLIGHT_STATE}", String, on_flight_state)
+            on_status = partial(self._on_flight_status, number)
+            handle.subscribe(f"/{name}/{FLIGHT_STATUS}", FlightStatus, on_status)
         scalar = {name: number for number, name in enumerate(self.names)}
         for topic, vehicles in self._vectorized.items():
             numbers = np.array([scalar.pop(vehicle.name) for vehicle in vehicles])
@@ -106,5 +98,5 @@ class VehicleStates:
         self._states[numbers] = np.reshape(message.data, (-1, 7))[:, :6]
         self._times[numbers] = self._handle.time()
 
-    def _on_flight_state(self, number, message):
-        self.flight_states[number] = _NAMES.get(message.data, FlightStatus.UNKNOWN)
+    def _on_flight_status(self, number, message):
+        self.flight_states[number] = message.state

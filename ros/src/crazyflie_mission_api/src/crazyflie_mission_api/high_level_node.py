@@ -11,6 +11,7 @@ from typing_extensions import override
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Position
 from crazyflie_mission_api.conversions import from_message, reference_message, setpoint_goal
+from crazyflie_mission_api.flight_words import WORDS
 from crazyflie_mission_api.follower import Follower
 from crazyflie_mission_api.high_level_parameters import HighLevelParameters
 from crazyflie_mission_api.service_relay import relay
@@ -28,16 +29,6 @@ MAX_STATE_AGE = 0.5
 
 FIRST_CLIMB = 1.0
 """Highest takeoff of the takeoff server, m; the rest of a climb follows in flight."""
-
-_WORDS = {
-    FlightStatus.UNKNOWN: "not known to fly",
-    FlightStatus.ON_GROUND: "on ground",
-    FlightStatus.TAKING_OFF: "taking off",
-    FlightStatus.FLYING: "flying",
-    FlightStatus.DESCENDING: "descending",
-    FlightStatus.LANDING: "landing",
-}
-_STATES = {words.replace(" ", "_"): state for state, words in _WORDS.items()}
 
 
 class HighLevelNode(Node):
@@ -89,7 +80,7 @@ class HighLevelNode(Node):
             ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
         ):
             handle.advertise_service(f"~{name}", service_type, callback)
-        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(parameters.flight_status_topic, FlightStatus, self._on_flight_status)
         handle.subscribe(
             parameters.state_topic,
             PositionVelocityYawStateStamped,
@@ -125,9 +116,9 @@ class HighLevelNode(Node):
         self._measured = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
         self._measured_at = self._handle.time()
 
-    def _on_flight_state(self, message):
+    def _on_flight_status(self, message):
         took_off = self._flight_state == FlightStatus.TAKING_OFF
-        state = self._flight_state = _STATES.get(message.data, FlightStatus.UNKNOWN)
+        state = self._flight_state = message.state
         if state != FlightStatus.TAKING_OFF:
             self._hover = None
             if took_off and state != FlightStatus.FLYING:
@@ -199,7 +190,7 @@ class HighLevelNode(Node):
     def _on_stop(self, _):
         if self._flight_state in (FlightStatus.FLYING, FlightStatus.TAKING_OFF):
             raise ServiceError(
-                f"the vehicle is {_WORDS[self._flight_state]}; expected it to have landed: stop "
+                f"the vehicle is {WORDS[self._flight_state]}; expected it to have landed: stop "
                 "would let it fall, which is what emergency is for"
             )
         return srv.StopResponse()
@@ -237,7 +228,7 @@ class HighLevelNode(Node):
         if self._flight_state == FlightStatus.FLYING:
             self._begin_or_log(Follower.start, 0)
         else:
-            self._handle.error(f"not started: the vehicle is {_WORDS[self._flight_state]}")
+            self._handle.error(f"not started: the vehicle is {WORDS[self._flight_state]}")
 
     def _on_setpoints_stop(self, _):
         self._end_stream()
@@ -249,7 +240,7 @@ class HighLevelNode(Node):
         elif self._flight_state == FlightStatus.FLYING:
             self._begin(command, *arguments)
         else:
-            raise ServiceError(f"the vehicle is {_WORDS[self._flight_state]}; expected it to fly")
+            raise ServiceError(f"the vehicle is {WORDS[self._flight_state]}; expected it to fly")
 
     def _begin(self, command, *arguments):
         try:

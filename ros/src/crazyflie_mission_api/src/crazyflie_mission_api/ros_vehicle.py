@@ -13,6 +13,7 @@ from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_mission_api.conversions import heading, to_message
+from crazyflie_mission_api.flight_words import WORDS
 from crazyflie_mission_api.futures import done, in_turn
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.mission_vehicle import MissionVehicle
@@ -21,7 +22,7 @@ from crazyflie_mission_api.synchronized_start import SynchronizedStart
 from crazyflie_mission_api.timed_trajectory import START_SKEW
 from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces
-from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
 from crazyflie_utils.parameters.types import FINITE
 
@@ -46,7 +47,7 @@ _SETTLING_TIME = 0.5
 _HIGH_LEVEL = "commander/enHighLevel"
 """The firmware parameter that enables high-level commands."""
 
-_ENDED = ("on_ground", "landing", "descending")
+_ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
 """States after a flight."""
 
 _HOLD_DURATION = 0.5
@@ -101,7 +102,7 @@ class RosVehicle(MissionVehicle):
         self._ground = 0.0
         self._landing_end = 0.0
         self._status = ""
-        self._flight_state = ""
+        self._flight_state = FlightStatus.UNKNOWN
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
@@ -115,8 +116,8 @@ class RosVehicle(MissionVehicle):
             if frames is None:
                 state = PositionVelocityYawStateStamped
                 handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
-            handle.subscribe(f"{top}/in_flight_state", String, self._on_flight_state)
-            handle.subscribe(f"{top}/in_flight_status", String, self._on_status)
+            topic = f"{top}/in_flight_flight_status"
+            handle.subscribe(topic, FlightStatus, self._on_flight_status)
 
     # State.
 
@@ -151,13 +152,13 @@ class RosVehicle(MissionVehicle):
             bad = ("lost", "cannot fly", "emergency", "disconnected")
             return self._status if self._status.startswith(bad) else self._stream.fault()
         if self._flight_state in _ENDED:
-            return f"it does not fly any more: {self._status}"
+            return f"it does not fly any more: {self._status or WORDS[self._flight_state]}"
         return ""
 
     @override
     def has_landed(self) -> bool:
         if not self._uses_driver:
-            return self._flight_state == "on_ground"
+            return self._flight_state == FlightStatus.ON_GROUND
         place = self.position()
         if place is None:
             is_down = self._status.startswith(_READY)
@@ -178,8 +179,8 @@ class RosVehicle(MissionVehicle):
     def _on_status(self, message):
         self._status = message.data
 
-    def _on_flight_state(self, message):
-        self._flight_state = message.data
+    def _on_flight_status(self, message):
+        self._flight_state, self._status = message.state, message.reason
 
     # Commands.
 

@@ -11,13 +11,13 @@ from crazyflie_fleet.fleet_config import FleetConfig, LogTopic, VehicleConfig, c
 from crazyflie_fleet.settings import (
     DEFAULT_TOPICS,
     LOCAL,
+    VEHICLE_NAME,
     DefaultTopicSettings,
     FirmwareNumber,
     LogTopicSettings,
     MachineSettings,
     RobotSettings,
     Settings,
-    VehicleName,
     same_vehicle,
 )
 from crazyflie_utils import ParameterError
@@ -86,12 +86,7 @@ def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> FleetCon
 
 
 class _Parser:
-    """Parses one file; collects all errors.
-
-    Parameters
-    ----------
-    top : Entry
-    """
+    """Parses one file; collects all errors."""
 
     def __init__(self, top: Entry):
         self._top = top
@@ -117,7 +112,7 @@ class _Parser:
         if common is not None:
             self._check(common, Settings, "broadcasts")
         for name, entry in robots.items():
-            self._check_type(VehicleName(), name, entry)
+            self._check_type(VEHICLE_NAME, name, entry)
             self._check(entry, RobotSettings)
             self._check_choice(entry, "type", types)
         for entry in (*robots.values(), *types.values(), *([common] if common else [])):
@@ -263,7 +258,7 @@ class _Parser:
             parts["custom_topics"].entries() if "custom_topics" in parts else {}
         ).items():
             topic = self._read(inner, LogTopicSettings)
-            self._check_type(VehicleName(), key, inner)
+            self._check_type(VEHICLE_NAME, key, inner)
             if topic is not None:
                 custom.append(LogTopic(key, topic.frequency, topic.variables))
         enabled = "enabled" not in parts or self._check_type(

@@ -58,9 +58,9 @@ class IdealVehicle(MissionVehicle):
         name: str,
         clock: Clock,
         position: Triple,
-        bounds: Bounds = EVERYWHERE,
-        heading: float = 0.0,
-        start_skew: float = 0.0,
+        bounds: Bounds,
+        heading: float,
+        start_skew: float,
     ):
         self.name = name
         self.bounds = bounds
@@ -157,17 +157,11 @@ class DryRun(VehicleGroup):
     ):
         clock = DryRunClock()
         fences, yaws, skews = bounds or {}, headings or {}, start_skews or {}
-        vehicles = [
-            IdealVehicle(
-                name,
-                clock,
-                position,
-                fences.get(name, EVERYWHERE),
-                yaws.get(name, 0.0),
-                skews.get(name, 0.0),
-            )
-            for name, position in starts.items()
-        ]
+        vehicles = []
+        for name, position in starts.items():
+            fence = fences.get(name, EVERYWHERE)
+            yaw, skew = yaws.get(name, 0.0), skews.get(name, 0.0)
+            vehicles.append(IdealVehicle(name, clock, position, fence, yaw, skew))
         super().__init__(vehicles, clock, rules)
 
 

@@ -55,14 +55,7 @@ class Rules:
 
 
 class GroupState:
-    """Vehicles and their commanded trajectories.
-
-    Parameters
-    ----------
-    vehicles : iterable of MissionVehicle
-    clock : Clock
-    rules : Rules, optional
-    """
+    """Vehicles and their commanded trajectories."""
 
     def __init__(
         self, vehicles: Iterable[MissionVehicle], clock: Clock, rules: Rules | None = None

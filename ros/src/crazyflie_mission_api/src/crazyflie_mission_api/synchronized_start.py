@@ -10,12 +10,7 @@ _STEP = 0.02
 
 
 class SynchronizedStart:
-    """Publishes the names of the nodes that are to start.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    """
+    """Publishes the names of the nodes that are to start."""
 
     def __init__(self, handle: NodeHandle):
         self._handle = handle

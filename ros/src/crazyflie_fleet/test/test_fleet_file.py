@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_fleet import fleet_file
-from crazyflie_fleet.fleet import DOWNWASH, LogTopic, close_pairs
+from crazyflie_fleet.fleet_config import DOWNWASH, LogTopic, close_pairs
 from crazyflie_fleet.launch_text import launch_text
 from crazyflie_fleet.settings import same_vehicle
 from crazyflie_utils import ParameterError
@@ -60,7 +60,7 @@ def test_the_example():
     )
     assert second.default_topics == ("battery", "pose")
     assert fleet["cf1"].log_topics == ()
-    assert fleet.remarks == ()
+    assert fleet.warnings == ()
 
 
 def test_the_nearest_one_counts(load):
@@ -77,11 +77,11 @@ def test_the_nearest_one_counts(load):
     assert fleet["cf2"].settings.hover_height == 2.0
 
 
-def test_what_has_no_effect_is_remarked(load):
+def test_what_has_no_effect_is_warned_about(load):
     logging = "all:\n  broadcasts: {num_repeats: 15}\n  firmware_logging:\n    default_topics:\n"
     fleet = load(TWO + logging + "      odom: {frequency: 10}\n      status: {frequency: 1}\n")
-    (remark,) = fleet.remarks
-    assert remark.endswith(
+    (warning,) = fleet.warnings
+    assert warning.endswith(
         "fleet.yaml:12: all/firmware_logging/default_topics/odom is not offered by the driver, "
         "and left out"
     )

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
-from crazyflie_fleet.landing import MAX_DETOUR, _Picture, free_place, next_round
+from crazyflie_fleet.landing import MAX_DETOUR, _Scene, free_place, next_round
 
 SCALE = np.array([1.0, 1.0, 0.5])
 
@@ -124,15 +124,15 @@ def test_buffers_may_differ():
 
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, 10**6))
-def test_ways_are_clear_if_nobody_comes_near_on_them(seed):
+def test_ways_are_reachable_if_nobody_comes_near_on_them(seed):
     draw = np.random.default_rng(seed)
     n, limit = 6, 0.3
     places = draw.uniform((-0.6, -0.6, 0.8), (0.6, 0.6, 1.2), (n, 3))
     flags, box = np.zeros(n, dtype=bool), np.full((n, 2), np.inf)
-    picture = _Picture(places, ~flags, flags, np.full((n, n), limit), -box, box)
+    scene = _Scene(places, ~flags, flags, np.full((n, n), limit), -box, box)
     goals = draw.uniform(-1.0, 1.0, (20, 2))
     chosen = {1: (0.5, 0.0), 4: (-0.5, 0.2)}
-    for goal, is_clear in zip(goals, picture.are_clear(0, goals, chosen), strict=True):
+    for goal, is_clear in zip(goals, scene.are_reachable(0, goals, chosen), strict=True):
         ends = places.copy()
         ends[0, :2] = goal
         for j, place in chosen.items():

@@ -5,12 +5,13 @@ import math
 import pytest
 import rospy
 from geometry_msgs.msg import Point
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import Float64MultiArray
 
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_msgs.msg import (
+    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
@@ -20,18 +21,25 @@ from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
 
+def flight_status(state):
+    return FlightStatus(state=getattr(FlightStatus, state))
+
+
 class Flight:
     """Two vehicles, cf1 and cf2, 1 m apart along y."""
 
-    def __init__(self, own=2, swarms=None):
+    def __init__(self, own=2, vectorized=None):
         self.process = FakeProcess()
         node = ReferencesNode(
-            fleet_file.grid(2).vehicles[:own], fleet_file.grid(2).vehicles[own:], "world", swarms
+            fleet_file.grid(2).vehicles[:own],
+            fleet_file.grid(2).vehicles[own:],
+            "world",
+            vectorized,
         )
         assert self.process.launch(node, "/fleet/references")
         self.states = {}
         for name, y in (("cf1", 0.0), ("cf2", 1.0)):
-            self.process.publish(f"/{name}/in_flight_state", String("flying"))
+            self.process.publish(f"/{name}/in_flight_flight_status", flight_status("FLYING"))
             if f"/{name}/state" in self.process.transport.subscribers:
                 self.see(name, y)
         self.process.add_timer(0.05, self.repeat_states)
@@ -88,7 +96,7 @@ def test_who_would_come_too_close_waits_where_it_is(flight):
     assert flight.process.published("/fleet/waiting")[-1].data == "cf1"
     assert flight.process.logged("warn") == [
         "/fleet/references: cf1 and cf2 are 0.20 m apart and must not come closer than 0.30 m: "
-        "whom its reference leads nearer waits"
+        "a vehicle whose reference approaches the other is held"
     ]
 
 
@@ -110,8 +118,8 @@ def test_a_vehicle_in_flight_that_is_not_seen_any_more_is_said(flight):
     assert flight.process.logged("warn") == []
     flight.process.advance(1.0)
     assert flight.process.logged("warn") == [
-        "/fleet/references: cf2 is flying, and no state of it has come for 0.5 s: where it is, is "
-        "not known; the others keep apart from where it was last, (0.00, 1.00, 1.00)"
+        "/fleet/references: cf2 is in flight, and no state of it has come for 0.5 s: its position "
+        "is not known; the others keep apart from its last place, (0.00, 1.00, 1.00)"
     ]
     # They do, and do not take it for one that goes on with its last speed.
     flight.see("cf1", 0.4)
@@ -124,7 +132,7 @@ def test_a_vehicle_in_flight_that_is_not_seen_any_more_is_said(flight):
 
 
 def test_a_vehicle_on_the_ground_may_be_silent(flight):
-    flight.process.publish("/cf2/in_flight_state", String("on_ground"))
+    flight.process.publish("/cf2/in_flight_flight_status", flight_status("ON_GROUND"))
     flight.silence("cf2")
     flight.process.advance(2.0)
     assert flight.process.logged("warn") == []
@@ -141,10 +149,10 @@ def test_a_way_begins_where_the_vehicle_was(flight):
 def test_a_vehicle_that_was_never_seen_is_said():
     process = FakeProcess()
     assert process.launch(ReferencesNode(fleet_file.grid(1).vehicles, (), "world"), "/references")
-    process.publish("/cf1/in_flight_state", String("taking_off"))
+    process.publish("/cf1/in_flight_flight_status", flight_status("TAKING_OFF"))
     process.advance(0.1)
     (text,) = process.logged("warn")
-    assert text.startswith("/references: cf1 is taking off, and no state of it has come for")
+    assert text.startswith("/references: cf1 is in flight, and no state of it has come for")
     assert text.endswith("the others cannot keep apart from it")
 
 
@@ -162,7 +170,7 @@ def test_a_way_stands_still_while_its_vehicle_is_not_seen(flight):
 
 def test_states_of_many_come_in_one_message():
     _, second = fleet_file.grid(2).vehicles
-    flight = Flight(swarms={"/swarm/states": (second,)})
+    flight = Flight(vectorized={"/swarm/states": (second,)})
     flight.process.publish("/swarm/states", Float64MultiArray(data=[0.0, 1.5, 1.0, 0, 0, 0, 0]))
     flight.process.publish("/swarm/states", Float64MultiArray(data=[0.0] * 8))
     assert flight.process.logged("warn") == [
@@ -268,7 +276,7 @@ def test_go_to_relative_and_another_reference_ends_it(flight):
 def test_a_landing_ends_a_way(flight):
     flight.go_to()
     flight.process.advance(0.1)
-    flight.process.publish("/cf1/in_flight_state", String("descending"))
+    flight.process.publish("/cf1/in_flight_flight_status", flight_status("DESCENDING"))
     count = len(flight.followed("cf1"))
     flight.process.advance(1.0)
     assert len(flight.followed("cf1")) == count
@@ -285,7 +293,7 @@ def test_go_to_is_refused(flight):
     flight.process.advance(0.6)
     with pytest.raises(ServiceError, match="/cf1/go_to refused: the vehicle is not in flight"):
         flight.go_to()
-    flight.process.publish("/cf2/in_flight_state", String("on_ground"))
+    flight.process.publish("/cf2/in_flight_flight_status", flight_status("ON_GROUND"))
     flight.see("cf2", 1.0)
     with pytest.raises(ServiceError, match="/cf2/go_to refused: the vehicle is not in flight"):
         flight.go_to("cf2")

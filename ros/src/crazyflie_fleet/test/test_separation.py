@@ -6,7 +6,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.way import MAX_ACCELERATION, MAX_SPEED, Way, along, shortest
+from crazyflie_fleet.straight_move import (
+    MAX_ACCELERATION,
+    MAX_SPEED,
+    StraightMove,
+    evaluate,
+    shortest_duration,
+)
 from crazyflie_utils.refusal import RefusalError
 
 STILL = np.zeros((2, 3))
@@ -15,7 +21,7 @@ CLOSE = np.array([[0.0, 0.0, 1.0], [0.0, 0.25, 1.0]])
 
 
 def waiting(positions, velocities, goals, buffers=(0.15, 0.15)):
-    waits, pairs = Separation(buffers).waiting(*map(np.array, (positions, velocities, goals)))
+    waits, pairs = Separation(buffers).update(*map(np.array, (positions, velocities, goals)))
     return waits.tolist(), [(pair.first, pair.second) for pair in pairs]
 
 
@@ -47,11 +53,11 @@ def test_one_above_the_other_needs_more_distance():
 def test_who_waits_goes_on_only_with_some_more_distance():
     separation = Separation([0.15, 0.15])
     wanted = CLOSE[::-1]
-    assert separation.waiting(CLOSE, STILL, wanted)[0].all()
+    assert separation.update(CLOSE, STILL, wanted)[0].all()
     just_apart = np.array([[0.0, 0.0, 1.0], [0.0, 0.31, 1.0]])
-    assert separation.waiting(just_apart, STILL, just_apart[::-1])[0].all()
+    assert separation.update(just_apart, STILL, just_apart[::-1])[0].all()
     far_enough = np.array([[0.0, 0.0, 1.0], [0.0, 0.34, 1.0]])
-    assert not separation.waiting(far_enough, STILL, far_enough[::-1])[0].any()
+    assert not separation.update(far_enough, STILL, far_enough[::-1])[0].any()
 
 
 def test_who_is_not_seen_is_not_regarded():
@@ -82,10 +88,12 @@ SPEED = st.floats(-1.0, 1.0)
 @given(PLACE, PLACE, st.tuples(SPEED, SPEED, SPEED))
 def test_a_way_that_begins_in_a_move_is_smooth_and_not_too_fast(start, goal, velocity):
     start, goal, velocity = (np.array(each) for each in (start, goal, velocity))
-    duration = shortest(float(np.linalg.norm(goal - start)), float(np.linalg.norm(velocity)))
-    way = Way(start, goal, duration + 1e-9, velocity)
+    duration = shortest_duration(
+        float(np.linalg.norm(goal - start)), float(np.linalg.norm(velocity))
+    )
+    way = StraightMove(start, goal, duration + 1e-9, velocity)
     times = np.linspace(0.0, way.duration, 2001)
-    positions, velocities = along([way] * len(times), times)
+    positions, velocities = evaluate([way] * len(times), times)
     assert positions[0] == pytest.approx(start)
     assert velocities[0] == pytest.approx(velocity)
     assert positions[-1] == pytest.approx(goal, abs=1e-6)
@@ -97,28 +105,28 @@ def test_a_way_that_begins_in_a_move_is_smooth_and_not_too_fast(start, goal, vel
 
 
 def test_braking_does_not_take_longer_because_the_way_does():
-    way = Way(np.zeros(3), np.zeros(3), 60.0, np.array([1.0, 0.0, 0.0]))
-    positions, _ = along([way] * 600, np.linspace(0.0, 60.0, 600))
+    way = StraightMove(np.zeros(3), np.zeros(3), 60.0, np.array([1.0, 0.0, 0.0]))
+    positions, _ = evaluate([way] * 600, np.linspace(0.0, 60.0, 600))
     assert 0.25 < positions[:, 0].max() < 1.0
 
 
 @given(PLACE, PLACE, st.floats(0.0, 1.0))
 def test_a_way_is_smooth_and_not_too_fast(start, goal, share):
     start, goal = np.array(start), np.array(goal)
-    duration = shortest(float(np.linalg.norm(goal - start))) + 0.1
-    way = Way(start, goal, duration)
-    assert along([way], [0.0])[0][0] == pytest.approx(start)
-    assert along([way], [2.0 * duration])[0][0] == pytest.approx(goal)
+    duration = shortest_duration(float(np.linalg.norm(goal - start))) + 0.1
+    way = StraightMove(start, goal, duration)
+    assert evaluate([way], [0.0])[0][0] == pytest.approx(start)
+    assert evaluate([way], [2.0 * duration])[0][0] == pytest.approx(goal)
     for time in (0.0, duration):
-        assert along([way], [time])[1][0] == pytest.approx(np.zeros(3))
+        assert evaluate([way], [time])[1][0] == pytest.approx(np.zeros(3))
     time = share * duration
-    (position,), (velocity,) = along([way], [time])
+    (position,), (velocity,) = evaluate([way], [time])
     assert np.linalg.norm(velocity) <= MAX_SPEED
     wide = 1e-3
-    later = along([way], [min(time + wide, duration)])[1][0]
+    later = evaluate([way], [min(time + wide, duration)])[1][0]
     assert np.linalg.norm(later - velocity) / wide <= MAX_ACCELERATION + 0.05
     step = 1e-6
-    assert (along([way], [time + step])[0][0] - position) / step == pytest.approx(
+    assert (evaluate([way], [time + step])[0][0] - position) / step == pytest.approx(
         velocity, abs=1e-3
     )
 
@@ -129,10 +137,10 @@ def test_a_way_is_smooth_and_not_too_fast(start, goal, share):
     [(0.5, 1.2014), (1.0, 1.6990), (10.0, 9.375)],
 )
 def test_the_shortest_way_keeps_speed_and_acceleration(distance, seconds):
-    assert shortest(distance) == pytest.approx(seconds, abs=1e-4)
-    way = Way(np.zeros(3), np.array([distance, 0.0, 0.0]), shortest(distance))
+    assert shortest_duration(distance) == pytest.approx(seconds, abs=1e-4)
+    way = StraightMove(np.zeros(3), np.array([distance, 0.0, 0.0]), shortest_duration(distance))
     times = np.linspace(0.0, way.duration, 2001)
-    speeds = along([way] * len(times), times)[1][:, 0]
+    speeds = evaluate([way] * len(times), times)[1][:, 0]
     accelerations = np.gradient(speeds, times)
     assert speeds.max() <= MAX_SPEED + 1e-9
     assert np.abs(accelerations).max() <= MAX_ACCELERATION + 1e-2
@@ -141,4 +149,4 @@ def test_the_shortest_way_keeps_speed_and_acceleration(distance, seconds):
 @pytest.mark.parametrize("duration", [0.0, -1.0, 1.6, float("nan")])
 def test_no_way(duration):
     with pytest.raises(RefusalError, match=r"expected a duration of at least 1.70 s \(at most 2 m"):
-        Way(np.zeros(3), np.array([1.0, 0.0, 0.0]), duration)
+        StraightMove(np.zeros(3), np.array([1.0, 0.0, 0.0]), duration)

@@ -21,7 +21,7 @@ import time
 
 from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest
 from crazyflie_link.testing.fake_vehicle import FakeVehicle
-from crazyflie_mission_api.connection import RosVehicle
+from crazyflie_mission_api.ros_vehicle import RosVehicle
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.testing.programs import free_port, running
 from crazyflie_utils.testing.waiting import wait_until

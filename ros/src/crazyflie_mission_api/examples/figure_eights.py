@@ -9,8 +9,8 @@ import sys
 
 from crazyflie_demo.figure8 import figure8
 from crazyflie_mission_api import Fleet, Limits
-from crazyflie_mission_api.rehearsal import Team
 from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.polynomials import PolynomialPiece
 
 LIMITS = Limits(speed=1.0, acceleration=1.5)
@@ -24,7 +24,7 @@ def mirrored(pieces: Pieces) -> list[PolynomialPiece]:
     ]
 
 
-def mission(fleet: Team) -> None:
+def mission(fleet: VehicleGroup) -> None:
     """Fly it."""
     fleet.takeoff(1.0)
     ways = (figure8(), mirrored(figure8()))
@@ -33,5 +33,5 @@ def mission(fleet: Team) -> None:
 
 
 if __name__ == "__main__":
-    with Fleet(sys.argv[1:] or [f"cf{k}" for k in range(1, 9)], limits=LIMITS) as team:
-        team.fly(mission)
+    with Fleet(sys.argv[1:] or [f"cf{k}" for k in range(1, 9)], limits=LIMITS) as group:
+        group.fly(mission)

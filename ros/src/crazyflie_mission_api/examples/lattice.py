@@ -2,18 +2,18 @@
 """Many vehicles rise from a square on the floor into a lattice, turn it into a ring, and come back.
 
 Usage: lattice.py [N], how many; by default 100: cf1, cf2, ... as sw_swarm.launch has them. With
-the word "rehearse" behind it nothing flies, and no ROS is needed.
+the word "dry_run" behind it nothing flies, and no ROS is needed.
 """
 
 import math
 import sys
 
 import crazyflie_mission_api
-from crazyflie_fleet.fleet import DOWNWASH
-from crazyflie_mission_api import Limits, Rehearsal
+from crazyflie_fleet.fleet_config import DOWNWASH
+from crazyflie_mission_api import DryRun, Limits
 from crazyflie_mission_api.formations import Array, circle, lattice
-from crazyflie_mission_api.rehearsal import Team
-from crazyflie_mission_api.roster import Rules
+from crazyflie_mission_api.group_state import Rules
+from crazyflie_mission_api.vehicle_group import VehicleGroup
 
 SPACING = 0.7
 """Between neighbours, m."""
@@ -37,7 +37,7 @@ def ring(n: int) -> Array:
     return circle(n, max(1.0, n * SPACING / (2.0 * math.pi)), (0.0, 0.0, 1.5))
 
 
-def mission(fleet: Team) -> None:
+def mission(fleet: VehicleGroup) -> None:
     """Fly it."""
     fleet.takeoff(1.0)
     begin = [fleet.position(name) for name in fleet.names]
@@ -56,12 +56,13 @@ def square(n: int) -> Array:
 if __name__ == "__main__":
     number = int(sys.argv[1]) if len(sys.argv) > 1 else 100
     names = [f"cf{k}" for k in range(1, number + 1)]
-    if sys.argv[2:] == ["rehearse"]:
-        rehearsal = Rehearsal(
+    # The word of earlier versions was "rehearse".
+    if sys.argv[2:] in (["dry_run"], ["rehearse"]):
+        dry_run = DryRun(
             dict(zip(names, map(tuple, square(number).tolist()), strict=True)), Rules(LIMITS)
         )
-        mission(rehearsal)
-        print(f"{number} vehicles, {rehearsal.time():.0f} s, nobody meets")
+        mission(dry_run)
+        print(f"{number} vehicles, {dry_run.time():.0f} s, nobody meets")
     else:
-        with crazyflie_mission_api.Fleet(names, limits=LIMITS) as team:
-            team.fly(mission)
+        with crazyflie_mission_api.Fleet(names, limits=LIMITS) as group:
+            group.fly(mission)

@@ -7,21 +7,25 @@ from std_srvs.srv import Empty, EmptyResponse
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState
 from crazyflie_model.angles import quaternion_from_rpy
-from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    FlightStatus,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils import ServiceError
 from crazyflie_utils.tf.poses import StampedPose
 
 
-class Stack:
+class ControllerVehicle:
     """A vehicle that is at once where its reference is."""
 
     def __init__(self, process, name, position):
         self.position = list(position)
         self.yaw = 0.0
         self.refusal = ""
-        handle = process.handle(f"/{name}/stack")
+        handle = process.handle(f"/{name}/controller")
         self._state = handle.publisher("state", PositionVelocityYawStateStamped)
-        self._flight_state = handle.publisher("in_flight_state", String, latch=True)
+        self._flight_state = handle.publisher("in_flight_flight_status", FlightStatus, latch=True)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)
         handle.advertise_service("emergency", Empty, self._on_land)
@@ -31,7 +35,7 @@ class Stack:
 
     def be(self, state):
         """Tell a flight state."""
-        self._flight_state.publish(String(state))
+        self._flight_state.publish(FlightStatus(state=getattr(FlightStatus, state.upper())))
 
     def _on_takeoff(self, _):
         if self.refusal:
@@ -59,7 +63,7 @@ class Stack:
         self._state.publish(message)
 
 
-class Driven:
+class DriverVehicle:
     """A vehicle that is at once where it was told to be, behind the driver's services.
 
     With a ``frame`` its position is that of tf's frame ``name`` in it, else it comes as a pose.

@@ -1,4 +1,4 @@
-"""A rehearsal flown by the model of the vehicle under a controller, all vehicles at once."""
+"""A dry_run flown by the model of the vehicle under a controller, all vehicles at once."""
 
 from typing import NamedTuple
 
@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.distance import pdist
 
 from crazyflie_lqr.gain_file import load_matrix
-from crazyflie_mission_api import Rehearsal
+from crazyflie_mission_api import DryRun
 from crazyflie_model.dynamics import Coupled7D
 from crazyflie_model.integrators import rk4_step
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
@@ -27,31 +27,31 @@ class Flight(NamedTuple):
     """Share of controls at a limit."""
 
 
-def fly(team: Rehearsal, mission, gain_file: str) -> Flight:
+def fly(group: DryRun, mission, gain_file: str) -> Flight:
     """Rehearse a mission, and have the model follow it."""
-    courses = {name: [] for name in team.names}
-    for name, vehicle in team._vehicles.items():
+    trajectories = {name: [] for name in group.names}
+    for name, vehicle in group._vehicles.items():
         begin = vehicle._fly
 
         def note(pieces, name=name, vehicle=vehicle, begin=begin):
             answer = begin(pieces)
-            courses[name].append(vehicle._course)
+            trajectories[name].append(vehicle._trajectory)
             return answer
 
         vehicle._fly = note
-    starts = np.array([team.position(name) for name in team.names])
-    mission(team)
-    times = np.arange(0.0, team.time(), STEP)
-    places = np.stack([_places(courses[name], times) for name in team.names], axis=1)
+    starts = np.array([group.position(name) for name in group.names])
+    mission(group)
+    times = np.arange(0.0, group.time(), STEP)
+    places = np.stack([_places(trajectories[name], times) for name in group.names], axis=1)
     velocities = np.gradient(places, STEP, axis=0)
     return _follow(starts, places, velocities, load_matrix(gain_file, 4, 7))
 
 
-def _places(courses, times):
-    places = courses[0].positions(times)
-    for course in courses[1:]:
-        later = times >= course.begin
-        places[later] = course.positions(times[later])
+def _places(trajectories, times):
+    places = trajectories[0].positions(times)
+    for trajectory in trajectories[1:]:
+        later = times >= trajectory.begin
+        places[later] = trajectory.positions(times[later])
     return places
 
 

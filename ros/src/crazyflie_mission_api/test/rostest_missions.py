@@ -31,27 +31,32 @@ with Fleet(["cf1", "cf2"], bounds=Bounds((-2, -2, 0), (2, 2, 2))) as fleet:
     fleet.wait(1e6)
 """
 
-# Plays a script as users of the module have it: its commands return at once, so that it sleeps
-# as long as they take, in simulated time here.
+# A script of a user of the module: its commands return at once, so it waits for their ends.
 OLD = """
 import rospy
 from crazyflie import Crazyflie
 
+def wait_for(condition):
+    end = rospy.Time.now() + rospy.Duration(20.0)
+    while not condition():
+        assert rospy.Time.now() < end, cf.position()
+        rospy.sleep(0.05)
+
 rospy.init_node("script")
 cf = Crazyflie("cf1", "/cf1")
+x, y, _ = cf.position()
 cf.setParam("commander/enHighLevel", 1)
 cf.takeoff(targetHeight=0.6, duration=2.0)
-rospy.sleep(2.5)
+wait_for(lambda: cf.position()[2] > 0.55)
 cf.goTo(goal=[0.5, 0.0, 0.0], yaw=0.0, duration=2.0, relative=True)
-rospy.sleep(2.5)
-assert abs(cf.position()[0] - 0.5) < 0.15, cf.position()
+wait_for(lambda: abs(cf.position()[0] - x - 0.5) < 0.1)
 for k in range(100):
-    cf.cmdPosition((0.5, -0.5 - 0.005 * k, 0.6))
+    cf.cmdPosition((x + 0.5, y - 0.005 * k, 0.6))
     rospy.sleep(0.02)
 cf.notifySetpointsStop()
-rospy.sleep(2.0)
+wait_for(lambda: abs(cf.position()[1] - y + 0.5) < 0.1)
 cf.land(targetHeight=0.0, duration=2.0)
-rospy.sleep(5.0)
+wait_for(lambda: cf.position()[2] < 0.05)
 cf.stop()
 """
 
@@ -96,9 +101,7 @@ def test_ctrl_c_lands_and_what_is_wrong_is_known_before(tmp_path):
 def test_a_script_for_the_sdk_flies_a_simulated_vehicle(tmp_path):
     with recorded(["cf1"]) as tracks:
         x, y, _ = tracks["cf1"][-1]
-        text = OLD.replace("[0] - 0.5", f"[0] - {x + 0.5:.3f}")
-        text = text.replace("(0.5, -0.5 -", f"({x + 0.5:.3f}, {y:.3f} -")
-        status, errors = run(written(tmp_path, text))
+        status, errors = run(written(tmp_path, OLD))
         assert (status, errors) == (0, "")
         assert landed(tracks)
     assert tracks["cf1"][-1] == pytest.approx([x + 0.5, y - 0.5, 0.0], abs=0.16)

@@ -4,11 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import rospkg
+from fake_fleet import fake_process
 
-from crazyflie_fleet.process import make_nodes
+from crazyflie_fleet.fleet_process import make_nodes
 from crazyflie_mission_api import Fleet
-from crazyflie_mission_api import fleet as fleet_module
-from crazyflie_utils.testing import FakeProcess
 
 GAINS = Path(rospkg.RosPack().get_path("crazyflie_lqr")) / "config"
 NODES = {
@@ -21,29 +20,11 @@ NODES = {
 }
 
 
-class FakeClock:
-    """Time that passes when somebody waits."""
-
-    def __init__(self, handle, has_ended):
-        self._process = handle._process
-
-    def time(self):
-        return self._process.clock.time()
-
-    def wait_until(self, condition, deadline):
-        while not (done := condition()) and self.time() < deadline:
-            self._process.advance(0.05)
-        return done
-
-
 class Swarm:
     """What `sw_swarm.launch` flies: vehicles cf1, cf2, ... where they stand, m."""
 
     def __init__(self, monkeypatch, tmp_path, places, buffer=0.15):
-        monkeypatch.setattr(fleet_module, "RosClock", FakeClock)
-        monkeypatch.setattr(fleet_module, "topic_types", lambda handle: {})
-        self.process = FakeProcess()
-        monkeypatch.setattr(self.process, "start", lambda: self.process.advance(0.1))
+        self.process = fake_process(monkeypatch)
         file = tmp_path / "fleet.yaml"
         self.names = [f"cf{k}" for k in range(1, len(places) + 1)]
         robots = (
@@ -59,7 +40,7 @@ class Swarm:
 
     def fleet(self, **options):
         """Return the fleet of a mission."""
-        return Fleet(self.names, process=self.process, limit=1.0, **options)
+        return Fleet(self.names, process=self.process, startup_timeout=1.0, **options)
 
     def track(self, name):
         """Return where a vehicle was, shape (n, 3), m."""

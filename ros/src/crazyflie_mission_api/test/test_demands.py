@@ -6,10 +6,11 @@ import pytest
 
 from crazyflie_mission_api import Bounds, Limits, MissionError
 from crazyflie_mission_api.trajectories import (
-    Samples,
     check,
+    demands,
     duration,
     excess,
+    sampled,
     stretched,
     within_limits,
 )
@@ -38,14 +39,14 @@ BY_HAND = {
 
 
 def test_the_demands_of_a_trajectory_on_all_axes():
-    demands = Samples.of(ALL_AXES).demands()
-    assert demands.keys() == BY_HAND.keys()
+    found = demands(sampled(ALL_AXES)[1])
+    assert found.keys() == BY_HAND.keys()
     for name, value in BY_HAND.items():
-        assert demands[name][-1] == pytest.approx(value, abs=2e-6), name
+        assert found[name][-1] == pytest.approx(value, abs=2e-6), name
     # Half-way, after 15/29 of 30 samples; only speed and yaw rate grow.
-    assert demands["speed"][15] == pytest.approx(6.0 * 15 / 29)
-    assert demands["yaw_rate"][15] == pytest.approx(15 / 29)
-    assert demands["acceleration"][0] == pytest.approx(3.0)
+    assert found["speed"][15] == pytest.approx(6.0 * 15 / 29)
+    assert found["yaw_rate"][15] == pytest.approx(15 / 29)
+    assert found["acceleration"][0] == pytest.approx(3.0)
 
 
 # Acceleration by axis, m/s^2 (yaw: rad/s^2); then after 2 s speed, acceleration, yaw rate,
@@ -66,11 +67,11 @@ ALONE = [
 
 @pytest.mark.parametrize(("rates", "expected"), ALONE)
 def test_the_demands_of_one_axis(rates, expected):
-    demands = Samples.of([PolynomialPiece(2.0, *map(quadratic, rates))]).demands()
+    found = demands(sampled([PolynomialPiece(2.0, *map(quadratic, rates))])[1])
     names = ("speed", "acceleration", "yaw_rate", "tilt", "max_thrust")
     for name, value in zip(names, expected, strict=True):
-        assert demands[name][-1] == pytest.approx(value, abs=2e-6), name
-    assert demands["min_thrust"][-1] == pytest.approx(-expected[-1], abs=2e-6)
+        assert found[name][-1] == pytest.approx(value, abs=2e-6), name
+    assert found["min_thrust"][-1] == pytest.approx(-expected[-1], abs=2e-6)
 
 
 GENEROUS = {
@@ -112,12 +113,12 @@ def test_thrust_has_a_lower_limit_too():
 
 def test_what_a_longer_duration_does():
     # In twice the time speeds are 1/2, accelerations 1/4 as large.
-    demands = Samples.of(stretched(ALL_AXES, 2.0)).demands()
-    assert demands["speed"][-1] == pytest.approx(3.0)
-    assert demands["acceleration"][-1] == pytest.approx(0.75)
-    assert demands["yaw_rate"][-1] == pytest.approx(0.5)
+    found = demands(sampled(stretched(ALL_AXES, 2.0))[1])
+    assert found["speed"][-1] == pytest.approx(3.0)
+    assert found["acceleration"][-1] == pytest.approx(0.75)
+    assert found["yaw_rate"][-1] == pytest.approx(0.5)
     # sqrt(0.25^2 + 0.5^2) against 0.5 + 9.81.
-    assert demands["tilt"][-1] == pytest.approx(math.atan2(0.559017, 10.31), abs=2e-6)
+    assert found["tilt"][-1] == pytest.approx(math.atan2(0.559017, 10.31), abs=2e-6)
 
 
 @pytest.mark.parametrize(

@@ -1,70 +1,49 @@
 """A fleet on a fake process: one vehicle by its takeoff server, one by the driver."""
 
 import pytest
-from fake_vehicles import Driven, Stack
+from fake_fleet import fake_process
+from fake_vehicles import ControllerVehicle, DriverVehicle
 
 from crazyflie_mission_api import Bounds, Fleet, MissionError, plan
-from crazyflie_mission_api import fleet as fleet_module
-from crazyflie_utils.testing import FakeProcess
 
 NAMES = ["cf1", "cf2"]
-
-
-class FakeClock:
-    """Time that passes when somebody waits."""
-
-    def __init__(self, handle, has_ended):
-        self._process = handle._process
-
-    def time(self):
-        return self._process.clock.time()
-
-    def wait_until(self, condition, deadline):
-        while not (done := condition()) and self.time() < deadline:
-            self._process.advance(0.05)
-        return done
 
 
 @pytest.fixture
 def process(monkeypatch):
     """Return a process in which fleets find vehicles."""
-    monkeypatch.setattr(fleet_module, "RosClock", FakeClock)
-    monkeypatch.setattr(fleet_module, "topic_types", lambda handle: {})
-    fake = FakeProcess()
-    # A FakeProcess has started.
-    monkeypatch.setattr(fake, "start", lambda: fake.advance(0.1))
-    return fake
+    return fake_process(monkeypatch)
 
 
 @pytest.fixture
-def stack(process):
-    return Stack(process, "cf1", (0.0, 0.0, 0.0))
+def controlled(process):
+    return ControllerVehicle(process, "cf1", (0.0, 0.0, 0.0))
 
 
 @pytest.fixture
 def driven(process):
-    return Driven(process, "cf2", (1.0, 0.0, 0.0))
+    return DriverVehicle(process, "cf2", (1.0, 0.0, 0.0))
 
 
 @pytest.fixture
-def fleet(process, stack, driven):
-    return Fleet(NAMES, Bounds((-2, -2, 0), (2, 2, 2)), process=process, limit=0.5)
+def fleet(process, controlled, driven):
+    return Fleet(NAMES, Bounds((-2, -2, 0), (2, 2, 2)), process=process, startup_timeout=0.5)
 
 
-def test_one_script_for_both(fleet, stack, driven):
-    def mission(team):
-        team.takeoff(0.8)
-        team.go_to({"cf1": (0.0, 1.0, 1.0), "cf2": (1.0, 1.0, 1.5)})
+def test_one_script_for_both(fleet, controlled, driven):
+    def mission(group):
+        group.takeoff(0.8)
+        group.go_to({"cf1": (0.0, 1.0, 1.0), "cf2": (1.0, 1.0, 1.5)})
         path = plan([(0, 0, 1), (0.2, 0, 1), (0.2, 0.2, 1)])
-        team.follow(path, relative=True)
+        group.follow(path, relative=True)
 
     with fleet:
         fleet.fly(mission)
-        assert stack.position == pytest.approx([0.2, 1.2, 1.0], abs=1e-4)
+        assert controlled.position == pytest.approx([0.2, 1.2, 1.0], abs=1e-4)
         assert driven.position == pytest.approx([1.2, 1.2, 1.5], abs=1e-4)
         assert fleet.flying == NAMES
     assert fleet.flying == []
-    assert stack.position[2] == driven.position[2] == 0.0
+    assert controlled.position[2] == driven.position[2] == 0.0
     assert driven.called() == [
         "update_params",
         "update_params",
@@ -78,11 +57,11 @@ def test_one_script_for_both(fleet, stack, driven):
 
 
 @pytest.mark.parametrize("frame", [None, "world"])
-def test_headings_are_kept(process, stack, frame):
-    driven = Driven(process, "cf2", (1.0, 0.0, 0.0), frame)
+def test_headings_are_kept(process, controlled, frame):
+    driven = DriverVehicle(process, "cf2", (1.0, 0.0, 0.0), frame)
     # The controller of the other one keeps the heading 0, whatever it is.
-    driven.yaw, stack.yaw = 2.0, 0.3
-    fleet = Fleet(NAMES, process=process, limit=0.5)
+    driven.yaw, controlled.yaw = 2.0, 0.3
+    fleet = Fleet(NAMES, process=process, startup_timeout=0.5)
     with fleet:
         fleet.takeoff(1.0)
         fleet.go_to((0.0, 0.5, 0.0), relative=True)
@@ -126,31 +105,31 @@ def test_a_trajectory_that_is_too_long_for_a_memory_is_refused(fleet):
             fleet["cf2"].follow(long)
 
 
-def test_a_vehicle_that_is_in_trouble_ends_the_mission(fleet, stack, driven):
+def test_a_vehicle_that_is_in_trouble_ends_the_mission(fleet, controlled, driven):
     with pytest.raises(MissionError, match="cf2: lost: nothing is heard"), fleet:
         fleet.takeoff(0.8)
         driven.tell("lost: nothing is heard")
         fleet.wait(10.0)
-    assert stack.position[2] == 0.0
+    assert controlled.position[2] == 0.0
 
 
-def test_a_landing_that_nobody_here_has_wanted_is_noticed(fleet, stack):
+def test_a_landing_that_nobody_here_has_wanted_is_noticed(fleet, controlled):
     with pytest.raises(MissionError, match="cf1: it does not fly any more"), fleet:
         fleet.takeoff(0.8)
-        stack.be("descending")
+        controlled.be("descending")
         fleet.wait(10.0)
 
 
-def test_who_refuses_to_take_off_is_named_and_the_others_land(fleet, stack, driven):
-    stack.refusal = "the battery is low"
+def test_who_refuses_to_take_off_is_named_and_the_others_land(fleet, controlled, driven):
+    controlled.refusal = "the battery is low"
     with pytest.raises(MissionError, match="cf1: takeoff: the battery is low"), fleet:
         fleet.takeoff(0.8)
     assert "land" in driven.called()
     assert fleet.flying == []
 
 
-def test_who_does_not_arrive_is_named(process, stack, driven):
-    fleet = Fleet(NAMES, process=process, limit=0.5, patience=1.0)
+def test_who_does_not_arrive_is_named(process, controlled, driven):
+    fleet = Fleet(NAMES, process=process, startup_timeout=0.5, arrival_timeout=1.0)
     driven._on_setpoint = None
     text = r"cf2 is 1.00 m from \(1.00, 1.00, 1.00\): waited 1 s longer than planned; expected 0.15"
     with pytest.raises(MissionError, match=text), fleet:
@@ -161,10 +140,10 @@ def test_who_does_not_arrive_is_named(process, stack, driven):
 
 
 @pytest.mark.parametrize("frame", [None, "world"])
-def test_who_is_not_tracked_any_more_does_not_arrive(process, stack, frame):
-    driven = Driven(process, "cf2", (1.0, 0.0, 0.0), frame)
-    fleet = Fleet(NAMES, process=process, limit=0.5)
-    with pytest.raises(MissionError, match="^cf2: nobody says where it is"), fleet:
+def test_who_is_not_tracked_any_more_does_not_arrive(process, controlled, frame):
+    driven = DriverVehicle(process, "cf2", (1.0, 0.0, 0.0), frame)
+    fleet = Fleet(NAMES, process=process, startup_timeout=0.5)
+    with pytest.raises(MissionError, match="^cf2: its position is not known"), fleet:
         fleet.takeoff(1.0)
         fleet["cf2"].go_to((1, 0.5, 1), wait=False)
         # It was at its goal when it was seen last.
@@ -186,32 +165,32 @@ def test_a_landing_that_nobody_sees_is_told_by_the_supervisor(fleet, driven):
 
 def test_the_fixed_frame_is_the_drivers(process):
     process.transport.parameters["/this_process/frames/fixed"] = "hall"
-    Driven(process, "cf2", (1.0, 0.0, 0.0), "hall")
-    fleet = Fleet(["cf2"], process=process, limit=0.5)
+    DriverVehicle(process, "cf2", (1.0, 0.0, 0.0), "hall")
+    fleet = Fleet(["cf2"], process=process, startup_timeout=0.5)
     assert fleet.position("cf2") == (1.0, 0.0, 0.0)
 
 
 def test_vehicles_behind_the_driver_do_not_begin_at_the_same_moment(process):
     for number in (1, 2):
-        Driven(process, f"cf{number}", (number - 1.0, 0.0, 0.0))
-    fleet = Fleet(NAMES, separation=0.95, process=process, limit=0.5)
+        DriverVehicle(process, f"cf{number}", (number - 1.0, 0.0, 0.0))
+    fleet = Fleet(NAMES, separation=0.95, process=process, startup_timeout=0.5)
 
-    def mission(team):
-        team.takeoff(1.0)
-        team.go_to((1.0, 0.0, 0.0), relative=True)
+    def mission(group):
+        group.takeoff(1.0)
+        group.go_to((1.0, 0.0, 0.0), relative=True)
 
     text = "expected at least 0.95 m; that is if cf2 begins 0.15 s after the others"
     with pytest.raises(MissionError, match=text):
-        fleet.rehearse(mission)
+        fleet.dry_run(mission)
     with pytest.raises(MissionError, match=text), fleet:
         mission(fleet)
 
 
-def test_a_fence_counts(process, stack, driven):
+def test_a_fence_counts(process, controlled, driven):
     for side, value in (("min", -0.5), ("max", 0.5)):
         for axis in "xyz":
             process.transport.parameters[f"/cf1/geofence/box/{side}/{axis}"] = value * 3
-    fleet = Fleet(NAMES, process=process, limit=0.5)
+    fleet = Fleet(NAMES, process=process, startup_timeout=0.5)
     with fleet:
         fleet.takeoff(1.0)
         with pytest.raises(MissionError, match="y is 1.8 m; expected -1.5 to 1.5 m"):
@@ -219,9 +198,9 @@ def test_a_fence_counts(process, stack, driven):
         fleet["cf2"].go_to((1.0, 1.8, 1.0))
 
 
-def test_the_buffers_of_the_fleet_process_count(process, stack, driven):
+def test_the_buffers_of_the_fleet_process_count(process, controlled, driven):
     process.transport.parameters |= {"/cf1/buffer": 0.3, "/cf2/buffer": 0.35}
-    fleet = Fleet(NAMES, process=process, limit=0.5)
+    fleet = Fleet(NAMES, process=process, startup_timeout=0.5)
     with fleet:
         fleet.takeoff(1.0)
         with pytest.raises(
@@ -231,24 +210,24 @@ def test_the_buffers_of_the_fleet_process_count(process, stack, driven):
         fleet["cf1"].go_to((0.2, 0.0, 1.0), duration=6.0)
 
 
-def test_the_buffers_of_a_fleet_file_count(process, stack, driven, tmp_path):
+def test_the_buffers_of_a_fleet_file_count(process, controlled, driven, tmp_path):
     path = tmp_path / "two.yaml"
     path.write_text(
         "robots:\n  cf1: {initial_position: [0, 0, 0]}\n  cf2: {initial_position: [1, 0, 0]}\n"
         "all: {buffer: 0.4}\n"
     )
-    fleet = Fleet(path, process=process, limit=0.5)
+    fleet = Fleet(path, process=process, startup_timeout=0.5)
     assert fleet.rules.buffers == {"cf1": 0.4, "cf2": 0.4}
 
 
-def test_names_of_a_fleet_file(process, stack, driven, tmp_path):
+def test_names_of_a_fleet_file(process, controlled, driven, tmp_path):
     path = tmp_path / "two.yaml"
     robots = "robots:\n  cf1: {initial_position: [0, 0, 0]}\n  cf2: {initial_position: [1, 0, 0]}\n"
     path.write_text(robots)
-    assert Fleet(path, process=process, limit=0.5).names == NAMES
+    assert Fleet(path, process=process, startup_timeout=0.5).names == NAMES
     path.write_text(robots + "  cf3: {initial_position: [1, 0]}\n")
     with pytest.raises(MissionError, match=r"two.yaml:4"):
-        Fleet(str(path), process=process, limit=0.5)
+        Fleet(str(path), process=process, startup_timeout=0.5)
 
 
 @pytest.mark.parametrize(
@@ -263,6 +242,6 @@ def test_names_of_a_fleet_file(process, stack, driven, tmp_path):
         ([1], r"the vehicles are \[1\]"),
     ],
 )
-def test_names_that_make_no_sense(process, stack, driven, names, text):
+def test_names_that_make_no_sense(process, controlled, driven, names, text):
     with pytest.raises(MissionError, match=text):
-        Fleet(names, process=process, limit=0.1)
+        Fleet(names, process=process, startup_timeout=0.1)

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
-from crazyflie_mission_api import Rehearsal
+from crazyflie_mission_api import DryRun
 from crazyflie_mission_api.formations import assign, circle, lattice
-from crazyflie_mission_api.roster import Rules
+from crazyflie_mission_api.group_state import Rules
 
 PACKAGES = rospkg.RosPack()
 GAINS = PACKAGES.get_path("crazyflie_lqr") + "/config/K_soft.txt"
@@ -47,17 +47,17 @@ def test_nobody_meets_on_straight_ways_in_the_same_rhythm(seed):
 def test_the_lattice_of_any_number(n):
     example = runpy.run_path(f"{EXAMPLES}/lattice.py")
     starts = {f"cf{k}": tuple(place) for k, place in enumerate(example["square"](n).tolist())}
-    team = Rehearsal(starts, Rules(example["LIMITS"]))
-    example["mission"](team)
-    assert team.flying == []
-    assert {tuple(np.round(team.position(name), 6)) for name in starts} == set(starts.values())
+    group = DryRun(starts, Rules(example["LIMITS"]))
+    example["mission"](group)
+    assert group.flying == []
+    assert {tuple(np.round(group.position(name), 6)) for name in starts} == set(starts.values())
 
 
 def test_a_hundred_vehicles_fly_the_lattice():
     example = runpy.run_path(f"{EXAMPLES}/lattice.py")
     starts = {f"cf{k}": tuple(place) for k, place in enumerate(example["square"](100).tolist())}
-    team = Rehearsal(starts, Rules(example["LIMITS"]))
-    flight = model_flight.fly(team, example["mission"], GAINS)
+    group = DryRun(starts, Rules(example["LIMITS"]))
+    flight = model_flight.fly(group, example["mission"], GAINS)
     assert flight.error < 0.5
     assert flight.distance > 0.5
     assert flight.at_limit == 0.0

@@ -16,6 +16,7 @@ from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.minimum_snap import plan
 from crazyflie_model.polynomials import Goal
 from crazyflie_msgs.msg import (
+    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
@@ -48,7 +49,8 @@ class Bench:
     def be(self, state, position=(0.0, 0.0, 1.0)):
         """Tell where the vehicle is, and its flight state."""
         self.see(position)
-        self.process.publish("/cf1/in_flight_state", String(state))
+        status = FlightStatus(state=getattr(FlightStatus, state.upper()))
+        self.process.publish("/cf1/in_flight_flight_status", status)
 
     def see(self, position, velocity=(0.0, 0.0, 0.0)):
         """Tell where the vehicle is."""
@@ -258,7 +260,7 @@ REFUSED = {
     "has no pieces": lambda b: b.call("upload_trajectory", srv.UploadTrajectory, 0, 0, []),
     "height and duration are 0 m": lambda b: b.call("takeoff", srv.Takeoff, 0, 0.0, SECONDS(1.0)),
     "the vehicle is flying; expected it to have landed": lambda b: b.call("stop", srv.Stop, 0),
-    "the vehicle is on ground; expected it to fly": lambda b: (
+    "the vehicle is on the ground; expected it to fly": lambda b: (
         b.be("on_ground"),
         b.go_to((1, 0, 1)),
     ),
@@ -289,7 +291,7 @@ def test_who_does_not_fly_does_not_begin(bench):
     bench.be("on_ground", (0.0, 0.0, 0.0))
     bench.process.publish("/all/start_trajectory", String(TOP))
     assert len(bench.fly(0.5)) == 0
-    assert bench.process.logged("error") == [f"{TOP}: not started: the vehicle is on_ground"]
+    assert bench.process.logged("error") == [f"{TOP}: not started: the vehicle is on the ground"]
 
 
 def test_the_servers_hover_point_is_replaced_by_one_above_the_vehicle(bench):

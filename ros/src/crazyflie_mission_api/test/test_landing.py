@@ -7,44 +7,44 @@ import pytest
 from scipy.spatial.distance import pdist
 from simulated import Swarm
 
-from crazyflie_mission_api import Bounds, MissionError, Rehearsal
-from crazyflie_mission_api.rehearsal import rehearse
-from crazyflie_mission_api.roster import Rules
+from crazyflie_mission_api import Bounds, DryRun, MissionError
+from crazyflie_mission_api.dry_run import dry_run
+from crazyflie_mission_api.group_state import Rules
 
 ROW = {f"cf{k}": (float(k), 0.0, 0.0) for k in range(4)}
 TOWER = {"cf0": (0.0, 0.0, 1.0), "cf1": (0.0, 0.0, 2.0), "cf2": (0.0, 0.0, 3.0), "cf3": (3.0, 0, 1)}
 
 
-def to_the_tower(team):
+def to_the_tower(group):
     """Fly three vehicles above each other, one stays beside them."""
-    team.takeoff(1.0)
+    group.takeoff(1.0)
     for height in (2.0, 3.0):
         name = f"cf{height - 1:.0f}"
-        x, y, _ = team.position(name)
-        team[name].go_to((x, y, height))
-        team[name].go_to((0.0, 0.0, height))
+        x, y, _ = group.position(name)
+        group[name].go_to((x, y, height))
+        group[name].go_to((0.0, 0.0, height))
 
 
 @pytest.fixture
 def tower():
-    """Return a rehearsal of vehicles above each other."""
-    team = Rehearsal(ROW)
-    to_the_tower(team)
-    return team
+    """Return a dry_run of vehicles above each other."""
+    group = DryRun(ROW)
+    to_the_tower(group)
+    return group
 
 
-def places(team):
-    return np.array([team.position(name) for name in team.names])
+def places(group):
+    return np.array([group.position(name) for name in group.names])
 
 
-def watch(team):
+def watch(group):
     """Return a list of the least distances of vehicles, m, from now on."""
-    found, clock = [], team._clock
+    found, clock = [], group._clock
     wait_until = clock.wait_until
 
     def look(condition, deadline):
         def watched():
-            at = places(team)
+            at = places(group)
             if at[:, 2].max() > 0.0:
                 found.append(pdist(at * (1.0, 1.0, 0.5)).min())
             return condition()
@@ -67,12 +67,12 @@ def test_vehicles_above_each_other_land_beside_each_other(tower):
 
 
 def test_after_an_error_likewise():
-    team = Rehearsal(ROW)
-    with pytest.raises(ZeroDivisionError), team:
-        to_the_tower(team)
-        found = watch(team)
-        team.wait(1 / 0)
-    assert team.flying == []
+    group = DryRun(ROW)
+    with pytest.raises(ZeroDivisionError), group:
+        to_the_tower(group)
+        found = watch(group)
+        group.wait(1 / 0)
+    assert group.flying == []
     assert min(found) >= 0.3
 
 
@@ -121,7 +121,7 @@ def test_who_does_not_reach_a_free_place_stays_in_the_air_and_is_named(tower):
 
 def test_without_a_free_place_a_mission_is_refused_before_it_flies():
     corridor = Rules(bounds=Bounds((-0.05, -0.01, 0.0), (0.75, 0.01, 4.0)), separation=0.7)
-    team = Rehearsal({"cf0": (0.0, 0.0, 0.0), "cf1": (0.7, 0.0, 0.0)}, corridor)
+    group = DryRun({"cf0": (0.0, 0.0, 0.0), "cf1": (0.7, 0.0, 0.0)}, corridor)
 
     def mission(fleet):
         fleet.takeoff(1.0)
@@ -131,24 +131,24 @@ def test_without_a_free_place_a_mission_is_refused_before_it_flies():
     with pytest.raises(
         MissionError, match=r"cf0 and cf1 would be 0\.\d+ m apart, .* at least 0.7 m"
     ):
-        rehearse(team, mission)
+        dry_run(group, mission)
 
 
 def test_a_lattice_lands_where_it_is():
     names = [f"cf{k}" for k in range(27)]
     axis = np.arange(3)
     floor = np.stack(np.meshgrid(np.arange(9), axis, indexing="ij"), axis=-1).reshape(-1, 2)
-    team = Rehearsal(
+    group = DryRun(
         {name: (*map(float, place), 0.0) for name, place in zip(names, floor, strict=True)}
     )
     cube = np.stack(np.meshgrid(0.7 * axis, 0.7 * axis, 1.4 * axis + 1.0), axis=-1).reshape(-1, 3)
-    team.takeoff(1.0)
-    team.formation(cube)
-    found = watch(team)
-    team.land()
-    assert team.flying == []
+    group.takeoff(1.0)
+    group.formation(cube)
+    found = watch(group)
+    group.land()
+    assert group.flying == []
     assert min(found) >= 0.3
-    assert pdist(places(team)).min() >= 0.3
+    assert pdist(places(group)).min() >= 0.3
 
 
 def test_a_flight_ends_so_too(monkeypatch, tmp_path):

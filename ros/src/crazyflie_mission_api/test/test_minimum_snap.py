@@ -11,7 +11,7 @@ from numpy.polynomial import Polynomial
 
 from crazyflie_mission_api import Limits, MissionError, plan
 from crazyflie_mission_api.minimum_snap import best_times
-from crazyflie_mission_api.trajectories import Samples, duration, excess
+from crazyflie_mission_api.trajectories import demands, duration, excess, sampled
 from crazyflie_model.polynomials import hermite
 
 SQUARE = [(0, 0, 1), (1, 0, 1), (1, 1, 1.5), (0, 1, 1), (0, 0, 1)]
@@ -68,7 +68,7 @@ def test_the_times_make_the_snap_less_than_even_ones():
     assert spans.sum() == pytest.approx(1.0)
     assert spans[1] > spans[2] > spans[0]
     # With even times it swings out by more than half a metre.
-    y = Samples.of(plan(points, LIMITS)).position[:, 1]
+    y = sampled(plan(points, LIMITS))[1][0, 1]
     assert -0.25 < y.min()
     assert y.max() < 0.25
 
@@ -96,7 +96,7 @@ def test_tilt_and_thrust_are_limits_too():
     for goal, name in (((9, 0, 1), "tilt"), ((0, 0, 9), "max_thrust")):
         pieces = plan([(0, 0, 1), goal], fast)
         assert excess(pieces, fast) == {}
-        reached = Samples.of(pieces).demands()[name].max()
+        reached = demands(sampled(pieces)[1])[name].max()
         assert reached == pytest.approx(getattr(fast, name), rel=0.1)
 
 

@@ -7,17 +7,17 @@ from typing import Any
 import numpy as np
 import yaml
 
-from crazyflie_fleet.fleet import Fleet, LogTopic, Vehicle, close_pairs
+from crazyflie_fleet.fleet_config import FleetConfig, LogTopic, VehicleConfig, close_pairs
 from crazyflie_fleet.settings import (
     DEFAULT_TOPICS,
     LOCAL,
+    VEHICLE_NAME,
     DefaultTopicSettings,
     FirmwareNumber,
     LogTopicSettings,
     MachineSettings,
     RobotSettings,
     Settings,
-    VehicleName,
     same_vehicle,
 )
 from crazyflie_utils import ParameterError
@@ -35,7 +35,7 @@ _LOGGING = ("enabled", "default_topics", "custom_topics")
 _FIRMWARE_NUMBER = FirmwareNumber()
 
 
-def load(path: str | Path) -> Fleet:
+def load(path: str | Path) -> FleetConfig:
     """Return the fleet that a file describes.
 
     Raises
@@ -43,10 +43,10 @@ def load(path: str | Path) -> Fleet:
     ParameterError
         About everything that is wrong: file, line, and what was expected.
     """
-    return _Reading(load_yaml(path)).fleet()
+    return _Parser(load_yaml(path)).fleet()
 
 
-def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> Fleet:
+def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> FleetConfig:
     """Return n vehicles cf1, cf2, ... in rows around the origin.
 
     Parameters
@@ -76,37 +76,32 @@ def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> Fleet:
         settings = RobotSettings.from_mapping(
             {"initial_position": position, "uri": f"udp://127.0.0.1:{first_port + k}"}
         )
-        vehicles.append(Vehicle(f"cf{k + 1}", position, settings))
+        vehicles.append(VehicleConfig(f"cf{k + 1}", position, settings))
     for _, _, distance, limit in _close(vehicles):
         raise ParameterError(
             f"the spacing of the grid is {distance:g} m; expected at least {limit:g} m, the "
             "collision buffers of two vehicles"
         )
-    return Fleet(tuple(vehicles))
+    return FleetConfig(tuple(vehicles))
 
 
-class _Reading:
-    """One reading of a file; complaints gather, so that a user mends all in one go.
-
-    Parameters
-    ----------
-    top : Entry
-    """
+class _Parser:
+    """Parses one file; collects all errors."""
 
     def __init__(self, top: Entry):
         self._top = top
         self._parts = top.entries()
-        self._complaints: list[str] = []
-        self._remarks: dict[int, str] = {}
+        self._errors: list[str] = []
+        self._warnings: dict[int, str] = {}
 
-    def fleet(self) -> Fleet:
+    def fleet(self) -> FleetConfig:
         """Return the fleet, or raise `ParameterError`."""
         for key, entry in self._parts.items():
             if key not in _TOP:
-                self._complain(entry, f"is not known; expected one of {', '.join(_TOP)}")
+                self._error(entry, f"is not known; expected one of {', '.join(_TOP)}")
         robots = self._top["robots"].entries()
         types = self._entries("robot_types")
-        everybody = self._parts.get("all")
+        common = self._parts.get("all")
         machines = {
             name: self._read(entry, MachineSettings)
             for name, entry in self._entries("machines").items()
@@ -114,42 +109,44 @@ class _Reading:
         # What vehicles inherit is checked where it stands: it is wrong once, not in each of them.
         for entry in types.values():
             self._check(entry, Settings)
-        if everybody is not None:
-            self._check(everybody, Settings, "broadcasts")
+        if common is not None:
+            self._check(common, Settings, "broadcasts")
         for name, entry in robots.items():
-            self._check_type(VehicleName(), name, entry)
+            self._check_type(VEHICLE_NAME, name, entry)
             self._check(entry, RobotSettings)
             self._check_choice(entry, "type", types)
-        for entry in (*robots.values(), *types.values(), *([everybody] if everybody else [])):
+        for entry in (*robots.values(), *types.values(), *([common] if common else [])):
             self._check_choice(entry, "machine", (LOCAL, *machines))
-        self._end_if_wrong()
-        vehicles = [self._vehicle(name, entry, types, everybody) for name, entry in robots.items()]
-        self._end_if_wrong()
+        self._raise_errors()
+        vehicles = [self._vehicle(name, entry, types, common) for name, entry in robots.items()]
+        self._raise_errors()
         enabled = [vehicle for vehicle in vehicles if vehicle.settings.enabled]
         self._check_apart(enabled, robots)
-        self._end_if_wrong()
+        self._raise_errors()
         disabled = [vehicle.name for vehicle in vehicles if not vehicle.settings.enabled]
         if not enabled:
             raise self._top["robots"].error("has no vehicle that is enabled; expected one at least")
-        return Fleet(tuple(enabled), tuple(disabled), machines, tuple(self._remarks.values()))
+        return FleetConfig(
+            tuple(enabled), tuple(disabled), machines, tuple(self._warnings.values())
+        )
 
     def _entries(self, key):
         return self._parts[key].entries() if key in self._parts else {}
 
     # What is wrong.
 
-    def _complain(self, entry, text):
-        self._complaints += entry.error(text).complaints
+    def _error(self, entry, text):
+        self._errors += entry.error(text).complaints
 
-    def _end_if_wrong(self):
-        if self._complaints:
-            raise ParameterError(*dict.fromkeys(self._complaints))
+    def _raise_errors(self):
+        if self._errors:
+            raise ParameterError(*dict.fromkeys(self._errors))
 
     def _read(self, entry, settings, *besides):
         try:
             return entry.read(settings, besides)
         except ParameterError as error:
-            self._complaints += error.complaints
+            self._errors += error.complaints
             return None
 
     def _check(self, entry, settings, *besides):
@@ -158,13 +155,13 @@ class _Reading:
         try:
             self._firmware(entry)
         except ParameterError as error:
-            self._complaints += error.complaints
+            self._errors += error.complaints
 
     def _check_type(self, expected: ParameterType, value: Any, entry: Entry) -> Any:
         try:
             return expected(value)
         except ValueError:
-            self._complain(entry, f"is {shown(value)}; expected {expected}")
+            self._error(entry, f"is {shown(value)}; expected {expected}")
             return None
 
     def _check_choice(self, entry, key, known):
@@ -176,7 +173,7 @@ class _Reading:
                     if known
                     else f"none, as there are no {key}s"
                 )
-                self._complain(chosen, f"is {shown(chosen.value)}; expected {expected}")
+                self._error(chosen, f"is {shown(chosen.value)}; expected {expected}")
 
     def _check_apart(self, vehicles, robots):
         seen: dict[str, str] = {}
@@ -186,14 +183,14 @@ class _Reading:
             other = seen.setdefault(same_vehicle(vehicle.uri), vehicle.name)
             if other != vehicle.name:
                 line = robots[other]["uri"].line
-                self._complain(
+                self._error(
                     robots[vehicle.name]["uri"],
                     f"is {vehicle.uri}, as that of {other} in line {line}; expected an address "
                     "of its own",
                 )
         for i, j, distance, limit in _close(vehicles):
             first, second = (robots[vehicles[k].name]["initial_position"] for k in (i, j))
-            self._complain(
+            self._error(
                 second,
                 f"is {distance:.3g} m from that of {vehicles[i].name} in line {first.line}; "
                 f"expected at least {limit:.3g} m, their collision buffers",
@@ -201,15 +198,15 @@ class _Reading:
 
     # What vehicles are.
 
-    def _vehicle(self, name, robot, types, everybody):
-        layers = [everybody, types.get(robot["type"].value) if "type" in robot else None, robot]
+    def _vehicle(self, name, robot, types, common):
+        layers = [common, types.get(robot["type"].value) if "type" in robot else None, robot]
         node = _merged([layer.node for layer in layers if layer is not None])
         merged = Entry(robot.file, robot.name, node)
         settings = self._read(merged, RobotSettings, *_FIRMWARE, "broadcasts")
         if settings is None:
             return None
         self._check_voltages(merged, settings)
-        return Vehicle(name, settings.position, settings, *self._firmware(merged))
+        return VehicleConfig(name, settings.position, settings, *self._firmware(merged))
 
     def _check_voltages(self, merged, settings):
         # Only here it is known which of the robot, its type and all has said what.
@@ -225,7 +222,7 @@ class _Reading:
             other = f"voltage_critical, {critical:g} (V)"
         # Without the robot's name: what several inherit is wrong once.
         name = entry.name.removeprefix(f"{merged.name}/")
-        self._complain(Entry(entry.file, name, entry.node), f"{text} {other}")
+        self._error(Entry(entry.file, name, entry.node), f"{text} {other}")
 
     def _firmware(self, entry):
         parts = entry.entries()
@@ -244,16 +241,16 @@ class _Reading:
         parts = entry.entries()
         for key, inner in parts.items():
             if key not in _LOGGING:
-                self._complain(inner, f"is not known; expected one of {', '.join(_LOGGING)}")
+                self._error(inner, f"is not known; expected one of {', '.join(_LOGGING)}")
         standard = []
         for key, inner in (
             parts["default_topics"].entries() if "default_topics" in parts else {}
         ).items():
             if key not in DEFAULT_TOPICS:
-                self._complain(inner, f"is not known; expected one of {', '.join(DEFAULT_TOPICS)}")
+                self._error(inner, f"is not known; expected one of {', '.join(DEFAULT_TOPICS)}")
             elif not DEFAULT_TOPICS[key]:
-                remark = inner.error("is not offered by the driver, and left out")
-                self._remarks.setdefault(inner.line, str(remark))
+                warning = inner.error("is not offered by the driver, and left out")
+                self._warnings.setdefault(inner.line, str(warning))
             elif self._read(inner, DefaultTopicSettings) is not None:
                 standard.append(DEFAULT_TOPICS[key])
         custom = []
@@ -261,7 +258,7 @@ class _Reading:
             parts["custom_topics"].entries() if "custom_topics" in parts else {}
         ).items():
             topic = self._read(inner, LogTopicSettings)
-            self._check_type(VehicleName(), key, inner)
+            self._check_type(VEHICLE_NAME, key, inner)
             if topic is not None:
                 custom.append(LogTopic(key, topic.frequency, topic.variables))
         enabled = "enabled" not in parts or self._check_type(

@@ -1,11 +1,11 @@
-"""What RViz shows of a fleet: bodies, buffers and names."""
+"""ROS interface of the markers of a fleet: bodies, buffers and names."""
 
 from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA, String
 from typing_extensions import override
 from visualization_msgs.msg import Marker, MarkerArray
 
-from crazyflie_fleet.fleet import DOWNWASH, Vehicle
+from crazyflie_fleet.fleet_config import DOWNWASH, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import TOPIC
@@ -13,7 +13,7 @@ from crazyflie_utils.parameters.types import TOPIC
 BODY = ColorRGBA(0.15, 0.17, 0.20, 1.0)
 NAME = ColorRGBA(0.05, 0.25, 0.60, 1.0)
 FREE = ColorRGBA(0.05, 0.45, 0.90, 0.12)
-WAITING = ColorRGBA(0.85, 0.15, 0.10, 0.45)
+HELD = ColorRGBA(0.85, 0.15, 0.10, 0.45)
 
 _ROTOR = 0.0325
 """From the middle to a rotor, along x and along y, m."""
@@ -27,8 +27,10 @@ PERIOD = 1.0
 class FleetMarkersParameters(FleetParameters):
     """Parameters of `FleetMarkersNode`."""
 
-    waiting_topic: str = parameter(TOPIC, "who waits for whom", "/fleet/waiting", "topics/waiting")
-    markers_topic: str = parameter(TOPIC, "where markers go", "/fleet/markers", "topics/markers")
+    held_topic: str = parameter(
+        TOPIC, "names of the vehicles that are held", "/fleet/waiting", "topics/waiting"
+    )
+    markers_topic: str = parameter(TOPIC, "markers", "/fleet/markers", "topics/markers")
 
 
 class FleetMarkersNode(Node):
@@ -43,29 +45,29 @@ class FleetMarkersNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._publisher = handle.publisher(parameters.markers_topic, MarkerArray)
-        self._waiting: frozenset[str] = frozenset()
-        handle.subscribe(parameters.waiting_topic, String, self._on_waiting)
+        self._held: frozenset[str] = frozenset()
+        handle.subscribe(parameters.held_topic, String, self._on_held)
         handle.timer(PERIOD, self._publish, steady=True)
 
-    def _on_waiting(self, message):
-        self._waiting = frozenset(message.data.split())
+    def _on_held(self, message):
+        self._held = frozenset(message.data.split())
         self._publish()
 
     def _publish(self):
         markers = [
             marker
             for number, vehicle in enumerate(self._fleet.vehicles)
-            for marker in _markers(number, vehicle, vehicle.name in self._waiting)
+            for marker in _markers(number, vehicle, vehicle.name in self._held)
         ]
         self._publisher.publish(MarkerArray(markers))
 
 
-def _markers(number: int, vehicle: Vehicle, waits: bool) -> list[Marker]:
+def _markers(number: int, vehicle: VehicleConfig, is_held: bool) -> list[Marker]:
     radius = vehicle.buffer
     body = _marker("bodies", number, vehicle, Marker.SPHERE_LIST, BODY, (0.05, 0.05, 0.05))
     body.points = [Point(x, y, 0.0) for x in (-_ROTOR, _ROTOR) for y in (-_ROTOR, _ROTOR)]
     size = (2.0 * radius, 2.0 * radius, 2.0 * radius * DOWNWASH)
-    buffer = _marker("buffers", number, vehicle, Marker.SPHERE, WAITING if waits else FREE, size)
+    buffer = _marker("buffers", number, vehicle, Marker.SPHERE, HELD if is_held else FREE, size)
     name = _marker("names", number, vehicle, Marker.TEXT_VIEW_FACING, NAME, (0.0, 0.0, _TEXT_SIZE))
     name.text = vehicle.name
     name.pose.position.z = 0.15

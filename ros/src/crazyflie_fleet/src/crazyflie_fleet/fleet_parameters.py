@@ -1,4 +1,4 @@
-"""What the nodes of a fleet are told; all of them read the same fleet."""
+"""Parameters that say which vehicles a fleet has, and how they are flown."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -6,7 +6,7 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
-from crazyflie_fleet.fleet import Fleet
+from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_utils import Node, ParameterError, Parameters, parameter
 from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.parameters.types import (
@@ -60,7 +60,7 @@ class FleetParameters(Parameters):
     )
     fixed_frame: str = parameter(FRAME, "tf frame of the world", "world", "frames/fixed")
 
-    def fleet(self) -> Fleet:
+    def fleet(self) -> FleetConfig:
         """Return all vehicles, those of other machines included.
 
         Raises
@@ -76,7 +76,7 @@ class FleetParameters(Parameters):
             )
         return fleet.at_ports(self.virtual_port) if self.virtual_port else fleet
 
-    def own_names(self, fleet: Fleet) -> tuple[str, ...]:
+    def own_names(self, fleet: FleetConfig) -> tuple[str, ...]:
         """Return the names of the vehicles that are flown here.
 
         Raises
@@ -95,10 +95,10 @@ class FleetParameters(Parameters):
 
 
 class FlyParameters(FleetParameters):
-    """What the process that flies vehicles is told."""
+    """Parameters of the process that flies vehicles."""
 
     is_simulated: bool = parameter(BOOLEAN, "simulate the vehicles, too", name="simulated")
-    flies_together: bool = parameter(
+    is_vectorized: bool = parameter(
         BOOLEAN,
         "one simulator, estimator and controller for all simulated vehicles of one model of 7 "
         "states; else each has its own, with all their parameters",
@@ -109,8 +109,8 @@ class FlyParameters(FleetParameters):
         NodeParameters(), "parameters of every vehicle's nodes, node by node", name="nodes"
     )
     by_model: Mapping[str, Any] | None = parameter(
-        NodeParameters(), "those of vehicles of one model, which come before them", None, "models"
+        NodeParameters(), "those of vehicles of one model, which override them", None, "models"
     )
-    further: Mapping[str, type[Node]] | None = parameter(
-        NodeClasses(), "more nodes of every vehicle, by their names below its own", None
+    extra_nodes: Mapping[str, type[Node]] | None = parameter(
+        NodeClasses(), "more nodes of every vehicle, by their names below its own", None, "further"
     )

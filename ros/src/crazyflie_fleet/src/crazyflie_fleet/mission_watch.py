@@ -1,4 +1,4 @@
-"""Notices missions that end while their vehicles fly."""
+"""Detects missions that end while their vehicles fly."""
 
 from collections.abc import Callable
 
@@ -7,29 +7,29 @@ from std_msgs.msg import String
 from crazyflie_utils import NodeHandle
 
 MISSION_TOPIC = "/all/mission"
-"""What missions say while they fly: their name, and the names of the vehicles in flight."""
+"""Published by missions in flight: their name, and the names of the vehicles in flight."""
 
 MISSION_PERIOD = 0.5
-"""How often they say it, s of the machine's clock."""
+"""Between two of these messages, s of the machine's clock."""
 
-MISSION_LIMIT = 5.0
-"""A mission that has said nothing for so long has died, s of the machine's clock."""
+MISSION_TIMEOUT = 5.0
+"""A mission without a message for so long has died, s of the machine's clock."""
 
 
 class MissionWatch:
-    """Counts how long missions have said nothing.
+    """Watchdog of missions.
 
     Parameters
     ----------
     handle : NodeHandle
     on_lost : callable
-        ``on_lost(names)`` is called with the vehicles that a mission flew when it was heard last.
+        ``on_lost(names)`` is called with the vehicles of a mission's last message.
     """
 
     def __init__(self, handle: NodeHandle, on_lost: Callable[[list[str]], None]):
         self._on_lost = on_lost
         self._vehicles: dict[str, list[str]] = {}
-        # Ticks since each was heard; so a computer that slept does not lose them.
+        # Ticks since the last message, so that a suspended computer does not lose missions.
         self._ticks: dict[str, int] = {}
         handle.subscribe(MISSION_TOPIC, String, self._on_mission)
         handle.timer(MISSION_PERIOD, self._on_timer, steady=True)
@@ -47,5 +47,5 @@ class MissionWatch:
     def _on_timer(self):
         for mission in [*self._ticks]:
             self._ticks[mission] += 1
-            if self._ticks[mission] * MISSION_PERIOD > MISSION_LIMIT:
+            if self._ticks[mission] * MISSION_PERIOD > MISSION_TIMEOUT:
                 self._on_lost(self._forget(mission))

@@ -1,4 +1,4 @@
-"""ROS interface of what leads vehicles along ways, and apart."""
+"""ROS interface of straight moves, and of what keeps vehicles apart."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,14 +11,13 @@ from tf2_msgs.msg import TFMessage
 from typing_extensions import override
 
 from crazyflie_driver.srv import GoTo, GoToResponse
-from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_fleet.lander import LANDING_TOPIC
-from crazyflie_fleet.safe_descent import SafeDescents
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
-from crazyflie_fleet.sightings import DESCENDING, FLYING, STATE_LIMIT, Sightings
-from crazyflie_fleet.stack import DESCENT, REFERENCE, SAFE_DESCENT, SAFE_REFERENCE
-from crazyflie_fleet.way import Way, along
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_fleet.straight_move import StraightMove, evaluate
+from crazyflie_fleet.vehicle_nodes import REFERENCE, SAFE_REFERENCE
+from crazyflie_fleet.vehicle_states import MAX_STATE_AGE, VehicleStates
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_utils.refusal import RefusalError
@@ -26,29 +25,34 @@ from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
 
 SILENCE_PERIOD = 5.0
-"""From one warning about a vehicle whose states do not come to the next, s."""
+"""Between two warnings about a vehicle whose states do not come, s."""
 
 
 class ReferencesParameters(Parameters):
     """Parameters of `ReferencesNode`."""
 
-    way_period: float = parameter(TIME_STEP, "from one reference of a way to the next", 0.02)
-    watch_period: float = parameter(TIME_STEP, "from one look at the distances to the next", 0.05)
-    waiting_topic: str = parameter(TOPIC, "who waits for whom", "/fleet/waiting", "topics/waiting")
+    move_period: float = parameter(
+        TIME_STEP, "from one reference of a straight move to the next", 0.02, "way_period"
+    )
+    watch_period: float = parameter(TIME_STEP, "from one check of the distances to the next", 0.05)
+    held_topic: str = parameter(
+        TOPIC, "names of the vehicles that are held", "/fleet/waiting", "topics/waiting"
+    )
 
 
 @dataclass
-class _Led:
-    """A vehicle that is led; times are in s."""
+class _TrackedVehicle:
+    """A vehicle whose references pass through the node; times are in s."""
 
     number: int
-    vehicle: Vehicle
+    name: str
+    buffer: float
     publisher: Publisher
-    wanted: PositionVelocityStateStamped | None = None
-    way: Way | None = None
-    way_time: float = 0.0
-    waits: bool = False
-    is_landed: bool = False
+    commanded: PositionVelocityStateStamped | None = None
+    move: StraightMove | None = None
+    move_time: float = 0.0
+    is_held: bool = False
+    is_to_land: bool = False
 
 
 class ReferencesNode(Node):
@@ -56,17 +60,17 @@ class ReferencesNode(Node):
 
     Parameters
     ----------
-    vehicles : sequence of Vehicle
+    vehicles : sequence of VehicleConfig
         Those that are flown in this process.
-    others : sequence of Vehicle
+    others : sequence of VehicleConfig
         Those that are flown elsewhere, from which the former keep apart.
     fixed_frame : str
-    swarms : mapping of str to sequence of Vehicle, optional
+    vectorized : mapping of str to sequence of VehicleConfig, optional
         Topics that have the states of some of them in one message.
 
     Attributes
     ----------
-    sightings : Sightings
+    states : VehicleStates
         Of all of them.
     """
 
@@ -74,21 +78,19 @@ class ReferencesNode(Node):
 
     def __init__(
         self,
-        vehicles: tuple[Vehicle, ...],
-        others: tuple[Vehicle, ...],
+        vehicles: tuple[VehicleConfig, ...],
+        others: tuple[VehicleConfig, ...],
         fixed_frame: str,
-        swarms: Mapping[str, tuple[Vehicle, ...]] | None = None,
+        vectorized: Mapping[str, tuple[VehicleConfig, ...]] | None = None,
     ):
         self._vehicles = vehicles
         self._fixed_frame = fixed_frame
         # Own ones first.
-        everybody = (*vehicles, *others)
-        self.sightings = Sightings(everybody, swarms or {})
-        buffers = [vehicle.buffer for vehicle in everybody]
-        self._separation = Separation(buffers)
-        self._descents = SafeDescents(buffers)
-        self._led: list[_Led] = []
-        self._told = ""
+        all_vehicles = (*vehicles, *others)
+        self.states = VehicleStates(all_vehicles, vectorized or {})
+        self._separation = Separation([vehicle.buffer for vehicle in all_vehicles])
+        self._tracked: list[_TrackedVehicle] = []
+        self._published_held = ""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -97,31 +99,25 @@ class ReferencesNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        self._waiting = handle.publisher(parameters.waiting_topic, String, latch=True)
+        self._held = handle.publisher(parameters.held_topic, String, latch=True)
         self._publish_mocap_frames(handle)
         for vehicle in self._vehicles:
-            self._lead(handle, vehicle)
-        self.sightings.subscribe(handle)
+            self._track(handle, vehicle)
+        self.states.subscribe(handle)
         handle.subscribe(LANDING_TOPIC, String, self._on_landing)
-        handle.timer(parameters.way_period, self._on_way_timer)
+        handle.timer(parameters.move_period, self._on_move_timer)
         handle.timer(parameters.watch_period, self._on_watch_timer)
 
-    def _lead(self, handle, vehicle):
-        below = f"/{vehicle.name}/"
-        publisher = handle.publisher(below + SAFE_REFERENCE, PositionVelocityStateStamped)
-        led = _Led(len(self._led), vehicle, publisher)
-        self._led.append(led)
-        handle.advertise_service(below + "go_to", GoTo, partial(self._on_go_to, led))
-        handle.subscribe(
-            below + REFERENCE, PositionVelocityStateStamped, partial(self._on_reference, led)
-        )
-        descent = handle.publisher(below + SAFE_DESCENT, PositionVelocityStateStamped)
-        handle.subscribe(
-            below + DESCENT, PositionVelocityStateStamped, partial(self._on_descent, led, descent)
-        )
+    def _track(self, handle, vehicle):
+        top, message_type = f"/{vehicle.name}/", PositionVelocityStateStamped
+        publisher = handle.publisher(top + SAFE_REFERENCE, message_type)
+        tracked = _TrackedVehicle(len(self._tracked), vehicle.name, vehicle.buffer, publisher)
+        self._tracked.append(tracked)
+        handle.advertise_service(top + "go_to", GoTo, partial(self._on_go_to, tracked))
+        handle.subscribe(top + REFERENCE, message_type, partial(self._on_reference, tracked))
 
     def _publish_mocap_frames(self, handle):
-        # What motion capture calls a vehicle is the vehicle.
+        # The frame of motion capture is the frame of the vehicle, by another name.
         identity = Transform(Vector3(), Quaternion(w=1.0))
         transforms = [
             TransformStamped(Header(0, handle.stamp(), vehicle.mocap_frame), vehicle.name, identity)
@@ -132,107 +128,35 @@ class ReferencesNode(Node):
             static = handle.publisher("/tf_static", TFMessage, latch=True)
             static.publish(TFMessage(transforms))
 
+    def _is_flying(self, tracked):
+        return self.states.flight_states[tracked.number] == FlightStatus.FLYING
+
     # References.
 
     def _on_landing(self, message):
         names = message.data.split()
-        for led in self._led:
-            is_landed = led.vehicle.name in names
-            if is_landed and not led.is_landed and self._is_flying(led):
-                # Until its turn it stays; the fleet moves it if something is beneath it.
-                led.way = None
-                self._want(led, self._reference(self._place(led), np.zeros(3)))
-            led.is_landed = is_landed
+        for tracked in self._tracked:
+            is_to_land = tracked.name in names
+            if is_to_land and not tracked.is_to_land and self._is_flying(tracked):
+                # It hovers until its turn; only the fleet moves it.
+                tracked.move = None
+                self._command(tracked, self._reference(self._present(tracked), np.zeros(3)))
+            tracked.is_to_land = is_to_land
 
-    def _on_reference(self, led, message):
-        if led.is_landed and self._is_flying(led):
+    def _on_reference(self, tracked, message):
+        if tracked.is_to_land and self._is_flying(tracked):
             return
         if not is_finite(message.state):
-            # What is to be done about it is the controller's business.
-            led.publisher.publish(message)
+            # The controller decides what follows from it.
+            tracked.publisher.publish(message)
             return
-        led.way = None
-        self._want(led, message)
+        tracked.move = None
+        self._command(tracked, message)
 
-    def _on_descent(self, led, publisher, message):
-        number, now = led.number, self._handle.time()
-        if number not in self._descents:
-            flight_states = np.array(self.sightings.flight_states)
-            is_landing = ~self.sightings.are_in_flight() | (flight_states == DESCENDING)
-            distance = self._descents.begin(number, now, self.sightings.positions, is_landing)
-            if distance > 0.0:
-                self._handle.warn(
-                    f"{led.vehicle.name} lands {distance:.2f} m aside: another is beneath it"
-                )
-        aside = self._descents.reference(number, now, message.state.z, message.state.z_dot)
-        if aside is not None:
-            message = PositionVelocityStateStamped(message.header, PositionVelocityState(*aside))
-        publisher.publish(message)
-
-    def _want(self, led, message):
-        led.wanted = message
-        if not led.waits:
-            led.publisher.publish(message)
-
-    # Ways.
-
-    def _on_go_to(self, led, request):
-        goal = (request.goal.x, request.goal.y, request.goal.z)
-        duration = request.duration.to_sec()
-        name = f"/{led.vehicle.name}/go_to refused"
-        if not (self._is_flying(led) and self.sightings.are_fresh()[led.number]):
-            raise ServiceError(f"{name}: the vehicle is not in flight")
-        if not np.isfinite(goal).all():
-            raise ServiceError(f"{name}: the goal is {goal}; expected finite numbers (m)")
-        if request.yaw != 0.0:
-            raise ServiceError(f"{name}: the yaw is {request.yaw:g}; expected 0, which is held")
-        start = self._place(led)
-        end = start + goal if request.relative else np.array(goal)
-        try:
-            led.way = Way(start, end, duration, self._velocity(led, start))
-        except RefusalError as reason:
-            raise ServiceError(f"{name}: {reason}") from None
-        led.way_time = 0.0
-        return GoToResponse()
-
-    def _place(self, led):
-        # Where it is told to be, if it is about there: otherwise every way would begin with a jerk.
-        place = self.sightings.positions[led.number].copy()
-        told = place if led.wanted is None else _position(led.wanted)
-        return told if np.linalg.norm(told - place) < led.vehicle.buffer else place
-
-    def _velocity(self, led, place):
-        if led.waits:
-            return np.zeros(3)
-        if led.wanted is not None and np.array_equal(place, _position(led.wanted)):
-            return np.array(to_tuple(led.wanted.state)[3:])
-        return np.nan_to_num(self.sightings.velocities[led.number])
-
-    def _is_flying(self, led):
-        return self.sightings.flight_states[led.number] == FLYING
-
-    def _on_way_timer(self):
-        for led in self._led:
-            if not self._is_flying(led):
-                led.way = None
-            if self.sightings.flight_states[led.number] != DESCENDING:
-                self._descents.end(led.number)
-        ways = {led.number: led.way for led in self._led if led.way is not None and not led.waits}
-        if not ways:
-            return
-        fresh = self.sightings.are_fresh()
-        # A vehicle that nobody sees is not led on.
-        ways = {number: way for number, way in ways.items() if fresh[number]}
-        if not ways:
-            return
-        going = [self._led[number] for number in ways]
-        for led in going:
-            led.way_time += self._parameters.way_period
-        places = along([*ways.values()], [led.way_time for led in going])
-        for led, way, position, velocity in zip(going, ways.values(), *places, strict=True):
-            self._want(led, self._reference(position, velocity))
-            if led.way_time >= way.duration:
-                led.way = None
+    def _command(self, tracked, message):
+        tracked.commanded = message
+        if not tracked.is_held:
+            tracked.publisher.publish(message)
 
     def _reference(self, position, velocity):
         message = PositionVelocityStateStamped()
@@ -241,71 +165,129 @@ class ReferencesNode(Node):
         message.state = PositionVelocityState(*position.tolist(), *velocity.tolist())
         return message
 
+    # Straight moves.
+
+    def _on_go_to(self, tracked, request):
+        goal = (request.goal.x, request.goal.y, request.goal.z)
+        name = f"/{tracked.name}/go_to refused"
+        if not (self._is_flying(tracked) and self.states.are_fresh()[tracked.number]):
+            raise ServiceError(f"{name}: the vehicle is not in flight")
+        if not np.isfinite(goal).all():
+            raise ServiceError(f"{name}: the goal is {goal}; expected finite numbers (m)")
+        if request.yaw != 0.0:
+            raise ServiceError(f"{name}: the yaw is {request.yaw:g}; expected 0, which is held")
+        start = self._present(tracked)
+        end = start + goal if request.relative else np.array(goal)
+        velocity = self._present_velocity(tracked, start)
+        try:
+            tracked.move = StraightMove(start, end, request.duration.to_sec(), velocity)
+        except RefusalError as reason:
+            raise ServiceError(f"{name}: {reason}") from None
+        tracked.move_time = 0.0
+        return GoToResponse()
+
+    def _present(self, tracked):
+        """Return the commanded position; the measured one if the vehicle is not near it, m."""
+        measured = self.states.positions[tracked.number].copy()
+        commanded = measured if tracked.commanded is None else _position(tracked.commanded)
+        return commanded if np.linalg.norm(commanded - measured) < tracked.buffer else measured
+
+    def _present_velocity(self, tracked, position):
+        if tracked.is_held:
+            return np.zeros(3)
+        if tracked.commanded is not None and np.array_equal(position, _position(tracked.commanded)):
+            return np.array(to_tuple(tracked.commanded.state)[3:])
+        return np.nan_to_num(self.states.velocities[tracked.number])
+
+    def _on_move_timer(self):
+        fresh = self.states.are_fresh()
+        moving = []
+        for tracked in self._tracked:
+            if not self._is_flying(tracked):
+                tracked.move = None
+            # A move stops while its vehicle is held, or no state of it comes.
+            if tracked.move is not None and not tracked.is_held and fresh[tracked.number]:
+                tracked.move_time += self._parameters.move_period
+                moving.append(tracked)
+        if not moving:
+            return
+        for tracked, position, velocity in zip(moving, *_evaluate(moving), strict=True):
+            self._command(tracked, self._reference(position, velocity))
+            if tracked.move_time >= tracked.move.duration:
+                tracked.move = None
+
     # Distances.
 
     def _on_watch_timer(self):
-        in_flight, fresh = self.sightings.are_in_flight(), self.sightings.are_fresh()
-        positions = np.where(in_flight[:, None], self.sightings.positions, np.nan)
-        # A speed of long ago does not say where a vehicle will be.
-        velocities = np.where(fresh[:, None], self.sightings.velocities, 0.0)
+        in_flight, fresh = self.states.are_in_flight(), self.states.are_fresh()
+        positions = np.where(in_flight[:, None], self.states.positions, np.nan)
+        # An old velocity does not say where a vehicle will be.
+        velocities = np.where(fresh[:, None], self.states.velocities, 0.0)
         for number in np.flatnonzero(in_flight & ~fresh).tolist():
             self._warn_of_silence(number)
         goals = positions.copy()
-        told = [led for led in self._led if led.wanted is not None and led.way is None]
-        if told:
-            goals[[led.number for led in told]] = [_position(led.wanted) for led in told]
-        ways = {led.number: led.way for led in self._led if led.way is not None}
-        if ways:
-            soon = [self._led[number].way_time + LOOK_AHEAD for number in ways]
-            goals[[*ways]] = along([*ways.values()], soon)[0]
-        waiting, close = self._separation.waiting(positions, velocities, goals)
+        moving = [tracked for tracked in self._tracked if tracked.move is not None]
+        for tracked in self._tracked:
+            if tracked.commanded is not None and tracked.move is None:
+                goals[tracked.number] = _position(tracked.commanded)
+        if moving:
+            goals[[tracked.number for tracked in moving]] = _evaluate(moving, LOOK_AHEAD)[0]
+        held, close = self._separation.update(positions, velocities, goals)
         for pair in close:
-            self._warn(pair)
-        for led in self._led:
-            waits = bool(waiting[led.number])
-            if waits != led.waits:
-                self._turn(led, waits)
-        self._tell()
+            self._warn_of_pair(pair)
+        for tracked in self._tracked:
+            if held[tracked.number] and not tracked.is_held:
+                self._hold(tracked)
+            elif tracked.is_held and not held[tracked.number]:
+                self._release(tracked)
+        self._publish_held()
 
-    def _turn(self, led, waits):
-        led.waits = waits
-        if waits:
-            place = self.sightings.positions[led.number]
-            led.publisher.publish(self._reference(place, np.zeros(3)))
-        elif led.wanted is not None and led.way is None:
-            # Anew, since a controller does not go back to what is older than the place to wait.
-            wanted = np.array(to_tuple(led.wanted.state))
-            led.publisher.publish(self._reference(wanted[:3], wanted[3:]))
+    def _hold(self, tracked):
+        tracked.is_held = True
+        position = self.states.positions[tracked.number]
+        tracked.publisher.publish(self._reference(position, np.zeros(3)))
 
-    def _warn(self, pair):
-        first, second = (self.sightings.names[k] for k in (pair.first, pair.second))
+    def _release(self, tracked):
+        tracked.is_held = False
+        if tracked.commanded is not None and tracked.move is None:
+            # With a new stamp: a controller ignores what is older than the hold.
+            state = np.array(to_tuple(tracked.commanded.state))
+            tracked.publisher.publish(self._reference(state[:3], state[3:]))
+
+    def _publish_held(self):
+        held = " ".join(tracked.name for tracked in self._tracked if tracked.is_held)
+        if held != self._published_held:
+            self._published_held = held
+            self._held.publish(String(held))
+
+    def _warn_of_pair(self, pair):
+        first, second = (self.states.names[k] for k in (pair.first, pair.second))
         self._handle.warn(
             f"{first} and {second} are {pair.distance:.2f} m apart and must not come closer than "
-            f"{pair.limit:.2f} m: whom its reference leads nearer waits",
+            f"{pair.limit:.2f} m: a vehicle whose reference approaches the other is held",
             throttle=1.0,
             key=(pair.first, pair.second),
         )
 
     def _warn_of_silence(self, number):
-        name = self.sightings.names[number]
-        place = self.sightings.positions[number]
-        keep = "the others cannot keep apart from it"
-        if np.isfinite(place).all():
-            x, y, z = place.tolist()
-            keep = f"the others keep apart from where it was last, ({x:.2f}, {y:.2f}, {z:.2f})"
+        name, position = self.states.names[number], self.states.positions[number]
+        consequence = "the others cannot keep apart from it"
+        if np.isfinite(position).all():
+            x, y, z = position.tolist()
+            consequence = f"the others keep apart from its last place, ({x:.2f}, {y:.2f}, {z:.2f})"
         self._handle.warn(
-            f"{name} is {self.sightings.flight_states[number].replace('_', ' ')}, and no state of "
-            f"it has come for {STATE_LIMIT:g} s: where it is, is not known; {keep}",
+            f"{name} is in flight, and no state of it has come for {MAX_STATE_AGE:g} s: its "
+            f"position is not known; {consequence}",
             throttle=SILENCE_PERIOD,
             key=("silence", name),
         )
 
-    def _tell(self):
-        told = " ".join(led.vehicle.name for led in self._led if led.waits)
-        if told != self._told:
-            self._told = told
-            self._waiting.publish(String(told))
-
 
 def _position(message):
     return np.array(to_tuple(message.state)[:3])
+
+
+def _evaluate(moving, ahead=0.0):
+    """Return positions and velocities on the moves of vehicles, a time (s) ahead of now."""
+    moves = [tracked.move for tracked in moving]
+    return evaluate(moves, [tracked.move_time + ahead for tracked in moving])

@@ -1,22 +1,21 @@
-"""Which vehicles have to wait so that none meets another."""
+"""Collision avoidance: which vehicles must be held so that none comes too near to another."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_fleet.fleet import DOWNWASH, close_pairs
+from crazyflie_fleet.fleet_config import DOWNWASH, close_pairs
 
 LOOK_AHEAD = 0.5
-"""How far ahead of now the vehicles' motion is regarded, s: what a controller needs to stop one."""
+"""How far ahead vehicles are extrapolated, s: what a controller needs to stop one."""
 
-RELEASE = 1.1
-"""A pair has to be this much farther apart than it must before neither waits any more."""
+RELEASE_RATIO = 1.1
+"""Vehicles that are held are released at this distance, in sums of their buffers."""
 
 
-@dataclass(frozen=True)
-class Closeness:
+class ClosePair(NamedTuple):
     """Two vehicles that are, or soon will be, closer than their buffers.
 
     Attributes
@@ -38,53 +37,46 @@ class Closeness:
 class Separation:
     """Decide which vehicles must not follow their references.
 
-    A vehicle waits while it is too close to another, now or `LOOK_AHEAD` from now if both go on
-    as they do, and its reference leads it nearer. One whose reference leads it away does not wait,
-    so that a pair that has met can part.
+    A vehicle is held while it is too close to another, now or `LOOK_AHEAD` from now at the present
+    velocities, and its reference approaches the other. One whose reference leads away is not held.
 
     Parameters
     ----------
     buffers : sequence of float
-        Radius of each vehicle's own space, m.
+        Collision buffer of each vehicle, m.
     """
 
     def __init__(self, buffers: Sequence[float]):
         self._buffers = np.array(buffers, dtype=float)
         self._scale = np.array([1.0, 1.0, 1.0 / DOWNWASH])
-        self._waiting = np.zeros(len(self._buffers), dtype=bool)
+        self._held = np.zeros(len(self._buffers), dtype=bool)
 
-    def waiting(
+    def update(
         self,
         positions: NDArray[np.float64],
         velocities: NDArray[np.float64],
         goals: NDArray[np.float64],
-    ) -> tuple[NDArray[np.bool_], list[Closeness]]:
-        """Return who has to wait, and because of what.
+    ) -> tuple[NDArray[np.bool_], list[ClosePair]]:
+        """Return which vehicles are held, shape (n,), and the pairs that are too close.
 
         Parameters
         ----------
         positions, velocities, goals : (n, 3) array
-            Where each is, how it moves, and where its reference is: m, m/s, fixed frame. A vehicle
-            without a position is NaN and is not regarded; one without a goal has its position.
-
-        Returns
-        -------
-        (n,) array of bool
-        list of Closeness
-            Pairs that are too close now or soon.
+            Of vehicles and of their references, m and m/s, fixed frame. A vehicle whose position
+            is NaN is ignored; the goal of one without a reference is its position.
         """
         known = np.flatnonzero(np.isfinite(positions).all(axis=1))
-        buffers = self._buffers[known] * np.where(self._waiting[known], RELEASE, 1.0)
+        buffers = self._buffers[known] * np.where(self._held[known], RELEASE_RATIO, 1.0)
         now, soon = positions[known], (positions + LOOK_AHEAD * velocities)[known]
-        waiting = np.zeros_like(self._waiting)
-        pairs = {(i, j) for places in (now, soon) for i, j, _, _ in close_pairs(places, buffers)}
-        found = []
-        for a, b in sorted(pairs):
+        held = np.zeros_like(self._held)
+        numbers = {(i, j) for places in (now, soon) for i, j, _, _ in close_pairs(places, buffers)}
+        pairs = []
+        for a, b in sorted(numbers):
             i, j = int(known[a]), int(known[b])
             between = (positions[j] - positions[i]) * self._scale
-            waiting[i] |= bool((goals[i] - positions[i]) * self._scale @ between > 0.0)
-            waiting[j] |= bool((goals[j] - positions[j]) * self._scale @ between < 0.0)
+            held[i] |= bool((goals[i] - positions[i]) * self._scale @ between > 0.0)
+            held[j] |= bool((goals[j] - positions[j]) * self._scale @ between < 0.0)
             limit = float(self._buffers[i] + self._buffers[j])
-            found.append(Closeness(i, j, float(np.linalg.norm(between)), limit))
-        self._waiting = waiting
-        return waiting, found
+            pairs.append(ClosePair(i, j, float(np.linalg.norm(between)), limit))
+        self._held = held
+        return held, pairs

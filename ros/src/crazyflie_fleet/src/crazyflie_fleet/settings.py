@@ -1,4 +1,4 @@
-"""What a fleet file may say: the declared settings of vehicles, and what their values may be."""
+"""Declared settings of a fleet file, and the types of their values."""
 
 import re
 from typing import Any
@@ -19,11 +19,8 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.text_input import number_from_text
 
-RESERVED = ("all",)
-"""Names that vehicles cannot have: /all/takeoff is everybody's."""
-
 LOCAL = "local"
-"""The machine of vehicles that do not name one."""
+"""Default machine of vehicles."""
 
 DEFAULT_TOPICS = {
     "imu": "imu",
@@ -39,43 +36,38 @@ DEFAULT_TOPICS = {
 }
 """Key in ``default_topics`` -> standard topic of the driver; empty where it has none."""
 
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+
+class _Pattern(ParameterType):
+    """A text that a regular expression matches."""
+
+    label = "string"
+
+    def __init__(self, pattern: "re.Pattern[str]", expected: str):
+        self._pattern = pattern
+        self._expected = expected
+
+    @override
+    def __call__(self, value: Any) -> str:
+        if not isinstance(value, str) or not self._pattern.fullmatch(value):
+            raise ValueError
+        return value
+
+    @override
+    def __str__(self) -> str:
+        return self._expected
+
+
+VEHICLE_NAME = _Pattern(
+    re.compile(r"(?!all$)[A-Za-z][A-Za-z0-9_]*"),
+    "letters, digits and underscores, the first a letter, and not 'all'",
+)
+"""Of its namespace and of its frame; /all/takeoff is a service for all."""
+
 _URI = re.compile(
     r"radio://(?P<dongle>[0-9A-Fa-f*]+)/(?P<channel>\d+)/(?P<rate>250K|1M|2M)"
     r"(/(?P<address>[0-9A-Fa-f]{1,10}))?(\?.*)?|udp://[^/:\s]+:\d+|usb://\d+"
 )
-
-
-class VehicleName(ParameterType):
-    """The name of a vehicle: of its namespace and of its frame."""
-
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> str:
-        if not isinstance(value, str) or not _NAME.fullmatch(value) or value in RESERVED:
-            raise ValueError
-        return value
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return "letters, digits and underscores, the first a letter, and not 'all'"
-
-
-class Uri(ParameterType):
-    """The address of a vehicle."""
-
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> str:
-        if not isinstance(value, str) or not _URI.fullmatch(value):
-            raise ValueError
-        return value
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return "radio://DONGLE/CHANNEL/RATE/ADDRESS, udp://HOST:PORT or usb://NUMBER"
+URI = _Pattern(_URI, "radio://DONGLE/CHANNEL/RATE/ADDRESS, udp://HOST:PORT or usb://NUMBER")
 
 
 def same_vehicle(uri: str) -> str:
@@ -99,8 +91,8 @@ class StartPosition(ParameterType):
             raise ValueError(f"z is {z:g}, below the ground")
         return x, y, z
 
+    @override
     def __str__(self) -> str:
-        """Return what is expected."""
         return f"{POSITION}, z at least 0"
 
 
@@ -118,8 +110,8 @@ class FirmwareNumber(ParameterType):
         FINITE(value)
         return value
 
+    @override
     def __str__(self) -> str:
-        """Return what is expected."""
         return "a finite number"
 
 
@@ -137,7 +129,7 @@ class DefaultTopicSettings(Parameters):
 
 
 class Settings(Parameters):
-    """What a vehicle, its type, or ``all`` may say; the nearest one counts."""
+    """Settings of a vehicle, which override those of its type, which override those of ``all``."""
 
     model: str = parameter(
         Text(("near_hover", "coupled_7d", "quadrotor")), "dynamics in simulation", "near_hover"
@@ -177,10 +169,10 @@ class Settings(Parameters):
 
 
 class RobotSettings(Settings):
-    """What stands about one vehicle below ``robots``."""
+    """Settings of one vehicle below ``robots``."""
 
     enabled: bool = parameter(BOOLEAN, "whether it takes part", True)
-    uri: str | None = parameter(Uri(), "its address; not needed in simulation", None)
+    uri: str | None = parameter(URI, "its address; not needed in simulation", None)
     position: tuple[float, float, float] = parameter(
         StartPosition(), "where it stands before takeoff", name="initial_position"
     )

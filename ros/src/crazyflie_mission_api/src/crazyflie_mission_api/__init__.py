@@ -5,11 +5,11 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from crazyflie_mission_api.fleet import Fleet
 
+from crazyflie_mission_api.dry_run import DryRun
 from crazyflie_mission_api.limits import Bounds, Limits, MissionError
 from crazyflie_mission_api.minimum_snap import plan
-from crazyflie_mission_api.rehearsal import Rehearsal
 
-__all__ = ["Bounds", "Fleet", "Limits", "MissionError", "Rehearsal", "plan"]
+__all__ = ["Bounds", "Fleet", "Limits", "MissionError", "DryRun", "plan"]
 
 
 def __getattr__(name: str) -> object:

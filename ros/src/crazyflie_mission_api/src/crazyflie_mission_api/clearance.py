@@ -1,4 +1,4 @@
-"""How far apart vehicles have to be: for the mission, and for the fleet that watches them."""
+"""Distances between vehicles: of the mission, and of the fleet that keeps them apart."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.spatial.distance import pdist
 
-from crazyflie_fleet.separation import LOOK_AHEAD, RELEASE, Separation
+from crazyflie_fleet.separation import LOOK_AHEAD, RELEASE_RATIO, Separation
 from crazyflie_mission_api.formations import SCALE
 from crazyflie_mission_api.limits import Array, MissionError
 
@@ -18,11 +18,12 @@ class Clearance:
     Attributes
     ----------
     separation : float
-        Between any two vehicles, m; one above the other `crazyflie_fleet.fleet.DOWNWASH` times.
+        Between any two vehicles, m; one above the other `crazyflie_fleet.fleet_config.DOWNWASH`
+        times.
     buffers : mapping of str to float
         Collision buffers of vehicles that a fleet process watches, m. It holds a vehicle that
         comes nearer to another than both their buffers, and lets it go when it is
-        `crazyflie_fleet.separation.RELEASE` times as far away: a mission keeps that distance.
+        `crazyflie_fleet.separation.RELEASE_RATIO` times as far away: a mission keeps that distance.
     """
 
     separation: float = 0.3
@@ -31,10 +32,10 @@ class Clearance:
     def limits(self, names: Sequence[str]) -> Array:
         """Return how far apart each two of n vehicles have to be, shape (n, n), m."""
         radii = np.array([self.buffers.get(name, -np.inf) for name in names])
-        return np.maximum(self.separation, RELEASE * (radii[:, None] + radii))
+        return np.maximum(self.separation, RELEASE_RATIO * (radii[:, None] + radii))
 
     def check(self, names: Sequence[str], times: Array, places: Array) -> None:
-        """Refuse ways on which vehicles come too near, or so fast that the fleet holds them.
+        """Refuse positions that are too near, or approached so fast that the fleet holds vehicles.
 
         Parameters
         ----------
@@ -63,18 +64,18 @@ class Clearance:
         self._check_speeds(names, times, places)
 
     def _check_speeds(self, names, times, places):
-        """Refuse what the fleet's watch would hold, which looks ahead."""
+        """Refuse what the fleet would hold, which extrapolates positions."""
         watched = [k for k, name in enumerate(names) if name in self.buffers]
         if len(watched) < 2 or len(times) < 3:
             return
-        separation = Separation([RELEASE * self.buffers[names[k]] for k in watched])
+        separation = Separation([RELEASE_RATIO * self.buffers[names[k]] for k in watched])
         seen = places[watched]
         velocities = np.gradient(seen, times, axis=1)
         for k, time in enumerate(times[:-1]):
             # A reference is a little ahead of the vehicle that follows it.
-            waits, pairs = separation.waiting(seen[:, k], velocities[:, k], seen[:, k + 1])
+            held, pairs = separation.update(seen[:, k], velocities[:, k], seen[:, k + 1])
             for pair in pairs:
-                if waits[pair.first] or waits[pair.second]:
+                if held[pair.first] or held[pair.second]:
                     one, two = names[watched[pair.first]], names[watched[pair.second]]
                     raise MissionError(
                         f"{one} and {two} would come near each other too fast, {time:.1f} s from "
@@ -89,5 +90,5 @@ class Clearance:
         return (
             f" (the mission's separation is {self.separation:g} m; the collision buffers, with "
             f"which the fleet holds vehicles apart, are {self.buffers[one]:g} and "
-            f"{self.buffers[two]:g} m, and {RELEASE:g} times as much lets them go on)"
+            f"{self.buffers[two]:g} m, and {RELEASE_RATIO:g} times as much lets them go on)"
         )

@@ -6,9 +6,8 @@ import genpy
 from geometry_msgs.msg import Point, Pose, Quaternion, Twist, Vector3
 
 from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece
-from crazyflie_mission_api.follower import at_rest
 from crazyflie_model.angles import quaternion_from_rpy
-from crazyflie_model.polynomials import COEFFICIENTS, Goal, PolynomialPiece
+from crazyflie_model.polynomials import Goal, PolynomialPiece, at_rest
 from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,
@@ -18,13 +17,12 @@ from crazyflie_msgs.msg import (
 
 
 def to_message(piece: PolynomialPiece) -> TrajectoryPolynomialPiece:
-    """Return what the service upload_trajectory takes."""
-    axes = ([*axis, *[0.0] * (COEFFICIENTS - len(axis))] for axis in piece.axes)
-    return TrajectoryPolynomialPiece(*axes, genpy.Duration.from_sec(piece.duration))
+    """Return a piece for the service upload_trajectory."""
+    return TrajectoryPolynomialPiece(*piece.padded_axes, genpy.Duration.from_sec(piece.duration))
 
 
 def from_message(message: TrajectoryPolynomialPiece) -> PolynomialPiece:
-    """Return the piece that somebody uploads."""
+    """Return an uploaded piece."""
     axes = (message.poly_x, message.poly_y, message.poly_z, message.poly_yaw)
     return PolynomialPiece(message.duration.to_sec(), *axes)
 
@@ -56,7 +54,7 @@ def heading(x: float, y: float, z: float, w: float) -> float:
 
 
 def setpoint_goal(message: FullState | Position) -> Goal[float]:
-    """Return the goal that a setpoint of position means."""
+    """Return the goal of a setpoint of position."""
     if isinstance(message, Position):
         return at_rest((message.x, message.y, message.z), math.radians(message.yaw))
     p, v, a, q = (

@@ -1,4 +1,4 @@
-"""A team by ROS: simulated, virtual and real vehicles."""
+"""Groups of simulated, virtual and real vehicles, by ROS."""
 
 import signal
 import sys
@@ -15,15 +15,15 @@ from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC
-from crazyflie_fleet.stack import BUFFER
-from crazyflie_mission_api.connection import RosVehicle, prefix
+from crazyflie_fleet.vehicle_nodes import BUFFER
+from crazyflie_mission_api.dry_run import dry_run
+from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
-from crazyflie_mission_api.rehearsal import rehearse
 from crazyflie_mission_api.ros_clock import RosClock
-from crazyflie_mission_api.roster import Rules
-from crazyflie_mission_api.starter import Starter
-from crazyflie_mission_api.team import Team
+from crazyflie_mission_api.ros_vehicle import RosVehicle, prefix
+from crazyflie_mission_api.synchronized_start import SynchronizedStart
+from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, Number
@@ -41,12 +41,12 @@ _SERVICES = (
 )
 
 _POLL = 0.2
-"""How often it is looked whether a vehicle is there, s."""
+"""Between two searches for vehicles, s."""
 
 _YAW_STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 
 
-class Fleet(Team):
+class Fleet(VehicleGroup):
     """The vehicles of a mission, as they are on the ROS graph.
 
     A vehicle ``NAME`` is flown by the services that it offers: those of a `HighLevelNode`,
@@ -62,10 +62,10 @@ class Fleet(Team):
         Where they may fly; a vehicle's geofence counts as well.
     limits : Limits, optional
         Of trajectories.
-    separation, tolerance, patience : float
+    separation, tolerance, arrival_timeout : float
         See `Rules`.
-    limit : float
-        How long to wait for the vehicles to be there, s of the machine's clock.
+    startup_timeout : float
+        Until all vehicles are found, s of the machine's clock.
     process : Process, optional
         By default this script becomes a node, unless it is one.
 
@@ -82,8 +82,8 @@ class Fleet(Team):
         limits: Limits | None = None,
         separation: float = 0.3,
         tolerance: float = 0.15,
-        patience: float = 15.0,
-        limit: float = 30.0,
+        arrival_timeout: float = 15.0,
+        startup_timeout: float = 30.0,
         process: Process | None = None,
     ):
         chosen, buffers = vehicles_of(names)
@@ -93,41 +93,43 @@ class Fleet(Team):
             _catch_signals()
         self._handle = process.handle("/mission")
         try:
-            vehicles = _connect(process, self._handle, chosen, limit)
+            vehicles = _connect(process, self._handle, chosen, startup_timeout)
             clock = RosClock(self._handle, lambda: process.exit_status is not None)
             # Of the fleet process that flies them, if one does.
             watched = {name: _buffer(self._handle, name) for name in chosen}
             buffers |= {name: max(b, buffers.get(name, b)) for name, b in watched.items() if b}
-            rules = Rules(limits or Limits(), bounds, separation, tolerance, patience, buffers)
+            rules = Rules(
+                limits or Limits(), bounds, separation, tolerance, arrival_timeout, buffers
+            )
             super().__init__(vehicles, clock, rules)
             self._mission = f"mission_{uuid.uuid4().hex[:8]}"
             self._in_flight = self._handle.publisher(MISSION_TOPIC, String)
-            self._handle.timer(MISSION_PERIOD, self._say_who_flies, steady=True)
+            self._handle.timer(MISSION_PERIOD, self._publish_flying, steady=True)
             process.start()
-            self._await_positions(limit)
+            self._await_positions(startup_timeout)
         except BaseException:
             self._end()
             raise
 
-    def rehearse(self, mission: Callable[[Team], Any]) -> float:
-        """Check ``mission(fleet)`` without flying; return how long it takes, s.
+    def dry_run(self, mission: Callable[[VehicleGroup], Any]) -> float:
+        """Check ``mission(fleet)`` by a dry run; return its duration, s.
 
         Raises
         ------
         MissionError
-            What the mission would have run into.
+            The mission would fail.
         """
-        return rehearse(self, mission)
+        return dry_run(self, mission)
 
-    def fly(self, mission: Callable[[Team], Any]) -> None:
-        """Rehearse ``mission(fleet)``; if nothing is wrong with it, fly it."""
-        duration = self.rehearse(mission)
-        self._handle.info(f"{', '.join(self.names)}: a mission of about {duration:.0f} s")
+    def fly(self, mission: Callable[[VehicleGroup], Any]) -> None:
+        """Check ``mission(fleet)`` by a dry run, then fly it."""
+        duration = self.dry_run(mission)
+        self._handle.info(f"{', '.join(self.names)}: dry run passed, a mission of {duration:.0f} s")
         mission(self)
 
     @override
     def __exit__(self, kind: type[BaseException] | None, error: Any, traceback: Any) -> None:
-        """Land who still flies, whatever has happened, and say who cannot be landed."""
+        """Land the vehicles that still fly, also after an error; log those that cannot land."""
         try:
             if self.flying:
                 why = f" after {error!r}" if error is not None else ""
@@ -137,19 +139,19 @@ class Fleet(Team):
             if self.flying:
                 self._handle.error(f"MAY STILL FLY: {', '.join(self.flying)}")
             else:
-                self._say_who_flies()
+                self._publish_flying()
             self._end()
 
-    def _say_who_flies(self):
-        # A fleet process lands them when this ends.
+    def _publish_flying(self):
+        # A fleet process lands them when these messages end.
         self._in_flight.publish(String(" ".join([self._mission, *self.flying])))
 
-    def _await_positions(self, limit):
-        end = time.monotonic() + limit
+    def _await_positions(self, timeout):
+        end = time.monotonic() + timeout
         while missing := [name for name in self.names if self._vehicles[name].position() is None]:
             if time.monotonic() > end:
                 raise MissionError(
-                    f"{', '.join(missing)}: nobody has said where they are for {limit:g} s; "
+                    f"{', '.join(missing)}: no position for {timeout:g} s; "
                     "expected a state, or for the driver's vehicles a pose or a tf frame"
                 )
             time.sleep(0.01)
@@ -182,15 +184,15 @@ def _buffer(handle, name):
     return handle.get_param(f"{prefix(name)}/{BUFFER}", Number("m", above=0.0), None)
 
 
-def _connect(process, handle, names, limit):
-    end = time.monotonic() + limit
+def _connect(process, handle, names, timeout):
+    end = time.monotonic() + timeout
     missing = list(names)
     found = {}
-    starter = Starter(handle)
+    synchronized_start = SynchronizedStart(handle)
     while missing:
         services = handle.service_nodes()
         for name in list(missing):
-            vehicle = _vehicle(process, handle, name, services, starter)
+            vehicle = _vehicle(process, handle, name, services, synchronized_start)
             if vehicle is not None:
                 found[name] = vehicle
                 missing.remove(name)
@@ -200,21 +202,21 @@ def _connect(process, handle, names, limit):
                 {s.rpartition("/takeoff")[0].strip("/") or "/" for s in services if "takeoff" in s}
             )
             raise MissionError(
-                f"no takeoff and land, and no go_to, below {tops} after {limit:g} s; takeoff is "
-                f"offered by: {', '.join(there) or 'nobody'}"
+                f"no takeoff and land, and no go_to, below {tops} after {timeout:g} s; takeoff is "
+                f"offered by: {', '.join(there) or 'no node'}"
             )
         if missing:
             time.sleep(_POLL)
     return [found[name] for name in names]
 
 
-def _vehicle(process, handle, name, services, starter):
+def _vehicle(process, handle, name, services, synchronized_start):
     top = prefix(name)
     commander = f"{top}/high_level"
     if f"{commander}/go_to" in services:
         has_yaw = handle.get_param(f"{commander}/reference/yaw", BOOLEAN, False)
         frames = _frames(handle, commander)
-        return RosVehicle(name, handle, _below(commander), starter, frames, has_yaw)
+        return RosVehicle(name, handle, _below(commander), synchronized_start, frames, has_yaw)
     driver = services.get(f"{top}/upload_trajectory")
     if driver is not None and services.get(f"{top}/takeoff") == driver:
         fixed = handle.get_param(f"{driver}/frames/fixed", FRAME, "world")
@@ -224,7 +226,7 @@ def _vehicle(process, handle, name, services, starter):
         handle.set_param(f"{commander}/reference/yaw", has_yaw)
         if not HighLevelNode().initialize(process.handle(commander)):
             raise MissionError(f"{commander} could not be started; its reason is in the log")
-        return RosVehicle(name, handle, _below(commander), starter, has_yaw=has_yaw)
+        return RosVehicle(name, handle, _below(commander), synchronized_start, has_yaw=has_yaw)
     return None
 
 

@@ -1,31 +1,23 @@
-"""What a high-level commander refers a controller to: rest, ways, trajectories."""
+"""References of a high-level commander: hover, straight moves, trajectories."""
 
 import math
-from collections.abc import Sequence
 
-from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
 from crazyflie_model.planner import smooth_piece
 from crazyflie_model.polynomials import Goal
-from crazyflie_model.trajectory import Trajectory
+from crazyflie_model.trajectory import Pieces, Trajectory
 from crazyflie_utils.refusal import RefusalError
 
 NEAR = 0.5
-"""A new way begins at the present goal if the vehicle is so near to it, m; otherwise, as
-somebody else has moved the vehicle, where this is."""
-
-
-def at_rest(position: Sequence[float], yaw: float) -> Goal[float]:
-    """Return the goal of a vehicle that is to stay, m and rad."""
-    x, y, z = position
-    return Goal((x, y, z), (0.0,) * 3, (0.0,) * 3, yaw, 0.0)
+"""A move begins at the present goal if the vehicle is this near to it, m; otherwise where the
+vehicle is, since another node has moved it."""
 
 
 class Follower:
     """The goal of one vehicle, by time.
 
-    Commands are those of the firmware's high-level commander, and so is the way that they
-    are flown. All raise `RefusalError` when they make no sense.
+    Commands, and the trajectories that follow from them, are those of the firmware's high-level
+    commander. Invalid commands raise `RefusalError`.
     """
 
     def __init__(self) -> None:
@@ -35,15 +27,15 @@ class Follower:
         self._begin = 0.0
 
     def forget(self) -> None:
-        """Have no goal; trajectories that were uploaded stay."""
+        """Delete the goal; uploaded trajectories stay."""
         self._trajectory = self._setpoint = None
 
     def take_setpoint(self, goal: Goal[float]) -> None:
-        """Have a goal that a stream of setpoints has, in the place of any command."""
+        """Replace any command by the goal of a setpoint."""
         self._trajectory, self._setpoint = None, goal
 
     def is_moving(self, time: float) -> bool:
-        """Return whether a way or a trajectory is not at its end yet."""
+        """Return whether a move or a trajectory has not ended."""
         return self._trajectory is not None and time < self._begin + self._trajectory.duration
 
     def goal(self, time: float) -> Goal[float] | None:
@@ -77,7 +69,7 @@ class Follower:
         self._fly(time, Trajectory((smooth_piece(start, position, yaw, duration),)))
 
     def upload(self, number: int, pieces: Pieces) -> None:
-        """Keep a trajectory under a number."""
+        """Store a trajectory under a number."""
         if not pieces:
             raise RefusalError("the trajectory has no pieces")
         for piece in pieces:

@@ -1,4 +1,4 @@
-"""Formations: where their places are, and who flies to which."""
+"""Formations: their places, and the assignment of vehicles to them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,11 +7,11 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.distance import cdist
 
-from crazyflie_fleet.fleet import DOWNWASH
+from crazyflie_fleet.fleet_config import DOWNWASH
 from crazyflie_mission_api.limits import Array
 
 SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
-"""By which positions are multiplied before distances are taken."""
+"""Factors of positions before distances are calculated."""
 
 Point = tuple[float, float, float]
 
@@ -53,9 +53,9 @@ def circle(n: int, radius: float, center: Sequence[float] = (0.0, 0.0, 1.0)) -> 
 
 
 def assign(places: Mapping[str, Sequence[float]], goals: Array) -> dict[str, Point]:
-    """Return which vehicle flies to which goal, such that the sum of squared ways is least.
+    """Assign goals to vehicles with the least sum of squared distances.
 
-    Vehicles that then fly straight there in the same time, in the same rhythm, come no nearer than
+    Vehicles that then fly straight there with the same time law come no nearer than
     min(start distance, goal distance) / sqrt(2), distances as in `Clearance`: Turpin, Michael and
     Kumar, CAPT: Concurrent Assignment and Planning of Trajectories for Multiple Robots (IJRR 2014).
 

@@ -6,7 +6,7 @@ from typing import Any
 
 
 def done(error: Exception | None) -> "Future[Any]":
-    """Return the future of what has been done already, or has failed."""
+    """Return a future that is done: with the result None, or an error."""
     future: Future[Any] = Future()
     if error is None:
         future.set_result(None)
@@ -16,7 +16,7 @@ def done(error: Exception | None) -> "Future[Any]":
 
 
 def in_turn(*calls: Callable[[], "Future[Any]"]) -> "Future[Any]":
-    """Make calls one after the other; return the outcome of the last one, or of one that fails."""
+    """Make calls one after the other; return the future of the last one, or of one that fails."""
     outcome: Future[Any] = Future()
 
     def go_on(answer, left):

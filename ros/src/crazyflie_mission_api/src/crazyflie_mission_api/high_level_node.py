@@ -5,55 +5,53 @@ from concurrent.futures import Future
 from typing import Any
 
 from std_msgs.msg import String
-from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
+from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Position
 from crazyflie_mission_api.conversions import from_message, reference_message, setpoint_goal
-from crazyflie_mission_api.follower import Follower, at_rest
+from crazyflie_mission_api.flight_words import WORDS
+from crazyflie_mission_api.follower import Follower
 from crazyflie_mission_api.high_level_parameters import HighLevelParameters
-from crazyflie_model.polynomials import Goal
+from crazyflie_mission_api.service_relay import relay
+from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import (
+    FlightStatus,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 
-STATE_LIMIT = 0.5
-"""A state older than this says nothing, and nor does a setpoint, s."""
-
-_CALL_LIMIT = 58.0
-"""How long a takeoff or landing of the takeoff server may take, s of the machine's clock."""
+MAX_STATE_AGE = 0.5
+"""Of a state that says where the vehicle is, and of the last setpoint of a stream, s."""
 
 FIRST_CLIMB = 1.0
-"""How high the takeoff server's takeoff goes at most, m; what is higher follows in flight."""
-
-_FLYING, _TAKING_OFF, _DESCENDING, _LANDING = "flying", "taking_off", "descending", "landing"
+"""Highest takeoff of the takeoff server, m; the rest of a climb follows in flight."""
 
 
 class HighLevelNode(Node):
     """Fly a vehicle by high-level commands: make references for its controller.
 
-    In its own namespace it offers what the driver offers for a real vehicle, so that whoever
-    flies by these services flies simulated vehicles as well. On the ground and during takeoff
-    and landing it is silent.
+    In its own namespace it offers the services of the driver for a real vehicle, so that the same
+    clients fly simulated vehicles. It publishes nothing on the ground, and during takeoff and
+    landing.
     """
 
     needed_in_flight = True
 
     def __init__(self) -> None:
         self._follower = Follower()
-        self._flight_state = ""
+        self._flight_state = FlightStatus.UNKNOWN
         self._measured: Goal[float] | None = None
         self._measured_at = 0.0
         self._is_moving = False
         # When the last setpoint came; None without a stream.
         self._setpoint_time: float | None = None
-        # Where a takeoff that was asked for here goes, in place of the server's hover point.
+        # The goal of a takeoff by this node, instead of the server's hover point.
         self._hover: Goal[float] | None = None
-        # What was told during a takeoff, for its end.
+        # A command during a takeoff, for its end.
         self._next: tuple[Any, ...] | None = None
         self._landings: list[Future[Any]] = []
 
@@ -82,7 +80,7 @@ class HighLevelNode(Node):
             ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
         ):
             handle.advertise_service(f"~{name}", service_type, callback)
-        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(parameters.flight_status_topic, FlightStatus, self._on_flight_status)
         handle.subscribe(
             parameters.state_topic,
             PositionVelocityYawStateStamped,
@@ -100,7 +98,7 @@ class HighLevelNode(Node):
         """Leave the controller a reference at rest."""
         goal = self._follower.goal(self._handle.time())
         moves = self._is_moving or self._setpoint_time is not None
-        if self._flight_state == _FLYING and moves and goal is not None:
+        if self._flight_state == FlightStatus.FLYING and moves and goal is not None:
             self._publish(at_rest(goal.position, goal.yaw))
         self._forget_goal()
 
@@ -109,7 +107,7 @@ class HighLevelNode(Node):
         self._is_moving = False
         self._setpoint_time = None
 
-    # What the vehicle does.
+    # State of the vehicle.
 
     def _on_state(self, message):
         s = message.state
@@ -118,21 +116,21 @@ class HighLevelNode(Node):
         self._measured = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
         self._measured_at = self._handle.time()
 
-    def _on_flight_state(self, message):
-        aborted = self._flight_state == _TAKING_OFF and message.data not in (_TAKING_OFF, _FLYING)
-        self._flight_state = message.data
-        if message.data != _TAKING_OFF:
+    def _on_flight_status(self, message):
+        took_off = self._flight_state == FlightStatus.TAKING_OFF
+        state = self._flight_state = message.state
+        if state != FlightStatus.TAKING_OFF:
             self._hover = None
-        if aborted:
-            # What was told during this takeoff must not be done after the next one.
-            self._next = None
-        if message.data == _FLYING:
+            if took_off and state != FlightStatus.FLYING:
+                # A command during an aborted takeoff must not take effect after the next one.
+                self._next = None
+        if state == FlightStatus.FLYING:
             command, self._next = self._next, None
             if command is not None:
-                self._begin_unasked(*command)
+                self._begin_or_log(*command)
         else:
             self._forget_goal()
-        if message.data in (_DESCENDING, _LANDING):
+        if state in (FlightStatus.DESCENDING, FlightStatus.LANDING):
             landings, self._landings = self._landings, []
             for answer in landings:
                 if not answer.done():
@@ -140,17 +138,17 @@ class HighLevelNode(Node):
 
     def _on_reference(self, message):
         # With its hover point the server leaves the vehicle to the controller, until it flies.
-        if self._flight_state != _TAKING_OFF or self._hover is None:
+        if self._flight_state != FlightStatus.TAKING_OFF or self._hover is None:
             return
         s = message.state
         if (s.x, s.y, s.z) != self._hover.position:
             self._publish(self._hover)
 
-    def _where(self):
+    def _present(self):
         age = self._handle.time() - self._measured_at
-        if self._measured is None or not 0.0 <= age < STATE_LIMIT:
+        if self._measured is None or not 0.0 <= age < MAX_STATE_AGE:
             topic = self._handle.resolve(self._parameters.state_topic)
-            raise ServiceError(f"no state has come on {topic} for {STATE_LIMIT:g} s")
+            raise ServiceError(f"no state has come on {topic} for {MAX_STATE_AGE:g} s")
         return self._measured
 
     # Commands.
@@ -162,7 +160,7 @@ class HighLevelNode(Node):
                 f"height and duration are {request.height:g} m and {duration:g} s; expected "
                 "more than 0"
             )
-        start = self._where()
+        start = self._present()
         x, y, ground = start.position
         if request.height <= ground:
             raise ServiceError(
@@ -171,7 +169,7 @@ class HighLevelNode(Node):
             )
         self._hover = at_rest((x, y, min(request.height, ground + FIRST_CLIMB)), start.yaw)
         self._next = (Follower.go_to, (x, y, request.height), start.yaw, duration)
-        call = self._call(self._parameters.takeoff, srv.TakeoffResponse)
+        call = relay(self._handle, self._parameters.takeoff, srv.TakeoffResponse)
         call.add_done_callback(self._handle.guard(self._forget_refused))
         return call
 
@@ -180,37 +178,20 @@ class HighLevelNode(Node):
             self._hover = self._next = None
 
     def _on_land(self, _):
-        answer = self._call(self._parameters.land, srv.LandResponse)
+        answer = relay(self._handle, self._parameters.land, srv.LandResponse)
         # The server answers after the landing, the driver when it begins.
         self._landings.append(answer)
         return answer
 
     def _on_emergency(self, _):
         self._follower.forget()
-        return self._call(self._parameters.emergency, EmptyResponse)
-
-    def _call(self, service, response_type):
-        answer: Future[Any] = Future()
-
-        def finish(done):
-            error = done.exception()
-            if answer.done():
-                if error is not None:
-                    self._handle.error(str(error))
-            elif error is None:
-                answer.set_result(response_type())
-            else:
-                answer.set_exception(error)
-
-        call = self._handle.call_service(service, Empty, EmptyRequest(), _CALL_LIMIT)
-        call.add_done_callback(finish)
-        return answer
+        return relay(self._handle, self._parameters.emergency, EmptyResponse)
 
     def _on_stop(self, _):
-        if self._flight_state in (_FLYING, _TAKING_OFF):
+        if self._flight_state in (FlightStatus.FLYING, FlightStatus.TAKING_OFF):
             raise ServiceError(
-                f"the vehicle is {self._flight_state.replace('_', ' ')}; expected it to have "
-                "landed: stop would let it fall, which is what emergency is for"
+                f"the vehicle is {WORDS[self._flight_state]}; expected it to have landed: stop "
+                "would let it fall, which is what emergency is for"
             )
         return srv.StopResponse()
 
@@ -221,7 +202,7 @@ class HighLevelNode(Node):
             )
         goal = (request.goal.x, request.goal.y, request.goal.z)
         duration = request.duration.to_sec()
-        self._obey(Follower.go_to, goal, request.yaw, duration, request.relative)
+        self._execute(Follower.go_to, goal, request.yaw, duration, request.relative)
         return srv.GoToResponse()
 
     def _on_upload(self, request):
@@ -232,7 +213,7 @@ class HighLevelNode(Node):
         return srv.UploadTrajectoryResponse()
 
     def _on_start(self, request):
-        self._obey(
+        self._execute(
             Follower.start,
             request.trajectoryId,
             request.timescale,
@@ -244,33 +225,32 @@ class HighLevelNode(Node):
     def _on_start_all(self, message):
         if self._handle.name not in message.data.split():
             return
-        if self._flight_state == _FLYING:
-            self._begin_unasked(Follower.start, 0)
+        if self._flight_state == FlightStatus.FLYING:
+            self._begin_or_log(Follower.start, 0)
         else:
-            self._handle.error(f"not started: the vehicle is {self._flight_state or 'not known'}")
+            self._handle.error(f"not started: the vehicle is {WORDS[self._flight_state]}")
 
     def _on_setpoints_stop(self, _):
         self._end_stream()
         return srv.NotifySetpointsStopResponse()
 
-    def _obey(self, command, *arguments):
-        if self._flight_state == _TAKING_OFF:
+    def _execute(self, command, *arguments):
+        if self._flight_state == FlightStatus.TAKING_OFF:
             self._next = (command, *arguments)
-        elif self._flight_state == _FLYING:
+        elif self._flight_state == FlightStatus.FLYING:
             self._begin(command, *arguments)
         else:
-            state = self._flight_state.replace("_", " ") or "not known to fly"
-            raise ServiceError(f"the vehicle is {state}; expected it to fly")
+            raise ServiceError(f"the vehicle is {WORDS[self._flight_state]}; expected it to fly")
 
     def _begin(self, command, *arguments):
         try:
-            command(self._follower, self._handle.time(), self._where(), *arguments)
+            command(self._follower, self._handle.time(), self._present(), *arguments)
         except RefusalError as reason:
             raise ServiceError(str(reason)) from None
         self._setpoint_time = None
         self._is_moving = True
 
-    def _begin_unasked(self, command, *arguments):
+    def _begin_or_log(self, command, *arguments):
         try:
             self._begin(command, *arguments)
         except ServiceError as reason:
@@ -282,7 +262,7 @@ class HighLevelNode(Node):
         goal = setpoint_goal(message)
         if not all(map(math.isfinite, (*goal.position, *goal.velocity, goal.yaw))):
             self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
-        elif self._flight_state == _FLYING:
+        elif self._flight_state == FlightStatus.FLYING:
             self._is_moving = False
             self._setpoint_time = self._handle.time()
             self._follower.take_setpoint(goal)
@@ -303,7 +283,7 @@ class HighLevelNode(Node):
     def _on_timer(self):
         now = self._handle.time()
         last = self._setpoint_time
-        if last is not None and not 0.0 <= now - last < STATE_LIMIT:
+        if last is not None and not 0.0 <= now - last < MAX_STATE_AGE:
             self._end_stream()
         if not self._is_moving:
             return

@@ -22,6 +22,12 @@ class HighLevelParameters(Parameters):
     flight_state_topic: str = parameter(
         TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
     )
+    own_flight_status_topic: str | None = parameter(
+        TOPIC,
+        "the same, typed; by default the name of flight_state with `_flight_status` for `_state`",
+        None,
+        "topics/flight_status",
+    )
     takeoff: str = parameter(SERVICE, "the takeoff server's", "takeoff", "srv/takeoff")
     land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
     emergency: str = parameter(SERVICE, "stops the motors", "emergency", "srv/emergency")
@@ -29,3 +35,9 @@ class HighLevelParameters(Parameters):
         TOPIC, "names those that begin trajectory 0 at once", START_TOPIC, "topics/start"
     )
     time_step: float = parameter(TIME_STEP, "from one reference to the next", 0.02)
+
+    @property
+    def flight_status_topic(self) -> str:
+        """The takeoff server's flight state, typed."""
+        prefix = self.flight_state_topic.removesuffix("_state")
+        return self.own_flight_status_topic or f"{prefix}_flight_status"

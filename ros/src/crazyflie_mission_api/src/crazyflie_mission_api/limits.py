@@ -1,4 +1,4 @@
-"""What a mission must keep to: the limits of a vehicle, and the space it may fly in."""
+"""Limits of missions: demands on a vehicle, and the box that it may fly in."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ class MissionError(Exception):
 
 @dataclass(frozen=True)
 class Limits:
-    """What a trajectory asks of a vehicle at most.
+    """Largest demands of a trajectory on a vehicle.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ EVERYWHERE = Bounds((-math.inf, -math.inf, 0.0), (math.inf, math.inf, math.inf))
 
 
 def point(value: Sequence[float], what: str) -> Array:
-    """Return a point, shape (3,), m, that somebody has given.
+    """Return a point of a user as an array, shape (3,), m.
 
     Raises
     ------

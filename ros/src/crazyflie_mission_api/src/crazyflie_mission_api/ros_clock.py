@@ -1,17 +1,20 @@
-"""Time as a team needs it, by ROS."""
+"""The time of vehicles, by ROS."""
 
 import threading
 import time
 from collections.abc import Callable
 
+from typing_extensions import override
+
 from crazyflie_mission_api.limits import MissionError
+from crazyflie_mission_api.mission_vehicle import Clock
 from crazyflie_utils import NodeHandle
 
 _FROZEN = 10.0
 """How long simulated time may stand still, s of the machine's clock."""
 
 
-class RosClock:
+class RosClock(Clock):
     """The time of a process, real or simulated.
 
     Parameters
@@ -27,12 +30,12 @@ class RosClock:
         self._tick = threading.Condition()
         handle.timer(0.02, self._wake)
 
+    @override
     def time(self) -> float:
-        """Return the time, s."""
         return self._handle.time()
 
+    @override
     def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
-        """Wait until ``condition()`` or ``deadline`` (s); return the condition."""
         last, moved_at = self.time(), time.monotonic()
         while not (done := condition()) and (now := self.time()) < deadline:
             if self._has_ended():

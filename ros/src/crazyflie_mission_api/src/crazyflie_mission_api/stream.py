@@ -10,10 +10,10 @@ from typing import Any
 from crazyflie_driver.msg import FullState
 from crazyflie_driver.setpoint_gate import OVERLAP
 from crazyflie_mission_api.conversions import full_state_message
-from crazyflie_mission_api.course import Course
 from crazyflie_mission_api.futures import done
-from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_mission_api.timed_trajectory import TimedTrajectory
 from crazyflie_model.polynomials import Goal
+from crazyflie_model.trajectory import Pieces
 from crazyflie_utils import NodeHandle
 
 STEP = 0.02
@@ -31,11 +31,11 @@ Send = Callable[[], "Future[Any]"]
 
 @dataclass
 class _Command:
-    """A command that waits for its turn, or for its answer; times are in s."""
+    """A command in the queue; times are in s."""
 
     send: Send
     retry_end: float
-    course: Course | None = None
+    trajectory: TimedTrajectory | None = None
     sent_time: float = 0.0
     outcome: "Future[Any]" = field(default_factory=Future)
 
@@ -70,7 +70,7 @@ class SetpointStream:
         self._handle = handle
         self._frame = frame
         self._hold = hold
-        self._course: Course | None = None
+        self._trajectory: TimedTrajectory | None = None
         self._commands: deque[_Command] = deque()
         self._next_hold = 0.0
         self._fault = ""
@@ -78,10 +78,10 @@ class SetpointStream:
         handle.timer(STEP, self._on_timer)
 
     def start(self, pieces: Pieces) -> "Future[Any]":
-        """Stream a trajectory from now on, in the place of the present one."""
+        """Stream a trajectory from now on, instead of the present one."""
 
         def begin():
-            self._course = Course(pieces, self._handle.time())
+            self._trajectory = TimedTrajectory(pieces, self._handle.time())
             return done(None)
 
         return self.hand_over(begin)
@@ -107,10 +107,10 @@ class SetpointStream:
 
     def stop(self) -> None:
         """End the setpoints at once, whatever becomes of the vehicle."""
-        self._course = None
+        self._trajectory = None
 
     def fault(self) -> str:
-        """Return why the end of a trajectory has not been handed over; empty if it has."""
+        """Return why ``hold`` has failed at the end of a trajectory; empty if it has not."""
         return self._fault
 
     def _enqueue(self, command):
@@ -120,12 +120,12 @@ class SetpointStream:
 
     def _send(self):
         command = self._commands[0]
-        command.course, command.sent_time = self._course, self._handle.time()
+        command.trajectory, command.sent_time = self._trajectory, self._handle.time()
         command.send().add_done_callback(partial(self._handle.submit, self._on_answer))
 
     def _on_answer(self, answer):
         command, error, now = self._commands[0], answer.exception(), self._handle.time()
-        is_streaming = self._course is not None and self._course is command.course
+        is_streaming = self._trajectory is not None and self._trajectory is command.trajectory
         if is_streaming and error is not None and now < command.retry_end:
             self._send_later()
             return
@@ -133,7 +133,7 @@ class SetpointStream:
             if now - command.sent_time > MAX_ANSWER_TIME:
                 self._send()
                 return
-            self._course = None
+            self._trajectory = None
         self._commands.popleft()
         if self._commands:
             self._send()
@@ -151,19 +151,19 @@ class SetpointStream:
         timer = self._handle.timer(RETRY_PERIOD, send)
 
     def _on_timer(self):
-        course, now = self._course, self._handle.time()
-        if course is None:
+        trajectory, now = self._trajectory, self._handle.time()
+        if trajectory is None:
             return
-        message = full_state_message(course.goal(now), self._frame)
+        message = full_state_message(trajectory.goal(now), self._frame)
         message.header.stamp = self._handle.stamp()
         self._publisher.publish(message)
-        if now >= max(course.end, self._next_hold) and not self._commands:
+        if now >= max(trajectory.end, self._next_hold) and not self._commands:
             self._next_hold = now + RETRY_PERIOD
-            held = self.hand_over(partial(self._hold, course.destination))
+            held = self.hand_over(partial(self._hold, trajectory.destination))
             held.add_done_callback(self._note_hold)
 
     def _note_hold(self, held):
-        if held.exception() is not None and self._course is not None:
+        if held.exception() is not None and self._trajectory is not None:
             self._fault = (
                 f"the trajectory has ended, and go_to has failed: {held.exception()}; setpoints "
                 "go on at its end"

@@ -1,74 +1,61 @@
-"""Trajectories of polynomials: what they ask of a vehicle, and how they are changed."""
+"""Trajectories of polynomials: their demands on a vehicle, and checks of them."""
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from crazyflie_mission_api.limits import Array, Bounds, Limits, MissionError
 from crazyflie_model.angles import Triple
-from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_model.planner import smooth_piece
+from crazyflie_model.polynomials import PolynomialPiece, at_rest, evaluate
+from crazyflie_model.trajectory import Pieces, duration, moved, stretched
 from crazyflie_model.units import GRAVITY
 
-Pieces = Sequence[PolynomialPiece]
-"""A trajectory: as in the CSV files of crazyflie_demo and in a vehicle's memory."""
+__all__ = ["Pieces", "check", "moved", "straight", "stretched", "within_limits"]
 
 SAMPLES = 30
-"""Points of a piece at which it is looked at."""
+"""Points of a piece that are evaluated."""
 
 
-@dataclass(frozen=True)
-class Samples:
-    """A trajectory at n moments.
+def sampled(pieces: Pieces) -> tuple[Array, Array]:
+    """Return n times (s), shape (n,), and the trajectory at them, shape (3, 4, n).
 
-    Attributes
-    ----------
-    time : ndarray, shape (n,)
-        Since the beginning, s.
-    position, velocity, acceleration : ndarray, shape (n, 3)
-        m, m/s, m/s^2.
-    yaw, yaw_rate : ndarray, shape (n,)
-        rad, rad/s.
+    The axes are the derivative (value, first, second) and x, y, z (m), yaw (rad). There are
+    `SAMPLES` points of each piece, both its ends included.
     """
+    begins = np.cumsum([0.0, *(piece.duration for piece in pieces)])
+    times: list[Array] = [
+        np.linspace(0.0, piece.duration, SAMPLES, dtype=np.float64) for piece in pieces
+    ]
+    values = [
+        np.stack([np.stack(evaluate(axis, time)) for axis in piece.axes], axis=1)
+        for piece, time in zip(pieces, times, strict=True)
+    ]
+    times = [begin + time for begin, time in zip(begins, times, strict=False)]
+    return np.concatenate(times), np.concatenate(values, axis=-1)
 
-    time: Array
-    position: Array
-    velocity: Array
-    acceleration: Array
-    yaw: Array
-    yaw_rate: Array
 
-    @classmethod
-    def of(cls, pieces: Pieces) -> "Samples":
-        """Return `SAMPLES` points of each piece, both its ends included."""
-        columns: list[list[Array]] = [[], [], [], [], [], []]
-        begin = 0.0
-        for piece in pieces:
-            time = np.linspace(0.0, piece.duration, SAMPLES, dtype=np.float64)
-            goal = piece.evaluate(time)
-            vectors = (goal.position, goal.velocity, goal.acceleration)
-            values = [begin + time, *(np.stack(v, axis=-1) for v in vectors)]
-            for column, value in zip(columns, [*values, goal.yaw, goal.yaw_rate], strict=True):
-                column.append(np.asarray(value, dtype=np.float64))
-            begin += piece.duration
-        return cls(*map(np.concatenate, columns))
+def demands(values: Array) -> dict[str, Array]:
+    """Return the demands on the vehicle, shape (n,), by the name of the limit.
 
-    def demands(self) -> dict[str, Array]:
-        """Return what is asked of the vehicle at each moment, by the name of the limit.
+    Thrust points along acceleration minus gravity (Mellinger and Kumar, Minimum Snap
+    Trajectory Generation and Control for Quadrotors, ICRA 2011).
 
-        Thrust points along acceleration minus gravity (Mellinger and Kumar, Minimum Snap
-        Trajectory Generation and Control for Quadrotors, ICRA 2011).
-        """
-        thrust = self.acceleration + [0.0, 0.0, GRAVITY]
-        return {
-            "speed": np.linalg.norm(self.velocity, axis=1),
-            "acceleration": np.linalg.norm(self.acceleration, axis=1),
-            "yaw_rate": np.abs(self.yaw_rate),
-            "tilt": np.arctan2(np.hypot(thrust[:, 0], thrust[:, 1]), thrust[:, 2]),
-            "max_thrust": np.linalg.norm(thrust, axis=1),
-            "min_thrust": -np.linalg.norm(thrust, axis=1),
-        }
+    Parameters
+    ----------
+    values : ndarray, shape (3, 4, n)
+        As of `sampled`.
+    """
+    _, velocity, acceleration = values
+    thrust = acceleration[:3] + [[0.0], [0.0], [GRAVITY]]
+    return {
+        "speed": np.linalg.norm(velocity[:3], axis=0),
+        "acceleration": np.linalg.norm(acceleration[:3], axis=0),
+        "yaw_rate": np.abs(velocity[3]),
+        "tilt": np.arctan2(np.hypot(thrust[0], thrust[1]), thrust[2]),
+        "max_thrust": np.linalg.norm(thrust, axis=0),
+        "min_thrust": -np.linalg.norm(thrust, axis=0),
+    }
 
 
 _UNITS = {
@@ -84,13 +71,13 @@ _TOLERANCE = 1e-6
 
 def excess(pieces: Pieces, limits: Limits) -> dict[str, tuple[float, float]]:
     """Return which limits a trajectory exceeds: name to the worst value and its moment (s)."""
-    samples = Samples.of(pieces)
+    times, values = sampled(pieces)
     found = {}
-    for name, values in samples.demands().items():
-        worst = int(values.argmax())
+    for name, demand in demands(values).items():
+        worst = int(demand.argmax())
         limit = getattr(limits, name) * (-1.0 if name == "min_thrust" else 1.0)
-        if values[worst] > limit + _TOLERANCE:
-            found[name] = (abs(float(values[worst])), float(samples.time[worst]))
+        if demand[worst] > limit + _TOLERANCE:
+            found[name] = (abs(float(demand[worst])), float(times[worst]))
     return found
 
 
@@ -133,7 +120,7 @@ def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str, slower: str
     ------
     MissionError
     """
-    bounds.check(Samples.of(pieces).position, what)
+    bounds.check(sampled(pieces)[1][0, :3].T, what)
     for name, (value, time) in excess(pieces, limits).items():
         words = name.replace("max_", "").replace("min_", "").replace("_", " ")
         side = "least" if name == "min_thrust" else "most"
@@ -143,52 +130,15 @@ def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str, slower: str
         )
 
 
-_REST_TO_REST = (0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0)
-"""From 0 to 1 in 1 s, with three derivatives that are 0 at both ends: as the firmware goes."""
-
-
 def straight(
     start: Triple, goal: Triple, start_yaw: float = 0.0, yaw: float = 0.0, seconds: float = 1.0
 ) -> list[PolynomialPiece]:
-    """Return the way from rest to rest, m; the turn, rad, is the shorter one."""
-    turn = math.remainder(yaw - start_yaw, 2.0 * math.pi)
-    ways = [b - a for a, b in zip(start, goal, strict=True)]
-    axes = (
-        [begin, *(way * c for c in _REST_TO_REST[1:])]
-        for begin, way in zip((*start, start_yaw), (*ways, turn), strict=True)
-    )
-    return stretched([PolynomialPiece(1.0, *axes)], seconds)
-
-
-def stretched(pieces: Pieces, factor: float) -> list[PolynomialPiece]:
-    """Return the same path in ``factor`` times the time."""
-    return [
-        PolynomialPiece(
-            piece.duration * factor,
-            *([c / factor**k for k, c in enumerate(axis)] for axis in piece.axes),
-        )
-        for piece in pieces
-    ]
-
-
-def moved(pieces: Pieces, offset: Sequence[float]) -> list[PolynomialPiece]:
-    """Return the trajectory with an offset (x, y, z), m, added to all positions."""
-    by_axis = (*offset, 0.0)
-
-    def move(piece):
-        axes = ([axis[0] + d, *axis[1:]] for axis, d in zip(piece.axes, by_axis, strict=True))
-        return PolynomialPiece(piece.duration, *axes)
-
-    return [move(piece) for piece in pieces]
-
-
-def duration(pieces: Pieces) -> float:
-    """Return how long a trajectory takes, s."""
-    return sum(piece.duration for piece in pieces)
+    """Return the straight move from rest to rest, m; the turn, rad, is the shorter one."""
+    return [smooth_piece(at_rest(start, start_yaw), goal, yaw, seconds)]
 
 
 _SHORTEST = 1e-3
-"""No trajectory is made shorter than this, s: one that goes nowhere asks for nothing."""
+"""Of a trajectory, s: one that does not move has no demands."""
 
 
 def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:
@@ -198,7 +148,7 @@ def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:
     Tilt and thrust follow from acceleration, in which gravity is not; for these the
     time is stretched in steps until they are kept, too.
     """
-    peaks = {name: float(values.max()) for name, values in Samples.of(pieces).demands().items()}
+    peaks = {name: float(values.max()) for name, values in demands(sampled(pieces)[1]).items()}
     factor = max(
         peaks["speed"] / limits.speed,
         peaks["yaw_rate"] / limits.yaw_rate,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from crazyflie_demo.figure8 import figure8
-from crazyflie_mission_api import Bounds, Limits, MissionError, Rehearsal, plan
-from crazyflie_mission_api.rehearsal import rehearse
-from crazyflie_mission_api.roster import Rules
+from crazyflie_mission_api import Bounds, DryRun, Limits, MissionError, plan
+from crazyflie_mission_api.dry_run import dry_run
+from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.trajectories import duration, moved, stretched
 
 ROOM = Bounds((-2.0, -2.0, 0.0), (2.0, 2.0, 2.0))
@@ -16,33 +16,33 @@ STARTS = {"cf1": (0.0, 0.0, 0.0), "cf2": (1.0, 0.0, 0.0)}
 
 
 @pytest.fixture
-def team():
+def group():
     """Return two vehicles on the ground of a room."""
-    return Rehearsal(STARTS, Rules(bounds=ROOM))
+    return DryRun(STARTS, Rules(bounds=ROOM))
 
 
 @pytest.fixture
-def flying(team):
+def flying(group):
     """Return two vehicles that hover at 1 m."""
-    team.takeoff(1.0)
-    return team
+    group.takeoff(1.0)
+    return group
 
 
-def test_a_mission_from_takeoff_to_landing(team):
-    with team:
-        team.takeoff(1.0)
-        assert team.flying == ["cf1", "cf2"]
-        assert team.position("cf2") == pytest.approx((1.0, 0.0, 1.0))
-        team.go_to({"cf1": (-1.0, 0.0, 1.0), "cf2": (1.0, 1.0, 1.5)})
-        assert team.position("cf1") == pytest.approx((-1.0, 0.0, 1.0))
-        team["cf2"].go_to((0.0, 0.5, 0.0), relative=True)
-        assert team.position("cf2") == pytest.approx((1.0, 1.5, 1.5))
-        team["cf1"].follow(plan([(-1, 0, 1), (-1, 1, 1), (-1.5, 0, 1)]))
-        assert team.position("cf1") == pytest.approx((-1.5, 0.0, 1.0))
-        team.go_to((0.0, 0.0, -0.2), relative=True)
-        assert team.position("cf1") == pytest.approx((-1.5, 0.0, 0.8))
-    assert team.flying == []
-    assert team.position("cf1") == pytest.approx((-1.5, 0.0, 0.0))
+def test_a_mission_from_takeoff_to_landing(group):
+    with group:
+        group.takeoff(1.0)
+        assert group.flying == ["cf1", "cf2"]
+        assert group.position("cf2") == pytest.approx((1.0, 0.0, 1.0))
+        group.go_to({"cf1": (-1.0, 0.0, 1.0), "cf2": (1.0, 1.0, 1.5)})
+        assert group.position("cf1") == pytest.approx((-1.0, 0.0, 1.0))
+        group["cf2"].go_to((0.0, 0.5, 0.0), relative=True)
+        assert group.position("cf2") == pytest.approx((1.0, 1.5, 1.5))
+        group["cf1"].follow(plan([(-1, 0, 1), (-1, 1, 1), (-1.5, 0, 1)]))
+        assert group.position("cf1") == pytest.approx((-1.5, 0.0, 1.0))
+        group.go_to((0.0, 0.0, -0.2), relative=True)
+        assert group.position("cf1") == pytest.approx((-1.5, 0.0, 0.8))
+    assert group.flying == []
+    assert group.position("cf1") == pytest.approx((-1.5, 0.0, 0.0))
 
 
 def test_going_nowhere_is_no_error(flying):
@@ -53,37 +53,37 @@ def test_going_nowhere_is_no_error(flying):
 
 
 def test_a_takeoff_to_where_the_vehicle_is_is_refused():
-    table = Rehearsal({"cf1": (0.0, 0.0, 1.0)})
+    table = DryRun({"cf1": (0.0, 0.0, 1.0)})
     with pytest.raises(MissionError, match="the height is 1 m, and it is at 1.00 m; expected at"):
         table.takeoff(1.0)
     assert table.flying == []
 
 
-def yaws(team):
+def yaws(group):
     """Return where the vehicles are told to head, rad."""
-    return [team._courses[name].destination.yaw for name in team.names]
+    return [group._commanded[name].destination.yaw for name in group.names]
 
 
 def test_a_heading_is_kept_unless_another_is_told():
-    team = Rehearsal(STARTS, headings={"cf1": 1.0, "cf2": -0.5})
-    team.takeoff(1.0)
-    assert yaws(team) == [1.0, -0.5]
-    team.go_to({"cf1": (0.0, 1.0, 1.0)})
-    team.formation([(1.0, 1.0, 1.0), (0.0, 1.0, 1.0)])
-    assert yaws(team) == [1.0, -0.5]
-    team["cf1"].go_to((0.0, 1.0, 1.2), yaw=0.0)
-    assert yaws(team) == pytest.approx([0.0, -0.5])
+    group = DryRun(STARTS, headings={"cf1": 1.0, "cf2": -0.5})
+    group.takeoff(1.0)
+    assert yaws(group) == [1.0, -0.5]
+    group.go_to({"cf1": (0.0, 1.0, 1.0)})
+    group.formation([(1.0, 1.0, 1.0), (0.0, 1.0, 1.0)])
+    assert yaws(group) == [1.0, -0.5]
+    group["cf1"].go_to((0.0, 1.0, 1.2), yaw=0.0)
+    assert yaws(group) == pytest.approx([0.0, -0.5])
 
 
 def test_a_relative_heading_is_relative():
-    team = Rehearsal(STARTS, headings={"cf1": 1.0, "cf2": -0.5})
-    team.takeoff(1.0)
-    team.go_to((0.0, 0.0, 0.2), yaw=0.25, relative=True)
-    assert yaws(team) == pytest.approx([1.25, -0.25])
+    group = DryRun(STARTS, headings={"cf1": 1.0, "cf2": -0.5})
+    group.takeoff(1.0)
+    group.go_to((0.0, 0.0, 0.2), yaw=0.25, relative=True)
+    assert yaws(group) == pytest.approx([1.25, -0.25])
     # Its yaw rate counts, of the vehicle as it heads.
-    begin = team.time()
-    team["cf1"].go_to((0.0, 0.0, 1.2), yaw=1.25 - math.pi)
-    assert team.time() - begin == pytest.approx(math.pi * 35.0 / 16.0 / 1.5, abs=0.06)
+    begin = group.time()
+    group["cf1"].go_to((0.0, 0.0, 1.2), yaw=1.25 - math.pi)
+    assert group.time() - begin == pytest.approx(math.pi * 35.0 / 16.0 / 1.5, abs=0.06)
 
 
 def test_the_way_takes_as_long_as_the_limits_demand(flying):
@@ -119,8 +119,8 @@ def one_behind_the_other(fleet):
 
 def test_vehicles_that_do_not_begin_together_are_checked_as_if_each_were_late():
     rules = Rules(separation=0.95)
-    one_behind_the_other(Rehearsal(STARTS, rules))
-    late = Rehearsal(STARTS, rules, start_skews={"cf1": 0.15, "cf2": 0.15})
+    one_behind_the_other(DryRun(STARTS, rules))
+    late = DryRun(STARTS, rules, start_skews={"cf1": 0.15, "cf2": 0.15})
     text = (
         r"cf1 and cf2 would be 0.949 m apart, \d.\d s from now; expected at least 0.95 m; "
         r"that is if cf2 begins 0.15 s after the others"
@@ -128,11 +128,11 @@ def test_vehicles_that_do_not_begin_together_are_checked_as_if_each_were_late():
     with pytest.raises(MissionError, match=text):
         one_behind_the_other(late)
     # The other one is earlier then.
-    mixed = Rehearsal(STARTS, rules, start_skews={"cf1": 0.15})
+    mixed = DryRun(STARTS, rules, start_skews={"cf1": 0.15})
     with pytest.raises(MissionError, match="if cf2 begins 0.15 s after the others"):
         one_behind_the_other(mixed)
     # What is on its way already may have begun late, too.
-    late = Rehearsal(STARTS, Rules(separation=0.96), start_skews={"cf1": 0.15, "cf2": 0.15})
+    late = DryRun(STARTS, Rules(separation=0.96), start_skews={"cf1": 0.15, "cf2": 0.15})
     late.takeoff(1.0)
     late["cf2"].go_to((2.0, 0.0, 1.0), wait=False)
     late.wait(0.05)
@@ -145,12 +145,12 @@ def test_a_formation_sends_everybody_to_the_place_that_suits(flying):
     assert gone == {"cf1": (0.0, 1.0, 1.0), "cf2": (1.0, 1.0, 1.0)}
 
 
-def test_an_error_in_flight_ends_with_a_landing(team):
-    with pytest.raises(ZeroDivisionError), team:
-        team.takeoff(1.0)
-        team.wait(1 / 0)
-    assert team.flying == []
-    assert team.position("cf1")[2] == pytest.approx(0.0)
+def test_an_error_in_flight_ends_with_a_landing(group):
+    with pytest.raises(ZeroDivisionError), group:
+        group.takeoff(1.0)
+        group.wait(1 / 0)
+    assert group.flying == []
+    assert group.position("cf1")[2] == pytest.approx(0.0)
 
 
 def test_an_emergency_is_no_landing(flying):
@@ -159,25 +159,25 @@ def test_an_emergency_is_no_landing(flying):
     assert flying.position("cf1")[2] == 0.0
 
 
-def test_a_mission_is_rehearsed_where_the_vehicles_are(team):
+def test_a_dry_run_has_the_positions_of_the_vehicles(group):
     def mission(fleet):
         fleet.takeoff(1.0)
         fleet.go_to({"cf1": (0.0, 3.0, 1.0)})
 
     with pytest.raises(MissionError, match=r"cf1: go_to is out of bounds: y is 3 m; expected -2"):
-        rehearse(team, mission)
-    assert team.flying == []
-    assert rehearse(team, lambda fleet: fleet.takeoff(1.0)) > 4.0
+        dry_run(group, mission)
+    assert group.flying == []
+    assert dry_run(group, lambda fleet: fleet.takeoff(1.0)) > 4.0
 
 
-def test_a_mission_is_rehearsed_as_the_vehicles_head():
-    team = Rehearsal(STARTS, headings={"cf1": math.pi / 2})
+def test_a_dry_run_has_the_headings_of_the_vehicles():
+    group = DryRun(STARTS, headings={"cf1": math.pi / 2})
 
     def mission(fleet):
         fleet.takeoff(1.0)
-        assert yaws(fleet) == [math.pi / 2, 0.0]
+        assert yaws(fleet) == pytest.approx([math.pi / 2, 0.0], abs=1e-12)
 
-    rehearse(team, mission)
+    dry_run(group, mission)
 
 
 BAD = {
@@ -218,34 +218,34 @@ def test_bad_commands_are_named_and_move_nobody(flying, text):
     assert [flying.position(name) for name in flying.names] == before
 
 
-def test_a_takeoff_needs_all_of_its_way(team):
-    team["cf2"].takeoff(1.0)
-    team["cf2"].go_to((0.0, 0.0, 1.0))
+def test_a_takeoff_needs_all_of_its_way(group):
+    group["cf2"].takeoff(1.0)
+    group["cf2"].go_to((0.0, 0.0, 1.0))
     # Right below the other vehicle, and far enough from it at its end only.
     with pytest.raises(MissionError, match=r"cf1 and cf2 would be 0.25 m apart, 0.0 s from now"):
-        team["cf1"].takeoff(1.8)
+        group["cf1"].takeoff(1.8)
     with pytest.raises(MissionError, match=r"cf1 and cf2 would be"):
-        team["cf1"].takeoff(0.5)
-    team["cf1"].takeoff(0.4)
-    assert team.flying == ["cf1", "cf2"]
+        group["cf1"].takeoff(0.5)
+    group["cf1"].takeoff(0.4)
+    assert group.flying == ["cf1", "cf2"]
 
 
 def test_a_takeoff_goes_up():
-    team = Rehearsal({"cf1": (0.0, 0.0, 0.7)})
+    group = DryRun({"cf1": (0.0, 0.0, 0.7)})
     with pytest.raises(
         MissionError, match="the height is 0.75 m, and it is at 0.70 m; expected at"
     ):
-        team.takeoff(0.75)
-    team.takeoff(0.8)
+        group.takeoff(0.75)
+    group.takeoff(0.8)
 
 
-def test_commands_on_the_ground_are_refused(team):
+def test_commands_on_the_ground_are_refused(group):
     with pytest.raises(MissionError, match="cf1: go_to: it is on the ground; expected takeoff"):
-        team["cf1"].go_to((0, 0, 1))
+        group["cf1"].go_to((0, 0, 1))
     with pytest.raises(MissionError, match="cf1: takeoff .* z is 3 m; expected 0 to 2 m"):
-        team.takeoff(3.0)
+        group.takeoff(3.0)
     with pytest.raises(MissionError, match="height is nan"):
-        team.takeoff(math.nan)
+        group.takeoff(math.nan)
 
 
 @pytest.mark.parametrize(
@@ -261,7 +261,10 @@ def test_commands_on_the_ground_are_refused(team):
         (lambda: Bounds("room", (0, 0, 0)), "bounds are 'room' to"),
         (lambda: Rules(separation=-1), "separation is -1; expected a finite number >= 0"),
         (lambda: Rules(tolerance=0), "tolerance is 0; expected a finite number > 0"),
-        (lambda: Rules(patience=math.nan), "patience is nan; expected a finite number >= 0"),
+        (
+            lambda: Rules(arrival_timeout=math.nan),
+            "arrival_timeout is nan; expected a finite number >= 0",
+        ),
         (lambda: Limits(tilt=math.nan), "limits: tilt is nan"),
     ],
 )

@@ -12,7 +12,7 @@ _FRACTION = Number(minimum=-0.5, maximum=0.5)
 
 
 class VirtualFleetParameters(FleetParameters):
-    """What the process is told."""
+    """Parameters of the process."""
 
     observer_port: int = parameter(_UDP_PORT, "UDP port of the vehicles' true poses", 19800)
     command_port: int = parameter(_UDP_PORT, "UDP port of motion capture", 1510)
@@ -31,26 +31,26 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     ParameterError
         A parameter, or the fleet file, is wrong.
     """
-    told = handle.load(VirtualFleetParameters)
-    if not told.virtual_port:
+    config = handle.load(VirtualFleetParameters)
+    if not config.virtual_port:
         raise ParameterError(f"parameter {handle.name}/fleet/virtual_port is 0; expected a port")
     nodes: dict[str, Node] = {}
     bodies = {}
-    for number, vehicle in enumerate(told.fleet().vehicles):
+    for number, vehicle in enumerate(config.fleet().vehicles):
         x, y, z = vehicle.position
         if z != 0.0:
-            handle.warn(f"{vehicle.name} stands on the ground, and not at a height of {z:g} m")
+            handle.warn(f"{vehicle.name} starts on the ground, and not at a height of {z:g} m")
         name = f"{handle.name}/{vehicle.name}"
         handle.set_param(
             name,
             {
-                "port": told.virtual_port + number,
+                "port": config.virtual_port + number,
                 "init": {"x": x, "y": y},
-                "mass_error": told.mass_error,
-                "thrust_error": told.thrust_error,
+                "mass_error": config.mass_error,
+                "thrust_error": config.thrust_error,
                 "seed": number,
                 "observer": {
-                    "port": told.observer_port,
+                    "port": config.observer_port,
                     "name": vehicle.name,
                     "id": number + 1,
                 },
@@ -58,12 +58,12 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         )
         nodes[name] = VirtualCrazyflieNode()
         bodies[vehicle.name] = {
-            "parent_frame_id": told.fixed_frame,
+            "parent_frame_id": config.fixed_frame,
             "child_frame_id": vehicle.mocap_frame,
         }
-    ports = {"command_port": told.command_port, "data_port": told.data_port}
-    noise = {"position": told.position_noise, "attitude": told.attitude_noise}
-    own = {**ports, "observer": {"port": told.observer_port}, "noise": noise}
+    ports = {"command_port": config.command_port, "data_port": config.data_port}
+    noise = {"position": config.position_noise, "attitude": config.attitude_noise}
+    own = {**ports, "observer": {"port": config.observer_port}, "noise": noise}
     handle.set_param(f"{handle.name}/mocap", own)
     nodes[f"{handle.name}/mocap"] = VirtualMocapNode()
     local = {"server_address": "127.0.0.1", "local_address": "127.0.0.1"}

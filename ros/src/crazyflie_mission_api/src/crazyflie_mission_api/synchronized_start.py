@@ -1,4 +1,4 @@
-"""Several vehicles that begin at the same moment."""
+"""Start of several vehicles by one message."""
 
 from std_msgs.msg import String
 
@@ -6,16 +6,11 @@ from crazyflie_mission_api.high_level_parameters import START_TOPIC
 from crazyflie_utils import NodeHandle
 
 _STEP = 0.02
-"""Who is to start within such a time, s, is named in one message."""
+"""Vehicles that are to start within this time, s, are named in one message."""
 
 
-class Starter:
-    """Names nodes that are to start, all those of a moment in one message.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    """
+class SynchronizedStart:
+    """Publishes the names of the nodes that are to start."""
 
     def __init__(self, handle: NodeHandle):
         self._handle = handle
@@ -24,7 +19,7 @@ class Starter:
         handle.timer(_STEP, self._on_timer)
 
     def start(self, node: str) -> None:
-        """Have a `HighLevelNode` start what was uploaded to it."""
+        """Have a `HighLevelNode` start its uploaded trajectory 0."""
         self._handle.submit(lambda: self._names.append(node))
 
     def _on_timer(self):

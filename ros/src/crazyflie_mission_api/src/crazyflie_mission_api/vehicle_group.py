@@ -1,4 +1,4 @@
-"""Missions: what a script says to vehicles, checked before they move."""
+"""Commands of missions to groups of vehicles, checked before vehicles move."""
 
 from __future__ import annotations
 
@@ -8,67 +8,65 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from crazyflie_mission_api import formations, trajectories
-from crazyflie_mission_api.course import Course, check_starts
-from crazyflie_mission_api.landing import LandingTeam
+from crazyflie_mission_api.group_state import raise_failures, text
+from crazyflie_mission_api.landing import LandingGroup
 from crazyflie_mission_api.limits import Array, MissionError, number, point
-from crazyflie_mission_api.roster import refuse, text
-from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_with_skew
+from crazyflie_mission_api.trajectories import moved, straight, stretched
+from crazyflie_model.trajectory import Pieces, duration
 
 Point = Sequence[float]
 
 _SHORTEST_CLIMB = 2.0
 """s."""
 
-_LEAST_CLIMB = 0.1
-"""How high a takeoff goes at least, m."""
+_MIN_CLIMB = 0.1
+"""Lowest takeoff, above the start, m."""
 
 _CLIMB_STEP = 0.1
-"""From one height of a climb at which distances are looked at to the next, m."""
+"""Between two heights of a climb at which distances are checked, m."""
 
 
-class Team(LandingTeam):
+class VehicleGroup(LandingGroup):
     """Vehicles that fly a mission; each command is for all of them.
 
-    ``team["cf1"]`` and ``team["cf1", "cf2"]`` are teams of some, with the same commands. A
-    command is checked as a whole before anything moves. It returns when it has been carried out;
-    with ``wait=False`` when it has begun, and `arrive` waits.
+    ``group["cf1"]`` and ``group["cf1", "cf2"]`` are subgroups, with the same commands. A command
+    is checked as a whole before anything moves. It returns when it has been carried out; with
+    ``wait=False`` when it has begun, and `arrive` waits.
     """
-
-    # Commands.
 
     def takeoff(self, height: float = 1.0, wait: bool = True) -> None:
         """Climb straight up to a height, m."""
-        height = number(height, "takeoff: height", _LEAST_CLIMB)
-        ways = {}
+        height = number(height, "takeoff: height", _MIN_CLIMB)
+        climbs = {}
         for name in self._vehicles:
-            if name in self._courses:
+            if name in self._commanded:
                 raise MissionError(f"{name}: takeoff: it flies already; expected it on the ground")
             x, y, z = self.position(name)
-            if height < z + _LEAST_CLIMB:
+            if height < z + _MIN_CLIMB:
                 raise MissionError(
                     f"{name}: takeoff: the height is {height:g} m, and it is at {z:.2f} m; "
-                    f"expected at least {_LEAST_CLIMB:g} m more"
+                    f"expected at least {_MIN_CLIMB:g} m more"
                 )
             goal = (x, y, height)
             self.fence(name).check(np.array(goal), f"{name}: takeoff to {text(goal)}")
             heading = self._vehicles[name].heading()
-            way = trajectories.straight((x, y, z), goal, heading, heading)
-            climb = max(_SHORTEST_CLIMB, self._quickest(way))
-            ways[name] = trajectories.stretched(way, climb)
+            climb = straight((x, y, z), goal, heading, heading)
+            climbs[name] = stretched(climb, max(_SHORTEST_CLIMB, self._shortest_duration(climb)))
         self._check_climbs(height)
-        # Noted first: what has begun to take off must be landed whatever happens.
-        self._courses.update({name: Course(way, self.time()) for name, way in ways.items()})
+        # Noted first: vehicles that have begun to take off must be landed after any error.
+        self._commanded.update({n: TimedTrajectory(c, self.time()) for n, c in climbs.items()})
 
         def take_off(name):
-            return self._vehicles[name].take_off(height, trajectories.duration(ways[name]))
+            return self._vehicles[name].take_off(height, duration(climbs[name]))
 
         failures = self._answers(take_off)
-        for name, way in ways.items():
-            # A takeoff server answers after some time, with the height still to be reached.
-            self._courses[name] = Course(way, self.time())
+        for name, climb in climbs.items():
+            # A takeoff server answers after some time, before the height is reached.
+            self._commanded[name] = TimedTrajectory(climb, self.time())
             if name in failures and self._vehicles[name].has_landed():
-                del self._courses[name]
-        refuse("takeoff", failures)
+                del self._commanded[name]
+        raise_failures("takeoff", failures)
         if wait:
             self.arrive()
 
@@ -91,38 +89,36 @@ class Team(LandingTeam):
         duration : float, optional
             s; by default as short as the limits allow.
         relative : bool
-            Goals and ``yaw`` count from where each vehicle was told to be.
+            Goals and ``yaw`` count from the commanded pose of each vehicle.
         wait : bool
         """
         places = self._goals(goals, relative)
-        starts = {name: self._rest_of(name, "go_to") for name in places}
+        starts = {name: self._destination(name, "go_to") for name in places}
         yaws = {name: start.yaw for name, start in starts.items()}
         if yaw is not None:
-            told = number(yaw, "go_to: yaw")
-            yaws = {name: told + relative * kept for name, kept in yaws.items()}
-        ways = {
-            name: trajectories.straight(starts[name].position, goal, starts[name].yaw, yaws[name])
+            added = number(yaw, "go_to: yaw")
+            yaws = {name: added + relative * kept for name, kept in yaws.items()}
+        moves = {
+            name: straight(starts[name].position, goal, starts[name].yaw, yaws[name])
             for name, goal in places.items()
         }
         if duration is None:
-            shortest = (self._quickest(way) for way in ways.values())
-            duration = max(1.0, *shortest)
+            duration = max(1.0, *map(self._shortest_duration, moves.values()))
         seconds = number(duration, "go_to: duration", 1e-3)
-        ways = {name: trajectories.stretched(way, seconds) for name, way in ways.items()}
-        self._check(ways, "go_to", "a longer duration")
+        moves = {name: stretched(move, seconds) for name, move in moves.items()}
+        self._check(moves, "go_to", "a longer duration")
 
-        # Calls take their time, and who begins later meets others.
-        prompt = [name for name in ways if self._vehicles[name].start_skew == 0.0]
-        together = prompt if len(ways) > 1 else []
-        chosen = self._some(together)
-        chosen._tell("go_to", lambda name: self._vehicles[name].prepare(ways[name], False))
+        # Service calls take time: where it is possible, vehicles start by one message.
+        prompt = [name for name in moves if self._vehicles[name].start_skew == 0.0]
+        together = prompt if len(moves) > 1 else []
+        self._prepare({name: moves[name] for name in together}, "go_to", stream=False)
 
         def command(name):
             if name in together:
                 return self._vehicles[name].start()
             return self._vehicles[name].go_to(places[name], yaws[name], seconds)
 
-        self._fly(ways, "go_to", command, wait)
+        self._fly(moves, "go_to", command, wait)
 
     def follow(
         self,
@@ -137,11 +133,11 @@ class Team(LandingTeam):
         Parameters
         ----------
         paths : sequence of PolynomialPiece, or mapping of str to such
-            As `minimum_snap.plan` and files of trajectories have them.
+            From `minimum_snap.plan`, or from a file of trajectories.
         timescale : float
             2 takes twice as long.
         relative : bool
-            As if it began where the vehicle was told to be; otherwise it has to begin there.
+            Move each to the commanded position of its vehicle; otherwise it has to begin there.
         stream : bool
             Send a real vehicle setpoint by setpoint; otherwise pieces are uploaded.
         wait : bool
@@ -151,31 +147,29 @@ class Team(LandingTeam):
         if not given:
             raise MissionError("follow: there are no trajectories; expected one at least")
         self._check_names(given)
-        ways = {}
+        flown = {}
         for name, pieces in given.items():
             what = f"{name}: trajectory"
             trajectories.check_numbers(pieces, what)
-            start = self._rest_of(name, "follow").position
-            way = trajectories.stretched(pieces, factor)
-            first = way[0].evaluate(0.0).position
+            start = self._destination(name, "follow").position
+            flown[name] = stretched(pieces, factor)
+            first = flown[name][0].evaluate(0.0).position
             if relative:
-                offset = [a - b for a, b in zip(start, first, strict=True)]
-                way = trajectories.moved(way, offset)
+                x, y, z = (a - b for a, b in zip(start, first, strict=True))
+                flown[name] = moved(flown[name], (x, y, z))
             elif math.dist(first, start) > self.rules.tolerance:
                 raise MissionError(
                     f"{what} begins at {text(first)}, {math.dist(first, start):.2f} m from where "
                     f"the vehicle is, {text(start)}; expected at most {self.rules.tolerance:g} m"
                 )
-            ways[name] = way
-        self._check(ways, "trajectory", "a timescale > 1")
-        chosen = self._some(ways)
-        chosen._tell("upload", lambda name: self._vehicles[name].prepare(ways[name], stream))
-        self._fly(ways, "follow", lambda name: self._vehicles[name].start(), wait)
+        self._check(flown, "trajectory", "a timescale > 1")
+        self._prepare(flown, "upload", stream)
+        self._fly(flown, "follow", lambda name: self._vehicles[name].start(), wait)
 
     def formation(
         self, places: Array | Sequence[Point], duration: float | None = None, wait: bool = True
     ) -> dict[str, tuple[float, float, float]]:
-        """Fly to places in a way that nobody meets; return who has gone where.
+        """Fly to places without meeting; return the place of each vehicle, m.
 
         Parameters
         ----------
@@ -190,7 +184,7 @@ class Team(LandingTeam):
                 f"formation: the number of places is {len(goals)}; expected {len(self._vehicles)}, "
                 "one for each vehicle"
             )
-        starts = {name: self._rest_of(name, "formation").position for name in self._vehicles}
+        starts = {name: self._destination(name, "formation").position for name in self._vehicles}
         chosen = formations.assign(starts, np.array(goals))
         self.go_to(chosen, duration=duration, wait=wait)
         return chosen
@@ -198,13 +192,13 @@ class Team(LandingTeam):
     # What commands have in common.
 
     def _check_climbs(self, height):
-        # How long a takeoff takes, servers and vehicles decide: all of the way has to be free.
+        # Servers and vehicles decide how long a takeoff takes: the whole way has to be free.
         starts = {name: self.position(name) for name in self._vehicles}
         highest = max(height - z for _, _, z in starts.values())
         for climb in np.linspace(0.0, highest, math.ceil(highest / _CLIMB_STEP) + 1).tolist():
             self._check_apart(
                 {
-                    name: Course.rest((x, y, min(z + climb, height)))
+                    name: TimedTrajectory.hover((x, y, min(z + climb, height)))
                     for name, (x, y, z) in starts.items()
                 }
             )
@@ -223,35 +217,43 @@ class Team(LandingTeam):
         places = {name: point(goal, f"{name}: goal") for name, goal in goals.items()}
         if relative:
             places = {
-                name: goal + self._rest_of(name, "go_to").position for name, goal in places.items()
+                name: goal + self._destination(name, "go_to").position
+                for name, goal in places.items()
             }
         return {name: tuple(map(float, goal)) for name, goal in places.items()}
 
-    def _rest_of(self, name, command):
-        if name not in self._courses:
+    def _destination(self, name, command):
+        """Return the commanded goal of a vehicle that hovers."""
+        if name not in self._commanded:
             raise MissionError(f"{name}: {command}: it is on the ground; expected takeoff before")
-        left = self._courses[name].end - self.time()
+        left = self._commanded[name].end - self.time()
         if left > 0.0:
             raise MissionError(
                 f"{name}: {command}: it is on its way for another {left:.1f} s; expected arrive() "
                 "before"
             )
-        return self._courses[name].destination
+        return self._commanded[name].destination
 
-    def _check(self, ways, what, slower):
-        for name, way in ways.items():
-            trajectories.check(way, self.rules.limits, self.fence(name), f"{name}: {what}", slower)
+    def _check(self, flown, what, slower):
+        for name, pieces in flown.items():
+            fence = self.fence(name)
+            trajectories.check(pieces, self.rules.limits, fence, f"{name}: {what}", slower)
         now = self.time()
-        begun = {name: self._course(name, way, now) for name, way in ways.items()}
-        check_starts({**self._courses, **begun}, now, self._check_apart)
+        timed = {name: self._timed(name, pieces, now) for name, pieces in flown.items()}
+        check_with_skew({**self._commanded, **timed}, now, self._check_apart)
 
-    def _fly(self, ways, what, command, wait):
-        team = self._some(ways)
+    def _prepare(self, flown, what, stream):
+        def prepare(name):
+            return self._vehicles[name].prepare(flown[name], stream)
+
+        raise_failures(what, self._answers(prepare, flown))
+
+    def _fly(self, flown, what, command, wait):
         begin = self.time()
-        failures = team._answers(command)
-        for name, way in ways.items():
+        failures = self._answers(command, flown)
+        for name, pieces in flown.items():
             if name not in failures:
-                self._courses[name] = self._course(name, way, begin)
-        refuse(what, failures)
+                self._commanded[name] = self._timed(name, pieces, begin)
+        raise_failures(what, failures)
         if wait:
-            team.arrive()
+            self[tuple(flown)].arrive()

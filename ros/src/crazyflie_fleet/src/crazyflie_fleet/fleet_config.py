@@ -12,7 +12,7 @@ from crazyflie_fleet.settings import MachineSettings, RobotSettings
 
 DOWNWASH = 2.0
 """How much farther apart one above the other two vehicles have to be than side by side: the
-air that rotors throw down takes lift from who flies below."""
+air that rotors throw down takes lift from a vehicle below."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class LogTopic:
 
 
 @dataclass(frozen=True)
-class Vehicle:
+class VehicleConfig:
     """One vehicle.
 
     Attributes
@@ -43,9 +43,9 @@ class Vehicle:
     name : str
         Its namespace and its tf frame.
     position : tuple of float
-        Where it stands before takeoff: x, y, z in m, fixed frame.
+        Before takeoff: x, y, z in m, fixed frame.
     settings : RobotSettings
-        What else is said of it, its type's and everybody's included.
+        Merged from the vehicle, its type and ``all``.
     firmware_params : dict of str to float
         "group.name" to value, written after each connection.
     default_topics : tuple of str
@@ -62,53 +62,53 @@ class Vehicle:
 
     @property
     def uri(self) -> str | None:
-        """Its address; None if it has none."""
+        """Its address, if it has one."""
         return self.settings.uri
 
     @property
     def buffer(self) -> float:
-        """Radius of the space that is its own, m; `DOWNWASH` times as high."""
+        """Radius of its collision ellipsoid, m; `DOWNWASH` times as high."""
         return self.settings.buffer
 
     @property
     def hover_point(self) -> tuple[float, float, float]:
-        """Where a takeoff ends, m."""
+        """Position x, y, z at the end of a takeoff, m."""
         x, y, z = self.position
         return x, y, z + self.settings.hover_height
 
     @property
     def mocap_frame(self) -> str:
-        """What motion capture calls it."""
+        """Name of its tf frame from motion capture."""
         return self.settings.mocap_frame or self.name
 
 
 @dataclass(frozen=True)
-class Fleet:
+class FleetConfig:
     """The vehicles that take part.
 
     Attributes
     ----------
-    vehicles : tuple of Vehicle
+    vehicles : tuple of VehicleConfig
         Those that are enabled, in the order of the file.
     disabled : tuple of str
         Names of the others.
     machines : dict of str to MachineSettings
         Other computers.
-    remarks : tuple of str
-        What is accepted and has no effect: file, line and why.
+    warnings : tuple of str
+        Entries without effect: file, line and reason.
     """
 
-    vehicles: tuple[Vehicle, ...]
+    vehicles: tuple[VehicleConfig, ...]
     disabled: tuple[str, ...] = ()
     machines: Mapping[str, MachineSettings] = dataclasses.field(default_factory=dict)
-    remarks: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the vehicles that take part."""
         return tuple(vehicle.name for vehicle in self.vehicles)
 
-    def at_ports(self, first_port: int) -> "Fleet":
+    def at_ports(self, first_port: int) -> "FleetConfig":
         """Return the same vehicles at UDP ports of this computer, one after the other."""
         vehicles = tuple(
             dataclasses.replace(
@@ -121,7 +121,7 @@ class Fleet:
         )
         return dataclasses.replace(self, vehicles=vehicles)
 
-    def __getitem__(self, name: str) -> Vehicle:
+    def __getitem__(self, name: str) -> VehicleConfig:
         """Return a vehicle that takes part; raises KeyError."""
         for vehicle in self.vehicles:
             if vehicle.name == name:
@@ -132,7 +132,7 @@ class Fleet:
 def close_pairs(
     positions: npt.NDArray[np.float64], buffers: Sequence[float] | npt.NDArray[np.float64]
 ) -> Iterator[tuple[int, int, float, float]]:
-    """Yield the pairs of places that are closer than the buffers of who is there.
+    """Yield the pairs of places that are closer than the buffers of their vehicles.
 
     Parameters
     ----------

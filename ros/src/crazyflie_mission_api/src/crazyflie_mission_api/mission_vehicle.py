@@ -1,53 +1,53 @@
-"""What a team needs of its vehicles and of time, whoever flies them."""
+"""What a group needs of its vehicles and of time: by ROS, or ideal."""
 
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any, Protocol
 
 from crazyflie_mission_api.limits import Bounds
-from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
+from crazyflie_model.trajectory import Pieces
 
 
-class Vehicle(Protocol):
+class MissionVehicle(Protocol):
     """A vehicle that takes high-level commands.
 
-    A command returns a future, which is done when the vehicle has it, not when it has
+    A command returns a future, which is done when the vehicle has accepted it, not when it has
     carried it out; its exception says why it was refused.
+
+    Attributes
+    ----------
+    name : str
+    bounds : Bounds
+        Its fence.
+    start_skew : float
+        How much later than others that are called to `start` in a row it may begin, s.
     """
 
-    @property
-    def name(self) -> str:
-        """What it is called."""
-
-    @property
-    def bounds(self) -> Bounds:
-        """The box that it is fenced in."""
-
-    @property
-    def start_skew(self) -> float:
-        """How much later than others that are told to `start` in a row it may begin, s."""
+    name: str
+    bounds: Bounds
+    start_skew: float
 
     def position(self) -> Triple | None:
-        """Return where it is, m; None when that is not known."""
+        """Return the position, m; None when it is not known."""
 
     def heading(self) -> float:
-        """Return its heading, rad; 0 when that is not known, or never another."""
+        """Return the heading, rad; 0 when it is not known, or cannot change."""
 
-    def trouble(self) -> str:
-        """Return why it cannot fly on; an empty text when it can."""
+    def fault(self) -> str:
+        """Return why the vehicle cannot fly on; empty if it can."""
 
     def has_landed(self) -> bool:
-        """Return whether it stands, with its motors off."""
+        """Return whether the vehicle is on the ground, with its motors off."""
 
     def take_off(self, height: float, duration: float) -> "Future[Any]":
-        """Climb straight up to a height (m) in a duration (s), more or less."""
+        """Climb straight up to a height (m) in about a duration (s)."""
 
     def land(self, duration: float) -> "Future[Any]":
-        """Sink straight down to the ground in a duration (s), more or less."""
+        """Sink straight down to the ground in about a duration (s)."""
 
-    def rest(self) -> None:
-        """Be told that it has landed."""
+    def stop_motors(self) -> None:
+        """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
 
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
         """Fly to a point (m) and heading (rad) in a duration (s)."""
@@ -59,11 +59,11 @@ class Vehicle(Protocol):
         """Fly the trajectory that was prepared last."""
 
     def emergency(self) -> "Future[Any]":
-        """Stop the motors, wherever it is."""
+        """Stop the motors at once."""
 
 
 class Clock(Protocol):
-    """Time as the vehicles live by it."""
+    """The time of the vehicles."""
 
     def time(self) -> float:
         """Return the time, s."""
@@ -79,5 +79,5 @@ class Clock(Protocol):
 
 
 def never() -> bool:
-    """Return False: a condition that only time ends."""
+    """Return False: the condition of a wait for a time."""
     return False

@@ -1,4 +1,4 @@
-"""ROS interface of what all vehicles do together."""
+"""ROS interface of the services for all vehicles of a fleet."""
 
 from concurrent.futures import Future
 from functools import partial
@@ -8,41 +8,41 @@ from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
 from crazyflie_driver.srv import GoTo, GoToResponse
-from crazyflie_fleet.fleet import Fleet
-from crazyflie_fleet.lander import LIMIT, Lander, Refusals
-from crazyflie_fleet.mission_watch import MISSION_LIMIT, MissionWatch
-from crazyflie_fleet.sightings import Sightings
+from crazyflie_fleet.fleet_config import FleetConfig
+from crazyflie_fleet.lander import SERVICE_TIMEOUT, Lander, Refusals
+from crazyflie_fleet.mission_watch import MISSION_TIMEOUT, MissionWatch
+from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_utils import Node, NodeHandle, ServiceError
 
 
-class FleetNode(Node):
+class FleetServicesNode(Node):
     """Offer one service for all vehicles where each has its own.
 
-    A call is answered when all vehicles have answered, with an error that names every one that
-    has refused. Vehicles land one after the other where they are above each other; so are those
-    of a mission that has died.
+    A call is answered when all vehicles have answered, with an error that names each one that
+    has refused. Vehicles above each other land one after the other, also those of a mission that
+    has died.
 
     Parameters
     ----------
-    fleet : Fleet
-    sightings : Sightings
+    fleet : FleetConfig
+    states : VehicleStates
         Of all its vehicles.
     """
 
     needed_in_flight = True
 
-    def __init__(self, fleet: Fleet, sightings: Sightings):
+    def __init__(self, fleet: FleetConfig, states: VehicleStates):
         self._fleet = fleet
-        self._sightings = sightings
+        self._states = states
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        for remark in self._fleet.remarks:
-            handle.warn(remark)
+        for warning in self._fleet.warnings:
+            handle.warn(warning)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        self._lander = Lander(handle, self._fleet, self._sightings)
+        self._lander = Lander(handle, self._fleet, self._states)
         for service, call in (("takeoff", self._on_takeoff), ("land", self._on_land)):
             handle.advertise_service(f"/all/{service}", Empty, call)
             handle.advertise_service(f"/{service}_all", Empty, call)
@@ -51,8 +51,8 @@ class FleetNode(Node):
 
     @override
     def make_safe(self) -> None:
-        """Tell those that wait for a landing; each vehicle has services of its own."""
-        self._lander.give_up()
+        """Answer the callers of landings; each vehicle has services of its own."""
+        self._lander.abort()
 
     def _on_takeoff(self, request):
         return self._call_all("takeoff", Empty, request, EmptyResponse())
@@ -64,27 +64,27 @@ class FleetNode(Node):
         return answer
 
     def _on_lost_mission(self, names):
-        flying = self._sightings.flying() & {*names}
+        flying = self._states.flying() & {*names}
         if not flying:
             return
         chosen = [name for name in self._fleet.names if name in flying]
         self._handle.error(
-            f"a mission that flew {', '.join(chosen)} has said nothing for {MISSION_LIMIT:g} s and "
-            "is taken for dead: landing them"
+            f"a mission that flew {', '.join(chosen)} has said nothing for {MISSION_TIMEOUT:g} s "
+            "and is taken for dead: landing them"
         )
-        self._lander.land(chosen).add_done_callback(self._note_landing)
+        self._lander.land(chosen).add_done_callback(self._log_refusals)
 
-    def _note_landing(self, done):
+    def _log_refusals(self, done):
         if done.result():
-            self._handle.error(f"MAY STILL FLY: {self._in_words(done.result())}")
+            self._handle.error(f"MAY STILL FLY: {self._text(done.result())}")
 
     def _reply(self, answer: Future[Any], refusals: Refusals, response: Any) -> None:
         if refusals:
-            answer.set_exception(ServiceError(self._in_words(refusals)))
+            answer.set_exception(ServiceError(self._text(refusals)))
         else:
             answer.set_result(response)
 
-    def _in_words(self, refusals: Refusals) -> str:
+    def _text(self, refusals: Refusals) -> str:
         texts = "; ".join(f"{name}: {text}" for name, text in sorted(refusals.items()))
         return f"{len(refusals)} of {len(self._fleet.vehicles)} vehicles: {texts}"
 
@@ -100,15 +100,15 @@ class FleetNode(Node):
         open_calls = set(self._fleet.names)
         refusals: dict[str, str] = {}
 
-        def note(name: str, done: Future[Any]) -> None:
-            error = done.exception()
-            if error is not None:
-                refusals[name] = str(error)
+        def on_answer(name: str, done: Future[Any]) -> None:
+            if done.exception() is not None:
+                refusals[name] = str(done.exception())
             open_calls.discard(name)
             if not open_calls:
                 self._reply(answer, refusals, response)
 
         for name in self._fleet.names:
-            call = self._handle.call_service(f"/{name}/{service}", service_type, request, LIMIT)
-            call.add_done_callback(partial(note, name))
+            path = f"/{name}/{service}"
+            call = self._handle.call_service(path, service_type, request, SERVICE_TIMEOUT)
+            call.add_done_callback(partial(on_answer, name))
         return answer

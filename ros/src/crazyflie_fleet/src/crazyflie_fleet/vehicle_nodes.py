@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from crazyflie_control_merger.cmd_vel_converter_node import CmdVelConverterNode
-from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
 )
@@ -26,11 +26,11 @@ DESCENT, SAFE_DESCENT = f"{REFERENCE}_descent", f"{REFERENCE}_descent_safe"
 STATE, LQR_CONTROL = "state", "control/lqr"
 TAKEOFF_CONTROL, FINAL_CONTROL = "control/takeoff", "control/final"
 IN_FLIGHT = "in_flight"
-FLIGHT_STATE = f"{IN_FLIGHT}_state"
+FLIGHT_STATE, FLIGHT_STATUS = f"{IN_FLIGHT}_state", f"{IN_FLIGHT}_flight_status"
 """Topics and services of a vehicle, below its name."""
 
 BUFFER = "buffer"
-"""Parameter below a vehicle's name with its collision buffer, m, for those who plan its flights."""
+"""Parameter below a vehicle's name: its collision buffer, m, by which missions are planned."""
 
 SIMULATORS: dict[str, type[Node]] = {
     "near_hover": NearHoverSimulatorNode,
@@ -38,7 +38,7 @@ SIMULATORS: dict[str, type[Node]] = {
     "quadrotor": QuadrotorSimulatorNode,
 }
 
-HOVER_STACK: dict[str, type[Node]] = {
+HOVER_NODES: dict[str, type[Node]] = {
     "state_estimator": PositionVelocityYawStateEstimatorNode,
     "lqr_controller": PositionVelocityYawStateLiftLqrNode,
     "takeoff_server": TakeoffServerNode,
@@ -46,23 +46,25 @@ HOVER_STACK: dict[str, type[Node]] = {
 }
 
 
-def node_classes(vehicle: Vehicle, is_simulated: bool) -> dict[str, type[Node]]:
+def node_classes(vehicle: VehicleConfig, is_simulated: bool) -> dict[str, type[Node]]:
     """Return the classes of a vehicle's nodes, by their names below the vehicle's."""
     if is_simulated:
-        return {"simulator": SIMULATORS[vehicle.settings.model], **HOVER_STACK}
-    return {"cmd_vel_converter": CmdVelConverterNode, **HOVER_STACK}
+        return {"simulator": SIMULATORS[vehicle.settings.model], **HOVER_NODES}
+    return {"cmd_vel_converter": CmdVelConverterNode, **HOVER_NODES}
 
 
-def parameters(vehicle: Vehicle, frames: Mapping[str, str], common: Mapping[str, Any]) -> Tree:
+def parameters(
+    vehicle: VehicleConfig, frames: Mapping[str, str], common: Mapping[str, Any]
+) -> Tree:
     """Return the parameters of a vehicle's nodes, node by node.
 
     Parameters
     ----------
-    vehicle : Vehicle
+    vehicle : VehicleConfig
     frames : mapping
         Names of the tf frames, fixed and robot.
     common : mapping
-        What those of all vehicles have in common, node by node.
+        Of all vehicles, node by node.
     """
     hover, settings = vehicle.hover_point, vehicle.settings
     own: Tree = {

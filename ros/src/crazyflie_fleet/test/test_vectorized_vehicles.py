@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from crazyflie_fleet.batch_vehicles import BatchVehicles
-from crazyflie_fleet.swarm_node import batch_control, is_memoryless
+from crazyflie_fleet.vectorized_simulator_node import batch_control, is_memoryless
+from crazyflie_fleet.vectorized_vehicles import VectorizedVehicles
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.dynamics import Coupled7D, NearHover
 from crazyflie_simulator.vehicle import SimulatedVehicle
@@ -30,7 +30,7 @@ EVENT = st.one_of(st.tuples(st.integers(0, 2), CONTROL), st.sampled_from([0.004,
 @given(events=st.lists(EVENT, max_size=8))
 @settings(max_examples=15)
 def test_vehicles(dynamics, events):
-    batch = BatchVehicles(dynamics, PLACES, 5.0)
+    batch = VectorizedVehicles(dynamics, PLACES, 5.0)
     alone = [SimulatedVehicle(dynamics, place, 5.0) for place in PLACES]
     time = 5.0
     for event in events:
@@ -50,7 +50,7 @@ def test_vehicles(dynamics, events):
 
 
 def test_a_control_between_two_ticks_counts_from_its_time_on():
-    batch = BatchVehicles(NearHover(), PLACES, 0.0)
+    batch = VectorizedVehicles(NearHover(), PLACES, 0.0)
     alone = SimulatedVehicle(NearHover(), PLACES[0], 0.0)
     for vehicle_time, u in ((0.013, (0.1, 0.0, 0.0, 12.0)), (0.027, (0.0, 0.2, 1.0, 9.0))):
         batch.command(0, u, vehicle_time)
@@ -63,7 +63,7 @@ def test_a_control_between_two_ticks_counts_from_its_time_on():
 
 
 def test_a_reset_of_the_clock():
-    batch = BatchVehicles(NearHover(), PLACES, 10.0)
+    batch = VectorizedVehicles(NearHover(), PLACES, 10.0)
     alone = SimulatedVehicle(NearHover(), PLACES[1], 10.0)
     for part in (batch, alone):
         part.advance_to(10.5)

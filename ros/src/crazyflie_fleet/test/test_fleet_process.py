@@ -13,7 +13,7 @@ from std_srvs.srv import EmptyRequest
 
 from crazyflie_driver.srv import GoToRequest
 from crazyflie_fleet import lander
-from crazyflie_fleet.process import make_nodes
+from crazyflie_fleet.fleet_process import make_nodes
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_utils import Node, ParameterError, ServiceError
 from crazyflie_utils.parameters.types import FRAME, Number

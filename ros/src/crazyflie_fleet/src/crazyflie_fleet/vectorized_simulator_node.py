@@ -11,10 +11,16 @@ from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, Header
 from typing_extensions import override
 
-from crazyflie_fleet.batch_vehicles import BatchVehicles
-from crazyflie_fleet.fleet import Vehicle
+from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_fleet.messages import array_message, control_message, state_message
-from crazyflie_fleet.stack import FINAL_CONTROL, LQR_CONTROL, SAFE_DESCENT, SAFE_REFERENCE, STATE
+from crazyflie_fleet.vectorized_vehicles import VectorizedVehicles
+from crazyflie_fleet.vehicle_nodes import (
+    FINAL_CONTROL,
+    LQR_CONTROL,
+    SAFE_DESCENT,
+    SAFE_REFERENCE,
+    STATE,
+)
 from crazyflie_lqr.control_law import heading_error, limited, linear_control
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
@@ -77,8 +83,8 @@ def is_memoryless(K: NDArray[np.float64], u_ref: NDArray[np.float64]) -> bool:
     return np.allclose(alone, batch_control(K, u_ref, low[None], high[None])[0], rtol=0, atol=1e-12)
 
 
-class SwarmParameters(Parameters):
-    """Parameters of `SwarmNode`, named as those of the nodes that it stands for."""
+class VectorizedSimulatorParameters(Parameters):
+    """Parameters of `VectorizedSimulatorNode`, named as those of the nodes that it stands for."""
 
     time_step: float = parameter(
         TIME_STEP, "from one pose, state and control to the next", name="simulator/time_step"
@@ -113,19 +119,19 @@ class SwarmParameters(Parameters):
     )
 
 
-class SwarmNode(Node):
+class VectorizedSimulatorNode(Node):
     """Fly vehicles of one model of 7 states; each has its own topics.
 
     Parameters
     ----------
-    vehicles : sequence of Vehicle
+    vehicles : sequence of VehicleConfig
     model : str
         Of `MODELS`.
     """
 
     needed_in_flight = True
 
-    def __init__(self, vehicles: tuple[Vehicle, ...], model: str):
+    def __init__(self, vehicles: tuple[VehicleConfig, ...], model: str):
         self._vehicles = vehicles
         self._model = model
         self._ticks = 0
@@ -137,7 +143,7 @@ class SwarmNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(SwarmParameters)
+        self._parameters = handle.load(VectorizedSimulatorParameters)
         self._K, self._u_ref = np.array(self._parameters.K), np.array(self._parameters.u_ref)
         if not is_memoryless(self._K, self._u_ref):
             raise ParameterError(
@@ -150,7 +156,7 @@ class SwarmNode(Node):
         parameters = self._parameters
         self._start = handle.time()
         places = [vehicle.position for vehicle in self._vehicles]
-        self._batch = BatchVehicles(MODELS[self._model](), places, self._start)
+        self._batch = VectorizedVehicles(MODELS[self._model](), places, self._start)
         self._broadcast = handle.broadcast_poses(self._broadcast_poses)
         self._all_states = handle.publisher("~" + ALL_STATES, Float64MultiArray)
         if parameters.publishes_clock:

@@ -3,13 +3,18 @@
 from collections.abc import Mapping
 from typing import Any
 
-from crazyflie_fleet.fleet import Fleet, Vehicle
-from crazyflie_fleet.fleet_node import FleetNode
+from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_fleet.fleet_parameters import FlyParameters
+from crazyflie_fleet.fleet_services_node import FleetServicesNode
 from crazyflie_fleet.references_node import ReferencesNode
-from crazyflie_fleet.sightings import Sightings
-from crazyflie_fleet.stack import BUFFER, Tree, merged, node_classes, parameters
-from crazyflie_fleet.swarm_node import ALL_STATES, MODELS, SwarmNode, SwarmParameters
+from crazyflie_fleet.safe_descents_node import SafeDescentsNode
+from crazyflie_fleet.vectorized_simulator_node import (
+    ALL_STATES,
+    MODELS,
+    VectorizedSimulatorNode,
+    VectorizedSimulatorParameters,
+)
+from crazyflie_fleet.vehicle_nodes import BUFFER, Tree, merged, node_classes, parameters
 from crazyflie_takeoff.all_emergency_node import AllEmergencyNode
 from crazyflie_utils import Node, NodeHandle, ParameterError
 
@@ -22,49 +27,55 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     ParameterError
         A parameter, or the fleet file, is wrong.
     """
-    return _Plan(handle, handle.load(FlyParameters)).nodes
+    return _NodeFactory(handle, handle.load(FlyParameters)).nodes
 
 
-class _Plan:
-    """Which nodes there are."""
+class _NodeFactory:
+    """Makes the nodes of the process."""
 
-    def __init__(self, handle: NodeHandle, told: FlyParameters):
+    def __init__(self, handle: NodeHandle, config: FlyParameters):
         self._handle = handle
-        self._told = told
+        self._config = config
         self.nodes: dict[str, Node] = {}
-        # Of all simulators one is the source of simulated time.
+        # One simulator is the source of simulated time.
         self._has_clock = False
-        swarms: dict[str, tuple[Vehicle, ...]] = {}
-        fleet = told.fleet()
-        vehicles = tuple(fleet[name] for name in told.own_names(fleet))
+        vectorized: dict[str, tuple[VehicleConfig, ...]] = {}
+        fleet = config.fleet()
+        vehicles = tuple(fleet[name] for name in config.own_names(fleet))
         others = tuple(each for each in fleet.vehicles if each not in vehicles)
-        for model in MODELS if told.is_simulated and told.flies_together else ():
+        for model in MODELS if config.is_simulated and config.is_vectorized else ():
             of_model = tuple(each for each in vehicles if each.settings.model == model)
             if of_model:
-                swarms[self._add_swarm(model, of_model)] = of_model
+                vectorized[self._add_vectorized(model, of_model)] = of_model
         for vehicle in vehicles:
             self._add_vehicle(vehicle)
-        references = ReferencesNode(vehicles, others, told.fixed_frame, swarms)
+        references = ReferencesNode(vehicles, others, config.fixed_frame, vectorized)
+        buffers = [vehicle.buffer for vehicle in (*vehicles, *others)]
         self.nodes[f"{handle.name}/references"] = references
+        self.nodes[f"{handle.name}/descents"] = SafeDescentsNode(
+            vehicles, references.states, buffers
+        )
         if vehicles[0] is fleet.vehicles[0]:
-            self._add_services(fleet, references.sightings)
+            # One process serves all vehicles, also those of other machines.
+            self.nodes[handle.name] = FleetServicesNode(fleet, references.states)
+            self.nodes["/all_emergency"] = AllEmergencyNode()
 
     def _add(self, name: str, node: Node, tree: Mapping[str, Any]) -> None:
         self._handle.set_param(name, dict(tree))
         self.nodes[name] = node
 
     def _common(self, model: str) -> Tree:
-        tree = merged(self._told.common, (self._told.by_model or {}).get(model, {}))
+        tree = merged(self._config.common, (self._config.by_model or {}).get(model, {}))
         if self._has_clock:
             tree = merged(tree, {"simulator": {"clock": {"publish": False}}})
         return tree
 
-    def _add_swarm(self, model: str, vehicles: tuple[Vehicle, ...]) -> str:
-        """Return the topic of their states."""
+    def _add_vectorized(self, model: str, vehicles: tuple[VehicleConfig, ...]) -> str:
+        """Add the simulator of all vehicles of a model; return the topic of their states."""
         name = f"{self._handle.name}/{model}"
         tree = self._common(model)
         own: Tree = {key: tree[key] for key in ("simulator", "lqr_controller") if key in tree}
-        known = {declaration.name for declaration in SwarmParameters.declarations()}
+        known = {each.name for each in VectorizedSimulatorParameters.declarations()}
         unknown = [path for path in _paths(own) if path not in known]
         if unknown:
             raise ParameterError(
@@ -74,31 +85,25 @@ class _Plan:
                     for path in unknown
                 )
             )
-        self._add(
-            name, SwarmNode(vehicles, model), {**own, "frames": {"fixed": self._told.fixed_frame}}
-        )
+        frames = {"fixed": self._config.fixed_frame}
+        self._add(name, VectorizedSimulatorNode(vehicles, model), {**own, "frames": frames})
         self._has_clock = True
         return f"{name}/{ALL_STATES}"
 
-    def _add_vehicle(self, vehicle: Vehicle) -> None:
-        classes = node_classes(vehicle, self._told.is_simulated)
+    def _add_vehicle(self, vehicle: VehicleConfig) -> None:
+        classes = node_classes(vehicle, self._config.is_simulated)
         if f"{self._handle.name}/{vehicle.settings.model}" in self.nodes:
             for name in ("simulator", "state_estimator", "lqr_controller"):
                 del classes[name]
         self._handle.set_param(f"/{vehicle.name}/{BUFFER}", vehicle.buffer)
-        frames = {"fixed": self._told.fixed_frame, "robot": vehicle.name}
+        frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
         tree = parameters(vehicle, frames, self._common(vehicle.settings.model))
-        for name, node_class in (self._told.further or {}).items():
+        for name, node_class in (self._config.extra_nodes or {}).items():
             own = merged(tree.get(name, {}), {"frames": frames})
             self._add(f"/{vehicle.name}/{name}", node_class(), own)
         for name, node_class in classes.items():
             self._add(f"/{vehicle.name}/{name}", node_class(), tree[name])
         self._has_clock = True
-
-    def _add_services(self, fleet: Fleet, sightings: Sightings) -> None:
-        # One process serves them all, also those of other machines.
-        self.nodes[self._handle.name] = FleetNode(fleet, sightings)
-        self.nodes["/all_emergency"] = AllEmergencyNode()
 
 
 def _paths(tree: Mapping[str, Any], prefix: str = "") -> list[str]:

@@ -14,7 +14,7 @@ _OFF_STEPS = round(OFF_AGE / STEP)
 _NEVER = np.iinfo(np.int64).max
 
 
-class BatchVehicles:
+class VectorizedVehicles:
     """Vehicles that each do what `crazyflie_simulator.vehicle.SimulatedVehicle` does, on one clock.
 
     Parameters

@@ -6,7 +6,7 @@ from pathlib import Path
 import rospkg
 
 from crazyflie_driver.srv import AddCrazyflieResponse, UpdateParamsResponse
-from crazyflie_fleet.add_node import FleetAddNode
+from crazyflie_fleet.connect_node import FleetConnectNode
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
@@ -45,7 +45,7 @@ def add(missing=(), **parameters):
     process = FakeProcess()
     driver = Driver(process, missing)
     launched = process.launch(
-        FleetAddNode(), "/fleet_add", {"fleet/file": str(EXAMPLE), **parameters}
+        FleetConnectNode(), "/fleet_add", {"fleet/file": str(EXAMPLE), **parameters}
     )
     return process, driver, launched
 

@@ -1,4 +1,4 @@
-"""A node that has the driver add the vehicles of a fleet, and ends."""
+"""Connects the vehicles of a fleet by the driver."""
 
 from functools import partial
 
@@ -7,19 +7,19 @@ from typing_extensions import override
 from crazyflie_driver.add_node import command_again
 from crazyflie_driver.srv import AddCrazyflie, UpdateParams, UpdateParamsRequest
 from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS, VehicleParameters
-from crazyflie_fleet.fleet import Fleet, Vehicle
+from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import TEXT, ListOf
 
 ADD = "/add_crazyflie"
 
-LIMIT = 60.0
-"""How long, in s, the driver may take to come up, to connect, and to write parameters."""
+TIMEOUT = 60.0
+"""Of the driver to start, to connect, and to write parameters, s."""
 
 
-def connection(vehicle: Vehicle) -> VehicleParameters:
-    """Return how a vehicle is connected, and what is published of it."""
+def connection(vehicle: VehicleConfig) -> VehicleParameters:
+    """Return the driver's parameters of a vehicle: its address and its log topics."""
     switches = {
         f"enable_logging_{topic}": topic in vehicle.default_topics for topic in STANDARD_TOPICS
     }
@@ -36,7 +36,7 @@ def connection(vehicle: Vehicle) -> VehicleParameters:
     )
 
 
-class FleetAddParameters(FleetParameters):
+class FleetConnectParameters(FleetParameters):
     """Which vehicles are added."""
 
     vehicles: tuple[str, ...] = parameter(
@@ -44,7 +44,7 @@ class FleetAddParameters(FleetParameters):
     )
 
     @override
-    def own_names(self, fleet: Fleet) -> tuple[str, ...]:
+    def own_names(self, fleet: FleetConfig) -> tuple[str, ...]:
         names = super().own_names(fleet)
         unknown = [name for name in self.vehicles if name not in names]
         if unknown:
@@ -54,16 +54,16 @@ class FleetAddParameters(FleetParameters):
         return self.vehicles or names
 
 
-class FleetAddNode(Node):
-    """Have vehicles connected and their firmware parameters written.
+class FleetConnectNode(Node):
+    """Connect vehicles and write their firmware parameters.
 
-    The process ends with status 0 when all of them are there, else with 1, and names the others.
-    The driver itself writes the parameters again when a lost link is back.
+    The process ends with status 0 when all are connected, else with 1, and names the others.
+    The driver itself writes the parameters again after a reconnection.
     """
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        parameters = handle.load(FleetAddParameters)
+        parameters = handle.load(FleetConnectParameters)
         fleet = parameters.fleet()
         self._vehicles = [fleet[name] for name in parameters.own_names(fleet)]
         missing = [vehicle.name for vehicle in self._vehicles if vehicle.uri is None]
@@ -77,7 +77,7 @@ class FleetAddNode(Node):
         self._failed: list[str] = []
         for vehicle in self._vehicles:
             request = self._connections[vehicle.name].request()
-            answer = handle.call_service(ADD, AddCrazyflie, request, LIMIT)
+            answer = handle.call_service(ADD, AddCrazyflie, request, TIMEOUT)
             answer.add_done_callback(partial(self._on_added, vehicle))
 
     def _on_added(self, vehicle, done):
@@ -90,7 +90,7 @@ class FleetAddNode(Node):
             names.append(name.replace(".", "/"))
             self._handle.set_param(f"/{vehicle.name}/{names[-1]}", value)
         answer = self._handle.call_service(
-            f"/{vehicle.name}/update_params", UpdateParams, UpdateParamsRequest(names), LIMIT
+            f"/{vehicle.name}/update_params", UpdateParams, UpdateParamsRequest(names), TIMEOUT
         )
         answer.add_done_callback(lambda done: self._finish(vehicle, done.exception()))
 

@@ -1,4 +1,4 @@
-"""Vehicles as a team needs them, by ROS."""
+"""Vehicles of a mission by ROS services and topics."""
 
 import math
 from concurrent.futures import Future
@@ -9,22 +9,25 @@ import genpy
 from geometry_msgs.msg import Point, PoseStamped
 from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest
+from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_mission_api.conversions import heading, to_message
-from crazyflie_mission_api.course import START_SKEW
+from crazyflie_mission_api.flight_words import WORDS
 from crazyflie_mission_api.futures import done, in_turn
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
-from crazyflie_mission_api.starter import Starter
+from crazyflie_mission_api.mission_vehicle import MissionVehicle
 from crazyflie_mission_api.stream import SetpointStream
-from crazyflie_mission_api.trajectories import Pieces
+from crazyflie_mission_api.synchronized_start import SynchronizedStart
+from crazyflie_mission_api.timed_trajectory import START_SKEW
 from crazyflie_model.angles import Triple
-from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_model.trajectory import Pieces
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
 from crazyflie_utils.parameters.types import FINITE
 
-CALL_LIMIT = 60.0
-"""How long a service may take, s of the machine's clock."""
+CALL_TIMEOUT = 60.0
+"""Of a service, s of the machine's clock."""
 
 MEMORY = 31
 """Pieces that the memory of a vehicle holds."""
@@ -32,30 +35,33 @@ MEMORY = 31
 MAX_POSITION_AGE = 0.5
 """A position older than this is not known, s; as `high_level_node.STATE_LIMIT`."""
 
-_ON_GROUND = 0.1
-"""Height above where it stood at which a vehicle has landed, m."""
+_LANDED_HEIGHT = 0.1
+"""Above the start, m: a vehicle below has landed."""
 
 _READY = "ready"
-"""How the status of the driver begins when the vehicle's supervisor says that it does not fly."""
+"""Beginning of the driver's status of a vehicle that does not fly, as its supervisor says."""
 
-_SETTLING = 0.5
-"""After a landing should be at its end, s."""
+_SETTLING_TIME = 0.5
+"""After the planned end of a landing, s."""
 
 _HIGH_LEVEL = "commander/enHighLevel"
-"""The parameter of a vehicle that has it take high-level commands."""
+"""The firmware parameter that enables high-level commands."""
+
+_ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
+"""States after a flight."""
 
 _HOLD_DURATION = 0.5
 """Of the go_to at the end of a stream, to where the vehicle is, s."""
 
-_HOLD_LIMIT = 3.0
-"""How long it may take to be answered, s of the machine's clock; the driver's own limit is 1 s."""
+_HOLD_TIMEOUT = 3.0
+"""Of its answer, s of the machine's clock; the driver's own timeout is 1 s."""
 
 _LANDING_RETRY_TIME = 10.0
-"""How long a vehicle that is streamed to is told to land, s: without an answer setpoints would end
+"""How long a landing is tried while setpoints are streamed, s: without an answer they would end
 with the mission, and the vehicle would fall."""
 
 
-class RosVehicle:
+class RosVehicle(MissionVehicle):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`.
 
     Parameters
@@ -63,11 +69,11 @@ class RosVehicle:
     name : str
     handle : NodeHandle
     services : dict of str to str
-        Where its services are: go_to, takeoff and so on to absolute names.
-    starter : Starter, optional
-        Of those that a controller flies, and not the driver.
+        Short name, such as go_to, to absolute name.
+    synchronized_start : SynchronizedStart, optional
+        Of vehicles that a controller flies, and not the driver.
     frames : tuple of str, optional
-        The fixed frame and its own, if tf says where it is; with the driver only as long as
+        The fixed frame and its own, if its position comes by tf; with the driver only as long as
         there are no poses.
     has_yaw : bool
         Whether it can have another heading than 0.
@@ -78,16 +84,17 @@ class RosVehicle:
         name: str,
         handle: NodeHandle,
         services: dict[str, str],
-        starter: Starter | None = None,
+        synchronized_start: SynchronizedStart | None = None,
         frames: tuple[str, str] | None = None,
         has_yaw: bool = True,
     ):
         self.name = name
         self.bounds = fence(handle, prefix(name))
+        self.start_skew = START_SKEW if synchronized_start is None else 0.0
         self._handle = handle
         self._services = services
-        self._starter = starter
-        self._is_driven = is_driven = starter is None
+        self._synchronized_start = synchronized_start
+        self._uses_driver = uses_driver = synchronized_start is None
         self._has_yaw = has_yaw
         # Position and heading.
         self._pose: tuple[Triple, float] | None = None
@@ -95,12 +102,12 @@ class RosVehicle:
         self._ground = 0.0
         self._landing_end = 0.0
         self._status = ""
-        self._flight_state = ""
+        self._flight_state = FlightStatus.UNKNOWN
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
         self._lookup = None if frames is None else partial(handle.listen_to_poses(), *frames)
-        if is_driven:
+        if uses_driver:
             handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
             handle.subscribe(f"{top}/status", String, self._on_status)
             frame = "" if frames is None else frames[0]
@@ -109,23 +116,18 @@ class RosVehicle:
             if frames is None:
                 state = PositionVelocityYawStateStamped
                 handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
-            handle.subscribe(f"{top}/in_flight_state", String, self._on_flight_state)
-            handle.subscribe(f"{top}/in_flight_status", String, self._on_status)
+            topic = f"{top}/in_flight_flight_status"
+            handle.subscribe(topic, FlightStatus, self._on_flight_status)
 
-    @property
-    def start_skew(self) -> float:
-        """How much later than others that are told to `start` in a row it may begin, s."""
-        return 0.0 if self._starter is not None else START_SKEW
+    # State.
 
-    # Where it is, and how it is.
-
+    @override
     def position(self) -> Triple | None:
-        """Return where it is, m; None when that is not known for `MAX_POSITION_AGE`."""
         pose = self._latest_pose()
         return None if pose is None else pose[0]
 
+    @override
     def heading(self) -> float:
-        """Return its heading, rad; 0 when that is not known, or never another."""
         pose = self._latest_pose() if self._has_yaw else None
         return 0.0 if pose is None else pose[1]
 
@@ -144,25 +146,25 @@ class RosVehicle:
             return None
         return pose.position, heading(*pose.rotation)
 
-    def trouble(self) -> str:
-        """Return why it cannot fly on; an empty text when it can."""
+    @override
+    def fault(self) -> str:
         if self._stream is not None:
             bad = ("lost", "cannot fly", "emergency", "disconnected")
             return self._status if self._status.startswith(bad) else self._stream.fault()
-        if self._flight_state in ("on_ground", "landing", "descending"):
-            return f"it does not fly any more: {self._status or self._flight_state}"
+        if self._flight_state in _ENDED:
+            return f"it does not fly any more: {self._status or WORDS[self._flight_state]}"
         return ""
 
+    @override
     def has_landed(self) -> bool:
-        """Return whether it stands, as far as that is known."""
-        if not self._is_driven:
-            return self._flight_state == "on_ground"
+        if not self._uses_driver:
+            return self._flight_state == FlightStatus.ON_GROUND
         place = self.position()
         if place is None:
             is_down = self._status.startswith(_READY)
         else:
-            is_down = place[2] < self._ground + _ON_GROUND
-        # Whoever is told then stops the motors: not on the last centimetres.
+            is_down = place[2] < self._ground + _LANDED_HEIGHT
+        # Then the mission stops the motors: not in the last centimetres.
         return is_down and self._handle.time() >= self._landing_end
 
     def _on_pose(self, message):
@@ -177,20 +179,20 @@ class RosVehicle:
     def _on_status(self, message):
         self._status = message.data
 
-    def _on_flight_state(self, message):
-        self._flight_state = message.data
+    def _on_flight_status(self, message):
+        self._flight_state, self._status = message.state, message.reason
 
     # Commands.
 
+    @override
     def take_off(self, height: float, duration: float) -> "Future[Any]":
-        """Climb straight up."""
         place = self.position()
         self._ground = 0.0 if place is None else place[2]
 
         def climb():
             return self._call("takeoff", srv.Takeoff, 0, height, _seconds(duration))
 
-        if not self._is_driven:
+        if not self._uses_driver:
             return climb()
         # The first call waits for the driver to have read the parameters, which it sets then.
         return in_turn(lambda: self._update(), lambda: self._update(_HIGH_LEVEL), climb)
@@ -200,30 +202,30 @@ class RosVehicle:
             self._handle.set_param(f"{prefix(self.name)}/{name}", 1)
         return self._call("update_params", srv.UpdateParams, list(parameters))
 
+    @override
     def land(self, duration: float) -> "Future[Any]":
-        """Sink straight down."""
-        self._landing_end = self._handle.time() + duration + _SETTLING
+        self._landing_end = self._handle.time() + duration + _SETTLING_TIME
         return self._hand_over(
             lambda: self._call("land", srv.Land, 0, self._ground, _seconds(duration)),
             _LANDING_RETRY_TIME,
         )
 
-    def rest(self) -> None:
-        """Stop the motors of a vehicle that has landed: those of the firmware idle on."""
-        if self._is_driven:
+    @override
+    def stop_motors(self) -> None:
+        if self._uses_driver:
             self._call("stop", srv.Stop, 0)
 
+    @override
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
-        """Fly to a point."""
         request = (0, False, Point(*goal), yaw, _seconds(duration))
         return self._hand_over(lambda: self._call("go_to", srv.GoTo, *request))
 
+    @override
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
-        """Take a trajectory, to be uploaded or streamed."""
-        self._prepared = pieces if stream and self._is_driven else None
+        self._prepared = pieces if stream and self._uses_driver else None
         if self._prepared is not None:
             return done(None)
-        if self._is_driven and len(pieces) > MEMORY:
+        if self._uses_driver and len(pieces) > MEMORY:
             return done(
                 ServiceError(
                     f"the trajectory has {len(pieces)} pieces; expected at most {MEMORY}, which is "
@@ -233,27 +235,27 @@ class RosVehicle:
         messages = [to_message(piece) for piece in pieces]
         return self._call("upload_trajectory", srv.UploadTrajectory, 0, 0, messages)
 
+    @override
     def start(self) -> "Future[Any]":
-        """Fly the trajectory that was prepared last."""
         if self._prepared is not None and self._stream is not None:
             return self._stream.start(self._prepared)
-        if self._starter is not None:
-            self._starter.start(self._services["start_trajectory"].rpartition("/")[0])
+        if self._synchronized_start is not None:
+            self._synchronized_start.start(self._services["start_trajectory"].rpartition("/")[0])
             return done(None)
         request = (0, 0, 1.0, False, False)
         return self._hand_over(
             lambda: self._call("start_trajectory", srv.StartTrajectory, *request)
         )
 
+    @override
     def emergency(self) -> "Future[Any]":
-        """Stop the motors."""
         if self._stream is not None:
             self._stream.stop()
         return self._handle.call_service(
-            self._services["emergency"], Empty, EmptyRequest(), CALL_LIMIT
+            self._services["emergency"], Empty, EmptyRequest(), CALL_TIMEOUT
         )
 
-    def _call(self, name, service_type, *arguments, limit=CALL_LIMIT):
+    def _call(self, name, service_type, *arguments, limit=CALL_TIMEOUT):
         request = service_type._request_class(*arguments)
         return self._handle.call_service(self._services[name], service_type, request, limit)
 
@@ -262,7 +264,7 @@ class RosVehicle:
 
     def _hold(self, goal):
         request = (0, False, Point(*goal.position), goal.yaw, _seconds(_HOLD_DURATION))
-        return self._call("go_to", srv.GoTo, *request, limit=_HOLD_LIMIT)
+        return self._call("go_to", srv.GoTo, *request, limit=_HOLD_TIMEOUT)
 
 
 def prefix(name: str) -> str:

@@ -1,0 +1,102 @@
+"""States and flight states of the vehicles of a fleet, as received."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from std_msgs.msg import Float64MultiArray
+
+from crazyflie_fleet.fleet_config import VehicleConfig
+from crazyflie_fleet.vehicle_nodes import FLIGHT_STATUS, STATE
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
+from crazyflie_utils import NodeHandle
+from crazyflie_utils.vectors import to_tuple
+
+MAX_STATE_AGE = 0.5
+"""Of a state that says where its vehicle is, s."""
+
+_IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCENDING)
+
+
+class VehicleStates:
+    """The last states and flight states of vehicles, which have numbers in the order given.
+
+    Parameters
+    ----------
+    vehicles : sequence of VehicleConfig
+    vectorized : mapping of str to sequence of VehicleConfig
+        Topics that have the states of some of them in one message.
+
+    Attributes
+    ----------
+    names : list of str
+    flight_states : ndarray, shape (n,)
+        `FlightStatus.state` of each; UNKNOWN before the first.
+    """
+
+    def __init__(
+        self,
+        vehicles: Sequence[VehicleConfig],
+        vectorized: Mapping[str, Sequence[VehicleConfig]],
+    ):
+        self.names = [vehicle.name for vehicle in vehicles]
+        self.flight_states = np.full(len(vehicles), FlightStatus.UNKNOWN)
+        self._vectorized = vectorized
+        self._states = np.full((len(vehicles), 6), np.nan)
+        self._times = np.full(len(vehicles), -np.inf)
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """Last positions, shape (n, 3), m, fixed frame; NaN before the first."""
+        return self._states[:, :3]
+
+    @property
+    def velocities(self) -> NDArray[np.float64]:
+        """Last velocities, shape (n, 3), m/s, fixed frame; NaN before the first."""
+        return self._states[:, 3:]
+
+    def subscribe(self, handle: NodeHandle) -> None:
+        """Subscribe to the topics of all vehicles through the handle of a node."""
+        self._handle = handle
+        for number, name in enumerate(self.names):
+            on_status = partial(self._on_flight_status, number)
+            handle.subscribe(f"/{name}/{FLIGHT_STATUS}", FlightStatus, on_status)
+        scalar = {name: number for number, name in enumerate(self.names)}
+        for topic, vehicles in self._vectorized.items():
+            numbers = np.array([scalar.pop(vehicle.name) for vehicle in vehicles])
+            handle.subscribe(topic, Float64MultiArray, partial(self._on_states, numbers))
+        for name, number in scalar.items():
+            on_state = partial(self._on_state, number)
+            handle.subscribe(f"/{name}/{STATE}", PositionVelocityYawStateStamped, on_state)
+
+    def are_fresh(self) -> NDArray[np.bool_]:
+        """Return which positions are finite and younger than `MAX_STATE_AGE`, shape (n,)."""
+        age = self._handle.time() - self._times
+        return (age >= 0.0) & (age < MAX_STATE_AGE) & np.isfinite(self.positions).all(axis=1)
+
+    def are_in_flight(self) -> NDArray[np.bool_]:
+        """Return from which vehicles others have to keep apart, shape (n,)."""
+        return np.isin(self.flight_states, _IN_FLIGHT)
+
+    def flying(self) -> set[str]:
+        """Return the names of those in flight."""
+        return {self.names[number] for number in np.flatnonzero(self.are_in_flight())}
+
+    def _on_state(self, number, message):
+        self._states[number] = to_tuple(message.state)[:6]
+        self._times[number] = self._handle.time()
+
+    def _on_states(self, numbers, message):
+        if len(message.data) != 7 * len(numbers):
+            self._handle.warn(
+                f"ignoring {len(message.data)} numbers as states of {len(numbers)} vehicles",
+                throttle=1.0,
+                key="states",
+            )
+            return
+        self._states[numbers] = np.reshape(message.data, (-1, 7))[:, :6]
+        self._times[numbers] = self._handle.time()
+
+    def _on_flight_status(self, number, message):
+        self.flight_states[number] = message.state

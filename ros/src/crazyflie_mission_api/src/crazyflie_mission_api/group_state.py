@@ -1,0 +1,197 @@
+"""The vehicles of a group and their commanded trajectories."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Self
+
+from crazyflie_mission_api.clearance import Clearance
+from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError, number
+from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle, never
+from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_apart
+from crazyflie_mission_api.trajectories import within_limits
+from crazyflie_model import trajectory
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Limits of all commands of a mission.
+
+    Attributes
+    ----------
+    limits : Limits
+        Of every vehicle.
+    bounds : Bounds
+        Of every vehicle; its own fence counts as well.
+    separation : float
+        Between any two vehicles in flight, m.
+    tolerance : float
+        Distance from the goal at which a vehicle has arrived, m.
+    arrival_timeout : float
+        How long a vehicle may take beyond the planned duration, s.
+    buffers : mapping of str to float
+        Collision buffers of vehicles that a fleet process keeps apart, m; see `Clearance`.
+    """
+
+    limits: Limits = field(default_factory=Limits)
+    bounds: Bounds = EVERYWHERE
+    separation: float = 0.3
+    tolerance: float = 0.15
+    arrival_timeout: float = 15.0
+    buffers: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def clearance(self) -> Clearance:
+        """Distances between vehicles."""
+        return Clearance(self.separation, self.buffers)
+
+    def __post_init__(self) -> None:
+        number(self.separation, "separation", 0.0)
+        number(self.tolerance, "tolerance", above=0.0)
+        number(self.arrival_timeout, "arrival_timeout", 0.0)
+
+
+class GroupState:
+    """Vehicles and their commanded trajectories."""
+
+    def __init__(
+        self, vehicles: Iterable[MissionVehicle], clock: Clock, rules: Rules | None = None
+    ):
+        self._vehicles = {vehicle.name: vehicle for vehicle in vehicles}
+        # Subgroups, too, keep apart from all vehicles.
+        self._all_vehicles = self._vehicles
+        self._clock = clock
+        self.rules = rules or Rules()
+        # Of all vehicles in flight; shared with subgroups.
+        self._commanded: dict[str, TimedTrajectory] = {}
+
+    def __getitem__(self, names: str | tuple[str, ...]) -> Self:
+        """Return a subgroup."""
+        chosen = names if isinstance(names, tuple) else (names,)
+        self._check_names(chosen)
+        subgroup = copy.copy(self)
+        subgroup._vehicles = {name: self._vehicles[name] for name in chosen}
+        return subgroup
+
+    def __enter__(self) -> Self:
+        return self
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the vehicles."""
+        return [*self._vehicles]
+
+    @property
+    def flying(self) -> list[str]:
+        """Names of the vehicles in flight."""
+        return [name for name in self._vehicles if name in self._commanded]
+
+    def time(self) -> float:
+        """Return the time of the vehicles, s."""
+        return self._clock.time()
+
+    def position(self, name: str) -> tuple[float, float, float]:
+        """Return the position of a vehicle, m."""
+        self._check_names([name])
+        position = self._vehicles[name].position()
+        if position is None:
+            raise MissionError(f"{name}: its position is not known; expected motion capture or /tf")
+        return position
+
+    def fence(self, name: str) -> Bounds:
+        """Return the box that a vehicle may fly in."""
+        return self.rules.bounds.within(self._vehicles[name].bounds)
+
+    def wait(self, seconds: float) -> None:
+        """Let time pass, s, while the vehicles fly on."""
+        self._wait(never, self.time() + number(seconds, "wait", 0.0))
+
+    def arrive(self) -> None:
+        """Wait until all vehicles are at their commanded destinations.
+
+        Raises
+        ------
+        MissionError
+            A vehicle is not there `Rules.arrival_timeout` after the planned end.
+        """
+        end = max((self._commanded[name].end for name in self.flying), default=self.time())
+        self._wait(never, end)
+        if not self._wait(lambda: not self._late(), end + self.rules.arrival_timeout):
+            raise MissionError(
+                f"{'; '.join(self._late())}: waited {self.rules.arrival_timeout:g} s longer than "
+                f"planned; expected {self.rules.tolerance:g} m at most"
+            )
+
+    def emergency(self) -> None:
+        """Stop all motors at once, wherever the vehicles are: they fall."""
+        failures = self._answers(lambda name: self._vehicles[name].emergency())
+        for name in self._vehicles.keys() - failures.keys():
+            self._commanded.pop(name, None)
+        raise_failures("emergency", failures)
+
+    # What commands have in common.
+
+    def _shortest_duration(self, pieces):
+        return trajectory.duration(within_limits(pieces, self.rules.limits))
+
+    def _timed(self, name, pieces, begin):
+        return TimedTrajectory(pieces, begin, self._vehicles[name].start_skew)
+
+    def _check_apart(self, changed):
+        """Check trajectories together with those of all other vehicles."""
+        on_ground = {
+            name: vehicle.position()
+            for name, vehicle in self._all_vehicles.items()
+            if name not in self._commanded
+        }
+        resting = {name: TimedTrajectory.hover(p) for name, p in on_ground.items() if p is not None}
+        everything = {**resting, **self._commanded, **changed}
+        check_apart(everything, self.time(), self.rules.clearance)
+
+    def _check_names(self, names):
+        for name in names:
+            if name not in self._vehicles:
+                raise MissionError(
+                    f"there is no vehicle {name!r}; expected one of {', '.join(self._vehicles)}"
+                )
+
+    def _answers(self, command, names=None):
+        """Return why ``command(name)`` was refused: name to reason; by default of all vehicles."""
+        futures = {name: command(name) for name in (self._vehicles if names is None else names)}
+        # Their limit is one of the machine's clock: simulated time may fly past a slow answer.
+        self._clock.wait_until(lambda: all(f.done() for f in futures.values()), math.inf)
+        errors = {name: future.exception() for name, future in futures.items()}
+        return {name: str(error) for name, error in errors.items() if error is not None}
+
+    def _wait(self, condition, deadline):
+        self._clock.wait_until(lambda: condition() or bool(self._faults()), deadline)
+        if faults := self._faults():
+            raise MissionError("; ".join(faults))
+        return condition()
+
+    def _faults(self):
+        faults = {name: self._vehicles[name].fault() for name in self.flying}
+        return [f"{name}: {fault}" for name, fault in faults.items() if fault]
+
+    def _late(self):
+        late = []
+        for name in self.flying:
+            goal = self._commanded[name].destination.position
+            distance = math.dist(self.position(name), goal)
+            if distance > self.rules.tolerance:
+                late.append(f"{name} is {distance:.2f} m from {text(goal)}")
+        return late
+
+
+def text(position: Iterable[float]) -> str:
+    """Return a position (m) as text."""
+    return f"({', '.join(f'{value:.2f}' for value in position)})"
+
+
+def raise_failures(what: str, failures: Mapping[str, str]) -> None:
+    """Raise an error that names each vehicle that has refused a command, and its reason."""
+    if failures:
+        raise MissionError("; ".join(f"{name}: {what}: {why}" for name, why in failures.items()))

@@ -29,6 +29,7 @@ LAYERS = [
         "crazyflie_description",
         "crazyflie_controller",
         "crazyflie_link",
+        "crazyflie_references",
         "crazyflie_reports",
         "crazyflie_sweep",
         "crazyflie_package_generator",

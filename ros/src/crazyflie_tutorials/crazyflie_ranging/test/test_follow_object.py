@@ -13,7 +13,7 @@ from crazyflie_ranging.follow_object_node import FollowObjectNode
 from crazyflie_ranging.follower import FollowDistances, Follower
 from crazyflie_ranging.obstacle_stop import AXES, ObstacleStop
 from crazyflie_ranging.obstacle_stop_node import ObstacleStopNode
-from crazyflie_teleop.velocity_reference import Velocity
+from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils.testing import FakeProcess
 
 COURSE = Follower(FollowDistances(0.1, 0.3, 1.0), scale_linear=1.0, scale_angular=0.5)

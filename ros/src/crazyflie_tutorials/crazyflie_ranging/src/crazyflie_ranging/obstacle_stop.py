@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from crazyflie_teleop.velocity_reference import Velocity
+from crazyflie_references.velocity_reference import Velocity
 
 AXES: dict[str, tuple[str, int]] = {
     "front": ("x", 1),

@@ -7,7 +7,7 @@ from typing_extensions import override
 
 from crazyflie_ranging.latest_ranges import LatestRanges
 from crazyflie_ranging.obstacle_stop import AXES, ObstacleStop
-from crazyflie_teleop.velocity_reference import Velocity
+from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import DURATION, TIME_STEP, TOPIC, ListOf, Number, Text
 from crazyflie_utils.vectors import is_finite

@@ -1,6 +1,6 @@
 """The velocity with which a vehicle flies a circle."""
 
-from crazyflie_teleop.velocity_reference import Velocity
+from crazyflie_references.velocity_reference import Velocity
 
 
 def circle_velocity(radius: float, speed: float, clockwise: bool) -> Velocity:

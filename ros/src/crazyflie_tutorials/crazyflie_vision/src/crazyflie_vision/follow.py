@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from crazyflie_teleop.velocity_reference import Velocity
+from crazyflie_references.velocity_reference import Velocity
 from crazyflie_vision.target import Target
 
 

@@ -6,7 +6,7 @@ from geometry_msgs.msg import PointStamped, Twist, Vector3
 from sensor_msgs.msg import CameraInfo
 from typing_extensions import override
 
-from crazyflie_teleop.velocity_reference import Velocity
+from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number

@@ -27,7 +27,7 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Limits:
+class ReferenceLimits:
     """What a reference keeps to.
 
     Attributes
@@ -55,19 +55,19 @@ class VelocityReference:
 
     Parameters
     ----------
-    limits : Limits
+    limits : ReferenceLimits
     silence : float
         A velocity that is older than this, s, counts no more: the reference comes to rest.
 
     Attributes
     ----------
-    limits : Limits
+    limits : ReferenceLimits
     silence : float
     pose : Pose or None
         None until there is one to begin at.
     """
 
-    def __init__(self, limits: Limits, silence: float):
+    def __init__(self, limits: ReferenceLimits, silence: float):
         self.limits = limits
         self.silence = silence
         self.pose: Pose | None = None
@@ -78,9 +78,9 @@ class VelocityReference:
     def place(self, x: float, y: float, z: float) -> None:
         """Begin anew at rest at a place; the heading stays, or is 0."""
         self.pose = Pose(x, y, z, 0.0 if self.pose is None else self.pose.yaw)
-        self.rest()
+        self.stop()
 
-    def rest(self) -> None:
+    def stop(self) -> None:
         """Stop at once, and forget what was commanded."""
         self._velocity = Velocity()
         self._command = Velocity()

@@ -11,7 +11,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_teleop.velocity_reference import Limits, Velocity, VelocityReference
+from crazyflie_references.velocity_reference import ReferenceLimits, Velocity, VelocityReference
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
@@ -67,10 +67,10 @@ class VelocityReferenceParameters(Parameters):
     )
     limits: LimitParameters = group(LimitParameters, "limits")
 
-    def limits_of_reference(self) -> Limits:
+    def limits_of_reference(self) -> ReferenceLimits:
         """Return the limits as the algorithm wants them."""
         each = self.limits
-        return Limits(
+        return ReferenceLimits(
             each.horizontal,
             each.vertical,
             each.yaw_dot,
@@ -122,7 +122,7 @@ class VelocityReferenceNode(Node):
     def make_safe(self) -> None:
         """Let the vehicle hover where the reference is."""
         if self._is_moving:
-            self._reference.rest()
+            self._reference.stop()
             self._publish()
 
     def _reconfigure(self, parameters):
@@ -133,7 +133,7 @@ class VelocityReferenceNode(Node):
         self._flight_state = message.data
         if message.data != FLYING:
             self._is_moving = False
-            self._reference.rest()
+            self._reference.stop()
 
     def _on_reference(self, message):
         state = message.state

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_teleop.circle import circle_velocity
-from crazyflie_teleop.velocity_reference import Limits, Velocity, VelocityReference
+from crazyflie_references.velocity_reference import ReferenceLimits, Velocity, VelocityReference
 
-LIMITS = Limits(0.7, 0.4, 1.5, acceleration=1.0, min_height=0.3, max_height=2.0)
+LIMITS = ReferenceLimits(0.7, 0.4, 1.5, acceleration=1.0, min_height=0.3, max_height=2.0)
 DT = 0.02
 SPEED = st.floats(-5.0, 5.0)
 
@@ -47,27 +46,6 @@ def test_velocities_are_those_of_the_heading():
     assert flown.velocity == pytest.approx((0.0, 0.5, 0.0))
     now = fly(flown, Velocity(y=0.5), 3.0, now)
     assert flown.velocity == pytest.approx((-0.5, 0.0, 0.0))
-
-
-@pytest.mark.parametrize("clockwise", [True, False])
-def test_a_circle_closes_and_has_its_radius(clockwise):
-    flown = reference()
-    velocity = circle_velocity(radius=0.5, speed=0.3, clockwise=clockwise)
-    now = fly(flown, velocity, 1.0)
-    begin = flown.pose
-    side = -1.0 if clockwise else 1.0
-    middle = (
-        begin.x - side * 0.5 * math.sin(begin.yaw),
-        begin.y + side * 0.5 * math.cos(begin.yaw),
-    )
-    period = 2.0 * math.pi * 0.5 / 0.3
-    quarter = fly(flown, velocity, period / 4.0, now)
-    turned = math.remainder(flown.pose.yaw - begin.yaw, 2.0 * math.pi)
-    assert turned == pytest.approx(side * math.pi / 2.0, abs=0.02)
-    for _ in range(3):
-        assert math.dist((flown.pose.x, flown.pose.y), middle) == pytest.approx(0.5, abs=1e-3)
-        quarter = fly(flown, velocity, period / 4.0, quarter)
-    assert (flown.pose.x, flown.pose.y) == pytest.approx((begin.x, begin.y), abs=0.03)
 
 
 @given(SPEED, SPEED, SPEED, SPEED)

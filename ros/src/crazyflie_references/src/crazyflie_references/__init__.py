@@ -1,0 +1,1 @@
+"""References for controllers, from velocities."""

@@ -7,7 +7,11 @@ from std_srvs.srv import Empty, EmptyResponse
 from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState
 from crazyflie_model.angles import quaternion_from_rpy
-from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+    VehicleStatus,
+)
 from crazyflie_utils import ServiceError
 from crazyflie_utils.tf.poses import StampedPose
 
@@ -76,7 +80,7 @@ class Driven:
         self._handle = handle = process.handle(f"/{name}/driver")
         self._pose = handle.publisher("pose", PoseStamped)
         self._broadcast = handle.broadcast_poses()
-        self._status = handle.publisher("status", String, latch=True)
+        self._status = handle.publisher("vehicle_status", VehicleStatus, latch=True)
         for service, service_type in (
             ("takeoff", srv.Takeoff),
             ("land", srv.Land),
@@ -92,8 +96,16 @@ class Driven:
         handle.timer(0.05, self._on_timer)
 
     def tell(self, status):
-        """Say how the vehicle is."""
-        self._status.publish(String(status))
+        """Publish the vehicle's status: "flying", "ready" or "lost", and anything more."""
+        flies, lost = status.startswith("flying"), status.startswith("lost")
+        self._status.publish(
+            VehicleStatus(
+                link=VehicleStatus.LOST if lost else VehicleStatus.CONNECTED,
+                has_supervisor=not lost,
+                supervisor=VehicleStatus.FLYING if flies else VehicleStatus.ARMED,
+                text=status,
+            )
+        )
 
     def called(self):
         """Return the names of the services that were called."""

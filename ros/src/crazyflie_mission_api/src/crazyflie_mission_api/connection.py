@@ -19,7 +19,7 @@ from crazyflie_mission_api.starter import Starter
 from crazyflie_mission_api.stream import SetpointStream
 from crazyflie_mission_api.trajectories import Pieces
 from crazyflie_model.angles import Triple
-from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped, VehicleStatus
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
 from crazyflie_utils.parameters.types import FINITE
 
@@ -35,8 +35,8 @@ MAX_POSITION_AGE = 0.5
 _ON_GROUND = 0.1
 """Height above where it stood at which a vehicle has landed, m."""
 
-_READY = "ready"
-"""How the status of the driver begins when the vehicle's supervisor says that it does not fly."""
+_FAULTS = VehicleStatus.TUMBLED | VehicleStatus.LOCKED | VehicleStatus.CRASHED
+"""States of the supervisor in which a vehicle cannot fly."""
 
 _SETTLING = 0.5
 """After a landing should be at its end, s."""
@@ -95,6 +95,7 @@ class RosVehicle:
         self._ground = 0.0
         self._landing_end = 0.0
         self._status = ""
+        self._driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
         self._flight_state = ""
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
@@ -102,7 +103,7 @@ class RosVehicle:
         self._lookup = None if frames is None else partial(handle.listen_to_poses(), *frames)
         if is_driven:
             handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
-            handle.subscribe(f"{top}/status", String, self._on_status)
+            handle.subscribe(f"{top}/vehicle_status", VehicleStatus, self._on_driver_status)
             frame = "" if frames is None else frames[0]
             self._stream = SetpointStream(handle, f"{top}/cmd_full_state", frame, self._hold)
         else:
@@ -147,8 +148,10 @@ class RosVehicle:
     def trouble(self) -> str:
         """Return why it cannot fly on; an empty text when it can."""
         if self._stream is not None:
-            bad = ("lost", "cannot fly", "emergency", "disconnected")
-            return self._status if self._status.startswith(bad) else self._stream.fault()
+            status = self._driver_status
+            is_cut_off = status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
+            is_bad = is_cut_off or status.is_emergency or status.supervisor & _FAULTS
+            return status.text if is_bad else self._stream.fault()
         if self._flight_state in ("on_ground", "landing", "descending"):
             return f"it does not fly any more: {self._status or self._flight_state}"
         return ""
@@ -159,7 +162,13 @@ class RosVehicle:
             return self._flight_state == "on_ground"
         place = self.position()
         if place is None:
-            is_down = self._status.startswith(_READY)
+            status = self._driver_status
+            is_down = (
+                status.link == VehicleStatus.CONNECTED
+                and status.has_supervisor
+                and not status.is_emergency
+                and not status.supervisor & (_FAULTS | VehicleStatus.FLYING)
+            )
         else:
             is_down = place[2] < self._ground + _ON_GROUND
         # Whoever is told then stops the motors: not on the last centimetres.
@@ -176,6 +185,9 @@ class RosVehicle:
 
     def _on_status(self, message):
         self._status = message.data
+
+    def _on_driver_status(self, message):
+        self._driver_status = message
 
     def _on_flight_state(self, message):
         self._flight_state = message.data

@@ -4,6 +4,7 @@ import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future
+from dataclasses import dataclass, field
 
 from crazyflie_driver.delivery import Delivery
 from crazyflie_driver.jobs import Jobs
@@ -53,23 +54,9 @@ def connect_within(
         sleep(PAUSE)
 
 
+@dataclass(eq=False)
 class Connection:
     """Connect to a vehicle once, follow its link, and end the connection.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-        Of the server.
-    own : NodeHandle
-        Of the vehicle; is closed in the end.
-    name : str
-        Of the vehicle, for messages.
-    crazyflie : crazyflie_link.Crazyflie
-    gate : SetpointGate
-    jobs : Jobs
-    delivery : Delivery
-    publish : callable
-        ``publish()`` publishes the vehicle's status.
 
     Attributes
     ----------
@@ -81,31 +68,24 @@ class Connection:
         Whether the vehicle has been connected, and its topics and services are there.
     """
 
-    def __init__(
-        self,
-        handle: NodeHandle,
-        own: NodeHandle,
-        name: str,
-        crazyflie: Crazyflie,
-        gate: SetpointGate,
-        jobs: Jobs,
-        delivery: Delivery,
-        publish: Callable[[], None],
-    ):
-        self.text = f"connecting to {crazyflie.address.uri}"
-        self.is_leaving = False
-        self.is_established = False
-        self._handle = handle
-        self._own = own
-        self._name = name
-        self._crazyflie = crazyflie
-        self._gate = gate
-        self._jobs = jobs
-        self._delivery = delivery
-        self._publish = publish
-        # Held while topics and services are announced, or taken down.
-        self._announcing = threading.Lock()
-        self._connection_count = 0
+    # Of the server, and of the vehicle; the second one is closed in the end.
+    _handle: NodeHandle
+    _own: NodeHandle
+    _name: str
+    _crazyflie: Crazyflie
+    _gate: SetpointGate
+    _jobs: Jobs
+    _delivery: Delivery
+    _publish: Callable[[], None]
+    text: str = field(init=False)
+    is_leaving: bool = False
+    is_established: bool = False
+    # Held while topics and services are announced, or taken down.
+    _announcing: threading.Lock = field(default_factory=threading.Lock)
+    _connection_count: int = 0
+
+    def __post_init__(self) -> None:
+        self.text = f"connecting to {self._crazyflie.address.uri}"
 
     def connect(
         self, limit: float, prepare: Callable[[], None], announce: Callable[[], None]

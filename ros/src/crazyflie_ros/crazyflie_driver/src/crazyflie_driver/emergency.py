@@ -1,6 +1,7 @@
 """The emergency stop of a vehicle, latched until it is removed."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from crazyflie_driver.jobs import Jobs
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
@@ -8,29 +9,14 @@ from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_utils import ServiceError
 
 
+@dataclass(eq=False)
 class Emergency:
-    """Stop a vehicle's motors for good, and refuse what would start them again.
+    """Stop a vehicle's motors for good, and refuse what would start them again."""
 
-    Parameters
-    ----------
-    crazyflie : crazyflie_link.Crazyflie
-    gate : SetpointGate
-    jobs : Jobs
-    on_latched : callable
-        ``on_latched()`` is called once the stop is on its way.
-    """
-
-    def __init__(
-        self,
-        crazyflie: Crazyflie,
-        gate: SetpointGate,
-        jobs: Jobs,
-        on_latched: Callable[[], None],
-    ):
-        self._crazyflie = crazyflie
-        self._gate = gate
-        self._jobs = jobs
-        self._on_latched = on_latched
+    _crazyflie: Crazyflie
+    _gate: SetpointGate
+    _jobs: Jobs
+    _on_latched: Callable[[], None]
 
     @property
     def is_latched(self) -> bool:

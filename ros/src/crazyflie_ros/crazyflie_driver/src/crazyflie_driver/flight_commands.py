@@ -3,6 +3,7 @@
 import contextlib
 import time
 from concurrent.futures import Future
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from crazyflie_driver.battery import Battery, Charge
@@ -34,54 +35,29 @@ _REARMING = 0.5
 landing (0.16 s) and every 30 s on the ground (0.08 s)."""
 
 
+@dataclass(eq=False)
 class FlightCommands:
     """Send a vehicle high-level commands.
 
     In flight the firmware stops its motors at the notice that setpoints stop, unless a command
     follows at once: so the notice is sent together with the command, which was checked before.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    name : str
-        Of the vehicle, for messages.
-    crazyflie : crazyflie_link.Crazyflie
-    setpoints : SetpointTopics
-    flight : FlightState
-    battery : Battery
-    emergency : Emergency
-    jobs : Jobs
-    safety : SafetyParameters
     """
 
-    def __init__(
-        self,
-        handle: NodeHandle,
-        name: str,
-        crazyflie: Crazyflie,
-        setpoints: SetpointTopics,
-        flight: FlightState,
-        battery: Battery,
-        emergency: Emergency,
-        jobs: Jobs,
-        safety: SafetyParameters,
-    ):
-        self._handle = handle
-        self._name = name
-        self._crazyflie = crazyflie
-        self._setpoints = setpoints
-        self._gate = setpoints.gate
-        self._flight = flight
-        self._battery = battery
-        self._emergency = emergency
-        self._jobs = jobs
-        self._safety = safety
-        # How long the last setpoint shall count, ms, in a notice that has not been sent yet.
-        self._pending_notify: int | None = None
-        self._notify_timer: Timer | None = None
-        self._feeds_watchdog = False
-        # By what has begun them.
-        self._landings: dict[str, Future[None]] = {}
+    _handle: NodeHandle
+    _name: str
+    _crazyflie: Crazyflie
+    _setpoints: SetpointTopics
+    _flight: FlightState
+    _battery: Battery
+    _emergency: Emergency
+    _jobs: Jobs
+    _safety: SafetyParameters
+    # How long the last setpoint shall count, ms, in a notice that has not been sent yet.
+    _pending_notify: int | None = None
+    _notify_timer: Timer | None = None
+    _feeds_watchdog: bool = False
+    # By what has begun them.
+    _landings: dict[str, Future[None]] = field(default_factory=dict)
 
     @property
     def is_high_level_flight_active(self) -> bool:
@@ -233,19 +209,19 @@ class FlightCommands:
 
     def _execute(self, command, job):
         job.check()
-        number = self._gate.high_level(self._handle.time())
+        number = self._setpoints.gate.high_level(self._handle.time())
         high_level = self._crazyflie.high_level
         try:
             _send(command, high_level.guarded(lambda: self._prepare_sending(command, job)))
         except CrazyflieError:
-            self._gate.resume(number)
+            self._setpoints.gate.resume(number)
             job.check()
             raise
         self._setpoints.high_level_until(self._handle.time() + command.duration)
         if command.ends_flight:
             self._flight.end_accepted(command.duration)
         else:
-            self._gate.handle(Event.FLIGHT_CALLED)
+            self._setpoints.gate.handle(Event.FLIGHT_CALLED)
             self._feeds_watchdog = True
 
     def _prepare_sending(self, command, job):

@@ -1,6 +1,7 @@
 """Whether a vehicle flies, and by its high-level commander."""
 
 import math
+from dataclasses import dataclass
 
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.setpoint_topics import SetpointTopics
@@ -19,31 +20,22 @@ _LOGGED_STATE_LIMIT = 1.0
 """Time limit of log data with the state, s; they come every 0.1 s."""
 
 
+@dataclass(eq=False)
 class FlightState:
     """Tell flights by the high-level commander from all else that has FLYING in it.
 
     FLYING holds until 2 s after the motors have stopped, and a landing that is commanded then
     starts them again: a flight needs HIGH_LEVEL_ACTIVE, too. Of firmware that does not report it
-    (before protocol 12), what was sent last decides.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-        For the time.
-    crazyflie : crazyflie_link.Crazyflie
-    log : LogTopics
-    setpoints : SetpointTopics
+    (before protocol 12), what was sent last decides: when the planner was commanded to move, and
+    when it holds the motors off.
     """
 
-    def __init__(
-        self, handle: NodeHandle, crazyflie: Crazyflie, log: LogTopics, setpoints: SetpointTopics
-    ):
-        self._time = handle.time
-        self._crazyflie = crazyflie
-        self._log = log
-        self._setpoints = setpoints
-        # When the planner was commanded to move, and when it holds the motors off.
-        self._planned, self._plan_end = -math.inf, math.inf
+    _handle: NodeHandle
+    _crazyflie: Crazyflie
+    _log: LogTopics
+    _setpoints: SetpointTopics
+    _planned: float = -math.inf
+    _plan_end: float = math.inf
 
     @property
     def supervisor(self) -> SupervisorState | None:
@@ -73,11 +65,11 @@ class FlightState:
 
     def motion_sent(self) -> None:
         """Take note that the planner is commanded to move."""
-        self._planned, self._plan_end = self._time(), math.inf
+        self._planned, self._plan_end = self._handle.time(), math.inf
 
     def end_accepted(self, duration: float) -> None:
         """Take note that the planner holds the motors off after a duration (s)."""
-        self._plan_end = self._time() + duration
+        self._plan_end = self._handle.time() + duration
 
     def is_high_level(self, state: SupervisorState | None) -> bool:
         """Return whether a state, None if unknown, is a flight by the high-level commander."""
@@ -93,7 +85,7 @@ class FlightState:
         state = self.read()
         is_streamed = self._setpoints.runs_motors
         latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)
-        if state is None or self._time() - latest < _REPORT_LAG:
+        if state is None or self._handle.time() - latest < _REPORT_LAG:
             return False
         return not (self._may_move(state) or (is_streamed and SupervisorState.FLYING in state))
 
@@ -102,4 +94,4 @@ class FlightState:
         if state.reports_planner:
             return SupervisorState.HIGH_LEVEL_ACTIVE in state
         is_latest = self._planned >= self._setpoints.last_time
-        return is_latest and self._time() < self._plan_end
+        return is_latest and self._handle.time() < self._plan_end

@@ -1,6 +1,7 @@
 """Services of one vehicle."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
@@ -14,7 +15,6 @@ from crazyflie_driver.jobs import Jobs
 from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.service_names import ServiceNames
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
-from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_link.high_level import HighLevel
@@ -48,6 +48,7 @@ _COMMANDS: dict[str, tuple[type, Callable[[HighLevel, Any], None]]] = {
 """High-level command -> type of its service, and what sends it."""
 
 
+@dataclass(eq=False)
 class VehicleServices:
     """Announce a vehicle's services and carry them out.
 
@@ -60,28 +61,16 @@ class VehicleServices:
         Where they are.
     """
 
-    def __init__(
-        self,
-        handle: NodeHandle,
-        parameters: VehicleParameters,
-        crazyflie: Crazyflie,
-        jobs: Jobs,
-        gate: SetpointGate,
-        flight: FlightState,
-        commands: FlightCommands,
-        emergency: Emergency,
-        mirror: ParameterMirror,
-    ):
-        self.names = ServiceNames(handle, parameters.prefix)
-        self._handle = handle
-        self._name = parameters.name
-        self._crazyflie = crazyflie
-        self._jobs = jobs
-        self._gate = gate
-        self._flight = flight
-        self._commands = commands
-        self._emergency = emergency
-        self._mirror = mirror
+    _handle: NodeHandle
+    _name: str
+    names: ServiceNames
+    _crazyflie: Crazyflie
+    _jobs: Jobs
+    _gate: SetpointGate
+    _flight: FlightState
+    _commands: FlightCommands
+    _emergency: Emergency
+    _mirror: ParameterMirror
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has."""

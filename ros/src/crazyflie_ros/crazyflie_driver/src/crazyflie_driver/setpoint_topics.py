@@ -4,6 +4,7 @@ import contextlib
 import enum
 import math
 from collections import deque
+from dataclasses import dataclass, field
 from functools import partial
 
 from geometry_msgs.msg import Twist
@@ -38,22 +39,13 @@ class Control(enum.Enum):
     REFERENCE = enum.auto()
 
 
+@dataclass(eq=False)
 class SetpointTopics:
     """Subscribe to a vehicle's setpoints and pass them on, as long as that is allowed.
 
     Nothing is repeated or made up: when messages stop coming, the firmware's own
     watchdogs act, after 0.5 s and 2 s. But when the last one had the motors stand still,
     "setpoints stop" is sent: otherwise the vehicle would be locked 2 s later.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    parameters : VehicleParameters
-    crazyflie : crazyflie_link.Crazyflie
-    log : LogTopics
-        Knows whether the vehicle is armed, and where it is.
-    gate : SetpointGate
-        Whether setpoints are passed on.
 
     Attributes
     ----------
@@ -64,27 +56,19 @@ class SetpointTopics:
         Setpoints that were not sent.
     """
 
-    def __init__(
-        self,
-        handle: NodeHandle,
-        parameters: VehicleParameters,
-        crazyflie: Crazyflie,
-        log: LogTopics,
-        gate: SetpointGate,
-    ):
-        self.control = Control.HIGH_LEVEL
-        self.ignored = 0
-        self.gate = gate
-        self._handle = handle
-        self._parameters = parameters
-        self._crazyflie = crazyflie
-        self._log = log
-        self._times: deque[float] = deque(maxlen=1000)
-        self._high_level_end: float | None = None
-        self._topic = ""
-        self._external_time: float | None = None
-        self._lift = LiftWatch()
-        self._commanded_yaw: float | None = None
+    _handle: NodeHandle
+    _parameters: VehicleParameters
+    _crazyflie: Crazyflie
+    _log: LogTopics
+    gate: SetpointGate
+    control: Control = Control.HIGH_LEVEL
+    ignored: int = 0
+    _times: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
+    _high_level_end: float | None = None
+    _topic: str = ""
+    _external_time: float | None = None
+    _lift: LiftWatch = field(default_factory=LiftWatch)
+    _commanded_yaw: float | None = None
 
     def subscribe(self) -> None:
         """Subscribe to all topics."""

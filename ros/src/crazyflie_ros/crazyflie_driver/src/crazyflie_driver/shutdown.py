@@ -3,6 +3,7 @@
 import contextlib
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from crazyflie_driver.emergency import Emergency
 from crazyflie_driver.flight_state import FlightState
@@ -19,39 +20,20 @@ _REACTION_TIME = 0.3
 """Time after which the vehicle has begun to land, s."""
 
 
+@dataclass(eq=False)
 class Shutdown:
     """Land a vehicle that flies and can land by itself, stop the motors of any other.
 
     The firmware lands without a link, too; zero thrust would stop it in the air: so nothing is sent
     to a vehicle of which neither supervisor nor log tell whether it flies.
-
-    Parameters
-    ----------
-    crazyflie : crazyflie_link.Crazyflie
-    emergency : Emergency
-    flight : FlightState
-    setpoints : SetpointTopics
-    duration : float
-        Of the landing, s.
-    warn : callable
-        ``warn(text)`` is told what the operator should know.
     """
 
-    def __init__(
-        self,
-        crazyflie: Crazyflie,
-        emergency: Emergency,
-        flight: FlightState,
-        setpoints: SetpointTopics,
-        duration: float,
-        warn: Callable[[str], None],
-    ):
-        self._crazyflie = crazyflie
-        self._emergency = emergency
-        self._flight = flight
-        self._setpoints = setpoints
-        self._duration = duration
-        self._warn = warn
+    _crazyflie: Crazyflie
+    _emergency: Emergency
+    _flight: FlightState
+    _setpoints: SetpointTopics
+    _duration: float
+    _warn: Callable[[str], None]
 
     def land_or_stop(self, limit: float) -> str:
         """Return what could not be done, empty if nothing; blocks.

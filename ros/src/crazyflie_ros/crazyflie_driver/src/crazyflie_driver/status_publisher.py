@@ -1,6 +1,7 @@
 """The topics that say what state a vehicle is in, and whether the driver is connected to it."""
 
 import math
+from dataclasses import dataclass
 from typing import Protocol
 
 from std_msgs.msg import Bool, Header, String
@@ -33,47 +34,29 @@ class ConnectionState(Protocol):
     is_established: bool
 
 
+@dataclass(eq=False)
 class StatusPublisher:
-    """Publish the status of a vehicle, in words and typed, and whether it is connected.
+    """Publish the status of a vehicle, in words and typed, and whether it is connected."""
 
-    Parameters
-    ----------
-    handle : NodeHandle
-    prefix : str
-        Absolute namespace of the vehicle; empty for the root.
-    crazyflie : crazyflie_link.Crazyflie
-    log : LogTopics
-    setpoints : SetpointTopics
-    battery : Battery
-    connection : ConnectionState
-    """
+    _handle: NodeHandle
+    _prefix: str
+    _crazyflie: Crazyflie
+    _log: LogTopics
+    _setpoints: SetpointTopics
+    _battery: Battery
+    _connection: ConnectionState
+    _published: tuple[object, ...] = ()
+    _is_connected: bool = False
 
-    def __init__(
-        self,
-        handle: NodeHandle,
-        prefix: str,
-        crazyflie: Crazyflie,
-        log: LogTopics,
-        setpoints: SetpointTopics,
-        battery: Battery,
-        connection: ConnectionState,
-    ):
-        self._handle = handle
-        self._crazyflie = crazyflie
-        self._log = log
-        self._setpoints = setpoints
-        self._gate = setpoints.gate
-        self._battery = battery
-        self._connection = connection
-        self._published: tuple[object, ...] = ()
-        self._is_connected = False
-        self._text = handle.publisher(f"{prefix}/{STATUS_TOPIC}", String, latch=True)
-        self._typed = handle.publisher(
+    def __post_init__(self) -> None:
+        prefix = self._prefix
+        self._text = self._handle.publisher(f"{prefix}/{STATUS_TOPIC}", String, latch=True)
+        self._typed = self._handle.publisher(
             f"{prefix}/{VEHICLE_STATUS_TOPIC}", VehicleStatus, latch=True
         )
-        self._connected = handle.publisher(f"{prefix}/{CONNECTED_TOPIC}", Bool, latch=True)
+        self._connected = self._handle.publisher(f"{prefix}/{CONNECTED_TOPIC}", Bool, latch=True)
         self._connected.publish(Bool(False))
-        handle.timer(PERIOD, self._repeat)
+        self._handle.timer(PERIOD, self._repeat)
 
     def status(self) -> VehicleStatus:
         """Return what is known of the vehicle now."""
@@ -85,7 +68,7 @@ class StatusPublisher:
             link_text=self._connection.text,
             supervisor=int(state or 0),
             has_supervisor=state is not None,
-            is_emergency=self._gate.is_emergency,
+            is_emergency=self._setpoints.gate.is_emergency,
             battery=int(battery.charge),
             battery_voltage=_or_nan(battery.voltage),
             link_quality=math.nan,
@@ -95,7 +78,7 @@ class StatusPublisher:
             is_streamed=self._setpoints.is_streaming,
             setpoint_rate=self._setpoints.rate(),
             setpoints_ignored=self._setpoints.ignored,
-            are_setpoints_blocked=self._gate.is_blocking(self._handle.time()),
+            are_setpoints_blocked=self._setpoints.gate.is_blocking(self._handle.time()),
             restarts=crazyflie.restarts,
         )
         try:

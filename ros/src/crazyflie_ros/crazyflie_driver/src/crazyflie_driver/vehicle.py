@@ -12,6 +12,7 @@ from crazyflie_driver.jobs import Jobs
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
+from crazyflie_driver.service_names import ServiceNames
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
@@ -80,8 +81,9 @@ class DriverVehicle:
             own, name, crazyflie, setpoints, flight, battery, emergency, jobs, server
         )
         self._mirror = mirror = ParameterMirror(own, prefix, crazyflie)
+        self._names = names = ServiceNames(own, prefix)
         self._services = VehicleServices(
-            own, parameters, crazyflie, jobs, gate, flight, self.commands, emergency, mirror
+            own, name, names, crazyflie, jobs, gate, flight, self.commands, emergency, mirror
         )
         duration = server.landing_duration
         self._shutdown = Shutdown(crazyflie, emergency, flight, setpoints, duration, self._warn)
@@ -125,7 +127,7 @@ class DriverVehicle:
         return self._connection.leave(lambda: self._shutdown.land_or_stop(limit))
 
     def _wait_for_controllers(self):
-        self._services.names.wait_for_controllers(lambda: self.is_leaving)
+        self._names.wait_for_controllers(lambda: self.is_leaving)
 
     def _announce(self):
         self._log.start()

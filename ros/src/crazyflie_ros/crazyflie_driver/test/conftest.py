@@ -1,7 +1,7 @@
 """A server with a vehicle with scripted answers, and keeps what it is sent."""
 
 import pytest
-from safety_helpers import FLYING, is_, position, wait_for_words
+from safety_helpers import FLYING, is_, stream_position, wait_for_words
 
 from crazyflie_driver.msg import LogBlock
 from crazyflie_driver.server_node import CrazyflieServerNode
@@ -118,11 +118,19 @@ def shared(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         server = Server()
-        vehicle = server.make_vehicle()
-        server.add(vehicle.uri)
-        vehicle.wait_for_packets(7, 1)
+        add_vehicle(server)
         yield server
         server.close()
+
+
+def add_vehicle(server):
+    """Return a vehicle that was added as cf1, with nothing that it was sent."""
+    vehicle = server.make_vehicle()
+    server.add(vehicle.uri)
+    # What ends the zero thrust after connecting.
+    vehicle.wait_for_packets(7, 1)
+    vehicle.received.clear()
+    return vehicle
 
 
 @pytest.fixture
@@ -140,12 +148,7 @@ def flying(shared):
 @pytest.fixture
 def vehicle(server):
     """Return a vehicle that has been added as cf1, without logging and parameters."""
-    vehicle = server.make_vehicle()
-    server.add(vehicle.uri)
-    # What ends the zeros after connecting.
-    vehicle.wait_for_packets(7, 1)
-    vehicle.received.clear()
-    return vehicle
+    return add_vehicle(server)
 
 
 @pytest.fixture
@@ -153,9 +156,7 @@ def hovering(server, vehicle):
     """Return a server and a vehicle that flies on positions."""
     is_(vehicle, FLYING)
     wait_for_words(server, "flying")
-    position(server)
-    vehicle.wait_for_packets(7, 0)
-    vehicle.received.clear()
+    stream_position(server, vehicle)
     return server, vehicle
 
 

@@ -5,12 +5,20 @@ import math
 import struct
 
 import pytest
-from conftest import Server
 from genpy import Duration
 from geometry_msgs.msg import Point
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from safety_helpers import FLYING, LAND, SETPOINTS_STOP, TAKEOFF, is_, position, wait_for_words
+from safety_helpers import (
+    FLYING,
+    LAND,
+    SETPOINTS_STOP,
+    TAKEOFF,
+    is_,
+    position,
+    stream_position,
+    wait_for_words,
+)
 
 from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
@@ -30,22 +38,16 @@ GROUPS, KNOWN_TRAJECTORY = 0b0101, 7
 
 
 @pytest.fixture(scope="module")
-def streaming(tmp_path_factory):
-    """Return a server and a vehicle that flies on positions, for all tests."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        server = Server()
-        vehicle = server.make_vehicle()
-        server.add(vehicle.uri)
-        vehicle.wait_for_packets(7, 1)
-        server.call("/cf1/set_group_mask", SetGroupMaskRequest(GROUPS))
-        piece = TrajectoryPolynomialPiece(duration=Duration(1))
-        upload = UploadTrajectoryRequest(KNOWN_TRAJECTORY, 0, [piece])
-        server.call("/cf1/upload_trajectory", upload)
-        is_(vehicle, FLYING)
-        wait_for_words(server, "flying")
-        yield server, vehicle
-        server.close()
+def streaming(shared):
+    """Return a server and a vehicle with groups and a trajectory, for all tests."""
+    (vehicle,) = shared.vehicles
+    shared.call("/cf1/set_group_mask", SetGroupMaskRequest(GROUPS))
+    piece = TrajectoryPolynomialPiece(duration=Duration(1))
+    upload = UploadTrajectoryRequest(KNOWN_TRAJECTORY, 0, [piece])
+    shared.call("/cf1/upload_trajectory", upload)
+    is_(vehicle, FLYING)
+    wait_for_words(shared, "flying")
+    return shared, vehicle
 
 
 @pytest.fixture
@@ -61,9 +63,7 @@ def begin(server, vehicle):
     is_(vehicle, FLYING)
     server.process.advance(1.0)
     vehicle.received.clear()
-    position(server)
-    vehicle.wait_for_packets(7, 0)
-    vehicle.received.clear()
+    stream_position(server, vehicle)
 
 
 def assert_flies_on(server, vehicle):
@@ -179,7 +179,7 @@ def test_commands_for_some_groups_are_refused_where_those_of_the_vehicle_are_not
 def test_a_takeoff_with_a_low_battery(flight):
     server, vehicle = flight
     vehicle.log["pm.vbat"] = ("f", 3.1)
-    battery = server.node._vehicles[vehicle.uri]._battery
+    battery = server.node._vehicles[vehicle.uri].battery
     wait_until(battery.words, "the low voltage")
     with pytest.raises(ServiceError, match="battery low"):
         server.call("/cf1/takeoff", TAKEOFF)
@@ -195,12 +195,12 @@ def test_a_vehicle_that_cannot_fly(flight, name, request_):
     server, vehicle = flight
     is_(vehicle, 0x252)
     driven = server.node._vehicles[vehicle.uri]
-    wait_until(lambda: driven.supervisor == 0x252, "the state")
+    wait_until(lambda: driven.flight.supervisor == 0x252, "the state")
     with pytest.raises(ServiceError, match="cannot fly, its state is: armed, flying, locked"):
         server.call(f"/cf1/{name}", request_)
     assert_flies_on(server, vehicle)
     is_(vehicle, FLYING)
-    wait_until(lambda: driven.supervisor == FLYING, "the state")
+    wait_until(lambda: driven.flight.supervisor == FLYING, "the state")
 
 
 @pytest.mark.parametrize("answer", [b"\x08\x00\x00\x10", None])

@@ -1,7 +1,6 @@
 """A vehicle that is left, or handed over from one kind of command to the other."""
 
 import struct
-import threading
 
 import pytest
 from safety_helpers import (
@@ -10,6 +9,8 @@ from safety_helpers import (
     LAND,
     READY,
     TAKEOFF,
+    UNLOCKED,
+    begin_removing,
     commands,
     is_,
     position,
@@ -26,28 +27,24 @@ LIMIT = 60.0
 
 def test_a_vehicle_on_the_ground_is_left_unlocked(server, vehicle):
     server.remove(vehicle.uri)
-    assert commands(vehicle) == [(3, 0)] * 100 + [(7, 1)]
+    assert commands(vehicle) == UNLOCKED
 
 
 def test_zeros_after_connecting_lock_nothing(server):
     vehicle = server.make_vehicle()
     server.add(vehicle.uri)
     vehicle.wait_for_packets(7, 1)
-    assert commands(vehicle) == [(3, 0)] * 100 + [(7, 1)]
+    assert commands(vehicle) == UNLOCKED
 
 
 def test_a_vehicle_that_is_removed_in_flight_lands_first(hovering):
     server, vehicle = hovering
     is_(vehicle, HIGH_LEVEL)
-    begin = threading.Thread(target=server.remove, args=(vehicle.uri,))
-    begin.start()
-    vehicle.wait_for_packets(8, 0)
-    assert commands(vehicle)[:2] == [(7, 1), (8, 0)]
-    assert vehicle.packets(8, 0)[0][0] == 8
+    removing = begin_removing(server, vehicle)
     assert vehicle.packets(3, 0) == []
     is_(vehicle, FLYING)
-    begin.join(LIMIT)
-    assert commands(vehicle) == [(7, 1), (8, 0)] + [(3, 0)] * 100 + [(7, 1)]
+    removing.join(LIMIT)
+    assert commands(vehicle) == [(7, 1), (8, 0), *UNLOCKED]
 
 
 def test_a_landing_outlives_the_server(hovering):
@@ -90,7 +87,7 @@ def test_a_flight_on_thrust_cannot_be_landed_by_the_vehicle(server, vehicle):
     vehicle.wait_for_packets(3, 0)
     vehicle.received.clear()
     server.remove(vehicle.uri)
-    assert commands(vehicle) == [(3, 0)] * 100 + [(7, 1)]
+    assert commands(vehicle) == UNLOCKED
 
 
 def test_a_removal_without_a_link_says_what_it_could_not_do(server, vehicle):

@@ -7,9 +7,11 @@ from safety_helpers import (
     FLYING,
     HIGH_LEVEL,
     READY,
+    UNLOCKED,
+    begin_removing,
     commands,
     is_,
-    position,
+    stream_position,
     thrust,
     wait_for_words,
 )
@@ -27,8 +29,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWar
 
 OLD = 11
 """The last protocol version in which the supervisor cannot be asked for its state."""
-
-UNLOCKED = [(3, 0)] * 100 + [(7, 1)]
 
 
 def make_old_vehicle(server, state=None):
@@ -69,12 +69,8 @@ def test_an_old_vehicle_that_flies_lands_before_its_motors_are_stopped(server):
     vehicle = make_old_vehicle(server, FLYING)
     server.add(vehicle.uri)
     wait_for_words(server, "flying")
-    position(server)
-    vehicle.wait_for_packets(7, 0)
-    vehicle.received.clear()
-    removing = threading.Thread(target=server.remove, args=(vehicle.uri,))
-    removing.start()
-    assert vehicle.wait_for_packets(8, 0)[0][0] == 8
+    stream_position(server, vehicle)
+    removing = begin_removing(server, vehicle)
     is_(vehicle, HIGH_LEVEL)
     # The landing takes its time, in which the state is looked up again and again.
     count = len(vehicle.packets(15, 0))
@@ -130,9 +126,7 @@ def test_the_end_of_the_server_is_a_landing_for_an_old_vehicle(server):
     vehicle = make_old_vehicle(server, FLYING)
     server.add(vehicle.uri)
     wait_for_words(server, "flying")
-    position(server)
-    vehicle.wait_for_packets(7, 0)
-    vehicle.received.clear()
+    stream_position(server, vehicle)
 
     def obey():
         vehicle.wait_for_packets(8, 0)

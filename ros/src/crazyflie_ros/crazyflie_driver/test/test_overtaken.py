@@ -77,7 +77,7 @@ def test_a_hand_over_is_not_sent_without_its_command(hovering):
     vehicle.received.clear()
     go_to = server.process.call("/cf1/go_to", GoToRequest(duration=Duration(1)))
     wait_until(lambda: link._transmit_queue._commands, "the packet")
-    driven._worker.overtake("something else")
+    driven.jobs.supersede("something else")
     free.set()
     with pytest.raises(ServiceError, match="given up for something else"):
         go_to.result(LIMIT)

@@ -1,49 +1,77 @@
-"""Whether a vehicle is flown by its high-level commander."""
+"""Whether a vehicle flies, and by its high-level commander."""
 
 import math
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
+from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import NoReplyError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle
 
-if TYPE_CHECKING:
-    from crazyflie_driver.vehicle import DriverVehicle
+NOT_FLYABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
+"""States in which a vehicle cannot take off."""
 
 _REPORT_LAG = 0.2
 """How old a state may be, s: the firmware's supervisor runs at 25 Hz, and is logged at 10 Hz."""
 
+_LOGGED_STATE_LIMIT = 1.0
+"""Time limit of log data with the state, s; they come every 0.1 s."""
 
+
+@dataclass(eq=False)
 class FlightState:
     """Tell flights by the high-level commander from all else that has FLYING in it.
 
     FLYING holds until 2 s after the motors have stopped, and a landing that is commanded then
     starts them again: a flight needs HIGH_LEVEL_ACTIVE, too. Of firmware that does not report it
-    (before protocol 12), what was sent last decides.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    vehicle : DriverVehicle
-    setpoints : SetpointTopics
+    (before protocol 12), what was sent last decides: when the planner was commanded to move, and
+    when it holds the motors off.
     """
 
-    def __init__(self, handle: NodeHandle, vehicle: "DriverVehicle", setpoints: SetpointTopics):
-        self._handle = handle
-        self._vehicle = vehicle
-        self._setpoints = setpoints
-        # When the planner was last told to move, and when it holds the motors off.
-        self._planned, self._plan_end = -math.inf, math.inf
+    _handle: NodeHandle
+    _crazyflie: Crazyflie
+    _log: LogTopics
+    _setpoints: SetpointTopics
+    _planned: float = -math.inf
+    _plan_end: float = math.inf
+
+    @property
+    def supervisor(self) -> SupervisorState | None:
+        """The state that was logged last; None if none was on the present link."""
+        return self._log.supervisor
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether the vehicle logs that it flies; so it does for 2 s after a landing."""
+        state = self.supervisor
+        return state is not None and SupervisorState.FLYING in state
+
+    def read(self) -> SupervisorState | None:
+        """Return the state, from supervisor or log; None if neither reports it; blocks.
+
+        Before protocol 12 the supervisor cannot be asked; very old firmware does not log it either.
+
+        Raises
+        ------
+        LinkLostError
+        """
+        try:
+            state = self._crazyflie.supervisor.read()
+        except NoReplyError:
+            state = None
+        return self._log.next_state(_LOGGED_STATE_LIMIT) if state is None else state
 
     def motion_sent(self) -> None:
-        """Take note that the planner is told to move."""
+        """Take note that the planner is commanded to move."""
         self._planned, self._plan_end = self._handle.time(), math.inf
 
     def end_accepted(self, duration: float) -> None:
         """Take note that the planner holds the motors off after a duration (s)."""
         self._plan_end = self._handle.time() + duration
 
-    def is_flight(self, state: SupervisorState | None) -> bool:
+    def is_high_level(self, state: SupervisorState | None) -> bool:
         """Return whether a state, None if unknown, is a flight by the high-level commander."""
         return state is not None and SupervisorState.FLYING in state and self._may_move(state)
 
@@ -54,8 +82,8 @@ class FlightState:
         ------
         LinkLostError
         """
-        state = self._vehicle.read_state()
-        is_streamed = self._setpoints.is_flight
+        state = self.read()
+        is_streamed = self._setpoints.runs_motors
         latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)
         if state is None or self._handle.time() - latest < _REPORT_LAG:
             return False

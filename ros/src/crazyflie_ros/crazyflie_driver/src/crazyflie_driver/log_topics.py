@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import genpy
 from std_msgs.msg import Float32, Header
@@ -38,20 +39,9 @@ _OWN_PORTS = frozenset({0, 2, 4, 5, 8, 9, 15})
 comes from there is for the driver."""
 
 
+@dataclass(eq=False)
 class LogTopics:
     """Have a vehicle send log blocks and publish them.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    parameters : VehicleParameters
-    crazyflie : crazyflie_link.Crazyflie
-    delivery : Delivery
-        Has the messages published in their turn.
-    fixed_frame : str
-        Frame of the pose.
-    on_status : callable
-        ``on_status()`` is called whenever voltage and state have come.
 
     Attributes
     ----------
@@ -63,31 +53,22 @@ class LogTopics:
         Latest state; None until it has come on the present link.
     """
 
-    def __init__(
-        self,
-        handle: NodeHandle,
-        parameters: VehicleParameters,
-        crazyflie: Crazyflie,
-        delivery: Delivery,
-        fixed_frame: str,
-        on_status: Callable[[], None],
-    ):
-        self.voltage: float | None = None
-        self.rssi: float | None = None
-        self.height: float | None = None
-        self.vertical_speed: float | None = None
-        self.heading: float | None = None
-        self.supervisor: SupervisorState | None = None
-        self._handle = handle
-        self._parameters = parameters
-        self._crazyflie = crazyflie
-        self._delivery = delivery
-        self._fixed_frame = fixed_frame
-        self._on_status = on_status
-        self._packets: Publisher | None = None
-        self._logs_state = False
-        self._states = 0
-        self._state_came = threading.Condition()
+    _handle: NodeHandle
+    _parameters: VehicleParameters
+    _crazyflie: Crazyflie
+    _delivery: Delivery
+    _fixed_frame: str
+    _on_status: Callable[[], None]
+    voltage: float | None = None
+    rssi: float | None = None
+    height: float | None = None
+    vertical_speed: float | None = None
+    heading: float | None = None
+    supervisor: SupervisorState | None = None
+    _packets: Publisher | None = None
+    _logs_state: bool = False
+    _states: int = 0
+    _state_came: threading.Condition = field(default_factory=threading.Condition)
 
     def start(self) -> None:
         """Announce the topics and start the log blocks; blocks.

@@ -1,5 +1,7 @@
 """Firmware parameters as ROS parameters, PREFIX/GROUP/NAME."""
 
+from dataclasses import dataclass, field
+
 from typing_extensions import override
 
 from crazyflie_link.crazyflie import Crazyflie
@@ -13,24 +15,16 @@ _COMMANDS = ("kalman.resetEstimation",)
 """Parameters that do something once instead of keeping a value: not for a vehicle in the air."""
 
 
+@dataclass(eq=False)
 class ParameterMirror:
-    """Copy the firmware's parameters to ROS, and back on demand; all methods block.
+    """Copy the firmware's parameters to ROS, and back on demand; all methods block."""
 
-    Parameters
-    ----------
-    handle : NodeHandle
-    prefix : str
-        Namespace of the vehicle.
-    crazyflie : crazyflie_link.Crazyflie
-    """
+    _handle: NodeHandle
+    _prefix: str
+    _crazyflie: Crazyflie
+    _written: dict[str, int | float] = field(default_factory=dict)
 
-    def __init__(self, handle: NodeHandle, prefix: str, crazyflie: Crazyflie):
-        self._handle = handle
-        self._prefix = prefix
-        self._crazyflie = crazyflie
-        self._written: dict[str, int | float] = {}
-
-    def write_again(self) -> list[str]:
+    def reapply_parameters(self) -> list[str]:
         """Write what `write` has written since the start: a vehicle that was off has forgotten it.
 
         Returns

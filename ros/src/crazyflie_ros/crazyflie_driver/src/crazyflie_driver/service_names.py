@@ -7,6 +7,7 @@ has services takeoff and land as well.
 
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from typing_extensions import override
 
@@ -23,19 +24,12 @@ _SHARED = {"takeoff", "land"}
 """What controllers call their services, unless they are remapped."""
 
 
+@dataclass(eq=False)
 class ServiceNames:
-    """Find names for a vehicle's services; all methods block.
+    """Find names for a vehicle's services; all methods block."""
 
-    Parameters
-    ----------
-    handle : NodeHandle
-    prefix : str
-        Absolute namespace of the vehicle; empty for the root.
-    """
-
-    def __init__(self, handle: NodeHandle, prefix: str):
-        self._handle = handle
-        self._prefix = prefix
+    _handle: NodeHandle
+    _prefix: str
 
     def wait_for_controllers(self, is_over: Callable[[], bool]) -> None:
         """Wait for the services of controllers that are about to come.

@@ -46,19 +46,19 @@ def check_private_names(names: Iterable[str] = PRIVATE_NAMES) -> None:
         if not hasattr(owner, attribute) and attribute not in set_there:
             raise ImportError(
                 f"cflib has no {name.replace(':', '.')}, which crazyflie_link uses: install the "
-                f"version it was tested with, cflib=={pinned_version()}"
+                f"version it was tested with, {pinned_version()}"
             )
 
 
 def pinned_version() -> str:
-    """Return cflib's version in ros/requirements.txt, which an installed workspace has, too."""
+    """Return the version in ros/requirements.txt, such as "cflib==0.1.34"."""
     for folder in Path(__file__).resolve().parents:
-        for file in (folder, folder / "share" / "crazyflie_link"):
-            with contextlib.suppress(OSError):
-                text = (file / "requirements.txt").read_text(encoding="utf-8")
-                if found := re.search(r"^cflib==([\w.]+)", text, re.MULTILINE):
-                    return found[1]
-    return "(see ros/requirements.txt)"
+        with contextlib.suppress(OSError):
+            text = (folder / "requirements.txt").read_text(encoding="utf-8")
+            if found := re.search(r"^cflib==[\w.]+", text, re.MULTILINE):
+                return found[0]
+    # In an installed workspace.
+    return "cflib of the workspace's ros/requirements.txt"
 
 
 def forget_dead_radios() -> None:

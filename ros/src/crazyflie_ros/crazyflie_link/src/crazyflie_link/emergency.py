@@ -3,6 +3,7 @@
 import contextlib
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from cflib.crazyflie.localization import Localization
 from cflib.crazyflie.supervisor import (
@@ -39,28 +40,23 @@ _OLD_STOP = packet(
 _ASK_STATE = packet(CRTPPort.SUPERVISOR, SUPERVISOR_CH_INFO, bytes([CMD_GET_STATE_BITFIELD]))
 
 
+@dataclass(eq=False)
 class EmergencyStop:
     """Stop the motors, on the present link and on every later one.
 
     It is sent until the supervisor says that it is locked; to firmware that cannot say so, a few
     times while the vehicle is heard.
-
-    Parameters
-    ----------
-    any_link : callable
-        Returns the `Link` on which something can be sent, also one that is silent or still being
-        opened; None if there is none.
     """
 
-    def __init__(self, any_link: Callable[[], Link | None]):
-        self._any_link = any_link
-        self._closed = threading.Event()
-        self._changed = threading.Condition()
-        self._thread: threading.Thread | None = None
-        self._link: Link | None = None
-        self._heard = False
-        self._repeats = 0
-        self._is_obeyed = False
+    # Returns the link on which something can be sent, also if it is silent or being opened.
+    _any_link: Callable[[], Link | None]
+    _closed: threading.Event = field(default_factory=threading.Event)
+    _changed: threading.Condition = field(default_factory=threading.Condition)
+    _thread: threading.Thread | None = None
+    _link: Link | None = None
+    _heard: bool = False
+    _repeats: int = 0
+    _is_obeyed: bool = False
 
     @property
     def is_requested(self) -> bool:

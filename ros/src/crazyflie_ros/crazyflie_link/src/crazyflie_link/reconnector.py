@@ -4,6 +4,7 @@ import enum
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_link.link import Link
@@ -34,24 +35,13 @@ class LinkState(enum.Enum):
     LOST = "lost"
 
 
+@dataclass(eq=False)
 class Reconnector:
     """Keep a link to a vehicle; the first `connect` succeeds or raises.
 
-    Parameters
-    ----------
-    uri : str
-        For messages.
-    make_link : callable
-        Returns a new `Link`, which is not open.
-    restore : callable
-        ``restore()`` does on a link that was opened anew what the vehicle has forgotten; returns
-        what it could not do, or raises `CrazyflieError`.
-    is_urgent : callable
-        Whether to connect again without pauses.
-    on_state : callable, optional
-        See `Crazyflie`.
-    is_persistent : bool
-        Whether to connect again at all.
+    ``make_link()`` returns a new `Link`; ``restore()`` does on one that was opened anew what the
+    vehicle has forgotten, and returns what it could not do; ``is_urgent()`` tells whether to
+    connect again without pauses.
 
     Attributes
     ----------
@@ -62,31 +52,22 @@ class Reconnector:
         How many times the link has been set up.
     """
 
-    def __init__(
-        self,
-        uri: str,
-        make_link: Callable[[], Link],
-        restore: Callable[[], str],
-        is_urgent: Callable[[], bool],
-        on_state: Callable[[LinkState, str], None] | None,
-        is_persistent: bool,
-    ):
-        self.state = LinkState.DISCONNECTED
-        self.opening: Link | None = None
-        self.connection_count = 0
-        self._uri = uri
-        self._make_link = make_link
-        self._restore = restore
-        self._is_urgent = is_urgent
-        self._on_state = on_state
-        self._is_persistent = is_persistent
-        self._link: Link | None = None
-        self._silent_since: float | None = None
-        self._reason = "not connected yet"
-        self._announced: tuple[LinkState, str] | None = None
-        self._closed = threading.Event()
-        self._closing: threading.Thread | None = None
-        self._watcher: threading.Thread | None = None
+    _uri: str
+    _make_link: Callable[[], Link]
+    _restore: Callable[[], str]
+    _is_urgent: Callable[[], bool]
+    _on_state: Callable[[LinkState, str], None] | None
+    _is_persistent: bool
+    state: LinkState = LinkState.DISCONNECTED
+    opening: Link | None = None
+    connection_count: int = 0
+    _link: Link | None = None
+    _silent_since: float | None = None
+    _reason: str = "not connected yet"
+    _announced: tuple[LinkState, str] | None = None
+    _closed: threading.Event = field(default_factory=threading.Event)
+    _closing: threading.Thread | None = None
+    _watcher: threading.Thread | None = None
 
     def connect(self) -> None:
         """Connect for the first time; see `Crazyflie.connect`."""

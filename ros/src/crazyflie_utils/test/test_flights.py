@@ -18,7 +18,7 @@ def process():
 @pytest.fixture
 def flights(process):
     """Return the flights that a node of the process is needed for."""
-    return Flights(process, ["/cf/sensors/instrument"])
+    return Flights(process.topics, ["/cf/sensors/instrument"])
 
 
 def told(process):

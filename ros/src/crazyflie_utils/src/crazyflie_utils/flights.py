@@ -1,15 +1,11 @@
 """Which vehicles are in flight: what a process must know before it ends."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from std_msgs.msg import String
 
-if TYPE_CHECKING:
-    from crazyflie_utils.process import Process
+from crazyflie_utils.topics import Topics
 
 TOPIC = "/flights"
 """Where whoever starts and ends flights tells of them, latched."""
@@ -29,14 +25,15 @@ class Announcement:
 
     Parameters
     ----------
-    process : Process
+    topics : Topics
+        Of the process.
     node : str
     """
 
-    def __init__(self, process: Process, node: str):
+    def __init__(self, topics: Topics, node: str):
         self.node = node
         self.in_flight = False
-        self._publisher = process.topics.publisher(TOPIC, String, latch=True)
+        self._publisher = topics.publisher(TOPIC, String, latch=True)
 
     def tell(self, in_flight: bool) -> None:
         """Tell whether there is a flight."""
@@ -62,16 +59,17 @@ class Flights:
 
     Parameters
     ----------
-    process : Process
+    topics : Topics
+        Of the process.
     nodes : iterable of str
         Absolute names.
     """
 
-    def __init__(self, process: Process, nodes: Iterable[str]):
+    def __init__(self, topics: Topics, nodes: Iterable[str]):
         self._namespaces = [_namespace(node) for node in nodes]
         self._in_flight: dict[str, bool] = {}
         self._to_end_since: dict[str, float] = {}
-        process.topics.subscribe(TOPIC, String, self._note)
+        topics.subscribe(TOPIC, String, self._note)
 
     @property
     def in_flight(self) -> list[str]:

@@ -6,9 +6,11 @@ from functools import partial
 from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
+from crazyflie_utils.clock_source import ClockSource
 from crazyflie_utils.executor import Executor
 from crazyflie_utils.flights import Announcement
 from crazyflie_utils.handle import NodeHandle
+from crazyflie_utils.log import NodeLog
 from crazyflie_utils.node import Node
 from crazyflie_utils.tf.transforms import AHEAD, SIMULATED_AHEAD, Transforms
 from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
@@ -40,12 +42,13 @@ class Process:
             self.clock.nanoseconds,
             SIMULATED_AHEAD if use_sim_time else AHEAD,
         )
-        self._log = NodeHandle(self, "/tf")
+        self._tf_log = NodeLog(transport, "/tf")
         self._steady_clock = SteadyClock()
         # The poses of vehicles that are simulated in one tick are one message.
         tf = self.transforms.gather, self.transforms.send_gathered
         self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
         self._simulated = TimerQueue(self.executor, *tf)
+        self.clock_source = ClockSource(transport, self.topics, self.clock, self._simulated)
         self._announcements: list[Announcement] = []
         self.exit_status: int | None = None
         if isinstance(self.clock, SimulatedClock):
@@ -67,7 +70,7 @@ class Process:
 
     def announce_flights(self, node: str) -> Announcement:
         """Return what tells every process of the flights of a node, named absolutely."""
-        announcement = Announcement(self, node)
+        announcement = Announcement(self.topics, node)
         self._announcements.append(announcement)
         return announcement
 
@@ -149,4 +152,4 @@ class Process:
         self._simulated.run_due(now)
 
     def _warn_about_transform(self, text, key):
-        self._log.warn(text, throttle=1.0, key=key)
+        self._tf_log.warn(text, throttle=1.0, key=key)

@@ -212,6 +212,41 @@ class TimerQueue:
         return due
 
 
+class VaryingTimer:
+    """A timer whose period can change; see `NodeHandle.varying_timer`.
+
+    Parameters
+    ----------
+    add_timer : callable
+        See `ProcessContext.add_timer`.
+    work : callable
+    period : float
+        s.
+    """
+
+    def __init__(self, add_timer: Callable[..., Timer], work: Callable[[], None], period: float):
+        self._add_timer = add_timer
+        self._work = work
+        self._period = period
+        self._timer = add_timer(period, work)
+        self._is_stopped = False
+
+    def set_period(self, period: float) -> None:
+        """If it is another one than before, be due at most one period, s, from now, and so on.
+
+        Then many timers with the same period are due at different moments.
+        """
+        if period != self._period and not self._is_stopped:
+            self._period = period
+            self._timer.stop()
+            self._timer = self._add_timer(period, self._work, is_spread=True, may_be_early=True)
+
+    def stop(self) -> None:
+        """Never be due again."""
+        self._is_stopped = True
+        self._timer.stop()
+
+
 class SteadyTimers:
     """A thread that runs a queue of timers by a steady clock.
 

@@ -11,6 +11,7 @@ from typing import Any
 import genpy
 
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, Transport
+from crazyflie_utils.vectors import is_finite
 
 Receiver = Callable[[Any], None]
 
@@ -130,6 +131,53 @@ class Subscriber:
         receivers = self._topic.receivers
         self._topic.receivers = [each for each in receivers if each is not self._receiver]
         self._external.close()
+
+
+class LatestMessage:
+    """The latest message of a topic that has not been delivered.
+
+    Parameters
+    ----------
+    callback : callable
+        ``callback(message)``
+    """
+
+    def __init__(self, callback: Callable[[Any], None]):
+        self._callback = callback
+        self._message: Any = None
+
+    def take(self, message: Any) -> None:
+        """Keep a message in the place of the one before."""
+        self._message = message
+
+    def deliver(self) -> None:
+        """Call back with the latest message, if it is new."""
+        message, self._message = self._message, None
+        if message is not None:
+            self._callback(message)
+
+
+def finite_only(
+    callback: Callable[[Any], None],
+    field: str,
+    on_invalid: Callable[[], None] | None,
+    topic: str,
+    warn: Callable[..., None],
+) -> Callable[[Any], None]:
+    """Return a callback that drops messages with a NaN or infinity in a field.
+
+    See `NodeHandle.subscribe`; ``warn`` is that of its log.
+    """
+
+    def check(message):
+        if is_finite(getattr(message, field)):
+            callback(message)
+            return
+        warn(f"ignoring a message on {topic}: its {field} is not finite", throttle=1.0)
+        if on_invalid is not None:
+            on_invalid()
+
+    return check
 
 
 class Topics:

@@ -181,7 +181,7 @@ def harden(connection: Any, report: Report, limits_rate: bool) -> None:
         # After a reconnection there is another socket.
         if not inbox or inbox[0].sock is not connection.socket:
             inbox[:] = [Inbox(connection, report)]
-        messages = []
+        messages: list[genpy.Message] = []
         while not (messages or connection.done or rospy.core.is_shutdown()):
             messages = inbox[0].receive(limits_rate)
         connection.stat_num_msg += len(messages)

@@ -16,10 +16,10 @@ import rosgraph
 import rospy
 from rosgraph_msgs.msg import Clock
 
+from crazyflie_utils.log import Throttle
 from crazyflie_utils.parameters.writer import ParameterWriter
 from crazyflie_utils.ros1 import patches
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
-from crazyflie_utils.throttle import Throttle
 from crazyflie_utils.transport import (
     ExternalPublisher,
     ExternalSubscriber,

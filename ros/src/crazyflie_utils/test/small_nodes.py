@@ -15,7 +15,7 @@ SAFE = -1.0
 
 
 class RelayParameters(Parameters):
-    """What a `Relay` is told."""
+    """Parameters of a `Relay`."""
 
     offset: int = parameter(Integer(0, 10**9), "added to every number", live=True)
     in_topic: str = parameter(TOPIC, "where numbers come from", name="topics/in")

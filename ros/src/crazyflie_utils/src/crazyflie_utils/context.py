@@ -6,7 +6,7 @@ from typing import Protocol
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.clock_source import ClockSource
 from crazyflie_utils.executor import Executor
-from crazyflie_utils.flights import Announcement
+from crazyflie_utils.flights import ShutdownInhibitor
 from crazyflie_utils.tf.transforms import Transforms
 from crazyflie_utils.timers import Timer
 from crazyflie_utils.topics import Topics
@@ -54,7 +54,7 @@ class ProcessContext(Protocol):
     def clock_source(self) -> ClockSource:
         """For the node that publishes /clock."""
 
-    def announce_flights(self, node: str) -> Announcement:
+    def announce_flights(self, node: str) -> ShutdownInhibitor:
         """Return what publishes the flights of a node, named absolutely."""
 
     def end(self, status: int) -> None:

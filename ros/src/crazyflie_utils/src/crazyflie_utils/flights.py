@@ -8,20 +8,20 @@ from std_msgs.msg import String
 from crazyflie_utils.topics import Topics
 
 TOPIC = "/flights"
-"""Where whoever starts and ends flights tells of them, latched."""
+"""Topic of nodes that start and end flights, latched."""
 
 _IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
 
 
-class Announcement:
-    """Tells every process of the flights that a node starts and ends.
+class ShutdownInhibitor:
+    """Publishes the flights that a node starts and ends, which inhibit the end of processes.
 
     Attributes
     ----------
     node : str
         Its absolute name.
     in_flight : bool
-        What was told last.
+        What was published last.
 
     Parameters
     ----------
@@ -35,22 +35,22 @@ class Announcement:
         self.in_flight = False
         self._publisher = topics.publisher(TOPIC, String, latch=True)
 
-    def tell(self, in_flight: bool) -> None:
-        """Tell whether there is a flight."""
+    def publish(self, in_flight: bool) -> None:
+        """Publish whether there is a flight."""
         self.in_flight = in_flight
-        self._publish(_IN_FLIGHT if in_flight else _ON_GROUND)
+        self._send(_IN_FLIGHT if in_flight else _ON_GROUND)
 
-    def tell_of_end(self) -> None:
-        """Tell that a flight, if there is one, is to end because its process is to end."""
+    def publish_ending(self) -> None:
+        """Publish that a flight, if there is one, is to end because its process is to end."""
         if self.in_flight:
-            self._publish(_TO_END)
+            self._send(_TO_END)
 
     def close(self) -> None:
-        """Tell no more."""
+        """Publish no more."""
         self.in_flight = False
         self._publisher.close()
 
-    def _publish(self, state):
+    def _send(self, state):
         self._publisher.publish(String(f"{self.node} {state}"))
 
 
@@ -77,7 +77,7 @@ class Flights:
         return sorted(name for name, flies in self._in_flight.items() if flies)
 
     def unattended(self, within: float) -> list[str]:
-        """Return those in flight of which nobody has told within ``within`` (s) that they end."""
+        """Return those in flight that were not published as ending within ``within`` (s)."""
         since = time.monotonic() - within
         return [name for name in self.in_flight if self._to_end_since.get(name, since) <= since]
 

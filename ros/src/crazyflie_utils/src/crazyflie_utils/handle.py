@@ -71,7 +71,8 @@ class NodeHandle:
         self.broadcast_transforms = tf.broadcaster
         self.broadcast_static_transforms = tf.static_broadcaster
         self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
-        self.poses_are_heard, self.rejected_transforms = tf.is_heard, tf.rejected_by_reason
+        self.poses_are_heard = tf.has_pose_consumers
+        self.rejected_transforms = tf.rejected_by_reason
         self.service_nodes = process.transport.service_nodes
 
     def child(self) -> "NodeHandle":
@@ -270,13 +271,13 @@ class NodeHandle:
         self._process.transforms.on_pose(frame, period, lambda: self._submit(guarded))
 
     def announce_flights(self) -> Callable[[bool], None]:
-        """Return ``tell(in_flight)``, which publishes whether a flight of this node goes on.
+        """Return ``publish(in_flight)``, which publishes whether a flight of this node goes on.
 
         Processes with nodes that are needed in flight do not end at SIGINT before it has ended.
         """
-        announcement = self._process.announce_flights(self.name)
-        self._undo.append(announcement.close)
-        return announcement.tell
+        inhibitor = self._process.announce_flights(self.name)
+        self._undo.append(inhibitor.close)
+        return inhibitor.publish
 
     def on_fault(self, make_safe: Callable[[], None]) -> None:
         """Have ``make_safe()`` called after a callback of this node has raised."""

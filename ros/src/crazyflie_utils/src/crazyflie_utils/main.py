@@ -97,7 +97,7 @@ class NodeClasses(ParameterType):
 
 
 class ComposedParameters(Parameters):
-    """What a process of many nodes is told."""
+    """Parameters of a process of many nodes."""
 
     nodes: dict[str, type[Node]] = parameter(NodeClasses(), 'node name to "package.module:Class"')
 

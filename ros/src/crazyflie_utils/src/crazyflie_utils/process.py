@@ -8,11 +8,11 @@ from rosgraph_msgs.msg import Clock
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.clock_source import ClockSource
 from crazyflie_utils.executor import Executor
-from crazyflie_utils.flights import Announcement
+from crazyflie_utils.flights import ShutdownInhibitor
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.log import NodeLog
 from crazyflie_utils.node import Node
-from crazyflie_utils.tf.transforms import AHEAD, SIMULATED_AHEAD, Transforms
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED, Transforms
 from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
 from crazyflie_utils.topics import Topics
 from crazyflie_utils.transport import Transport
@@ -26,7 +26,7 @@ class Process:
     transport : Transport
         The world outside.
     use_sim_time : bool
-        Live by simulated time, which stands still until it is set.
+        Use simulated time, which stands still until it is set.
     """
 
     def __init__(self, transport: Transport, use_sim_time: bool):
@@ -40,7 +40,7 @@ class Process:
             self.topics,
             self._warn_about_transform,
             self.clock.nanoseconds,
-            SIMULATED_AHEAD if use_sim_time else AHEAD,
+            MAX_FUTURE_STAMP_SIMULATED if use_sim_time else MAX_FUTURE_STAMP,
         )
         self._tf_log = NodeLog(transport, "/tf")
         self._steady_clock = SteadyClock()
@@ -49,7 +49,7 @@ class Process:
         self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
         self._simulated = TimerQueue(self.executor, *tf)
         self.clock_source = ClockSource(transport, self.topics, self.clock, self._simulated)
-        self._announcements: list[Announcement] = []
+        self._inhibitors: list[ShutdownInhibitor] = []
         self.exit_status: int | None = None
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)
@@ -68,16 +68,16 @@ class Process:
         """Return the handle of the node with this absolute name."""
         return NodeHandle(self, name)
 
-    def announce_flights(self, node: str) -> Announcement:
-        """Return what tells every process of the flights of a node, named absolutely."""
-        announcement = Announcement(self.topics, node)
-        self._announcements.append(announcement)
-        return announcement
+    def announce_flights(self, node: str) -> ShutdownInhibitor:
+        """Return what publishes the flights of a node, named absolutely."""
+        inhibitor = ShutdownInhibitor(self.topics, node)
+        self._inhibitors.append(inhibitor)
+        return inhibitor
 
     @property
     def own_flights(self) -> list[str]:
         """Names of the nodes of this process that are in flight."""
-        return [each.node for each in self._announcements if each.in_flight]
+        return [each.node for each in self._inhibitors if each.in_flight]
 
     def add_timer(
         self,
@@ -116,20 +116,20 @@ class Process:
         self._simulated.stop()
 
     def leave(self, nodes: dict[str, Node]) -> None:
-        """Have every node begin to end what needs time, and other processes told of it.
+        """Have every node begin to end what needs time, and publish that it does.
 
         Parameters
         ----------
         nodes : dict of str to Node
             By absolute name.
         """
-        for announcement in self._announcements:
-            self.executor.submit(announcement.tell_of_end)
+        for inhibitor in self._inhibitors:
+            self.executor.submit(inhibitor.publish_ending)
         for name, node in nodes.items():
             self.executor.submit(self.handle(name).guard(node.leave))
 
     def shut_down(self, nodes: dict[str, Node]) -> None:
-        """Let no timer fire again, and every node leave its vehicle safe.
+        """Stop all timers, and have every node leave its vehicle safe.
 
         Parameters
         ----------

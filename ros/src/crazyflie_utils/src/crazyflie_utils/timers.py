@@ -281,17 +281,17 @@ class SteadyTimers:
     ) -> Timer:
         """Add a timer; its first deadline is one period from now, or see `TimerQueue.add`."""
         timer = self._queue.add(period, work, self._clock.time(), is_spread, may_be_early)
-        self._tell()
+        self._wake_up()
         return timer
 
     def stop(self) -> None:
         """Let no timer fire again, and end the thread."""
         self._queue.stop()
         self._stopped = True
-        self._tell()
+        self._wake_up()
 
-    def _tell(self):
-        # Another may have told already.
+    def _wake_up(self):
+        # It may be released already.
         with contextlib.suppress(RuntimeError):
             self._news.release()
 

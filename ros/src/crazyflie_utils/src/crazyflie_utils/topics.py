@@ -54,7 +54,7 @@ class Publisher:
         return self._topic.name
 
     def has_subscribers(self, beside: int = 0) -> bool:
-        """Tell whether anyone, here or outside, is connected and receives.
+        """Return whether anyone, here or outside, is connected and receives.
 
         Parameters
         ----------
@@ -64,11 +64,11 @@ class Publisher:
         return self.is_read_here(beside) or self.is_heard_outside()
 
     def is_heard_outside(self) -> bool:
-        """Tell whether anyone in another process is connected."""
+        """Return whether anyone in another process is connected."""
         return self._external.has_subscribers()
 
     def is_read_here(self, beside: int = 0) -> bool:
-        """Tell whether anyone in this process receives; so many do not count."""
+        """Return whether anyone in this process receives; so many do not count."""
         return len(self._topic.receivers) > beside
 
     def publish(self, message: genpy.Message, before: Sequence[genpy.Message] = ()) -> None:
@@ -115,7 +115,7 @@ class Subscriber:
         self._external = external
 
     def has_publishers(self) -> bool:
-        """Tell whether anyone, here or outside, is connected and may publish."""
+        """Return whether anyone, here or outside, is connected and may publish."""
         return bool(self._topic.publishers) or self._external.has_publishers()
 
     def caller(self, message: genpy.Message) -> str:

@@ -38,7 +38,7 @@ _MAX_READS = 16
 
 
 class RateLimiter:
-    """Tells whether a connection is flooded (a leaky bucket)."""
+    """Finds out whether a connection is flooded (a leaky bucket)."""
 
     def __init__(self) -> None:
         self._level = 0.0

@@ -30,10 +30,10 @@ way; the present pose is still the younger one."""
 _STEPS_BACK = 3
 """So many of them in a row, and the source's clock has been set back."""
 
-_MOST_FRAMES = 1000
+_MAX_FRAMES = 1000
 """Names of frames that are known, and frames that are kept for later."""
 
-_MOST_BYTES = 1024
+_MAX_BYTES = 1024
 """Of a transform that is kept for later."""
 
 _ONE = b"\x01\0\0\0"
@@ -134,9 +134,9 @@ class FrameTree:
             for child, start, end in entries(raw):
                 if child in self._wanted:
                     self.take(self._codec.decode(raw, start, end), now)
-                elif end - start <= _MOST_BYTES:
+                elif end - start <= _MAX_BYTES:
                     self._unread[child] = raw[start:end]
-                    if len(self._unread) > _MOST_FRAMES:
+                    if len(self._unread) > _MAX_FRAMES:
                         del self._unread[next(iter(self._unread))]
         except (struct.error, ValueError):
             self.rejected["cannot be read"] += 1
@@ -182,7 +182,7 @@ class FrameTree:
     def follow(self, frame: str | None, now: int) -> None:
         """Have a frame and all above it decoded, from the ROS time ``now`` (ns) on."""
         while frame is not None and frame not in self.followed:
-            if len(self.followed) >= _MOST_FRAMES:
+            if len(self.followed) >= _MAX_FRAMES:
                 return
             for name in (frame.encode(), b"/" + frame.encode()):
                 self._wanted.add(name)
@@ -248,7 +248,7 @@ class FrameTree:
     def _why_too_many(self, pose):
         # tf2 never forgets a name.
         names = self._names
-        if (pose.parent in names and pose.child in names) or len(names) < _MOST_FRAMES:
+        if (pose.parent in names and pose.child in names) or len(names) < _MAX_FRAMES:
             return None
         return "is one frame too many"
 

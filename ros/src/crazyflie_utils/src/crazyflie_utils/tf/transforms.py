@@ -12,10 +12,10 @@ from crazyflie_utils.tf.frame_tree import FrameTree
 from crazyflie_utils.tf.poses import PoseCodec, RawTransforms, StampedPose
 from crazyflie_utils.topics import Subscriber, Topics
 
-AHEAD = 0.2
+MAX_FUTURE_STAMP = 0.2
 """How far a stamp may be ahead of now, s. tf's static_transform_publisher stamps 0.1 s ahead."""
 
-SIMULATED_AHEAD = 2.0
+MAX_FUTURE_STAMP_SIMULATED = 2.0
 """The same in simulated time: pose and /clock come by different ways."""
 
 
@@ -26,16 +26,16 @@ class _Listener:
     ----------
     period : float
         s, by the poses' stamps.
-    tell : callable
+    callback : callable
     """
 
-    def __init__(self, period: float, tell: Callable[[], None]):
-        self.tell = tell
+    def __init__(self, period: float, callback: Callable[[], None]):
+        self.callback = callback
         self._period = round(period * 1e9)
         self._due = 0
 
     def is_due(self, stamp: int) -> bool:
-        """Tell whether a pose, by its stamp in ns, is one of those to be told of."""
+        """Return whether a pose, by its stamp in ns, is due."""
         early = self._due - stamp
         # Rounding makes none late by one pose; much earlier ones are of a clock that was set back.
         if self._period // 100 < early <= 2 * self._period:
@@ -45,7 +45,7 @@ class _Listener:
 
 
 class Transforms:
-    """What tf knows, and the way to tell it more.
+    """What the process has received of tf, and sends to it.
 
     Parameters
     ----------
@@ -119,8 +119,8 @@ class Transforms:
         """Have ``refresh()`` called before poses are looked up."""
         self._sources.append(refresh)
 
-    def is_heard(self) -> bool:
-        """Tell whether poses that are broadcast go anywhere but into look-ups of this process."""
+    def has_pose_consumers(self) -> bool:
+        """Return whether poses are used when they are broadcast, not only by lookups here."""
         beside = int(self._subscriber is not None)
         return bool(self._listeners) or self._publisher.has_subscribers(beside)
 
@@ -131,7 +131,7 @@ class Transforms:
             with self._lock:
                 for pose in poses:
                     self._tree.take(pose, now)
-            self._tell_of_arrivals()
+            self._notify_listeners()
         if not self._publisher.has_subscribers(beside=int(self._subscriber is not None)):
             return
         if self._gathered is None:
@@ -171,11 +171,11 @@ class Transforms:
             )
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
-    def on_pose(self, frame: str, period: float, tell: Callable[[], None]) -> None:
-        """Have ``tell()`` called when a pose of a frame is new; once in ``period`` (s)."""
+    def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
+        """Have ``callback()`` called when a pose of a frame is new; once in ``period`` (s)."""
         self._listen()
         with self._lock:
-            self._listeners.setdefault(frame, []).append(_Listener(period, tell))
+            self._listeners.setdefault(frame, []).append(_Listener(period, callback))
             self._tree.follow(frame, self._now())
 
     def clear(self) -> None:
@@ -231,20 +231,20 @@ class Transforms:
             else:
                 for transform in message.transforms:
                     self._tree.take(StampedPose.of(transform), now)
-        self._tell_of_arrivals()
+        self._notify_listeners()
 
     def _note_arrival(self, pose):
         for listener in self._listeners.get(pose.child, ()):
             if listener.is_due(pose.stamp):
                 self._arrived.append(listener)
 
-    def _tell_of_arrivals(self):
+    def _notify_listeners(self):
         # Not under the lock, since what is done now may look poses up.
         if self._arrived:
             with self._lock:
                 arrived, self._arrived = self._arrived, []
             for listener in arrived:
-                listener.tell()
+                listener.callback()
 
     def _on_static(self, message):
         with self._lock:

@@ -72,7 +72,7 @@ def test_node_is_told_of_every_fault(process):
 def test_make_safe_that_fails_is_logged(process):
     failing(process).on_fault(lambda: {}["nothing"])
     process.publish("/a", String("value"))
-    assert "make_safe failed too: KeyError('nothing')" in process.logged("error")[1]
+    assert "enter_safe_state failed too: KeyError('nothing')" in process.logged("error")[1]
 
 
 def test_faults_of_one_node_leave_others_alone(process):

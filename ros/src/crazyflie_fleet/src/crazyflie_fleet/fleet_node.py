@@ -50,7 +50,7 @@ class FleetNode(Node):
         self._missions = MissionWatch(handle, self._on_lost_mission)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Tell those that wait for a landing; each vehicle has services of its own."""
         self._lander.give_up()
 

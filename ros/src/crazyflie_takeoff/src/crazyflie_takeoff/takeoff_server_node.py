@@ -97,7 +97,7 @@ class TakeoffServerNode(Node):
         self._flight_state = handle.publisher(parameters.flight_state_topic, String, latch=True)
         self._status = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._announce_flight = handle.announce_flights()
+        self._announce_flight = handle.inhibit_shutdown()
         handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
         handle.subscribe(parameters.filter_state_topic, String, self._on_filter_state)
@@ -120,11 +120,11 @@ class TakeoffServerNode(Node):
         # Whether connections come about has nothing to do with simulated time.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover_state, steady=True)
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
-        handle.timer(STATUS_PERIOD, self._publish_status, steady=True, is_spread=True)
-        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True, is_spread=True)
+        handle.timer(STATUS_PERIOD, self._publish_status, steady=True, stagger=True)
+        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True, stagger=True)
 
     @override
-    def leave(self) -> None:
+    def prepare_shutdown(self) -> None:
         """Land: the process is to end."""
         flight = self._flight
         if flight is None or flight.state is FlightState.ON_GROUND:
@@ -137,7 +137,7 @@ class TakeoffServerNode(Node):
         self._set_pace()
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """End a takeoff with a landing, let a landing go on, and tell the callers."""
         if self._flight is not None:
             self._flight.abort()

@@ -45,8 +45,8 @@ class ProcessContext(Protocol):
         period: float,
         work: Callable[[], None],
         steady: bool = False,
-        is_spread: bool = False,
-        may_be_early: bool = False,
+        stagger: bool = False,
+        align_phase: bool = False,
     ) -> Timer:
         """Add a timer by the process's clock, or by the machine's if ``steady``."""
 
@@ -54,7 +54,7 @@ class ProcessContext(Protocol):
     def clock_source(self) -> ClockSource:
         """For the node that publishes /clock."""
 
-    def announce_flights(self, node: str) -> ShutdownInhibitor:
+    def inhibit_shutdown(self, node: str) -> ShutdownInhibitor:
         """Return what publishes the flights of a node, named absolutely."""
 
     def end(self, status: int) -> None:

@@ -46,7 +46,7 @@ class NodeHandle:
     clock_publisher, next_event : callable
         For the node that publishes /clock; see `ClockSource`.
     broadcast_transforms, broadcast_static_transforms, listen_to_transforms, listen_to_poses, \
-    poses_are_heard, rejected_transforms : callable
+    has_pose_consumers, rejected_transforms : callable
         See `Transforms`.
     service_nodes, report_fault : callable
         See `Transport.service_nodes`, which waits for the master, and `FaultHandler.report`.
@@ -71,7 +71,7 @@ class NodeHandle:
         self.broadcast_transforms = tf.broadcaster
         self.broadcast_static_transforms = tf.static_broadcaster
         self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
-        self.poses_are_heard = tf.has_pose_consumers
+        self.has_pose_consumers = tf.has_pose_consumers
         self.rejected_transforms = tf.rejected_by_reason
         self.service_nodes = process.transport.service_nodes
 
@@ -220,14 +220,14 @@ class NodeHandle:
         period: float,
         callback: Callable[[], None],
         steady: bool = False,
-        is_spread: bool = False,
+        stagger: bool = False,
     ) -> Timer:
         """Have ``callback()`` called every ``period`` seconds; ticks that are missed are skipped.
 
         With ``steady`` they are of the machine's clock also when time is simulated; with
-        ``is_spread`` not those of other timers, for reports of many nodes. See `TimerQueue.add`.
+        ``stagger`` not those of other timers, for reports of many nodes. See `TimerQueue.add`.
         """
-        timer = self._process.add_timer(period, self._tick(callback), steady, is_spread)
+        timer = self._process.add_timer(period, self._tick(callback), steady, stagger)
         self._undo.append(timer.stop)
         return timer
 
@@ -257,7 +257,7 @@ class NodeHandle:
         """Announce /tf and return ``broadcast(list of StampedPose)``; see `Transforms`.
 
         ``refresh()`` is called before callbacks of this process look poses up, which is early
-        enough to broadcast while `poses_are_heard` is false.
+        enough to broadcast while `has_pose_consumers` is false.
         """
         if refresh is not None:
             guarded, executor = self.guard(refresh), self._process.executor
@@ -270,18 +270,18 @@ class NodeHandle:
         guarded = self.guard(callback)
         self._process.transforms.on_pose(frame, period, lambda: self._submit(guarded))
 
-    def announce_flights(self) -> Callable[[bool], None]:
+    def inhibit_shutdown(self) -> Callable[[bool], None]:
         """Return ``publish(in_flight)``, which publishes whether a flight of this node goes on.
 
         Processes with nodes that are needed in flight do not end at SIGINT before it has ended.
         """
-        inhibitor = self._process.announce_flights(self.name)
+        inhibitor = self._process.inhibit_shutdown(self.name)
         self._undo.append(inhibitor.close)
         return inhibitor.publish
 
-    def on_fault(self, make_safe: Callable[[], None]) -> None:
-        """Have ``make_safe()`` called after a callback of this node has raised."""
-        self._faults.make_safe = make_safe
+    def on_fault(self, enter_safe_state: Callable[[], None]) -> None:
+        """Have ``enter_safe_state()`` called after a callback of this node has raised."""
+        self._faults.enter_safe_state = enter_safe_state
 
     def guard(self, callback: Callable[..., Any]) -> Callable[..., None]:
         """Return ``callback`` such that what it raises is reported and goes no further."""

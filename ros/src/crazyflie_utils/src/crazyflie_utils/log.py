@@ -73,12 +73,12 @@ class FaultHandler:
 
     Attributes
     ----------
-    make_safe : callable or None
+    enter_safe_state : callable or None
         Called after each fault.
     """
 
     def __init__(self, log: NodeLog):
-        self.make_safe: Callable[[], None] | None = None
+        self.enter_safe_state: Callable[[], None] | None = None
         self._log = log
         self._counts: dict[tuple[type, str, int | None], int] = {}
 
@@ -94,9 +94,9 @@ class FaultHandler:
             self._log.warn(
                 f"{name} failed again: {error!r} ({count} times)", throttle=5.0, key=fault
             )
-        if self.make_safe is None:
+        if self.enter_safe_state is None:
             return
         try:
-            self.make_safe()
+            self.enter_safe_state()
         except Exception as second:
-            self._log.error(f"make_safe failed too: {second!r}")
+            self._log.error(f"enter_safe_state failed too: {second!r}")

@@ -68,7 +68,7 @@ class Process:
         """Return the handle of the node with this absolute name."""
         return NodeHandle(self, name)
 
-    def announce_flights(self, node: str) -> ShutdownInhibitor:
+    def inhibit_shutdown(self, node: str) -> ShutdownInhibitor:
         """Return what publishes the flights of a node, named absolutely."""
         inhibitor = ShutdownInhibitor(self.topics, node)
         self._inhibitors.append(inhibitor)
@@ -84,8 +84,8 @@ class Process:
         period: float,
         work: Callable[[], None],
         steady: bool = False,
-        is_spread: bool = False,
-        may_be_early: bool = False,
+        stagger: bool = False,
+        align_phase: bool = False,
     ) -> Timer:
         """Add a timer by this process's clock, or by the machine's if ``steady``.
 
@@ -98,8 +98,8 @@ class Process:
         if self.uses_sim_time and not steady:
             if period == 0.0:
                 raise ValueError("a timer by simulated time needs a period > 0")
-            return self._simulated.add(period, work, self.clock.time(), is_spread, may_be_early)
-        return self._steady.add(period, work, is_spread, may_be_early)
+            return self._simulated.add(period, work, self.clock.time(), stagger, align_phase)
+        return self._steady.add(period, work, stagger, align_phase)
 
     def next_simulated_deadline(self) -> float:
         """Return when the next timer by simulated time is due, s."""
@@ -115,7 +115,7 @@ class Process:
         self._steady.stop()
         self._simulated.stop()
 
-    def leave(self, nodes: dict[str, Node]) -> None:
+    def prepare_shutdown(self, nodes: dict[str, Node]) -> None:
         """Have every node begin to end what needs time, and publish that it does.
 
         Parameters
@@ -126,7 +126,7 @@ class Process:
         for inhibitor in self._inhibitors:
             self.executor.submit(inhibitor.publish_ending)
         for name, node in nodes.items():
-            self.executor.submit(self.handle(name).guard(node.leave))
+            self.executor.submit(self.handle(name).guard(node.prepare_shutdown))
 
     def shut_down(self, nodes: dict[str, Node]) -> None:
         """Stop all timers, and have every node leave its vehicle safe.

@@ -99,8 +99,8 @@ class Shutdown:
         if own:
             self._log_waiting(own)
         # Not in this thread: a callback may never return.
-        leave = self._process.leave
-        threading.Thread(target=leave, args=(self._nodes,), name="leave", daemon=True).start()
+        prepare = self._process.prepare_shutdown
+        threading.Thread(target=prepare, args=(self._nodes,), name="end", daemon=True).start()
         begin = time.monotonic()
         is_logged = bool(own)
         while flights.in_flight and len(signals) == 1 and time.monotonic() < begin + _FLIGHT_LIMIT:

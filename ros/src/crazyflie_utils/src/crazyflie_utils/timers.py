@@ -102,8 +102,8 @@ class TimerQueue:
         period: float,
         work: Callable[[], None],
         now: float,
-        is_spread: bool = False,
-        may_be_early: bool = False,
+        stagger: bool = False,
+        align_phase: bool = False,
     ) -> Timer:
         """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
 
@@ -122,25 +122,25 @@ class TimerQueue:
         if not 0.0 <= period < math.inf:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
         with self._lock:
-            if may_be_early and period > 0.0:
-                begin = self._next_moment(period, now, is_spread) - period
+            if align_phase and period > 0.0:
+                begin = self._next_moment(period, now, stagger) - period
             else:
-                begin = self._begin(period, now, is_spread)
+                begin = self._begin(period, now, stagger)
             timer = Timer(period, work, begin)
             timer.number = next(self._order)
             timer.stopped = self._is_stopped
             self._push(timer)
         return timer
 
-    def _begin(self, period, now, is_spread):
+    def _begin(self, period, now, stagger):
         if self._is_running or period == 0.0:
             return now
-        if is_spread:
+        if stagger:
             return self._next_multiple(_SLOT, now) + self._next_slot(period)
         return self._next_multiple(period, now) if period <= _TOGETHER else now
 
-    def _next_moment(self, period, now, is_spread):
-        first = self._next_multiple(_SLOT, now) + (self._next_slot(period) if is_spread else 0.0)
+    def _next_moment(self, period, now, stagger):
+        first = self._next_multiple(_SLOT, now) + (self._next_slot(period) if stagger else 0.0)
         # Of the moments of its phase, the first one after now.
         return first - math.floor((first - now - _TOLERANCE) / period) * period
 
@@ -239,7 +239,7 @@ class VaryingTimer:
         if period != self._period and not self._is_stopped:
             self._period = period
             self._timer.stop()
-            self._timer = self._add_timer(period, self._work, is_spread=True, may_be_early=True)
+            self._timer = self._add_timer(period, self._work, stagger=True, align_phase=True)
 
     def stop(self) -> None:
         """Never be due again."""
@@ -276,11 +276,11 @@ class SteadyTimers:
         self,
         period: float,
         work: Callable[[], None],
-        is_spread: bool = False,
-        may_be_early: bool = False,
+        stagger: bool = False,
+        align_phase: bool = False,
     ) -> Timer:
         """Add a timer; its first deadline is one period from now, or see `TimerQueue.add`."""
-        timer = self._queue.add(period, work, self._clock.time(), is_spread, may_be_early)
+        timer = self._queue.add(period, work, self._clock.time(), stagger, align_phase)
         self._wake_up()
         return timer
 

@@ -21,7 +21,7 @@ class ClockedProcess(FakeProcess):
         super().__init__(start=0.0)
         self.steady_timers = []
 
-    def add_timer(self, period, work, steady=False, is_spread=False, may_be_early=False):
+    def add_timer(self, period, work, steady=False, stagger=False, align_phase=False):
         """Keep timers by the machine's clock, to be fired by `tick`."""
         if not steady:
             return super().add_timer(period, work)

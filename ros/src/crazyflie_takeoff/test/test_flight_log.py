@@ -46,7 +46,7 @@ def test_a_lost_controller_is_logged_once_and_is_no_matter_of_the_next_flight(ne
 
 def test_a_reason_is_logged_once(network):
     before = len(said(network, "info", "server"))
-    network.server.leave()
+    network.server.prepare_shutdown()
     until_on_ground(network)
     assert said(network, "info", "server")[before:] == [
         "landing: the launch is to end",

@@ -87,7 +87,7 @@ def flights(network):
 
 def test_a_server_that_is_to_leave_lands_first(network):
     assert flights(network)[-1].endswith(" in flight")
-    network.server.leave()
+    network.server.prepare_shutdown()
     until_on_ground(network)
     assert network.vehicle.touchdown_speed < 0.6
     assert flights(network)[-1].endswith(" on ground")
@@ -99,7 +99,7 @@ def test_from_far_above_a_server_that_is_to_leave_lands_faster():
     network.take_off()
     assert network.vehicle.z > 3.9
     begin = network.time
-    network.server.leave()
+    network.server.prepare_shutdown()
     until_on_ground(network)
     assert network.time - begin < 10.0
     assert network.vehicle.touchdown_speed < 1.0
@@ -112,7 +112,7 @@ def test_a_server_that_is_to_leave_makes_a_landing_under_way_faster(moment):
     land = network.call("/land")
     network.advance(moment)
     begin = network.time
-    network.server.leave()
+    network.server.prepare_shutdown()
     until_on_ground(network)
     assert network.time - begin < 10.0
     assert network.vehicle.z == 0.0
@@ -125,7 +125,7 @@ def test_a_server_that_is_to_leave_aborts_a_takeoff():
     network.advance(1.0)
     takeoff = network.call("/takeoff")
     network.advance(3.0)
-    network.server.leave()
+    network.server.prepare_shutdown()
     with pytest.raises(ServiceError, match="takeoff aborted: .* is to end"):
         takeoff.result(timeout=0)
     until_on_ground(network)
@@ -135,6 +135,6 @@ def test_a_server_that_is_to_leave_aborts_a_takeoff():
 def test_on_the_ground_there_is_nothing_to_land():
     network = HoverNetwork(SERVER)
     network.advance(1.0)
-    network.server.leave()
+    network.server.prepare_shutdown()
     network.advance(1.0)
     assert states(network) == ["on_ground"]

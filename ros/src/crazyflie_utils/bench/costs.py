@@ -5,6 +5,7 @@ Run it in a shell that has sourced the workspace:
 
     python3 ros/src/crazyflie_utils/bench/costs.py
 
+With CRAZYFLIE_ROSPY_PATCHES=none, or all names of its patches but one, it says what these bring.
 Wall time is per piece of work; CPU time is this process's, with all its threads.
 Nothing is asserted: the figures depend on the machine and on its other work.
 """
@@ -23,8 +24,10 @@ import rospy
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils import Node, TransformError, run
 from crazyflie_utils.main import begin
+from crazyflie_utils.ros1 import patches
 
 _COUNT = 5000
+_TOPICS = 100
 _LIMIT = 30.0
 _PERIOD = 0.001
 
@@ -58,10 +61,18 @@ def _measure():
             handle.subscribe(topic, ControlStamped, lambda message: None)
         return lambda: publisher.publish(message)
 
+    print(f"patches of rospy: {', '.join(sorted(patches.active())) or 'none'}")
     print(f"{'':44}{'wall':>10}{'CPU':>10}")
-    _report("publish, nobody listens", *_per_call(publish_to("/nobody", 0)))
-    _report("publish, 1 subscriber in the process", *_per_call(publish_to("/one", 1)))
-    _report("publish, 10 subscribers in the process", *_per_call(publish_to("/ten", 10)))
+    _report("announce a topic while nodes start", *_per_topic(process, handle))
+    works = {
+        "publish, nobody listens": publish_to("/nobody", 0),
+        "publish, 1 subscriber in the process": publish_to("/one", 1),
+        "publish, 10 subscribers in the process": publish_to("/ten", 10),
+    }
+    # Without its patch, rospy connects the process to itself.
+    time.sleep(2.0)
+    for name, work in works.items():
+        _report(name, *_per_call(work))
 
     back = queue.Queue()
     handle.subscribe("/back", ControlStamped, back.put)
@@ -88,6 +99,14 @@ def _measure():
     _report(f"timer tick, every {_PERIOD * 1e3:g} ms", *_per_tick(handle))
     process.stop()
     rospy.signal_shutdown("done")
+
+
+def _per_topic(process, handle):
+    wall, cpu = time.perf_counter(), time.process_time()
+    with process.transport.starting():
+        for number in range(_TOPICS):
+            handle.publisher(f"/topic{number}", ControlStamped)
+    return [(time.perf_counter() - wall) / _TOPICS, (time.process_time() - cpu) / _TOPICS]
 
 
 def _per_call(work, pause=0.0):

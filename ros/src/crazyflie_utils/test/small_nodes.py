@@ -15,7 +15,7 @@ SAFE = -1.0
 
 
 class RelayParameters(Parameters):
-    """What a `Relay` is told."""
+    """Parameters of a `Relay`."""
 
     offset: int = parameter(Integer(0, 10**9), "added to every number", live=True)
     in_topic: str = parameter(TOPIC, "where numbers come from", name="topics/in")
@@ -81,7 +81,7 @@ class Ticker(Node):
     def _on_timer(self):
         self._publisher.publish(Float64(self._handle.time()))
 
-    def make_safe(self):
+    def enter_safe_state(self):
         self._publisher.publish(Float64(SAFE))
 
 
@@ -91,12 +91,12 @@ class Pilot(Ticker):
     needed_in_flight = True
 
     def register_callbacks(self, handle):
-        self._tell = handle.announce_flights()
+        self._tell = handle.inhibit_shutdown()
         self._tell(True)
         super().register_callbacks(handle)
         handle.advertise_service("~land", Trigger, self._land)
 
-    def leave(self):
+    def prepare_shutdown(self):
         self._handle.info("asked to land")
 
     def _land(self, request):

@@ -18,7 +18,7 @@ def process():
 @pytest.fixture
 def flights(process):
     """Return the flights that a node of the process is needed for."""
-    return Flights(process, ["/cf/sensors/instrument"])
+    return Flights(process.topics, ["/cf/sensors/instrument"])
 
 
 def told(process):
@@ -53,13 +53,13 @@ def test_what_was_said_long_ago_does_not_count(process, flights, monkeypatch):
 
 
 def test_a_process_that_is_to_leave_tells_of_its_flights(process):
-    tell = process.handle(PILOT).announce_flights()
-    other = process.handle("/other/pilot").announce_flights()
+    tell = process.handle(PILOT).inhibit_shutdown()
+    other = process.handle("/other/pilot").inhibit_shutdown()
     assert process.own_flights == []
     tell(True)
     other(False)
     assert process.own_flights == [PILOT]
-    process.leave({})
+    process.prepare_shutdown({})
     assert told(process) == [
         f"{PILOT} in flight",
         "/other/pilot on ground",
@@ -71,6 +71,6 @@ def test_a_process_that_is_to_leave_tells_of_its_flights(process):
 
 def test_a_handle_that_is_closed_has_no_flights(process):
     handle = process.handle(PILOT)
-    handle.announce_flights()(True)
+    handle.inhibit_shutdown()(True)
     handle.close()
     assert process.own_flights == []

@@ -3,8 +3,8 @@
 import pytest
 import rosgraph
 
-from crazyflie_utils import master_watch
-from crazyflie_utils.master_watch import MasterWatch
+from crazyflie_utils.ros1 import master_watch
+from crazyflie_utils.ros1.master_watch import MasterWatch
 
 
 class Master:

@@ -30,9 +30,9 @@ class Echo(Node):
             raise TypeError("topic clash")
         self.order.append("complete")
 
-    def make_safe(self):
+    def enter_safe_state(self):
         self._publisher.publish(String("safe"))
-        if self._fails_in == "make_safe":
+        if self._fails_in == "enter_safe_state":
             raise RuntimeError("not safe")
 
     def _on_message(self, message):
@@ -96,7 +96,7 @@ def test_shutdown_makes_safe(process):
 
 
 def test_every_node_is_shut_down_though_one_fails(process):
-    nodes = {"/ns/a": Echo(fails_in="make_safe"), "/ns/b": Echo()}
+    nodes = {"/ns/a": Echo(fails_in="enter_safe_state"), "/ns/b": Echo()}
     for name, node in nodes.items():
         assert process.launch(node, name, {"gain": 1.0})
     ticks = []
@@ -134,7 +134,7 @@ def test_messages_of_shutdown_still_reach_the_other_nodes(process):
 def test_default_is_silence(process):
     node = Talker()
     assert process.launch(node, "/ns/talker")
-    node.make_safe()
+    node.enter_safe_state()
     process.shut_down({"/ns/talker": node})
     assert process.published("/ns/out") == []
     assert process.logged("error") == []

@@ -15,7 +15,7 @@ def test_log_names_the_node(process, handle):
 
 def test_throttled_warnings(process, handle, monkeypatch):
     now = [50.0]
-    monkeypatch.setattr("crazyflie_utils.handle_base.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("crazyflie_utils.log.time.monotonic", lambda: now[0])
     for _ in range(3):
         handle.warn("a", throttle=1.0)
         handle.warn("b", throttle=1.0)
@@ -72,7 +72,7 @@ def test_node_is_told_of_every_fault(process):
 def test_make_safe_that_fails_is_logged(process):
     failing(process).on_fault(lambda: {}["nothing"])
     process.publish("/a", String("value"))
-    assert "make_safe failed too: KeyError('nothing')" in process.logged("error")[1]
+    assert "enter_safe_state failed too: KeyError('nothing')" in process.logged("error")[1]
 
 
 def test_faults_of_one_node_leave_others_alone(process):

@@ -9,12 +9,12 @@ from xml.etree import ElementTree
 
 import pytest
 
-from crazyflie_utils import NodeHandle
 from crazyflie_utils.parameters import types as parameter_types
+from crazyflie_utils.testing import FakeProcess
 
 README = (Path(__file__).resolve().parents[1] / "README.md").read_text()
 CONSTANTS = [name for name in vars(parameter_types) if name.isupper()]
-METHODS = [name for name in vars(NodeHandle) if not name.startswith("_")]
+METHODS = [name for name in dir(FakeProcess().handle("/node")) if not name.startswith("_")]
 
 
 def blocks(language):

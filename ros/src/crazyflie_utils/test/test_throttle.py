@@ -1,6 +1,6 @@
 """What keeps a log from being flooded."""
 
-from crazyflie_utils.throttle import Throttle
+from crazyflie_utils.log import Throttle
 
 
 def test_a_key_passes_once_in_its_period():

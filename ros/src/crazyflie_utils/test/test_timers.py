@@ -85,7 +85,7 @@ def test_short_periods_that_a_process_begins_with_are_due_together(queue):
 def test_those_that_are_spread_are_due_one_after_the_other(queue):
     ticks = []
     for number in range(7):
-        queue.add(0.05, lambda number=number: ticks.append(number), now=1.0, is_spread=True)
+        queue.add(0.05, lambda number=number: ticks.append(number), now=1.0, stagger=True)
     for moment, due in ((1.05, [0, 5]), (1.06, [1, 6]), (1.07, [2]), (1.08, [3]), (1.09, [4])):
         ticks.clear()
         queue.run_due(moment)
@@ -100,8 +100,8 @@ def test_those_that_may_be_early_are_due_at_the_same_moments(queue):
     queue.add(0.01, lambda: None, now=0.003)
     run(queue, 0.013)
     for name in "abcde":
-        queue.add(0.04, lambda name=name: due.append(name), 0.017, True, may_be_early=True)
-    queue.add(0.01, lambda: due.append("quick"), 0.0185, may_be_early=True)
+        queue.add(0.04, lambda name=name: due.append(name), 0.017, True, align_phase=True)
+    queue.add(0.01, lambda: due.append("quick"), 0.0185, align_phase=True)
     moments = {}
     while queue.next_deadline() < 0.06:
         now = queue.next_deadline()

@@ -5,6 +5,7 @@ import threading
 
 import genpy
 import pytest
+import tf2_py
 from hypothesis import given
 from hypothesis import strategies as st
 from tf2_msgs.msg import TFMessage
@@ -35,7 +36,7 @@ def test_stamps_come_back_to_the_nanosecond(seconds, nanoseconds):
 
 
 def test_transforms_of_many_threads(process, lookup, monkeypatch):
-    monkeypatch.setattr("crazyflie_utils.tf.tf2_memory._MOST_STAMPS", 3)
+    monkeypatch.setattr("crazyflie_utils.tf.buffer._MAX_STAMPS", 3)
     process.clock.set(103.0)
     failures = []
 
@@ -69,6 +70,32 @@ def test_chains_frames_at_their_latest_common_time(process, lookup):
     assert found.transform.translation.x == pytest.approx(11.5)
 
 
+def test_a_transform_at_a_time(process, lookup):
+    for time, x in ((100.0, 1.0), (101.0, 2.0)):
+        hear(process, transform("world", "crazyflie", time, x=x))
+    stamp = genpy.Time(100, 250_000_001)
+    with pytest.raises(tf2_py.ExtrapolationException):
+        lookup("world", "crazyflie", genpy.Time(90))
+    process.clock.set(102.0)
+    hear(process, transform("world", "crazyflie", 101.5, x=2.5))
+    found = lookup("world", "crazyflie", stamp)
+    assert found.transform.translation.x == pytest.approx(1.25)
+    assert found.header.stamp == stamp
+    assert lookup("world", "crazyflie").transform.translation.x == 2.5
+    with pytest.raises(tf2_py.ExtrapolationException):
+        lookup("world", "crazyflie", genpy.Time(103))
+
+
+def test_static_broadcasts_add_up(process, lookup):
+    broadcast = process.handle("/mount").broadcast_static_transforms()
+    for child, x in (("camera", 0.1), ("deck", 0.2), ("camera", 0.3)):
+        broadcast([transform("crazyflie", child, 0.0, x=x)])
+    sent = process.published("/tf_static")[-1].transforms
+    assert [each.child_frame_id for each in sent] == ["camera", "deck"]
+    assert lookup("crazyflie", "camera").transform.translation.x == pytest.approx(0.3)
+    assert lookup("crazyflie", "deck").transform.translation.x == pytest.approx(0.2)
+
+
 def test_static_transforms_hold_at_any_time(process, lookup):
     hear(process, transform("crazyflie", "base", 0.0, x=0.1), topic="/tf_static")
     hear(process, transform("world", "crazyflie", 100.0, yaw=math.pi / 2))
@@ -77,12 +104,12 @@ def test_static_transforms_hold_at_any_time(process, lookup):
 
 
 def test_unknown_and_unconnected_frames_are_named(process, lookup):
-    with pytest.raises(TransformError, match="world"):
+    with pytest.raises(tf2_py.LookupException, match="world"):
         lookup("world", "crazyflie")
     hear(process, transform("world", "crazyflie", 100.0), transform("map", "other", 100.0))
     with pytest.raises(TransformError, match="nowhere"):
         lookup("world", "nowhere")
-    with pytest.raises(TransformError, match=r"world.*other|other.*world"):
+    with pytest.raises(tf2_py.ConnectivityException, match=r"world.*other|other.*world"):
         lookup("world", "other")
 
 

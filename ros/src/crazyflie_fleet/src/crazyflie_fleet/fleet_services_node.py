@@ -50,7 +50,7 @@ class FleetServicesNode(Node):
         self._missions = MissionWatch(handle, self._on_lost_mission)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Answer the callers of landings; each vehicle has services of its own."""
         self._lander.abort()
 

@@ -233,7 +233,7 @@ class VectorizedSimulatorNode(Node):
             return
         states = self._batch.states
         before, self._measured = self._measured, (time, states)
-        if self._handle.poses_are_heard():
+        if self._handle.has_pose_consumers():
             self._broadcast_poses()
         header = Header(0, self._handle.stamp(time), self._parameters.fixed_frame)
         if before is not None and time > before[0]:

@@ -94,7 +94,7 @@ class HighLevelNode(Node):
         handle.timer(parameters.time_step, self._on_timer)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Leave the controller a reference at rest."""
         goal = self._follower.goal(self._handle.time())
         moves = self._is_moving or self._setpoint_time is not None

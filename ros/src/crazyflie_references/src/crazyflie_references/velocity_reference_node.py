@@ -119,7 +119,7 @@ class VelocityReferenceNode(Node):
         handle.timer(parameters.time_step, self._on_timer)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Let the vehicle hover where the reference is."""
         if self._is_moving:
             self._reference.stop()

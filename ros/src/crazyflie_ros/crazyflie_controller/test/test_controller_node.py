@@ -84,13 +84,13 @@ def test_lands_before_its_process_ends():
     node = ControllerNode()
     process = launch(node)
     show(process)
-    node.leave()
+    node.prepare_shutdown()
     assert not process.published("/flights")
     call(process, "takeoff")
     show(process)
     assert process.published("/flights")[-1].data == "/crazyflie/controller in flight"
     show(process, z=0.1)
-    node.leave()
+    node.prepare_shutdown()
     # The descent, whose end it sees, and the thrust that fades for a second.
     for _ in range(60):
         show(process)

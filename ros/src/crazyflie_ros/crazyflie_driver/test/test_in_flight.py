@@ -146,7 +146,7 @@ def test_a_takeoff_without_any_reply_is_a_flight_all_the_same(make_server):
     assert server.process.published("/flights")[-1].data == "/crazyflie_server in flight"
     # The emergency watchdog.
     assert b"\x04" in vehicle.wait_for_packets(9, 1)
-    server.node.leave()
+    server.node.prepare_shutdown()
     wait_until(lambda: vehicle.flight.is_landing, "a landing")
 
 

@@ -64,7 +64,7 @@ def test_ctrl_c_while_the_link_is_silent_is_a_landing_all_the_same(server, vehic
     vehicle.is_frozen = True
     wait_for_words(server, "lost")
     vehicle.received.clear()
-    server.node.leave()
+    server.node.prepare_shutdown()
     vehicle.is_frozen = False
 
     def is_landed():

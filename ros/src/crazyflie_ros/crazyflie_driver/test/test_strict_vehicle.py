@@ -163,7 +163,7 @@ def test_nothing_starts_the_motors_after_a_touchdown(server, protocol):
         flight.run(LIMIT, until=lambda: not any(stabilizer.commands))
         flight.run(0.3)
         assert SupervisorState.FLYING in flight.state
-        server.node.leave()
+        server.node.prepare_shutdown()
         removing = threading.Thread(target=server.remove, args=(uri,))
         removing.start()
         while removing.is_alive():

@@ -48,7 +48,7 @@ def test_ctrl_c(landed):
     server, vehicle = landed
     server.process.advance(0.2)
     assert server.process.published("/flights")[-1].data == "/crazyflie_server on ground"
-    server.node.leave()
+    server.node.prepare_shutdown()
     server.process.advance(0.5)
     server.node.shutdown()
     assert_rests(vehicle)
@@ -106,6 +106,6 @@ def test_a_flight_that_another_client_began_is_landed(server):
     is_(vehicle, HIGH_LEVEL)
     server.add(vehicle.uri)
     wait_for_words(server, "flying")
-    server.node.leave()
+    server.node.prepare_shutdown()
     server.process.advance(0.2)
     assert [data[0] for data in vehicle.wait_for_packets(8, 0)] == [8]

@@ -224,7 +224,7 @@ class SimulatorNode(Node):
     def _is_unheard(self):
         """Tell whether it is early enough to broadcast a pose when it is looked up."""
         # Errors are those of a sequence of poses.
-        return self._motion_capture.is_perfect and not self._handle.poses_are_heard()
+        return self._motion_capture.is_perfect and not self._handle.has_pose_consumers()
 
     def _tick_time(self, tick):
         return self._start + tick * self._parameters.time_step

@@ -111,7 +111,7 @@ class StateEstimatorNode(Node):
             handle.timer(max(parameters.time_step, SILENCE_PERIOD), self._watch)
         else:
             handle.timer(parameters.time_step, self._estimate)
-        handle.timer(REPORT_PERIOD, self._report, is_spread=True)
+        handle.timer(REPORT_PERIOD, self._report, stagger=True)
 
     def _on_control(self, message):
         self._control.command(to_tuple(message.control), self._handle.time())

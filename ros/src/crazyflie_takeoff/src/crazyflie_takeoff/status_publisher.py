@@ -54,7 +54,7 @@ class StatusPublisher:
         self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
         self._text = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._announce_flight = handle.announce_flights()
+        self._announce_flight = handle.inhibit_shutdown()
         self.state: FlightState | None = None
         self.reason = ""
         self._published: tuple[object, ...] = ()

@@ -207,8 +207,8 @@ class TakeoffControlFilterNode(Node):
         self._listening_timer = handle.timer(LISTENING_TIME, self._stop_listening, steady=True)
         self._server_timer = handle.timer(SERVER_LIMIT, self._stop_waiting, steady=True)
         self._fresh_timer = handle.timer(FRESH_TIME, self._end_freshness, steady=True)
-        handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True, is_spread=True)
-        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True, is_spread=True)
+        handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True, stagger=True)
+        handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True, stagger=True)
 
     # What it hears.
 

@@ -106,13 +106,13 @@ class TakeoffServerNode(Node):
         # Whether connections come about has nothing to do with simulated time.
         self._recovery_timer = handle.timer(RECOVERY_LIMIT, self._recover, steady=True)
         self._start_timer = handle.timer(START_LIMIT, self._end_start, steady=True)
-        handle.timer(STATUS_PERIOD, self._status.publish, steady=True, is_spread=True)
+        handle.timer(STATUS_PERIOD, self._status.publish, steady=True, stagger=True)
         handle.timer(
-            diagnostics.PERIOD, self._status.publish_diagnostics, steady=True, is_spread=True
+            diagnostics.PERIOD, self._status.publish_diagnostics, steady=True, stagger=True
         )
 
     @override
-    def leave(self) -> None:
+    def prepare_shutdown(self) -> None:
         """Land, within `LEAVE_LIMIT`."""
         reason = "the launch is to end"
         self._land(reason, f"takeoff aborted: {self._handle.name} is to end")
@@ -120,7 +120,7 @@ class TakeoffServerNode(Node):
         self._set_pace()
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """End a takeoff with a landing, go on with a landing, and answer the callers."""
         if self._flight.flight_state is FlightState.TAKING_OFF:
             self._flight.handle(Event.LAND)

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from crazyflie_utils.main import run, run_composed, run_nodes
     from crazyflie_utils.node import Node
     from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
+    from crazyflie_utils.tf.buffer import TransformError
     from crazyflie_utils.tf.poses import StampedPose
-    from crazyflie_utils.tf.tf2_memory import TransformError
     from crazyflie_utils.transport import ServiceError
 
 _HOME = {
@@ -23,7 +23,7 @@ _HOME = {
     "Parameters": "crazyflie_utils.parameters.declaration",
     "ServiceError": "crazyflie_utils.transport",
     "StampedPose": "crazyflie_utils.tf.poses",
-    "TransformError": "crazyflie_utils.tf.tf2_memory",
+    "TransformError": "crazyflie_utils.tf.buffer",
     "parameter": "crazyflie_utils.parameters.declaration",
     "run": "crazyflie_utils.main",
     "run_composed": "crazyflie_utils.main",

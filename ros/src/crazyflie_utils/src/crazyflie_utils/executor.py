@@ -6,7 +6,7 @@ every node in a process passes through one `Executor`, which runs them one at a
 time in the order they were submitted. Nodes therefore need no locks, messages
 keep their order, and a callback never runs before the nodes are complete.
 
-No thread is handed anything: whoever submits work while the executor is free
+It has no thread of its own: the thread that submits work while the executor is free
 runs it, and what is submitted meanwhile. Python's interpreter lock leaves
 nothing to gain from more threads.
 """

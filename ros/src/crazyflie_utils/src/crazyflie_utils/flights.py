@@ -1,59 +1,56 @@
 """Which vehicles are in flight: what a process must know before it ends."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from std_msgs.msg import String
 
-if TYPE_CHECKING:
-    from crazyflie_utils.process import Process
+from crazyflie_utils.topics import Topics
 
 TOPIC = "/flights"
-"""Where whoever starts and ends flights tells of them, latched."""
+"""Topic of nodes that start and end flights, latched."""
 
 _IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
 
 
-class Announcement:
-    """Tells every process of the flights that a node starts and ends.
+class ShutdownInhibitor:
+    """Publishes the flights that a node starts and ends, which inhibit the end of processes.
 
     Attributes
     ----------
     node : str
         Its absolute name.
     in_flight : bool
-        What was told last.
+        What was published last.
 
     Parameters
     ----------
-    process : Process
+    topics : Topics
+        Of the process.
     node : str
     """
 
-    def __init__(self, process: Process, node: str):
+    def __init__(self, topics: Topics, node: str):
         self.node = node
         self.in_flight = False
-        self._publisher = process.topics.publisher(TOPIC, String, latch=True)
+        self._publisher = topics.publisher(TOPIC, String, latch=True)
 
-    def tell(self, in_flight: bool) -> None:
-        """Tell whether there is a flight."""
+    def publish(self, in_flight: bool) -> None:
+        """Publish whether there is a flight."""
         self.in_flight = in_flight
-        self._publish(_IN_FLIGHT if in_flight else _ON_GROUND)
+        self._send(_IN_FLIGHT if in_flight else _ON_GROUND)
 
-    def tell_of_end(self) -> None:
-        """Tell that a flight, if there is one, is to end because its process is to end."""
+    def publish_ending(self) -> None:
+        """Publish that a flight, if there is one, is to end because its process is to end."""
         if self.in_flight:
-            self._publish(_TO_END)
+            self._send(_TO_END)
 
     def close(self) -> None:
-        """Tell no more."""
+        """Publish no more."""
         self.in_flight = False
         self._publisher.close()
 
-    def _publish(self, state):
+    def _send(self, state):
         self._publisher.publish(String(f"{self.node} {state}"))
 
 
@@ -62,16 +59,17 @@ class Flights:
 
     Parameters
     ----------
-    process : Process
+    topics : Topics
+        Of the process.
     nodes : iterable of str
         Absolute names.
     """
 
-    def __init__(self, process: Process, nodes: Iterable[str]):
+    def __init__(self, topics: Topics, nodes: Iterable[str]):
         self._namespaces = [_namespace(node) for node in nodes]
         self._in_flight: dict[str, bool] = {}
         self._to_end_since: dict[str, float] = {}
-        process.topics.subscribe(TOPIC, String, self._note)
+        topics.subscribe(TOPIC, String, self._note)
 
     @property
     def in_flight(self) -> list[str]:
@@ -79,7 +77,7 @@ class Flights:
         return sorted(name for name, flies in self._in_flight.items() if flies)
 
     def unattended(self, within: float) -> list[str]:
-        """Return those in flight of which nobody has told within ``within`` (s) that they end."""
+        """Return those in flight that were not published as ending within ``within`` (s)."""
         since = time.monotonic() - within
         return [name for name in self.in_flight if self._to_end_since.get(name, since) <= since]
 

@@ -8,68 +8,94 @@ from typing import Any, TypeVar
 import genpy
 import rosgraph.names
 
-from crazyflie_utils.handle_tf import TfHandle
-from crazyflie_utils.handle_time import TimeHandle
-from crazyflie_utils.latest import Latest
+from crazyflie_utils.context import ProcessContext
+from crazyflie_utils.log import FaultHandler, NodeLog
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, Parameters, read_parameter
+from crazyflie_utils.parameters.private import PrivateParameters
+from crazyflie_utils.parameters.reconfigure import Reconfiguration
 from crazyflie_utils.parameters.types import ParameterType
-from crazyflie_utils.services import Reply, pass_on, serve
-from crazyflie_utils.topics import Publisher, Subscriber
-from crazyflie_utils.vectors import is_finite
+from crazyflie_utils.services import Reply, forward, serve
+from crazyflie_utils.tf.poses import StampedPose
+from crazyflie_utils.timers import Timer, VaryingTimer
+from crazyflie_utils.topics import LatestMessage, Publisher, Subscriber, finite_only
 
 P = TypeVar("P", bound=Parameters)
 M = TypeVar("M", bound=genpy.Message)
 
 
-class NodeHandle(TimeHandle, TfHandle):
+class NodeHandle:
     """Names, parameters, topics, services, timers, time, tf and log of one node.
 
-    The node's callbacks, whatever calls for them, run one at a time, and never
-    at the same time as those of another node in the process. A callback that
-    raises is logged once with its traceback, and the node is told so through
-    `on_fault`; it will be called again.
+    Callbacks run one at a time, also those of several nodes in a process. One that raises is logged
+    once with its traceback, `on_fault` has the node made safe, and it will be called again.
 
     Parameters
     ----------
-    process : Process
-        What the nodes of a process share.
+    process : ProcessContext
     name : str
         Absolute name of the node, such as /simulator.
+
+    Attributes
+    ----------
+    is_closed : bool
+        Whether `close` was called.
+    info, warn, error : callable
+        See `NodeLog`.
+    time, stamp, nanoseconds : callable
+        Seconds for intervals, ROS time for headers; see `SteadyClock` and `SimulatedClock`.
+    clock_publisher, next_event : callable
+        For the node that publishes /clock; see `ClockSource`.
+    broadcast_transforms, broadcast_static_transforms, listen_to_transforms, listen_to_poses, \
+    has_pose_consumers, rejected_transforms : callable
+        See `Transforms`.
+    service_nodes, report_fault : callable
+        See `Transport.service_nodes`, which waits for the master, and `FaultHandler.report`.
     """
 
-    def child(self) -> "NodeHandle":
-        """Return another handle of the node, for what may be closed before the node ends.
+    def __init__(self, process: ProcessContext, name: str):
+        self.name = name
+        self.is_closed = False
+        self._process = process
+        self._submit = process.executor.submit
+        self._undo: list[Callable[[], None]] = []
+        self._latest: list[LatestMessage] = []
+        log = NodeLog(process.transport, name)
+        self.info, self.warn, self.error = log.info, log.warn, log.error
+        self._faults = FaultHandler(log)
+        self.report_fault = self._faults.report
+        clock = process.clock
+        self.time, self.stamp, self.nanoseconds = clock.time, clock.stamp, clock.nanoseconds
+        source = process.clock_source
+        self.clock_publisher, self.next_event = source.publisher, source.next_event
+        tf = process.transforms
+        self.broadcast_transforms = tf.broadcaster
+        self.broadcast_static_transforms = tf.static_broadcaster
+        self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
+        self.has_pose_consumers = tf.has_pose_consumers
+        self.rejected_transforms = tf.rejected_by_reason
+        self.service_nodes = process.transport.service_nodes
 
-        `close` takes down what was made through it. It may be used from any thread.
-        """
-        child = NodeHandle(self._process, self._name)
-        child._faults = self._faults
+    def child(self) -> "NodeHandle":
+        """Return another handle of the node, to be closed before it; from any thread."""
+        child = NodeHandle(self._process, self.name)
+        child._faults, child.report_fault = self._faults, self.report_fault
         return child
 
     def close(self) -> None:
-        """Take down all publishers, subscribers, services and timers of this handle.
-
-        No callback that was registered through it begins any more.
-        """
-        self._is_closed = True
+        """Take down all that was made through this handle; its callbacks begin no more."""
+        self.is_closed = True
         while self._undo:
             self._undo.pop()()
 
-    # Names and parameters.
+    def end(self, status: int = 0) -> None:
+        """End the process, and with it all its nodes, with an exit status."""
+        self._process.end(status)
 
     def resolve(self, name: str) -> str:
-        """Return the absolute name of a topic, service or parameter.
+        """Return an absolute name, remapped; ``~name`` is the node's own."""
+        return self._process.transport.remap(rosgraph.names.resolve_name(name, self.name))
 
-        A relative name is in the node's namespace, ``~name`` is the node's own.
-        Remappings of the launch file apply.
-        """
-        return self._process.transport.remap(rosgraph.names.resolve_name(name, self._name))
-
-    def load(
-        self,
-        parameters: type[P],
-        on_change: Callable[[P], None] | None = None,
-    ) -> P:
+    def load(self, parameters: type[P], on_change: Callable[[P], None] | None = None) -> P:
         """Return the node's own (private) parameters, all of them checked.
 
         Parameters
@@ -77,92 +103,38 @@ class NodeHandle(TimeHandle, TfHandle):
         parameters : type
             Subclass of `Parameters`.
         on_change : callable, optional
-            Offers the live ones to dynamic_reconfigure: ``on_change(parameters)`` is
-            called between two other callbacks with all of them, checked, after some
-            were changed. It may raise `ParameterError` to refuse.
+            Offers the live ones to dynamic_reconfigure: ``on_change(parameters)`` is called with
+            all of them, checked, after some were changed. It may raise `ParameterError` to refuse.
 
         Raises
         ------
         ParameterError
             About everything that is not set though required, or not what is expected.
         """
-        own = self._own_parameters()
-
-        def get(name):
-            full_name = self._parameter_name(name)
-            if not full_name.startswith(self._name + "/"):
-                return self._process.transport.get_param(full_name)
-            value = own
-            for key in full_name.removeprefix(self._name + "/").split("/"):
-                if not isinstance(value, dict):
-                    raise KeyError(name)
-                value = value[key]
-            return value
-
-        loaded = parameters.read(get, self._parameter_name)
+        source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
+        loaded = parameters.read(source.get, source.full_name)
         if on_change is not None:
-            # Here, since most processes do without.
-            from crazyflie_utils.parameters.reconfigure import Reconfiguration
-
-            Reconfiguration(self, loaded, get, on_change)
+            Reconfiguration(self, loaded, source.get, on_change)
         return loaded
-
-    def _own_parameters(self):
-        # In one request, however many there are.
-        try:
-            return self._process.transport.get_param(self._name)
-        except KeyError:
-            return {}
-
-    def _parameter_name(self, name):
-        return self.resolve(name if name.startswith("/") else "~" + name)
 
     def get_param(self, name: str, type: ParameterType, default: Any = REQUIRED) -> Any:  # noqa: A002
         """Return a parameter that cannot be declared: another's, or one of a changing name.
 
-        Parameters
-        ----------
-        name : str
-            A relative name is in the node's namespace, ``~name`` is the node's own.
-        type : ParameterType
-        default : object, optional
-            Taken as it is when the parameter is not set.
-
-        Raises
-        ------
-        ParameterError
-            It is required but not set, or not what is expected.
+        Waits for the master: not for callbacks. Raises `ParameterError`, see `load`.
         """
         declaration = Declaration(self.resolve(name), type, "", default, live=False)
         return read_parameter(declaration, self._process.transport.get_param)
 
     def set_param(self, name: str, value: Any) -> None:
-        """Set a parameter that others may read; blocks for a few milliseconds.
-
-        Parameters
-        ----------
-        name : str
-            A relative name is in the node's namespace.
-        value : bool, int, float, str, list or dict
-            A dictionary takes the place of the whole namespace ``name``.
-        """
+        """Set a parameter, or a namespace to a dictionary; waits for the master."""
         self._process.transport.set_param(self.resolve(name), value)
 
     def set_param_later(self, name: str, value: Any) -> None:
-        """Do the same as `set_param` soon, without waiting for the master.
-
-        Of several values of a parameter that wait, only the latest is set. What cannot be set is
-        logged.
-        """
+        """As `set_param`, without waiting; of several values that wait, the latest is set."""
         self._process.transport.set_param_later(self.resolve(name), value)
 
-    # Topics and services.
-
     def publisher(self, topic: str, message_type: type, latch: bool = False) -> Publisher:
-        """Announce a topic and return its publisher.
-
-        With ``latch``, whoever subscribes later is sent the last message.
-        """
+        """Announce a topic; with ``latch``, later subscribers are sent the last message."""
         publisher = self._process.topics.publisher(self.resolve(topic), message_type, latch)
         self._undo.append(publisher.close)
         return publisher
@@ -176,47 +148,30 @@ class NodeHandle(TimeHandle, TfHandle):
         on_invalid: Callable[[], None] | None = None,
         latest_only: bool = False,
     ) -> Subscriber:
-        """Have ``callback(message)`` called for every message on a topic.
-
-        The message belongs to everybody: it must not be changed. The subscriber that is
-        returned tells whether there are publishers.
+        """Have ``callback(message)`` called for each message, which is shared: never change it.
 
         Parameters
         ----------
-        topic : str
-        message_type : type
-        callback : callable
         finite : str, optional
             A field of the message, such as "control", whose numbers must be finite.
             Other messages are dropped with a warning, and
         on_invalid : callable, optional
             is called instead, without arguments.
         latest_only : bool, optional
-            Only the latest message is delivered, before the node's next timer, which it has to
-            have, or service call.
+            Only the latest message is delivered, before the node's next timer or service call.
         """
+        name = self.resolve(topic)
         if finite:
-            callback = self._finite_only(self.resolve(topic), finite, callback, on_invalid)
+            callback = finite_only(callback, finite, on_invalid, name, self.warn)
         guarded = self.guard(callback)
-        submit, topics = self._process.executor.submit, self._process.topics
-        latest = Latest(guarded)
-        receive = latest.take if latest_only else lambda message: submit(partial(guarded, message))
-        subscriber = topics.subscribe(self.resolve(topic), message_type, receive)
-        self._undo.append(subscriber.close)
         if latest_only:
-            self._to_deliver.append(latest.deliver)
+            self._latest.append(LatestMessage(guarded))
+            receive = self._latest[-1].take
+        else:
+            receive = lambda message: self._submit(partial(guarded, message))  # noqa: E731
+        subscriber = self._process.topics.subscribe(name, message_type, receive)
+        self._undo.append(subscriber.close)
         return subscriber
-
-    def _finite_only(self, topic, field, callback, on_invalid):
-        def check(message):
-            if is_finite(getattr(message, field)):
-                callback(message)
-                return
-            self.warn(f"ignoring a message on {topic}: its {field} is not finite", throttle=1.0)
-            if on_invalid is not None:
-                on_invalid()
-
-        return check
 
     def advertise_service(
         self, name: str, service_type: type, callback: Callable[[Any], Any]
@@ -224,43 +179,119 @@ class NodeHandle(TimeHandle, TfHandle):
         """Answer calls of a service.
 
         ``callback(request)`` returns the response; or, for work that takes time, a
-        `concurrent.futures.Future` of it, so that the node goes on living
-        meanwhile; or raises `ServiceError` with a text for the caller.
+        `concurrent.futures.Future` of it; or raises `ServiceError` with a text for the caller.
         """
 
         def begin(request):
             answer: Future[Any] = Future()
-            submit = self._process.executor.submit
-            submit(self._deliver_latest)
-            submit(partial(serve, callback, request, answer, self))
+            for latest in self._latest:
+                self._submit(latest.deliver)
+            self._submit(partial(serve, callback, request, answer, self))
             return answer
 
-        end = self._process.transport.advertise_service(
-            self.resolve(name), service_type, begin, self._process.clock.time
-        )
-        self._undo.append(end)
+        advertise = self._process.transport.advertise_service
+        self._undo.append(advertise(self.resolve(name), service_type, begin, self.time))
 
     def call_service(
         self, name: str, service_type: type, request: Any, limit: float
     ) -> Future[Any]:
-        """Call a service of any process, without waiting for it.
+        """Call a service of any process, and return a future of the response at once.
 
-        Returns
-        -------
-        concurrent.futures.Future
-            Of the response; or of a `ServiceError` when the service refuses, is
-            not there, or has not answered after ``limit`` seconds of the
-            machine's clock. What is added to it with ``add_done_callback`` runs
-            like any callback; none may wait for it.
+        Its exception is a `ServiceError` when the service refuses, is not there, or does not answer
+        within ``limit`` seconds of the machine's clock. What is added to it with
+        ``add_done_callback`` runs like any callback; none may wait for it.
         """
-        outcome = Reply(self)
-        reply = self._process.transport.call_service(
-            self.resolve(name), service_type, request, limit
-        )
-        submit = self._process.executor.submit
-        reply.add_done_callback(lambda reply: submit(partial(pass_on, reply, outcome, self)))
+        transport, outcome = self._process.transport, Reply(self)
+        reply = transport.call_service(self.resolve(name), service_type, request, limit)
+        reply.add_done_callback(lambda reply: self._submit(partial(forward, reply, outcome, self)))
         return outcome
 
-    def service_nodes(self) -> dict[str, str]:
-        """Return every service that is offered now -> its node; blocks for a few milliseconds."""
-        return self._process.transport.service_nodes()
+    @property
+    def uses_sim_time(self) -> bool:
+        """Whether the process lives by simulated time (/use_sim_time)."""
+        return self._process.uses_sim_time
+
+    def age(self, stamp: genpy.Time) -> float:
+        """Return how long ago data with a stamp was measured, s; 0 without one or ahead of now."""
+        return max(self.nanoseconds() - stamp.to_nsec(), 0) * 1e-9 if stamp else 0.0
+
+    def timer(
+        self,
+        period: float,
+        callback: Callable[[], None],
+        steady: bool = False,
+        stagger: bool = False,
+    ) -> Timer:
+        """Have ``callback()`` called every ``period`` seconds; ticks that are missed are skipped.
+
+        With ``steady`` they are of the machine's clock also when time is simulated; with
+        ``stagger`` not those of other timers, for reports of many nodes. See `TimerQueue.add`.
+        """
+        timer = self._process.add_timer(period, self._tick(callback), steady, stagger)
+        self._undo.append(timer.stop)
+        return timer
+
+    def varying_timer(self, period: float, callback: Callable[[], None]) -> VaryingTimer:
+        """As `timer`, with a method ``set_period(period)``."""
+        timer = VaryingTimer(self._process.add_timer, self._tick(callback), period)
+        self._undo.append(timer.stop)
+        return timer
+
+    def _tick(self, callback):
+        guarded = self.guard(callback)
+
+        def tick():
+            for latest in self._latest:
+                latest.deliver()
+            guarded()
+
+        return tick
+
+    def submit(self, callback: Callable[..., None], *arguments: Any) -> None:
+        """Have ``callback(*arguments)`` called in its turn; from any thread of the node."""
+        self._submit(partial(self.guard(callback), *arguments))
+
+    def broadcast_poses(
+        self, refresh: Callable[[], None] | None = None
+    ) -> Callable[[list[StampedPose]], None]:
+        """Announce /tf and return ``broadcast(list of StampedPose)``; see `Transforms`.
+
+        ``refresh()`` is called before callbacks of this process look poses up, which is early
+        enough to broadcast while `has_pose_consumers` is false.
+        """
+        if refresh is not None:
+            guarded, executor = self.guard(refresh), self._process.executor
+            on_lookup = self._process.transforms.on_lookup
+            on_lookup(lambda: guarded() if executor.is_running_here else None)
+        return self._process.transforms.pose_broadcaster()
+
+    def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
+        """Have ``callback()`` called for new poses of a frame, one in ``period`` (s, by stamps)."""
+        guarded = self.guard(callback)
+        self._process.transforms.on_pose(frame, period, lambda: self._submit(guarded))
+
+    def inhibit_shutdown(self) -> Callable[[bool], None]:
+        """Return ``publish(in_flight)``, which publishes whether a flight of this node goes on.
+
+        Processes with nodes that are needed in flight do not end at SIGINT before it has ended.
+        """
+        inhibitor = self._process.inhibit_shutdown(self.name)
+        self._undo.append(inhibitor.close)
+        return inhibitor.publish
+
+    def on_fault(self, enter_safe_state: Callable[[], None]) -> None:
+        """Have ``enter_safe_state()`` called after a callback of this node has raised."""
+        self._faults.enter_safe_state = enter_safe_state
+
+    def guard(self, callback: Callable[..., Any]) -> Callable[..., None]:
+        """Return ``callback`` such that what it raises is reported and goes no further."""
+
+        def guarded(*args):
+            if self.is_closed:
+                return
+            try:
+                callback(*args)
+            except Exception as error:
+                self.report_fault(callback, error)
+
+        return guarded

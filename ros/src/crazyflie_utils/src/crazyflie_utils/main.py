@@ -3,8 +3,6 @@
 import gc
 import importlib
 import io
-import logging
-import os
 import signal
 import sys
 import threading
@@ -16,32 +14,17 @@ from typing import Any
 import rosgraph
 import rospy
 
-from crazyflie_utils.flights import Flights
 from crazyflie_utils.handle import NodeHandle
-from crazyflie_utils.master_watch import MasterWatch
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, GraphName, ParameterType
 from crazyflie_utils.process import Process
+from crazyflie_utils.ros1.master_watch import MasterWatch
 from crazyflie_utils.ros1.transport import RosTransport
+from crazyflie_utils.shutdown import FLUSH_TIME, Shutdown, catch_signals, exit_at_once, fail
 
 _MASTER_LIMIT = 10.0
 """How long, in s, a node waits for a ROS master."""
-
-_SHUTDOWN_LIMIT = 2.0
-"""How long, in s, shutdown waits for a callback that does not return."""
-
-_FLIGHT_LIMIT = 10.0
-"""How long, in s, a process lives on for a flight that is to end: less than the 15 s
-that roslaunch gives it."""
-
-_NOTICE_DELAY = 1.0
-"""How long, in s, a process waits for the word of another that its flight is to end, before it says
-itself what it waits for."""
-
-_FLUSH_TIME = 0.2
-"""How long, in s, the last messages have to be sent by rospy's threads and to be
-read: a subscriber hangs up as soon as the master tells it of the publisher's end."""
 
 _SWITCH_INTERVAL = 0.0005
 """How long, in s, a thread that has something to do waits for another that computes."""
@@ -93,9 +76,7 @@ def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, No
         ``make_nodes(handle)``, with the handle of that node, returns all nodes by absolute name.
         What it raises ends the process with status 1.
     """
-    # Before rospy's own handlers, which shut down inside the handler, where any lock may be held
-    # by the very code that was interrupted: a node that registers would hang.
-    signals = _catch_signals()
+    signals = catch_signals()
     _run(_begin(default_name, signals), make_nodes, signals)
 
 
@@ -116,7 +97,7 @@ class NodeClasses(ParameterType):
 
 
 class ComposedParameters(Parameters):
-    """What a process of many nodes is told."""
+    """Parameters of a process of many nodes."""
 
     nodes: dict[str, type[Node]] = parameter(NodeClasses(), 'node name to "package.module:Class"')
 
@@ -182,7 +163,7 @@ def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
     def end() -> None:
         process.stop()
         if is_own:
-            time.sleep(_FLUSH_TIME)
+            time.sleep(FLUSH_TIME)
             rospy.signal_shutdown("the script has ended")
 
     return process, end
@@ -195,7 +176,7 @@ def ros_process() -> Process:
         use_sim_time = BOOLEAN(value)
     except ValueError:
         rospy.logerr(f"parameter /use_sim_time is {value!r}; expected {BOOLEAN}")
-        _fail()
+        fail()
     # In simulated time there is no such thing as too many messages a second.
     transport = RosTransport(limits_rate=not use_sim_time)
     if use_sim_time:
@@ -228,117 +209,35 @@ def _run(process, make_nodes, signals):
             for name, node in nodes.items():
                 if not node.initialize(process.handle(name)):
                     process.transport.log("fatal", f"{name}: not initialized; the process exits")
-                    _fail()
-            flights = _flights(process, nodes)
+                    fail()
+            shutdown = Shutdown(process, nodes)
     except ParameterError as error:
         handle.error(str(error))
-        _fail()
+        fail()
     except Exception:
         handle.error(f"failed to initialize\n{traceback.format_exc()}")
-        _fail()
-    ending = _Ending(process, nodes)
-    rospy.on_shutdown(ending.run)
+        fail()
+    rospy.on_shutdown(shutdown.run)
     watch = MasterWatch()
     watch.start()
-    _stop_for_nobody()
+    _avoid_pauses()
     # Not in this thread, which must stay free to end a callback that does not.
     threading.Thread(target=process.start, name="start", daemon=True).start()
     while not signals and process.exit_status is None and not rospy.is_shutdown():
         time.sleep(0.1)
-    if signals == [signal.SIGINT] and flights is not None:
-        _let_flights_end(process, nodes, flights, signals)
+    if signals == [signal.SIGINT]:
+        shutdown.wait_for_flights(signals)
     watch.stop()
     rospy.signal_shutdown(f"signal {signals}" if signals else "the node has ended")
-    if ending.is_stuck:
-        _exit_at_once(1)
+    if shutdown.is_stuck:
+        exit_at_once(1)
     sys.exit(process.exit_status or 0)
 
 
-class _Ending:
-    """What a process does before rospy closes its connections."""
-
-    def __init__(self, process: Process, nodes: list[Node]):
-        self._process = process
-        self._nodes = nodes
-        self.is_stuck = False
-
-    def run(self):
-        work = threading.Thread(target=self._process.shut_down, args=(self._nodes,), daemon=True)
-        work.start()
-        work.join(_SHUTDOWN_LIMIT)
-        self.is_stuck = work.is_alive()
-        if self.is_stuck:
-            self._process.transport.log(
-                "fatal", f"a callback has not returned within {_SHUTDOWN_LIMIT:g} s; exiting"
-            )
-        time.sleep(_FLUSH_TIME)
-
-
-def _stop_for_nobody():
+def _avoid_pauses():
     """Keep what Python does by the way from delaying controls."""
     # A search for garbage among all that has been imported takes 10 ms; none of it ever is.
     gc.collect()
     gc.freeze()
     # By default a thread that computes lets others wait for 5 ms.
     sys.setswitchinterval(_SWITCH_INTERVAL)
-
-
-def _flights(process, nodes):
-    needed = [name for name, node in nodes.items() if node.needed_in_flight]
-    return Flights(process, needed) if needed else None
-
-
-def _let_flights_end(process, nodes, flights, signals):
-    if not flights.in_flight:
-        return
-
-    def say(names):
-        process.transport.log(
-            "warn",
-            f"{', '.join(names)}: in flight; ends after the landing, or in {_FLIGHT_LIMIT:g} s; "
-            "a second SIGINT ends at once",
-        )
-
-    own = process.own_flights
-    if own:
-        say(own)
-    # Not in this thread: a callback may never return.
-    threading.Thread(target=process.leave, args=(nodes,), name="leave", daemon=True).start()
-    begin = time.monotonic()
-    is_said = bool(own)
-    while flights.in_flight and len(signals) == 1 and time.monotonic() < begin + _FLIGHT_LIMIT:
-        time.sleep(0.05)
-        if not is_said and time.monotonic() > begin + _NOTICE_DELAY:
-            is_said = True
-            if names := flights.unattended(2.0 * _NOTICE_DELAY):
-                say(names)
-
-
-def _catch_signals():
-    caught = []
-
-    def note(number, _frame):
-        caught.append(number)
-        # After a first SIGINT a flight may have to end; the next signal ends that.
-        if len(caught) > 1 or number != signal.SIGINT:
-            for each in ends:
-                signal.signal(each, signal.SIG_DFL)
-
-    ends = (signal.SIGINT, signal.SIGTERM)
-    for each in ends:
-        signal.signal(each, note)
-    return caught
-
-
-def _fail():
-    rospy.signal_shutdown("failed to initialize")
-    _exit_at_once(1)
-
-
-def _exit_at_once(status):
-    # Otherwise threads, of rospy or stuck in a callback, keep the process alive
-    # for half a second or for ever.
-    logging.shutdown()
-    sys.stdout.flush()
-    sys.stderr.flush()
-    os._exit(status)

@@ -16,7 +16,7 @@ class Node:
        `load_parameters` with one call, and builds its algorithm from them;
     2. announces itself in `register_callbacks`: publishers, then services,
        then subscribers, timers last;
-    3. if silence is not safe enough, says what is in `make_safe`.
+    3. if silence is not safe enough, says what is in `enter_safe_state`.
 
     What changes while it runs begins in ``__init__``, without a ROS call.
 
@@ -51,7 +51,7 @@ class Node:
         except Exception:
             handle.error(f"failed to initialize\n{traceback.format_exc()}")
             return False
-        handle.on_fault(self.make_safe)
+        handle.on_fault(self.enter_safe_state)
         return True
 
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -68,15 +68,15 @@ class Node:
         """Create publishers, services, subscribers and timers, in this order."""
         raise NotImplementedError
 
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Leave the vehicle safe after a callback has raised, and at shutdown.
 
         By default the node falls silent; the vehicle's watchdog does the rest.
         """
 
-    def leave(self) -> None:
+    def prepare_shutdown(self) -> None:
         """End what needs time, such as a flight: called at SIGINT, when all goes on for a while."""
 
     def shutdown(self) -> None:
         """End: called once, when timers no longer fire and topics still work."""
-        self.make_safe()
+        self.enter_safe_state()

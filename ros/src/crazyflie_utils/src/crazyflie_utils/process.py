@@ -6,11 +6,13 @@ from functools import partial
 from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
+from crazyflie_utils.clock_source import ClockSource
 from crazyflie_utils.executor import Executor
-from crazyflie_utils.flights import Announcement
+from crazyflie_utils.flights import ShutdownInhibitor
 from crazyflie_utils.handle import NodeHandle
+from crazyflie_utils.log import NodeLog
 from crazyflie_utils.node import Node
-from crazyflie_utils.tf.transforms import AHEAD, SIMULATED_AHEAD, Transforms
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED, Transforms
 from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
 from crazyflie_utils.topics import Topics
 from crazyflie_utils.transport import Transport
@@ -24,7 +26,7 @@ class Process:
     transport : Transport
         The world outside.
     use_sim_time : bool
-        Live by simulated time, which stands still until it is set.
+        Use simulated time, which stands still until it is set.
     """
 
     def __init__(self, transport: Transport, use_sim_time: bool):
@@ -38,15 +40,16 @@ class Process:
             self.topics,
             self._warn_about_transform,
             self.clock.nanoseconds,
-            SIMULATED_AHEAD if use_sim_time else AHEAD,
+            MAX_FUTURE_STAMP_SIMULATED if use_sim_time else MAX_FUTURE_STAMP,
         )
-        self._log = NodeHandle(self, "/tf")
+        self._tf_log = NodeLog(transport, "/tf")
         self._steady_clock = SteadyClock()
         # The poses of vehicles that are simulated in one tick are one message.
         tf = self.transforms.gather, self.transforms.send_gathered
         self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
         self._simulated = TimerQueue(self.executor, *tf)
-        self._announcements: list[Announcement] = []
+        self.clock_source = ClockSource(transport, self.topics, self.clock, self._simulated)
+        self._inhibitors: list[ShutdownInhibitor] = []
         self.exit_status: int | None = None
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)
@@ -65,24 +68,24 @@ class Process:
         """Return the handle of the node with this absolute name."""
         return NodeHandle(self, name)
 
-    def announce_flights(self, node: str) -> Announcement:
-        """Return what tells every process of the flights of a node, named absolutely."""
-        announcement = Announcement(self, node)
-        self._announcements.append(announcement)
-        return announcement
+    def inhibit_shutdown(self, node: str) -> ShutdownInhibitor:
+        """Return what publishes the flights of a node, named absolutely."""
+        inhibitor = ShutdownInhibitor(self.topics, node)
+        self._inhibitors.append(inhibitor)
+        return inhibitor
 
     @property
     def own_flights(self) -> list[str]:
         """Names of the nodes of this process that are in flight."""
-        return [each.node for each in self._announcements if each.in_flight]
+        return [each.node for each in self._inhibitors if each.in_flight]
 
     def add_timer(
         self,
         period: float,
         work: Callable[[], None],
         steady: bool = False,
-        is_spread: bool = False,
-        may_be_early: bool = False,
+        stagger: bool = False,
+        align_phase: bool = False,
     ) -> Timer:
         """Add a timer by this process's clock, or by the machine's if ``steady``.
 
@@ -95,8 +98,8 @@ class Process:
         if self.uses_sim_time and not steady:
             if period == 0.0:
                 raise ValueError("a timer by simulated time needs a period > 0")
-            return self._simulated.add(period, work, self.clock.time(), is_spread, may_be_early)
-        return self._steady.add(period, work, is_spread, may_be_early)
+            return self._simulated.add(period, work, self.clock.time(), stagger, align_phase)
+        return self._steady.add(period, work, stagger, align_phase)
 
     def next_simulated_deadline(self) -> float:
         """Return when the next timer by simulated time is due, s."""
@@ -112,21 +115,21 @@ class Process:
         self._steady.stop()
         self._simulated.stop()
 
-    def leave(self, nodes: dict[str, Node]) -> None:
-        """Have every node begin to end what needs time, and other processes told of it.
+    def prepare_shutdown(self, nodes: dict[str, Node]) -> None:
+        """Have every node begin to end what needs time, and publish that it does.
 
         Parameters
         ----------
         nodes : dict of str to Node
             By absolute name.
         """
-        for announcement in self._announcements:
-            self.executor.submit(announcement.tell_of_end)
+        for inhibitor in self._inhibitors:
+            self.executor.submit(inhibitor.publish_ending)
         for name, node in nodes.items():
-            self.executor.submit(self.handle(name).guard(node.leave))
+            self.executor.submit(self.handle(name).guard(node.prepare_shutdown))
 
     def shut_down(self, nodes: dict[str, Node]) -> None:
-        """Let no timer fire again, and every node leave its vehicle safe.
+        """Stop all timers, and have every node leave its vehicle safe.
 
         Parameters
         ----------
@@ -149,4 +152,4 @@ class Process:
         self._simulated.run_due(now)
 
     def _warn_about_transform(self, text, key):
-        self._log.warn(text, throttle=1.0, key=key)
+        self._tf_log.warn(text, throttle=1.0, key=key)

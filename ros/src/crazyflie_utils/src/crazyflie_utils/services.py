@@ -3,18 +3,33 @@
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from typing_extensions import override
 
 from crazyflie_utils.transport import ServiceError
 
-if TYPE_CHECKING:
-    from crazyflie_utils.handle import NodeHandle
+
+class ServiceNode(Protocol):
+    """What is needed of a node's handle."""
+
+    name: str
+    is_closed: bool
+
+    @property
+    def error(self) -> Callable[[str], None]:
+        """Logs an error."""
+
+    @property
+    def report_fault(self) -> Callable[[Callable[..., Any], Exception], None]:
+        """Reports what a callback has raised."""
+
+    def guard(self, callback: Callable[..., Any]) -> Callable[..., None]:
+        """Return a callback whose exceptions are reported."""
 
 
 def serve(
-    callback: Callable[[Any], Any], request: Any, answer: Future[Any], handle: "NodeHandle"
+    callback: Callable[[Any], Any], request: Any, answer: Future[Any], handle: ServiceNode
 ) -> None:
     """Answer a request of a service.
 
@@ -26,7 +41,7 @@ def serve(
     answer : Future
         Is given the response, or a `ServiceError`; now, or when the future that the
         callback has returned is done.
-    handle : NodeHandle
+    handle : ServiceNode
         Of the node that offers the service.
     """
     if handle.is_closed:
@@ -41,23 +56,23 @@ def serve(
         answer.set_exception(ServiceError(f"{handle.name}: {error!r}"))
     else:
         if isinstance(response, Future):
-            response.add_done_callback(lambda done: pass_on(done, answer, handle))
+            response.add_done_callback(lambda done: forward(done, answer, handle))
         else:
             answer.set_result(response)
 
 
 class Reply(Future[Any]):
-    """What a call of a service brings; what is added to it is a callback of the node.
+    """The response to a call; what is added to it is a callback of the node.
 
     A plain future would only log what that raises, and the node would not be made safe.
 
     Parameters
     ----------
-    handle : NodeHandle
+    handle : ServiceNode
         Of the node that calls.
     """
 
-    def __init__(self, handle: "NodeHandle"):
+    def __init__(self, handle: ServiceNode):
         super().__init__()
         self._guard = handle.guard
 
@@ -66,7 +81,7 @@ class Reply(Future[Any]):
         super().add_done_callback(self._guard(fn))
 
 
-def pass_on(done: Future[Any], to: Future[Any], handle: "NodeHandle") -> None:
+def forward(done: Future[Any], to: Future[Any], handle: ServiceNode) -> None:
     """Let one future have the outcome of another, any error as a `ServiceError`."""
     if not to.set_running_or_notify_cancel():
         return

@@ -102,8 +102,8 @@ class TimerQueue:
         period: float,
         work: Callable[[], None],
         now: float,
-        is_spread: bool = False,
-        may_be_early: bool = False,
+        stagger: bool = False,
+        align_phase: bool = False,
     ) -> Timer:
         """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
 
@@ -122,25 +122,25 @@ class TimerQueue:
         if not 0.0 <= period < math.inf:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
         with self._lock:
-            if may_be_early and period > 0.0:
-                begin = self._next_moment(period, now, is_spread) - period
+            if align_phase and period > 0.0:
+                begin = self._next_moment(period, now, stagger) - period
             else:
-                begin = self._begin(period, now, is_spread)
+                begin = self._begin(period, now, stagger)
             timer = Timer(period, work, begin)
             timer.number = next(self._order)
             timer.stopped = self._is_stopped
             self._push(timer)
         return timer
 
-    def _begin(self, period, now, is_spread):
+    def _begin(self, period, now, stagger):
         if self._is_running or period == 0.0:
             return now
-        if is_spread:
+        if stagger:
             return self._next_multiple(_SLOT, now) + self._next_slot(period)
         return self._next_multiple(period, now) if period <= _TOGETHER else now
 
-    def _next_moment(self, period, now, is_spread):
-        first = self._next_multiple(_SLOT, now) + (self._next_slot(period) if is_spread else 0.0)
+    def _next_moment(self, period, now, stagger):
+        first = self._next_multiple(_SLOT, now) + (self._next_slot(period) if stagger else 0.0)
         # Of the moments of its phase, the first one after now.
         return first - math.floor((first - now - _TOLERANCE) / period) * period
 
@@ -212,6 +212,41 @@ class TimerQueue:
         return due
 
 
+class VaryingTimer:
+    """A timer whose period can change; see `NodeHandle.varying_timer`.
+
+    Parameters
+    ----------
+    add_timer : callable
+        See `ProcessContext.add_timer`.
+    work : callable
+    period : float
+        s.
+    """
+
+    def __init__(self, add_timer: Callable[..., Timer], work: Callable[[], None], period: float):
+        self._add_timer = add_timer
+        self._work = work
+        self._period = period
+        self._timer = add_timer(period, work)
+        self._is_stopped = False
+
+    def set_period(self, period: float) -> None:
+        """If it is another one than before, be due at most one period, s, from now, and so on.
+
+        Then many timers with the same period are due at different moments.
+        """
+        if period != self._period and not self._is_stopped:
+            self._period = period
+            self._timer.stop()
+            self._timer = self._add_timer(period, self._work, stagger=True, align_phase=True)
+
+    def stop(self) -> None:
+        """Never be due again."""
+        self._is_stopped = True
+        self._timer.stop()
+
+
 class SteadyTimers:
     """A thread that runs a queue of timers by a steady clock.
 
@@ -241,22 +276,22 @@ class SteadyTimers:
         self,
         period: float,
         work: Callable[[], None],
-        is_spread: bool = False,
-        may_be_early: bool = False,
+        stagger: bool = False,
+        align_phase: bool = False,
     ) -> Timer:
         """Add a timer; its first deadline is one period from now, or see `TimerQueue.add`."""
-        timer = self._queue.add(period, work, self._clock.time(), is_spread, may_be_early)
-        self._tell()
+        timer = self._queue.add(period, work, self._clock.time(), stagger, align_phase)
+        self._wake_up()
         return timer
 
     def stop(self) -> None:
         """Let no timer fire again, and end the thread."""
         self._queue.stop()
         self._stopped = True
-        self._tell()
+        self._wake_up()
 
-    def _tell(self):
-        # Another may have told already.
+    def _wake_up(self):
+        # It may be released already.
         with contextlib.suppress(RuntimeError):
             self._news.release()
 

@@ -11,6 +11,7 @@ from typing import Any
 import genpy
 
 from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, Transport
+from crazyflie_utils.vectors import is_finite
 
 Receiver = Callable[[Any], None]
 
@@ -53,7 +54,7 @@ class Publisher:
         return self._topic.name
 
     def has_subscribers(self, beside: int = 0) -> bool:
-        """Tell whether anyone, here or outside, is connected and receives.
+        """Return whether anyone, here or outside, is connected and receives.
 
         Parameters
         ----------
@@ -63,11 +64,11 @@ class Publisher:
         return self.is_read_here(beside) or self.is_heard_outside()
 
     def is_heard_outside(self) -> bool:
-        """Tell whether anyone in another process is connected."""
+        """Return whether anyone in another process is connected."""
         return self._external.has_subscribers()
 
     def is_read_here(self, beside: int = 0) -> bool:
-        """Tell whether anyone in this process receives; so many do not count."""
+        """Return whether anyone in this process receives; so many do not count."""
         return len(self._topic.receivers) > beside
 
     def publish(self, message: genpy.Message, before: Sequence[genpy.Message] = ()) -> None:
@@ -114,7 +115,7 @@ class Subscriber:
         self._external = external
 
     def has_publishers(self) -> bool:
-        """Tell whether anyone, here or outside, is connected and may publish."""
+        """Return whether anyone, here or outside, is connected and may publish."""
         return bool(self._topic.publishers) or self._external.has_publishers()
 
     def caller(self, message: genpy.Message) -> str:
@@ -130,6 +131,53 @@ class Subscriber:
         receivers = self._topic.receivers
         self._topic.receivers = [each for each in receivers if each is not self._receiver]
         self._external.close()
+
+
+class LatestMessage:
+    """The latest message of a topic that has not been delivered.
+
+    Parameters
+    ----------
+    callback : callable
+        ``callback(message)``
+    """
+
+    def __init__(self, callback: Callable[[Any], None]):
+        self._callback = callback
+        self._message: Any = None
+
+    def take(self, message: Any) -> None:
+        """Keep a message in the place of the one before."""
+        self._message = message
+
+    def deliver(self) -> None:
+        """Call back with the latest message, if it is new."""
+        message, self._message = self._message, None
+        if message is not None:
+            self._callback(message)
+
+
+def finite_only(
+    callback: Callable[[Any], None],
+    field: str,
+    on_invalid: Callable[[], None] | None,
+    topic: str,
+    warn: Callable[..., None],
+) -> Callable[[Any], None]:
+    """Return a callback that drops messages with a NaN or infinity in a field.
+
+    See `NodeHandle.subscribe`; ``warn`` is that of its log.
+    """
+
+    def check(message):
+        if is_finite(getattr(message, field)):
+            callback(message)
+            return
+        warn(f"ignoring a message on {topic}: its {field} is not finite", throttle=1.0)
+        if on_invalid is not None:
+            on_invalid()
+
+    return check
 
 
 class Topics:

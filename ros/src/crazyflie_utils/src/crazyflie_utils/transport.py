@@ -14,7 +14,7 @@ import genpy
 
 
 class ServiceError(Exception):
-    """A service refused or failed; the text tells the caller why."""
+    """A service refused or failed; the text is the reason, for the caller."""
 
 
 class ExternalPublisher(ABC):
@@ -22,7 +22,7 @@ class ExternalPublisher(ABC):
 
     @abstractmethod
     def has_subscribers(self) -> bool:
-        """Tell whether anyone outside this process subscribes."""
+        """Return whether anyone outside this process subscribes."""
 
     @abstractmethod
     def publish(self, *messages: genpy.Message) -> None:
@@ -30,7 +30,7 @@ class ExternalPublisher(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Tell those outside that no more messages come."""
+        """Publish no more."""
 
 
 class ExternalSubscriber(ABC):
@@ -38,7 +38,7 @@ class ExternalSubscriber(ABC):
 
     @abstractmethod
     def has_publishers(self) -> bool:
-        """Tell whether anyone outside this process is connected and may publish."""
+        """Return whether anyone outside this process is connected and may publish."""
 
     @abstractmethod
     def close(self) -> None:
@@ -91,7 +91,7 @@ class Transport(ABC):
     ) -> Callable[[], None]:
         """Answer calls of a service with the outcome of the future ``serve(request)``.
 
-        The caller is told of a `ServiceError`, and does not wait on when the process
+        The caller gets a `ServiceError`, also when the process
         ends or when ``time()``, by which the service lives, stands still. Returns a
         function that ends the service.
         """

@@ -108,7 +108,7 @@ def from_vector(
 
 
 def is_finite(message: genpy.Message) -> bool:
-    """Tell whether every number of a message, of nested ones and of lists, is finite."""
+    """Return whether every number of a message, of nested ones and of lists, is finite."""
     message_type: Any = type(message)
     # A sum is finite only of finite numbers; one that overflows says nothing.
     if _is_flat(message_type) and math.isfinite(sum(to_tuple(message), 0.0)):

@@ -116,13 +116,13 @@ def _latencies(arrivals):
 
 
 ROWS = [
-    *_rows("separate", "five processes", _NODES, [], {"cpu": 22.0, "memory": 120.0}),
+    *_rows("separate", "five processes", _NODES, [], {"cpu": 22.0, "memory": 190.0}),
     *_rows(
         "composed",
         "one process",
         _COMPOSED,
         ["composed:=true"],
-        {"cpu": 7.0, "memory": 40.0, "latency_p50": 0.15, "latency_p99": 0.4},
+        {"cpu": 7.0, "memory": 50.0, "latency_p50": 0.15, "latency_p99": 0.4},
     ),
     *_rows(
         "arrival",

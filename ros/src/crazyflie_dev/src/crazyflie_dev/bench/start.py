@@ -26,5 +26,5 @@ def _start_time():
 
 
 ROWS = [
-    Row("start", "from roslaunch to /takeoff, one process", "s", _start_time, most=1.2),
+    Row("start", "from roslaunch to /takeoff, one process", "s", _start_time, most=1.5),
 ]

@@ -65,7 +65,7 @@ class ControllerNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
-        self._announce_flight = handle.announce_flights()
+        self._announce_flight = handle.inhibit_shutdown()
         self._source = PoseSource(handle, self._parameters)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)
@@ -73,7 +73,7 @@ class ControllerNode(Node):
         handle.timer(1.0 / self._parameters.frequency, self._on_timer)
 
     @override
-    def leave(self) -> None:
+    def prepare_shutdown(self) -> None:
         """Land: the process is to end."""
         # On the ground, or landing already.
         with contextlib.suppress(RefusalError):

@@ -33,7 +33,7 @@ class ConstThrustNode(Node):
         handle.timer(1.0 / self._parameters.rate, self._on_timer)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         self._publisher.publish(Twist())
 
     def _reconfigure(self, parameters):

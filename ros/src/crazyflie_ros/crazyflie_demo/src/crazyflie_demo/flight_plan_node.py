@@ -113,7 +113,7 @@ class FlightPlanNode(Node):
         self._next()
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         if self._is_flying:
             self._is_flying = False
             self._handle.warn("landing")

@@ -77,7 +77,7 @@ class StreamNode(Node):
         handle.info(f"waiting for {handle.resolve(self.topic)}")
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         if self._is_flying:
             self._is_flying = False
             self._handle.warn("landing")

@@ -51,12 +51,12 @@ class CrazyflieServerNode(Node):
         handle.advertise_service(ADD, AddCrazyflie, self._on_add)
         handle.advertise_service(REMOVE, RemoveCrazyflie, self._on_remove)
         handle.subscribe(self._parameters.emergency_topic, Empty, self._on_emergency)
-        self._announce_flight = handle.announce_flights()
+        self._announce_flight = handle.inhibit_shutdown()
         handle.timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         handle.timer(_FLIGHTS_PERIOD, self._follow_flights)
 
     @override
-    def leave(self) -> None:
+    def prepare_shutdown(self) -> None:
         self._is_leaving = True
         self._follow_flights()
 

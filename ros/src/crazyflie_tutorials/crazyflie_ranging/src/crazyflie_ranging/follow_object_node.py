@@ -85,7 +85,7 @@ class FollowObjectNode(Node):
         handle.timer(parameters.time_step, self._on_timer)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Stop the vehicle."""
         self._publisher.publish(Twist())
 

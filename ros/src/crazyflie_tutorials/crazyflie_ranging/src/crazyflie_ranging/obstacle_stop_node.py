@@ -75,7 +75,7 @@ class ObstacleStopNode(Node):
         handle.timer(parameters.time_step, self._on_timer)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Stop the vehicle."""
         self._command = None
         self._publisher.publish(Twist())
@@ -99,7 +99,7 @@ class ObstacleStopNode(Node):
         if self._command is None:
             return
         if self._handle.time() - self._command_time > self._parameters.command_silence:
-            self.make_safe()
+            self.enter_safe_state()
         else:
             self._publish(self._command)
 

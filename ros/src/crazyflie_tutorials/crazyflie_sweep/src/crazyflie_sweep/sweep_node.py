@@ -83,7 +83,7 @@ class SweepNode(Node):
             self._start_timer = handle.timer(REPORT_PERIOD, self._start_when_possible)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Let the vehicle hover where the reference is."""
         if self._sweeper is not None and self._is_sweeping():
             self._sweeper.speed = 0.0

@@ -31,7 +31,7 @@ class CircleNode(Node):
         handle.timer(self._parameters.time_step, self._on_timer)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Stop the vehicle."""
         self._publisher.publish(Twist())
 

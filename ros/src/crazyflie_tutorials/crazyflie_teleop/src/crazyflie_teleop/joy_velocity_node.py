@@ -71,7 +71,7 @@ class JoyVelocityNode(Node):
         handle.subscribe(self._parameters.joy_topic, Joy, self._on_joy)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Stop the vehicle."""
         self._publisher.publish(Twist())
 

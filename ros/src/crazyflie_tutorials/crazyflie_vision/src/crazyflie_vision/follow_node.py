@@ -98,7 +98,7 @@ class FollowNode(Node):
         handle.timer(parameters.time_step, self._on_timer)
 
     @override
-    def make_safe(self) -> None:
+    def enter_safe_state(self) -> None:
         """Stop the vehicle."""
         self._seen_at = -math.inf
         self._publisher.publish(Twist())

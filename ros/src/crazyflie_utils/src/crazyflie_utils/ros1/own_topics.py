@@ -118,7 +118,7 @@ class OwnPublication(rospy.topics._PublisherImpl):
 
     @override
     def add_connection(self, c: Any) -> bool:
-        return super().add_connection(NonBlockingConnection(c, self._limit or None))
+        return super().add_connection(NonBlockingConnection(c, self._limit))
 
     def send(self, messages: tuple[genpy.Message, ...]) -> None:
         """Publish messages that are of the topic's type, all at once."""

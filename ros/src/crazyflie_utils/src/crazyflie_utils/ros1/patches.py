@@ -144,7 +144,7 @@ def _fits(target: str, expected: str) -> bool:
     parameters, _, names = expected.partition(":")
     try:
         function = functools.reduce(getattr, path.split("."), importlib.import_module(module))
-        code = function.__code__  # type: ignore[attr-defined]
+        code = function.__code__
     except (ImportError, AttributeError):
         return False
     # What a function calls may be in one within it.

@@ -38,7 +38,7 @@ _MAX_READS = 16
 
 
 class RateLimiter:
-    """Tells whether a connection is flooded (a leaky bucket)."""
+    """Finds out whether a connection is flooded (a leaky bucket)."""
 
     def __init__(self) -> None:
         self._level = 0.0
@@ -181,7 +181,7 @@ def harden(connection: Any, report: Report, limits_rate: bool) -> None:
         # After a reconnection there is another socket.
         if not inbox or inbox[0].sock is not connection.socket:
             inbox[:] = [Inbox(connection, report)]
-        messages = []
+        messages: list[genpy.Message] = []
         while not (messages or connection.done or rospy.core.is_shutdown()):
             messages = inbox[0].receive(limits_rate)
         connection.stat_num_msg += len(messages)

@@ -37,13 +37,13 @@ def serialized(message: genpy.Message, number: int) -> bytes:
 class NonBlockingConnection:
     """A connection to a subscriber, in the place of rospy's ``QueuedConnection``.
 
-    While the subscriber does not keep up, the last ``limit`` messages wait for it.
+    While the subscriber does not keep up, the last ``limit`` messages (0: all) wait for it.
     """
 
     def __init__(self, connection: Any, limit: int):
         self._connection = connection
         self._lock = threading.Lock()
-        self._waiting: deque[bytes] = deque(maxlen=limit)
+        self._waiting: deque[bytes] = deque(maxlen=limit or None)
         # The rest of a message that has begun; with it a thread is at work.
         self._rest = b""
         # Not only where the subscriber asks for it: messages above 490 bytes wait up to 40 ms.

@@ -16,10 +16,10 @@ import rosgraph
 import rospy
 from rosgraph_msgs.msg import Clock
 
+from crazyflie_utils.log import Throttle
 from crazyflie_utils.parameters.writer import ParameterWriter
 from crazyflie_utils.ros1 import patches
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
-from crazyflie_utils.throttle import Throttle
 from crazyflie_utils.transport import (
     ExternalPublisher,
     ExternalSubscriber,
@@ -37,7 +37,7 @@ _STALL_LIMIT = 5.0
 stands still."""
 
 
-_MOST_CALLS = 8
+_MAX_CALLS = 8
 """Calls of one service that may be without an answer. rospy waits for one without a limit, in
 a thread that nothing can end."""
 
@@ -211,9 +211,9 @@ class RosTransport(Transport):
         """
         own = self._own_services.get(name)
         future: Future[Any] = Future()
-        calls = self._calls.setdefault(name, threading.Semaphore(_MOST_CALLS))
+        calls = self._calls.setdefault(name, threading.Semaphore(_MAX_CALLS))
         if not calls.acquire(blocking=False):
-            _fail(future, f"{name} has not answered {_MOST_CALLS} earlier calls")
+            _fail(future, f"{name} has not answered {_MAX_CALLS} earlier calls")
             return future
         threading.Thread(
             target=_call,

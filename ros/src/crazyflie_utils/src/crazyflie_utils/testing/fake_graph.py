@@ -20,7 +20,7 @@ from crazyflie_utils.transport import (
 
 Deliver = Callable[[Any], None]
 
-_MOST_WAITING = 100
+_MAX_WAITING = 100
 """Messages that wait for a frozen process on one connection; of later ones the last counts."""
 
 
@@ -192,7 +192,7 @@ class _GraphProcess(FakeProcess):
         super().__init__(transport=_GraphTransport(name, graph, parameters), start=graph.time)
         self.name = name
         self.is_frozen = False
-        self.waiting: deque[tuple[Deliver, Any]] = deque(maxlen=_MOST_WAITING)
+        self.waiting: deque[tuple[Deliver, Any]] = deque(maxlen=_MAX_WAITING)
 
     def receive(self, deliver: Deliver, message: Any) -> None:
         """Deliver a message, or keep it until the process goes on."""

@@ -189,11 +189,11 @@ class FakeProcess(Process):
         period: float,
         work: Callable[[], None],
         steady: bool = False,
-        is_spread: bool = False,
-        may_be_early: bool = False,
+        stagger: bool = False,
+        align_phase: bool = False,
     ) -> Timer:
         """Add a timer; the machine's time, too, is moved by hand here."""
-        return super().add_timer(period, work, is_spread=is_spread, may_be_early=may_be_early)
+        return super().add_timer(period, work, stagger=stagger, align_phase=align_phase)
 
     def publish(self, topic: str, message: genpy.Message) -> None:
         """Publish from outside the process."""

@@ -35,7 +35,7 @@ _LIMIT = 10.0
 
 
 class HostilePublisher:
-    """Announces a topic with the master, and sends its subscribers whatever it is told.
+    """Announces a topic with the master, and sends its subscribers any bytes.
 
     Parameters
     ----------

@@ -18,19 +18,19 @@ _TEXT = "--text"
 
 
 def pytest_arguments(arguments: list[str]) -> list[str]:
-    """Return what pytest is told when rostest says ``arguments``.
+    """Return the arguments of pytest for those that rostest gives.
 
     rostest names a file for the results, in the way of gtest; with ``rostest -t``
     there is none.
     """
-    told = []
+    converted = []
     for argument in arguments:
         if argument.startswith(_OUTPUT):
-            told.append("--junit-xml=" + argument.removeprefix(_OUTPUT))
+            converted.append("--junit-xml=" + argument.removeprefix(_OUTPUT))
         elif argument != _TEXT:
-            told.append(argument)
+            converted.append(argument)
     # rospy calls notifyAll, which Python 3.10 has deprecated, with every /clock.
-    return [*told, "-p", "no:cacheprovider", "-v", "-W", "ignore:notifyAll:DeprecationWarning"]
+    return [*converted, "-p", "no:cacheprovider", "-v", "-W", "ignore:notifyAll:DeprecationWarning"]
 
 
 class InterruptIsFailure:

@@ -1,11 +1,10 @@
 """What a process knows of tf's frames.
 
-What comes from other processes is decoded only where somebody in this one looks it up: the
-frames that were asked for, and those above them in the tree. Of the others the last transform
-is kept as it came, for whoever asks later.
+Transforms of other processes are decoded only for frames that were looked up, and for those above
+them in the tree. Of the others the last transform is kept serialized.
 
-Nearly every look-up is of the latest pose of a frame in the one right above it, which is answered
-here. tf2 has the others; it is begun, and told of what has come lately, at the first of them.
+Nearly every lookup is of the latest pose of a frame in its parent, which is answered here. The
+others go to tf2, whose buffer is filled with the latest poses at the first of them.
 """
 
 import math
@@ -13,8 +12,10 @@ import struct
 from collections import Counter, deque
 from collections.abc import Callable, Hashable
 
+import tf2_py
+
+from crazyflie_utils.tf.buffer import Buffer
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose, entries
-from crazyflie_utils.tf.tf2_memory import Tf2Memory, TransformError
 
 _HISTORY = 100
 """Poses of a frame that are kept for the moment when tf2 is begun."""
@@ -29,10 +30,10 @@ way; the present pose is still the younger one."""
 _STEPS_BACK = 3
 """So many of them in a row, and the source's clock has been set back."""
 
-_MOST_FRAMES = 1000
+_MAX_FRAMES = 1000
 """Names of frames that are known, and frames that are kept for later."""
 
-_MOST_BYTES = 1024
+_MAX_BYTES = 1024
 """Of a transform that is kept for later."""
 
 _ONE = b"\x01\0\0\0"
@@ -51,7 +52,7 @@ class _Frame:
 
 
 class FrameTree:
-    """Frames, their poses and who is above whom. Not for several threads at once.
+    """Frames, their poses and parents. Not for several threads at once.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ class FrameTree:
         # Those that are followed, as they may be on the wire; and names that nobody may use.
         self._wanted = {b"", b"/"}
         self._unread: dict[bytes, bytes] = {}
-        self._tf2: Tf2Memory | None = None
+        self._tf2: Buffer | None = None
 
     def clear(self) -> None:
         """Forget everything that moves: time has been reset."""
@@ -107,23 +108,25 @@ class FrameTree:
             return frame.latest
         return None
 
-    def ask_tf2(self, target: str, source: str) -> StampedPose:
-        """Return the latest pose of frame ``source`` in frame ``target``.
+    def lookup(self, target: str, source: str, stamp: int = 0) -> StampedPose:
+        """Return the pose of frame ``source`` in ``target`` at a ROS time (ns), or the latest.
 
         Raises
         ------
         TransformError
-            A frame is unknown, or the two are not connected.
+            A frame is unknown, the two are not connected, or not at that time.
         """
         # tf2 need not begin as long as it would know no answer.
         for name in (target, source):
             if name not in self._names and target != source:
-                raise TransformError(f"frame {name} is not known; looked up {target} -> {source}")
+                text = f"frame {name} is not known; looked up {target} -> {source}"
+                raise tf2_py.LookupException(text)
         if not set(self._chain(target)) & set(self._chain(source)):
-            raise TransformError(f"frames {target} and {source} are not connected")
+            text = f"frames {target} and {source} are not connected"
+            raise tf2_py.ConnectivityException(text)
         if self._tf2 is None:
             self._tf2 = self._begin_tf2()
-        return self._tf2.lookup(target, source)
+        return self._tf2.lookup(target, source, stamp)
 
     def read(self, raw: bytes, now: int) -> None:
         """Take what is in a serialized message, at the ROS time ``now`` (ns)."""
@@ -131,9 +134,9 @@ class FrameTree:
             for child, start, end in entries(raw):
                 if child in self._wanted:
                     self.take(self._codec.decode(raw, start, end), now)
-                elif end - start <= _MOST_BYTES:
+                elif end - start <= _MAX_BYTES:
                     self._unread[child] = raw[start:end]
-                    if len(self._unread) > _MOST_FRAMES:
+                    if len(self._unread) > _MAX_FRAMES:
                         del self._unread[next(iter(self._unread))]
         except (struct.error, ValueError):
             self.rejected["cannot be read"] += 1
@@ -163,7 +166,7 @@ class FrameTree:
         if self._tf2 is None:
             frame.recent.append(pose)
         else:
-            self._tf2.tell(pose)
+            self._tf2.add(pose)
 
     def take_static(self, pose: StampedPose, now: int) -> None:
         """Take a pose that holds for ever, unless something is wrong with it."""
@@ -173,13 +176,13 @@ class FrameTree:
             return
         self._static[pose.child] = pose
         if self._tf2 is not None:
-            self._tf2.tell(pose, is_static=True)
+            self._tf2.add(pose, is_static=True)
         self._notice(pose, now)
 
     def follow(self, frame: str | None, now: int) -> None:
         """Have a frame and all above it decoded, from the ROS time ``now`` (ns) on."""
         while frame is not None and frame not in self.followed:
-            if len(self.followed) >= _MOST_FRAMES:
+            if len(self.followed) >= _MAX_FRAMES:
                 return
             for name in (frame.encode(), b"/" + frame.encode()):
                 self._wanted.add(name)
@@ -204,12 +207,12 @@ class FrameTree:
         return self._static[name].parent if name in self._static else None
 
     def _begin_tf2(self):
-        tf2 = Tf2Memory()
+        tf2 = Buffer()
         for pose in self._static.values():
-            tf2.tell(pose, is_static=True)
+            tf2.add(pose, is_static=True)
         for frame in self._frames.values():
             for pose in frame.recent:
-                tf2.tell(pose)
+                tf2.add(pose)
             frame.recent.clear()
         return tf2
 
@@ -245,7 +248,7 @@ class FrameTree:
     def _why_too_many(self, pose):
         # tf2 never forgets a name.
         names = self._names
-        if (pose.parent in names and pose.child in names) or len(names) < _MOST_FRAMES:
+        if (pose.parent in names and pose.child in names) or len(names) < _MAX_FRAMES:
             return None
         return "is one frame too many"
 

@@ -20,7 +20,7 @@ _HEADER = struct.Struct("<4I")  # Sequence number, s, ns, length of the parent's
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<3I")
 
-_MOST_NAMES = 1000
+_MAX_NAMES = 1000
 """Pairs of frames whose names are kept as they are on the wire, and the other way round."""
 
 
@@ -173,6 +173,6 @@ def _text(name):
 
 
 def _remember(memory, key, value):
-    if len(memory) >= _MOST_NAMES:
+    if len(memory) >= _MAX_NAMES:
         memory.clear()
     memory[key] = value

@@ -1,13 +1,10 @@
-"""tf for a process, however many nodes.
-
-What has come on /tf and /tf_static is in a `FrameTree`; here are the ways into and out of it.
-"""
+"""tf for all nodes of a process: what is received and sent on /tf and /tf_static."""
 
 import threading
-from collections import Counter
 from collections.abc import Callable, Hashable
 from typing import Any
 
+import genpy
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
@@ -15,30 +12,30 @@ from crazyflie_utils.tf.frame_tree import FrameTree
 from crazyflie_utils.tf.poses import PoseCodec, RawTransforms, StampedPose
 from crazyflie_utils.topics import Subscriber, Topics
 
-AHEAD = 0.2
+MAX_FUTURE_STAMP = 0.2
 """How far a stamp may be ahead of now, s. tf's static_transform_publisher stamps 0.1 s ahead."""
 
-SIMULATED_AHEAD = 2.0
+MAX_FUTURE_STAMP_SIMULATED = 2.0
 """The same in simulated time: pose and /clock come by different ways."""
 
 
 class _Listener:
-    """Somebody who is told of new poses of a frame, so often and no oftener.
+    """A callback for new poses of a frame, at most once in a period.
 
     Parameters
     ----------
     period : float
         s, by the poses' stamps.
-    tell : callable
+    callback : callable
     """
 
-    def __init__(self, period: float, tell: Callable[[], None]):
-        self.tell = tell
+    def __init__(self, period: float, callback: Callable[[], None]):
+        self.callback = callback
         self._period = round(period * 1e9)
         self._due = 0
 
     def is_due(self, stamp: int) -> bool:
-        """Tell whether a pose, by its stamp in ns, is one of those to be told of."""
+        """Return whether a pose, by its stamp in ns, is due."""
         early = self._due - stamp
         # Rounding makes none late by one pose; much earlier ones are of a clock that was set back.
         if self._period // 100 < early <= 2 * self._period:
@@ -48,7 +45,7 @@ class _Listener:
 
 
 class Transforms:
-    """What tf knows, and the way to tell it more.
+    """What the process has received of tf, and sends to it.
 
     Parameters
     ----------
@@ -71,6 +68,7 @@ class Transforms:
         ahead: float,
     ):
         self._topics = topics
+        self._static: dict[str, TransformStamped] = {}
         self._now = now
         self._codec = PoseCodec()
         self._tree = FrameTree(self._codec, warn, ahead, self._note_arrival)
@@ -85,13 +83,34 @@ class Transforms:
         # Each broadcaster outside has a thread of its own.
         self._lock = threading.RLock()
 
-    @property
-    def rejected(self) -> Counter[str]:
-        """How many transforms were dropped, by reason."""
-        return self._tree.rejected
+    def rejected_by_reason(self) -> dict[str, int]:
+        """Return how many transforms were not taken in this process, reason to number."""
+        return dict(self._tree.rejected)
 
-    def advertise(self) -> None:
-        """Announce that one more in this process will broadcast."""
+    def broadcaster(self) -> Callable[[list[TransformStamped]], None]:
+        """Announce /tf and return ``broadcast(list of TransformStamped)``."""
+        self._advertise()
+        return lambda transforms: self._publisher.publish(TFMessage(transforms))
+
+    def pose_broadcaster(self) -> Callable[[list[StampedPose]], None]:
+        """Announce /tf and return ``broadcast(list of StampedPose)``, which is quicker."""
+        self._advertise()
+        return self._broadcast_poses
+
+    def static_broadcaster(self) -> Callable[[list[TransformStamped]], None]:
+        """Announce /tf_static and return ``broadcast(list of TransformStamped)``.
+
+        Those of earlier calls hold on; a child frame that is there again is replaced.
+        """
+        publisher = self._topics.publisher("/tf_static", TFMessage, latch=True)
+
+        def broadcast(transforms: list[TransformStamped]) -> None:
+            self._static.update({each.child_frame_id: each for each in transforms})
+            publisher.publish(TFMessage(list(self._static.values())))
+
+        return broadcast
+
+    def _advertise(self):
         self._broadcasters += 1
         if self._publisher is None:
             self._publisher = self._topics.publisher("/tf", TFMessage, latch=False)
@@ -100,23 +119,19 @@ class Transforms:
         """Have ``refresh()`` called before poses are looked up."""
         self._sources.append(refresh)
 
-    def is_heard(self) -> bool:
-        """Tell whether poses that are broadcast go anywhere but into look-ups of this process."""
+    def has_pose_consumers(self) -> bool:
+        """Return whether poses are used when they are broadcast, not only by lookups here."""
         beside = int(self._subscriber is not None)
         return bool(self._listeners) or self._publisher.has_subscribers(beside)
 
-    def broadcast(self, transforms: list[TransformStamped]) -> None:
-        """Publish a list of geometry_msgs/TransformStamped on /tf."""
-        self._publisher.publish(TFMessage(transforms))
-
-    def broadcast_poses(self, poses: list[StampedPose]) -> None:
-        """Publish poses on /tf; a message is made only if anybody else gets it."""
+    def _broadcast_poses(self, poses):
+        # A message is made only if it is received outside of this class.
         if self._subscriber is not None:
             now = self._now()
             with self._lock:
                 for pose in poses:
                     self._tree.take(pose, now)
-            self._tell_of_arrivals()
+            self._notify_listeners()
         if not self._publisher.has_subscribers(beside=int(self._subscriber is not None)):
             return
         if self._gathered is None:
@@ -139,19 +154,28 @@ class Transforms:
         self._own = self._codec.encode(poses)
         self._publisher.publish(self._own)
 
-    def listen(self) -> None:
-        """Begin to collect what is said on /tf and /tf_static."""
+    def listener(self) -> Callable[..., TransformStamped]:
+        """Begin to listen to tf and return `lookup`."""
+        self._listen()
+        return self.lookup
+
+    def pose_listener(self) -> Callable[..., StampedPose]:
+        """Begin to listen to tf and return `lookup_pose`."""
+        self._listen()
+        return self.lookup_pose
+
+    def _listen(self):
         if self._subscriber is None:
             self._subscriber = self._topics.subscribe(
                 "/tf", TFMessage, self._on_transforms, RawTransforms
             )
             self._topics.subscribe("/tf_static", TFMessage, self._on_static)
 
-    def on_pose(self, frame: str, period: float, tell: Callable[[], None]) -> None:
-        """Have ``tell()`` called when a pose of a frame is new; once in ``period`` (s)."""
-        self.listen()
+    def on_pose(self, frame: str, period: float, callback: Callable[[], None]) -> None:
+        """Have ``callback()`` called when a pose of a frame is new; once in ``period`` (s)."""
+        self._listen()
         with self._lock:
-            self._listeners.setdefault(frame, []).append(_Listener(period, tell))
+            self._listeners.setdefault(frame, []).append(_Listener(period, callback))
             self._tree.follow(frame, self._now())
 
     def clear(self) -> None:
@@ -159,8 +183,16 @@ class Transforms:
         with self._lock:
             self._tree.clear()
 
-    def lookup(self, target: str, source: str) -> TransformStamped:
-        """Return the latest transform from ``source`` to ``target`` coordinates.
+    def lookup(self, target: str, source: str, stamp: genpy.Time | None = None) -> TransformStamped:
+        """Return the transform from ``source`` to ``target`` coordinates.
+
+        Parameters
+        ----------
+        target, source : str
+            Frames.
+        stamp : genpy.Time, optional
+            When; by default (and 0), the latest. Others are known from the first such lookup on,
+            for 10 s, and before it the last 100 transforms of frames that were looked up.
 
         Returns
         -------
@@ -170,11 +202,11 @@ class Transforms:
         Raises
         ------
         TransformError
-            A frame is unknown, or the two are not connected.
+            A frame is unknown, the two are not connected, or not at that time.
         """
-        return self.lookup_pose(target, source).message()
+        return self.lookup_pose(target, source, stamp).message()
 
-    def lookup_pose(self, target: str, source: str) -> StampedPose:
+    def lookup_pose(self, target: str, source: str, stamp: genpy.Time | None = None) -> StampedPose:
         """Return the same as `lookup`, as a pose, which is quicker."""
         for refresh in self._sources:
             refresh()
@@ -183,11 +215,11 @@ class Transforms:
             with self._lock:
                 tree.follow(target, self._now())
                 tree.follow(source, self._now())
-        pose = tree.latest(target, source)
+        pose = None if stamp else tree.latest(target, source)
         if pose is not None:
             return pose
         with self._lock:
-            return tree.ask_tf2(target, source)
+            return tree.lookup(target, source, stamp.to_nsec() if stamp else 0)
 
     def _on_transforms(self, message):
         if message is self._own:
@@ -199,20 +231,20 @@ class Transforms:
             else:
                 for transform in message.transforms:
                     self._tree.take(StampedPose.of(transform), now)
-        self._tell_of_arrivals()
+        self._notify_listeners()
 
     def _note_arrival(self, pose):
         for listener in self._listeners.get(pose.child, ()):
             if listener.is_due(pose.stamp):
                 self._arrived.append(listener)
 
-    def _tell_of_arrivals(self):
+    def _notify_listeners(self):
         # Not under the lock, since what is done now may look poses up.
         if self._arrived:
             with self._lock:
                 arrived, self._arrived = self._arrived, []
             for listener in arrived:
-                listener.tell()
+                listener.callback()
 
     def _on_static(self, message):
         with self._lock:

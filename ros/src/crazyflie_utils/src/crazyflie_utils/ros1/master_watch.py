@@ -1,4 +1,4 @@
-"""A master that is started anew knows nobody: nodes have to tell it of themselves again."""
+"""A master that is started anew knows no node: nodes have to register again."""
 
 import threading
 import xmlrpc.client

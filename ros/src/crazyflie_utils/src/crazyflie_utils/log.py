@@ -1,0 +1,102 @@
+"""A node's log: no floods, and one traceback for each fault."""
+
+import time
+import traceback
+from collections.abc import Callable, Hashable
+from typing import Any
+
+from crazyflie_utils.transport import Transport
+
+_MAX_KEYS = 64
+
+
+class Throttle:
+    """Lets each key pass once in a period.
+
+    It remembers a bounded number of keys. While it remembers that many, new ones do not pass:
+    there is more in the log than anybody reads.
+    """
+
+    def __init__(self) -> None:
+        self._allowed_from: dict[Hashable, float] = {}
+
+    def passes(self, key: Hashable, period: float, now: float) -> bool:
+        """Return whether ``key`` may pass at ``now`` (s); if so, not again for ``period`` (s)."""
+        if now < self._allowed_from.get(key, now):
+            return False
+        if key not in self._allowed_from and len(self._allowed_from) >= _MAX_KEYS:
+            self._allowed_from = {k: end for k, end in self._allowed_from.items() if now < end}
+            if len(self._allowed_from) >= _MAX_KEYS:
+                return False
+        self._allowed_from[key] = now + period
+        return True
+
+
+class NodeLog:
+    """Log of one node.
+
+    Parameters
+    ----------
+    transport : Transport
+    node : str
+        Absolute name, which begins each text.
+    """
+
+    def __init__(self, transport: Transport, node: str):
+        self._transport = transport
+        self._node = node
+        self._throttle = Throttle()
+
+    def info(self, text: str) -> None:
+        """Log what an operator may want to know."""
+        self._transport.log("info", f"{self._node}: {text}")
+
+    def warn(self, text: str, throttle: float = 0.0, key: Hashable = None) -> None:
+        """Log a warning; the same ``key`` (the text) at most once in ``throttle`` seconds.
+
+        The seconds are those of the machine's clock, so that a simulation that
+        runs fast does not flood the screen. A text that varies needs a key.
+        """
+        key = text if key is None else key
+        if throttle <= 0.0 or self._throttle.passes(key, throttle, time.monotonic()):
+            self._transport.log("warn", f"{self._node}: {text}")
+
+    def error(self, text: str) -> None:
+        """Log what makes the node fail."""
+        self._transport.log("error", f"{self._node}: {text}")
+
+
+class FaultHandler:
+    """Logs what the callbacks of a node raise, and has the node made safe.
+
+    A fault is logged with its traceback when it is new, and later only counted.
+
+    Attributes
+    ----------
+    enter_safe_state : callable or None
+        Called after each fault.
+    """
+
+    def __init__(self, log: NodeLog):
+        self.enter_safe_state: Callable[[], None] | None = None
+        self._log = log
+        self._counts: dict[tuple[type, str, int | None], int] = {}
+
+    def report(self, callback: Callable[..., Any], error: Exception) -> None:
+        """Log that ``callback`` has raised ``error``, and make the node safe."""
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        fault = (type(error), where.filename, where.lineno)
+        count = self._counts[fault] = self._counts.get(fault, 0) + 1
+        name = getattr(callback, "__qualname__", repr(callback))
+        if count == 1:
+            self._log.error(f"{name} failed\n{''.join(traceback.format_exception(error))}")
+        else:
+            self._log.warn(
+                f"{name} failed again: {error!r} ({count} times)", throttle=5.0, key=fault
+            )
+        if self.enter_safe_state is None:
+            return
+        try:
+            self.enter_safe_state()
+        except Exception as second:
+            self._log.error(f"enter_safe_state failed too: {second!r}")

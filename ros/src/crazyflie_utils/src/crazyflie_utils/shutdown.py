@@ -1,0 +1,132 @@
+"""The end of a process: signals, flights that go on, the last messages."""
+
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from typing import NoReturn
+
+import rospy
+
+from crazyflie_utils.flights import Flights
+from crazyflie_utils.node import Node
+from crazyflie_utils.process import Process
+
+_SHUTDOWN_LIMIT = 2.0
+"""How long, in s, shutdown waits for a callback that does not return."""
+
+_FLIGHT_LIMIT = 10.0
+"""How long, in s, a process goes on for a flight that is to end: less than the 15 s
+that roslaunch gives it."""
+
+_NOTICE_DELAY = 1.0
+"""How long, in s, a process waits for another one to publish that its flight is to end, before it
+logs by itself that it waits."""
+
+FLUSH_TIME = 0.2
+"""How long, in s, the last messages have to be sent by rospy's threads and to be
+read: a subscriber hangs up as soon as the master tells it of the publisher's end."""
+
+
+def catch_signals() -> list[int]:
+    """Return a list to which SIGINT and SIGTERM are added from now on.
+
+    To be called before ``rospy.init_node``, whose handlers shut down inside the handler, where
+    any lock may be held by the very code that was interrupted.
+    """
+    caught: list[int] = []
+    ends = (signal.SIGINT, signal.SIGTERM)
+
+    def note(number, _frame):
+        caught.append(number)
+        # After a first SIGINT a flight may have to end; the next signal ends that.
+        if len(caught) > 1 or number != signal.SIGINT:
+            for each in ends:
+                signal.signal(each, signal.SIG_DFL)
+
+    for each in ends:
+        signal.signal(each, note)
+    return caught
+
+
+class Shutdown:
+    """What a process does before rospy closes its connections.
+
+    Parameters
+    ----------
+    process : Process
+    nodes : dict of str to Node
+        By absolute name.
+
+    Attributes
+    ----------
+    is_stuck : bool
+        Whether a callback has not returned.
+    """
+
+    def __init__(self, process: Process, nodes: dict[str, Node]):
+        self._process = process
+        self._nodes = nodes
+        self.is_stuck = False
+        needed = [name for name, node in nodes.items() if node.needed_in_flight]
+        self._flights = Flights(process.topics, needed) if needed else None
+
+    def run(self) -> None:
+        """Stop timers and nodes, and wait until the last messages are sent."""
+        work = threading.Thread(target=self._process.shut_down, args=(self._nodes,), daemon=True)
+        work.start()
+        work.join(_SHUTDOWN_LIMIT)
+        self.is_stuck = work.is_alive()
+        if self.is_stuck:
+            text = f"a callback has not returned within {_SHUTDOWN_LIMIT:g} s; exiting"
+            self._process.transport.log("fatal", text)
+        time.sleep(FLUSH_TIME)
+
+    def wait_for_flights(self, signals: list[int]) -> None:
+        """Wait for the end of flights that nodes of this process are needed for, 10 s at most.
+
+        Parameters
+        ----------
+        signals : list of int
+            See `catch_signals`; a second one ends the waiting.
+        """
+        flights = self._flights
+        if flights is None or not flights.in_flight:
+            return
+        own = self._process.own_flights
+        if own:
+            self._log_waiting(own)
+        # Not in this thread: a callback may never return.
+        prepare = self._process.prepare_shutdown
+        threading.Thread(target=prepare, args=(self._nodes,), name="end", daemon=True).start()
+        begin = time.monotonic()
+        is_logged = bool(own)
+        while flights.in_flight and len(signals) == 1 and time.monotonic() < begin + _FLIGHT_LIMIT:
+            time.sleep(0.05)
+            if not is_logged and time.monotonic() > begin + _NOTICE_DELAY:
+                is_logged = True
+                if names := flights.unattended(2.0 * _NOTICE_DELAY):
+                    self._log_waiting(names)
+
+    def _log_waiting(self, names):
+        self._process.transport.log(
+            "warn",
+            f"{', '.join(names)}: in flight; ends after the landing, or in {_FLIGHT_LIMIT:g} s; "
+            "a second SIGINT ends at once",
+        )
+
+
+def fail() -> NoReturn:
+    """End a process that cannot begin, with status 1."""
+    rospy.signal_shutdown("failed to initialize")
+    exit_at_once(1)
+
+
+def exit_at_once(status: int) -> NoReturn:
+    """Exit though threads, of rospy or stuck in a callback, would keep the process alive."""
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)

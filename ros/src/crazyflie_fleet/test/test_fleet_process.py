@@ -174,7 +174,7 @@ def test_vehicles_above_each_other_do_not_land_on_each_other():
 
 
 def end_launch(tower):
-    tower.process.leave(tower.nodes)
+    tower.process.prepare_shutdown(tower.nodes)
     # A process lives on for 10 s.
     tower.process.advance(10.0)
 

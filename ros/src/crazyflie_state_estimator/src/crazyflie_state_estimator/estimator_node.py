@@ -158,8 +158,15 @@ class StateEstimatorNode(Node):
         acceleration = self._control.acceleration(attitude[2], now)
         if self._frozen.update(pose.stamp * 1e-9, pose.position, pose.rotation, acceleration):
             self._reject_frozen()
-            return None
+            return self._departure(attitude)
         return self._estimator.update(pose.stamp, pose.position, attitude, acceleration)
+
+    def _departure(self, attitude):
+        """Return the predicted motion where the measured one has just turned out to be wrong."""
+        departure = self._frozen.departure
+        if departure is None:
+            return None
+        return Motion(departure.position, departure.velocity, attitude, (0.0, 0.0, 0.0))
 
     def _reject_frozen(self):
         self._frozen_poses += 1

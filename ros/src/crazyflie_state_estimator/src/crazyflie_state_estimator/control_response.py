@@ -45,9 +45,9 @@ LAG, LAG_ERROR = 0.1, 0.04
 """Time constant of the vehicle's response (motors, attitude, latency of the poses) and its
 standard deviation, s."""
 
-THRESHOLDS = ((0.6, 3.6), (0.35, 5.5))
+THRESHOLDS = ((0.8, 3.6), (0.35, 5.5))
 """Least time T of a prediction, s, and the threshold for its distance, standard deviations. Of
-450 healthy flights, with gusts of up to 1 m/s and noise of up to 3 mm, the worst reached 0.8 of
+570 healthy flights, with gusts of up to 1 m/s and noise of up to 3 mm, the worst reached 0.8 of
 a threshold."""
 
 SETTLING = 0.5

@@ -129,15 +129,26 @@ def test_a_camera_that_freezes_is_noticed_with_the_next_pose_but_one(controller)
     ("controller", "freeze", "limit"),
     [
         ("lqr", 1.6, 2.0),
-        ("lqr", 2.5, 2.0),
-        ("lqr", 6.5, 2.0),
-        ("soft", 2.5, 2.0),
-        ("soft", 6.5, 2.0),
-        ("without integrator", 6.5, 6.0),
+        ("lqr", 2.5, 1.0),
+        ("lqr", 6.5, 1.0),
+        ("soft", 2.5, 1.0),
+        ("soft", 6.5, 0.5),
+        ("without integrator", 6.5, 1.0),
     ],
 )
 def test_a_camera_that_freezes_and_is_noisy_is_noticed(controller, freeze, limit):
     flight = Flight(3, controller, mass_error=0.05, thrust_error=-0.03)
-    flight.fly(freeze + 10.0, freeze)
+    away = flight.fly(freeze + 10.0, freeze)
     assert flight.rejected_at is not None
-    assert 0.5 < flight.rejected_at - freeze < limit
+    assert flight.rejected_at > freeze
+    assert away < limit
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_a_frozen_flight_is_handed_over_with_the_motion_of_the_vehicle(controller):
+    flight = Flight(3, controller, mass_error=0.05, thrust_error=-0.03)
+    away = flight.fly(12.5, 2.5)
+    true = flight.vehicle.state
+    position, velocity = flight.monitor.departure
+    assert math.dist(position, true[:3]) < 0.5 * max(away, 0.2)
+    assert math.dist(velocity, true[3:6]) < 0.6 * math.hypot(*true[3:6])

@@ -24,20 +24,32 @@ class Camera:
         self.time = 0.0
 
     def show(self, position, acceleration, duration=PERIOD, rotation=LEVEL):
-        """Show poses; ``position`` may be a function of the time; return what is said of each."""
+        """Show poses, a constant one or a function of the time; return what is said of each."""
         verdicts = []
         for _ in range(round(duration / PERIOD)):
             self.time += PERIOD
             there = position(self.time) if callable(position) else position
             seen = [each + self.noise * self.random.normal() for each in there]
-            verdicts.append(self.monitor.update(self.time, seen, rotation, acceleration))
+            control = acceleration(self.time) if callable(acceleration) else acceleration
+            verdicts.append(self.monitor.update(self.time, seen, rotation, control))
         return verdicts
 
-    def lift(self, speed=0.4):
+    def move(self, height, balance=STILL, start=0.0, duration=2.5):
+        """Show a move from one height to another one and stop there."""
+        begin, half, rate = self.time, (height - start) / 2.0, math.pi / duration
+        return self.show(
+            lambda t: (0.0, 0.0, start + half * (1.0 - math.cos(rate * (t - begin)))),
+            lambda t: (
+                *balance[:2],
+                balance[2] + half * rate * rate * math.cos(rate * (t - begin)),
+            ),
+            duration,
+        )
+
+    def lift(self):
         """Stand with motors off, and climb to 1 m."""
         self.show((0.0, 0.0, 0.0), None, 1.0)
-        begin = self.time
-        assert not any(self.show(lambda t: (0.0, 0.0, speed * (t - begin)), STILL, 1.0 / speed))
+        assert not any(self.move(1.0))
         assert not any(self.show((0.0, 0.0, 1.001), STILL))
         return self
 
@@ -62,7 +74,7 @@ def test_another_attitude_is_another_pose():
 
 def test_on_the_ground_poses_repeat():
     camera = Camera().lift()
-    assert not any(camera.show(lambda t: (0.0, 0.0, max(0.0, 1.0 - 0.1 * t)), STILL, 15.0))
+    assert not any(camera.move(0.0, start=1.001))
     assert not any(camera.show((0.0, 0.0, 0.0), STILL, 5.0))
     assert not any(camera.show((0.0, 0.0, 0.0), None, 5.0))
 
@@ -71,7 +83,11 @@ def test_a_simulated_hover_that_converges_repeats_in_the_end():
     camera = Camera().lift()
     begin = camera.time
     assert not any(
-        camera.show(lambda t: (0.0, 0.0, 1.0 + math.exp(-3.0 * (t - begin))), STILL, 30.0)
+        camera.show(
+            lambda t: (0.0, 0.0, 1.0 + 0.001 * math.exp(-3.0 * (t - begin))),
+            lambda t: (0.0, 0.0, 0.009 * math.exp(-3.0 * (t - begin))),
+            30.0,
+        )
     )
 
 
@@ -121,8 +137,7 @@ def test_a_vehicle_that_is_heavy_or_in_the_wind_is_believed(disturbance):
     balance = [-each for each in disturbance]
     for step in range(20):
         camera.show((0.0, 0.0, 0.0), [0.05 * step * each for each in balance], 0.1)
-    begin = camera.time
-    assert not any(camera.show(lambda t: (0.0, 0.0, 0.4 * (t - begin)), balance, 2.5))
+    assert not any(camera.move(1.0, balance))
     assert not any(camera.show((0.0, 0.0, 1.0), balance, 60.0))
 
 
@@ -135,7 +150,41 @@ def test_wind_that_rises_slowly_is_believed():
 def test_a_vehicle_that_stands_on_a_table_with_less_thrust_is_believed():
     camera = Camera(0.001).lift()
     camera.show((0.0, 0.0, 1.0), STILL, 5.0)
-    assert not any(camera.show((0.0, 0.0, 0.5), (1.0, 1.0, -2.0), 3.0))
+    begin = camera.time
+    assert not any(camera.show(lambda t: (0.0, 0.0, 1.0 - (t - begin) ** 2), (0.0, 0.0, -2.0), 0.7))
+    assert not any(camera.show((0.0, 0.0, 0.51), (1.0, 1.0, -2.0), 3.0))
+
+
+def test_motion_that_ends_without_a_control_is_none():
+    camera = Camera(0.001)
+    camera.show((0.0, 0.0, 0.0), None, 1.0)
+    camera.move(1.0, duration=2.0)
+    begin = camera.time
+    slope = 0.3 * math.pi
+    swing = camera.show(
+        lambda t: (0.3 * math.sin(math.pi * (t - begin)), 0.0, 1.0),
+        lambda t: (-slope * math.pi * math.sin(math.pi * (t - begin)), 0.0, 0.0),
+        2.0,
+    )
+    assert not any(swing)
+    verdicts = camera.show((0.0, 0.0, 1.0), STILL, 1.0)
+    assert verdicts.index(True) < 60
+    assert all(verdicts[60:])
+
+
+def test_the_first_pose_that_does_not_respond_comes_with_the_predicted_motion():
+    camera = Camera(0.001).lift()
+    camera.show((0.0, 0.0, 1.0), STILL, 5.0)
+    duration = 0.0
+    while not camera.show((0.0, 0.0, 1.0), (0.0, 0.0, 2.0))[0]:
+        duration += PERIOD
+    position, velocity = camera.monitor.departure
+    assert duration < 1.0
+    # The vehicle's response lags behind.
+    assert 0.4 < velocity[2] / (2.0 * duration) < 1.0
+    assert 0.2 < (position[2] - 1.0) / duration**2 < 1.0
+    camera.show((0.0, 0.0, 1.0), (0.0, 0.0, 2.0))
+    assert camera.monitor.departure is None
 
 
 # In the node.
@@ -163,3 +212,28 @@ def test_a_frozen_camera_gives_no_states_and_the_node_says_so(filter_type):
     assert counted["rejected: does not follow the control"] > 40
     fly(process, lambda elapsed: ((0.0, 0.0, 0.37 - 0.1 * elapsed), STILL), 0.1)
     assert len(process.published("/state")) > before + 5
+
+
+def test_the_last_state_before_the_silence_is_the_predicted_one():
+    process = launch(**{"topics/control": "/control/final", "filter/type": "kalman"})
+    random = np.random.default_rng(2)
+
+    def show(z, thrust):
+        command(process, thrust)
+        position = (random.normal(0.0, 1e-3), random.normal(0.0, 1e-3), random.normal(z, 1e-3))
+        fly(process, lambda _: (position, STILL), PERIOD)
+
+    fly(process, lambda _: (STILL, STILL), 0.5)
+    rate = math.pi / 2.0
+    for tick in range(200):
+        swing = math.cos(rate * tick * PERIOD)
+        show(0.5 * (1.0 - swing), 9.81 + 0.5 * rate * rate * swing)
+    for _ in range(200):
+        show(1.0, 9.81)
+    assert abs(process.published("/state")[-1].state.z_dot) < 0.05
+    for _ in range(200):
+        show(1.0, 12.0)
+    last = process.published("/state")[-1]
+    assert last.header.stamp.to_sec() < process.clock.stamp().to_sec() - 1.0
+    assert last.state.z_dot > 0.4
+    assert last.state.z > 1.05

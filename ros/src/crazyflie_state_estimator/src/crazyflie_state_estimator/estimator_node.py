@@ -21,7 +21,7 @@ from crazyflie_state_estimator.parameters import (
     KalmanWithControlParameters,
     StateEstimatorParameters,
 )
-from crazyflie_state_estimator.pose_gate import PoseGate, TiltMonitor, Verdict
+from crazyflie_state_estimator.pose_gate import Classification, PoseGate, TiltMonitor
 from crazyflie_state_estimator.rate_filter import FiniteDifference
 from crazyflie_utils import Node, NodeHandle, TransformError, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
@@ -32,7 +32,7 @@ REPORT_PERIOD = 1.0
 """Of the diagnostics, s; REP 107 wants one report a second."""
 
 SILENCE_PERIOD = 0.1
-"""How often an estimator that acts on arrival looks whether anything has arrived, s."""
+"""Period at which an estimator that acts on arrival checks for silence, s."""
 
 
 class StateEstimatorNode(Node):
@@ -117,7 +117,7 @@ class StateEstimatorNode(Node):
         self._control.command(to_tuple(message.control), self._handle.time())
 
     def _watch(self):
-        # Where nothing arrives somebody has to say so.
+        # Without arrivals `_estimate` would not run and report the silence.
         if self._handle.time() - self._last_success >= HOLD_LIMIT:
             self._estimate()
 
@@ -147,19 +147,26 @@ class StateEstimatorNode(Node):
         if pose.stamp == self._stamp:
             return None
         self._stamp = pose.stamp
-        self._tell_tilt(pose.rotation)
-        verdict = self._gate.judge(pose.stamp * 1e-9, pose.position)
-        if verdict is Verdict.BAD:
+        self._publish_tilt(pose.rotation)
+        classification = self._gate.classify(pose.stamp * 1e-9, pose.position)
+        if classification is Classification.BAD:
             return None
-        if verdict is Verdict.MOVED:
+        if classification is Classification.MOVED:
             self._estimator.reset()
             self._frozen.restart()
         attitude = rpy_from_quaternion(*pose.rotation)
         acceleration = self._control.acceleration(attitude[2], now)
         if self._frozen.update(pose.stamp * 1e-9, pose.position, pose.rotation, acceleration):
             self._reject_frozen()
-            return None
+            return self._departure(attitude)
         return self._estimator.update(pose.stamp, pose.position, attitude, acceleration)
+
+    def _departure(self, attitude):
+        """Return the predicted motion where the measured one has just turned out to be wrong."""
+        departure = self._frozen.departure
+        if departure is None:
+            return None
+        return Motion(departure.position, departure.velocity, attitude, (0.0, 0.0, 0.0))
 
     def _reject_frozen(self):
         self._frozen_poses += 1
@@ -170,7 +177,7 @@ class StateEstimatorNode(Node):
             key="frozen",
         )
 
-    def _tell_tilt(self, rotation):
+    def _publish_tilt(self, rotation):
         is_tilted = self._tilt.update(*rotation[:2])
         if is_tilted == self._is_tilted:
             return

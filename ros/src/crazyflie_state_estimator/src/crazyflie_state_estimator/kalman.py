@@ -22,8 +22,8 @@ MEMORY = 1.0
 """After a longer pause between two samples, in s, the filter starts afresh: the
 acceleration known by then is out of date."""
 
-_FIRST_RATE_VARIANCE = 10.0**2
-_FIRST_ACCELERATION_VARIANCE = 10.0**2
+UNKNOWN_RATE, UNKNOWN_ACCELERATION = 10.0, 10.0
+"""Standard deviations at the first sample, per s and s^2: next to nothing is assumed."""
 
 
 class ConstantAccelerationFilter(RateFilter):
@@ -52,10 +52,20 @@ class ConstantAccelerationFilter(RateFilter):
     acceleration_walk : float
         How much the unknown part of the acceleration changes in a second: the
         standard deviation, in units / s^2 / sqrt(s).
+    first_rate, first_acceleration : float, optional
+        Standard deviations of rate and acceleration at the first sample, in units / s and
+        units / s^2.
     """
 
-    def __init__(self, noise: float, acceleration_walk: float):
+    def __init__(
+        self,
+        noise: float,
+        acceleration_walk: float,
+        first_rate: float = UNKNOWN_RATE,
+        first_acceleration: float = UNKNOWN_ACCELERATION,
+    ):
         self.tune(noise, acceleration_walk)
+        self._first_variances = first_rate**2, 0.0, first_acceleration**2
         self._value: list[float] = []
         self._rate: list[float] = []
         self._acceleration: list[float] = []
@@ -74,10 +84,18 @@ class ConstantAccelerationFilter(RateFilter):
         p00, p01, p02, p11, p12, p22 = self._covariance
         return [[p00, p01, p02], [p01, p11, p12], [p02, p12, p22]]
 
+    @property
+    def acceleration(self) -> Components:
+        """Estimated acceleration, the known part included, in units / s^2."""
+        return self._acceleration
+
     @override
-    def start(self, value: Components) -> None:
-        """Take the first sample; next to nothing is assumed about rate and acceleration."""
+    def start(self, value: Components, acceleration: Components | None = None) -> None:
+        """Take the first sample, and the acceleration to be expected if it is not zero."""
         self._begin(value, [0.0] * len(value))
+        self._known = acceleration
+        if acceleration is not None:
+            self._acceleration = list(acceleration)
 
     @override
     def step(
@@ -94,8 +112,7 @@ class ConstantAccelerationFilter(RateFilter):
     def _begin(self, value, rate):
         self._value, self._rate = list(value), rate
         self._acceleration = [0.0] * len(rate)
-        variances = (_FIRST_RATE_VARIANCE, 0.0, _FIRST_ACCELERATION_VARIANCE)
-        self._covariance = (self._noise_variance, 0.0, 0.0, *variances)
+        self._covariance = (self._noise_variance, 0.0, 0.0, *self._first_variances)
         self._known = None
 
     def _take_over(self, known):

@@ -1,38 +1,38 @@
-"""Which poses of a vehicle are believed."""
+"""Rejection of poses that the vehicle cannot have flown to, and detection of tilt."""
 
 import math
 from collections.abc import Sequence
 from enum import Enum
 
 PERSISTENCE = 0.3
-"""A place that is too far away is believed in after the vehicle has been seen there so long, s:
-somebody has carried it while nobody looked."""
+"""A position that is too far away is accepted after the vehicle has been measured there for this
+time, s: it was carried there while it was not measured."""
 
-LONGEST_WAY = 0.5
-"""For how much time a vehicle that was not seen is believed to have flown on, s."""
+MAX_COAST_TIME = 0.5
+"""Longest time for which a vehicle that was not measured is assumed to have flown on, s."""
 
 CONFIRMATION = 3
-"""So many poses in a row, without a jump between them, are believed after wild ones: a few of
-many always come to lie where the vehicle might be."""
+"""Number of poses in a row, without a jump between them, that are accepted after outliers: some
+outliers happen to lie where the vehicle might be."""
 
-MOMENT = 0.03
-"""So long after a good pose one alone is believed, s: the vehicle cannot have gone far."""
+TRUST_WINDOW = 0.03
+"""A single pose is accepted within this time after a good one, s: the vehicle cannot be far."""
 
-SLACK = 0.02
-"""What noise may move a pose by, m."""
+NOISE_MARGIN = 0.02
+"""Largest displacement of a pose by noise, m."""
 
 
 Pose = tuple[float, tuple[float, ...]]
 """Time, s, and position, m."""
 
 
-class Verdict(Enum):
-    """What is to be done with a pose."""
+class Classification(Enum):
+    """How a pose is used."""
 
     GOOD = "good"
     BAD = "bad"
     MOVED = "moved"
-    """Good, but the vehicle did not fly there: velocities begin anew."""
+    """Good, but the vehicle did not fly there: filters restart."""
 
 
 class PoseGate:
@@ -56,22 +56,22 @@ class PoseGate:
         self.reset()
 
     def reset(self) -> None:
-        """Believe the next pose."""
-        # The last pose that was believed, the last one that came, and how long the latter
-        # has gone on without a jump: since when, and for how many poses.
+        """Accept the next pose."""
+        # The last accepted pose, the last one received, and since when and for how many poses
+        # the latter have had no jump.
         self._last: Pose | None = None
         self._previous: Pose | None = None
         self._since = 0.0
         self._count = 0
         self._is_doubtful = False
 
-    def judge(self, time: float, position: Sequence[float]) -> Verdict:
-        """Return what to do with a pose.
+    def classify(self, time: float, position: Sequence[float]) -> Classification:
+        """Classify a pose.
 
         Parameters
         ----------
         time : float
-            Its stamp, s, later than the last one's; an earlier one begins anew.
+            Its stamp, s, later than the last one's; an earlier one resets the gate.
         position : sequence, 3 components
             m.
         """
@@ -79,37 +79,37 @@ class PoseGate:
         if self._last is None or time < self._last[0]:
             self.reset()
             self._last = self._previous = pose
-            return Verdict.GOOD
+            return Classification.GOOD
         if self._previous is None or not self._is_reachable(self._previous, pose):
             self._since = time
             self._count = 0
         self._previous = pose
         self._count += 1
-        is_recent = not self._is_doubtful or time - self._last[0] < MOMENT
+        is_recent = not self._is_doubtful or time - self._last[0] < TRUST_WINDOW
         is_steady = is_recent or self._count >= CONFIRMATION
         if is_steady and self._is_reachable(self._last, pose):
-            self._believe(pose)
-            return Verdict.GOOD
+            self._accept(pose)
+            return Classification.GOOD
         if time - self._since >= PERSISTENCE - 1e-6:
-            self._believe(pose)
-            return Verdict.MOVED
+            self._accept(pose)
+            return Classification.MOVED
         self._is_doubtful = True
         self.rejected += 1
-        return Verdict.BAD
+        return Classification.BAD
 
-    def _believe(self, pose):
+    def _accept(self, pose):
         self._last = pose
         self._is_doubtful = False
 
     def _is_reachable(self, start, end):
-        way = self.max_speed * min(end[0] - start[0], LONGEST_WAY) + SLACK
+        way = self.max_speed * min(end[0] - start[0], MAX_COAST_TIME) + NOISE_MARGIN
         return math.dist(start[1], end[1]) <= way
 
 
 class TiltMonitor:
-    """Tells whether the vehicle has tipped over.
+    """Detects that the vehicle has tipped over.
 
-    One pose alone is no evidence: motion capture may mistake one marker for another.
+    A single pose is not enough: motion capture may mistake one marker for another.
 
     Parameters
     ----------

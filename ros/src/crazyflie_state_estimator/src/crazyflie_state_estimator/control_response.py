@@ -1,0 +1,253 @@
+"""Whether poses respond to the control, or show a place that the vehicle has left.
+
+    p'' = a(u) + d
+
+with the acceleration a that the control commands and a disturbance d of weight, battery and wind.
+A Kalman filter estimates p, v and d from the poses. From its estimate at t0 the vehicle is at
+
+    p(t) = p0 + v0 T + d0 T^2 / 2 + integral of integral of a,    T = t - t0,
+
+with the variance, along each axis,
+
+    s^2 = f P f' + min(q^2 T^5 / 20, (D T^2 / 2)^2) + L^2 |integral of a - a(t0)|^2 + n^2,
+
+where f = (1, T, T^2 / 2), P is the covariance of the estimate, q the random walk of the
+disturbance (`DISTURBANCE_WALK`), D its limit (`DISTURBANCE_CHANGE`), L the uncertainty of the
+vehicle's delay (`LAG_ERROR`) and n what a place is known to. Poses that stay at one place to within
+their noise although p(t) is more than a threshold times s away from it do not respond to the
+control. A vehicle in gusts departs from p(t), too, but does not stay at one place meanwhile.
+"""
+
+import math
+from collections import deque
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
+
+BLOCK, BLOCK_POSES = 0.05, 4
+"""Poses and controls are averaged over at least this time, s, and so many poses."""
+
+MAX_GAP = 0.25
+"""After a longer pause between two poses, s, the estimate starts anew."""
+
+DISTURBANCE_WALK = 0.25
+"""Random walk of the disturbance, m/s^2/sqrt(s)."""
+
+FIRST_SPEED, FIRST_DISTURBANCE = 1.0, 1.5
+"""Standard deviations of the velocity, m/s, and of the disturbance, m/s^2, after lifting off: mass
+and thrust of a vehicle may be wrong by 15 %."""
+
+DISTURBANCE_CHANGE = 0.05
+"""By how much the disturbance of a vehicle that stays at one place changes, m/s^2."""
+
+LAG, LAG_ERROR = 0.1, 0.04
+"""Time constant of the vehicle's response (motors, attitude, latency of the poses) and its
+standard deviation, s."""
+
+THRESHOLDS = ((0.8, 3.6), (0.35, 5.5))
+"""Least time T of a prediction, s, and the threshold for its distance, standard deviations. Of
+570 healthy flights, with gusts of up to 1 m/s and noise of up to 3 mm, the worst reached 0.8 of
+a threshold."""
+
+SETTLING = 0.5
+"""Estimates from the first part of a stay, s, still contain the end of the motion before it."""
+
+WINDOW, ESTIMATE_PERIOD = 3.0, 0.25
+"""Estimates are kept for this time, one every period, s."""
+
+TOLERANCE, TOLERANCE_FACTOR = 0.0003, 4.0
+"""Poses stay at a place when the mean of a block differs from that of the stay by less than the
+former, m, and so many standard deviations of the difference."""
+
+MIN_NOISE, PLACE_ERROR = 1e-4, 0.003
+"""Least noise of a pose, and error of the prediction at T = 0, m."""
+
+NOISE_AVERAGING = 40.0
+"""The variance of the noise is averaged over so many blocks."""
+
+Vector = Sequence[float]
+
+
+class Departure(NamedTuple):
+    """Predicted position (m) and velocity (m/s) of a vehicle whose poses do not show it."""
+
+    position: Vector
+    velocity: Vector
+
+
+class _Prediction(NamedTuple):
+    duration: float
+    departure: Departure
+    deviation: float
+
+
+class _Estimate(NamedTuple):
+    """The Kalman filter's estimate, and the integrals of the commanded acceleration until then."""
+
+    time: float
+    position: Vector
+    velocity: Vector
+    disturbance: Vector
+    covariance: list[list[float]]
+    commanded: Vector
+    speed: Vector
+    way: Vector
+
+
+class _Stay(NamedTuple):
+    begin: float
+    mean: Vector
+    poses: int
+
+
+class ResponseMonitor:
+    """Compares the poses of a vehicle in flight with the motion that its control causes."""
+
+    def __init__(self) -> None:
+        self._noise = 1e-3
+        self._filter = ConstantAccelerationFilter(
+            self._noise, DISTURBANCE_WALK, FIRST_SPEED, FIRST_DISTURBANCE
+        )
+        self.reset()
+
+    def reset(self) -> None:
+        """Start anew with the next pose; the noise of the poses stays known."""
+        self._block: list[tuple[float, Vector, Vector]] = []
+        self._time: float | None = None
+        self._commanded: Vector = ()
+        self._speed: Vector = (0.0, 0.0, 0.0)
+        self._way: Vector = (0.0, 0.0, 0.0)
+        self._estimates: deque[_Estimate] = deque()
+        self._latest: deque[_Estimate] = deque(maxlen=2)
+        self._before: _Estimate | None = None
+        self._stay: _Stay | None = None
+
+    def update(self, time: float, position: Vector, acceleration: Vector) -> Departure | None:
+        """Take a pose; return where the vehicle is if the poses do not respond to the control.
+
+        Parameters
+        ----------
+        time : float
+            Stamp of the pose, s.
+        position : sequence, 3 components
+            m, fixed frame.
+        acceleration : sequence, 3 components
+            That the control commands, m/s^2, fixed frame.
+        """
+        if self._block and not 0.0 < time - self._block[-1][0] < MAX_GAP:
+            self.reset()
+        self._block.append((time, position, acceleration))
+        if time - self._block[0][0] < BLOCK or len(self._block) <= BLOCK_POSES:
+            return None
+        # The last pose of a block is the first of the next one.
+        block, self._block = self._block[:-1], self._block[-1:]
+        times, positions, accelerations = zip(*block, strict=True)
+        middle = sum(times) / len(times)
+        mean = _mean(positions)
+        self._estimate(middle, mean, _mean(accelerations), len(block))
+        self._update_noise([each - middle for each in times], positions, mean)
+        self._update_stay(middle, mean, len(block))
+        return self._departure(middle)
+
+    def _estimate(self, time, position, acceleration, count):
+        self._filter.tune(self._noise / math.sqrt(count), DISTURBANCE_WALK)
+        if self._time is None:
+            self._time, self._commanded = time, acceleration
+            self._filter.start(position, acceleration)
+            return
+        dt, self._time = time - self._time, time
+        share = 1.0 - math.exp(-dt / LAG)
+        self._commanded = [
+            old + share * (new - old)
+            for old, new in zip(self._commanded, acceleration, strict=True)
+        ]
+        self._way = [
+            way + dt * speed + 0.5 * dt * dt * a
+            for way, speed, a in zip(self._way, self._speed, self._commanded, strict=True)
+        ]
+        self._speed = [v + dt * a for v, a in zip(self._speed, self._commanded, strict=True)]
+        value, rate = self._filter.step(dt, position, self._commanded)
+        disturbance = [
+            total - a for total, a in zip(self._filter.acceleration, self._commanded, strict=True)
+        ]
+        self._latest.append(
+            _Estimate(
+                time, value, rate, disturbance, self._filter.covariance,
+                self._commanded, self._speed, self._way,
+            )
+        )  # fmt: skip
+        while self._estimates and time - self._estimates[0].time > WINDOW:
+            self._estimates.popleft()
+        if not self._estimates or time - self._estimates[-1].time >= ESTIMATE_PERIOD:
+            self._estimates.append(self._latest[-1])
+
+    def _update_noise(self, times, positions, mean):
+        """Average the variance of the poses about a straight line through those of a block."""
+        spread = sum(t * t for t in times)
+        squares = 0.0
+        for axis, middle in enumerate(mean):
+            offsets = [each[axis] - middle for each in positions]
+            slope = sum(t * x for t, x in zip(times, offsets, strict=True)) / spread
+            squares += sum((x - slope * t) ** 2 for t, x in zip(times, offsets, strict=True))
+        variance = squares / (3.0 * (len(times) - 2))
+        variance = self._noise**2 + (variance - self._noise**2) / NOISE_AVERAGING
+        self._noise = max(math.sqrt(variance), MIN_NOISE)
+
+    def _update_stay(self, time, mean, count):
+        if self._stay is not None:
+            begin, place, total = self._stay
+            deviation = self._noise * math.sqrt(1.0 / count + 1.0 / total)
+            if math.dist(mean, place) < TOLERANCE + TOLERANCE_FACTOR * deviation:
+                share = count / (total + count)
+                place = [a + share * (b - a) for a, b in zip(place, mean, strict=True)]
+                self._stay = _Stay(begin, place, total + count)
+                return
+        self._stay = _Stay(time, mean, count)
+        self._before = self._latest[0] if self._latest else None
+
+    def _departure(self, time):
+        if self._stay is None:
+            return None
+        settled = self._stay.begin + SETTLING
+        estimates = [each for each in self._estimates if each.time > settled]
+        if self._before is not None and time - self._before.time < 2.0 * WINDOW:
+            estimates.insert(0, self._before)
+        place = self._stay.mean
+        predictions = [self._predict(time, each) for each in estimates]
+        best = max(predictions, key=lambda each: _significance(each, place), default=None)
+        return best.departure if best is not None and _significance(best, place) > 1.0 else None
+
+    def _predict(self, time, start):
+        """Return what follows from an estimate."""
+        t = time - start.time
+        speed = [b - a for a, b in zip(start.speed, self._speed, strict=True)]
+        position, velocity = [], []
+        for axis in range(3):
+            disturbance = start.disturbance[axis]
+            way = self._way[axis] - start.way[axis] - start.speed[axis] * t
+            position.append(
+                start.position[axis] + (start.velocity[axis] + 0.5 * disturbance * t) * t + way
+            )
+            velocity.append(start.velocity[axis] + disturbance * t + speed[axis])
+        (p00, p01, p02), (_, p11, p12), (_, _, p22) = start.covariance
+        variance = p00 + t * (2.0 * p01 + t * (p11 + p02 + t * (p12 + 0.25 * t * p22)))
+        variance += min(DISTURBANCE_WALK**2 * t / 5.0, DISTURBANCE_CHANGE**2) * t**4 / 4.0
+        changes = (v - a * t for v, a in zip(speed, start.commanded, strict=True))
+        variance += LAG_ERROR**2 * sum(each * each for each in changes)
+        variance += (PLACE_ERROR + TOLERANCE_FACTOR * self._noise / math.sqrt(BLOCK_POSES)) ** 2
+        return _Prediction(t, Departure(position, velocity), math.sqrt(variance))
+
+
+def _significance(prediction: _Prediction, place: Vector) -> float:
+    """Return how far away from the place a prediction is, over what is tolerated."""
+    duration, (position, _), deviation = prediction
+    threshold = next((limit for least, limit in THRESHOLDS if duration >= least), math.inf)
+    x, y, z = (a - b for a, b in zip(position, place, strict=True))
+    # A vehicle that is to sink may stand on something, and friction (of coefficient 1) hold it.
+    distance = math.hypot(x, y, z) if z >= 0.0 else max(math.hypot(x, y) + z, 0.0)
+    return distance / (threshold * deviation)
+
+
+def _mean(vectors: Sequence[Vector]) -> list[float]:
+    return [sum(column) / len(vectors) for column in zip(*vectors, strict=True)]

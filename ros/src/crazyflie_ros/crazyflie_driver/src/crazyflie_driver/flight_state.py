@@ -52,10 +52,6 @@ class FlightState:
         """Return the state, from supervisor or log; None if neither reports it; blocks.
 
         Before protocol 12 the supervisor cannot be asked; very old firmware does not log it either.
-
-        Raises
-        ------
-        LinkLostError
         """
         try:
             state = self._crazyflie.supervisor.read()
@@ -76,12 +72,7 @@ class FlightState:
         return state is not None and SupervisorState.FLYING in state and self._may_move(state)
 
     def is_on_ground(self) -> bool:
-        """Return whether neither setpoints nor planner can have the motors run; blocks.
-
-        Raises
-        ------
-        LinkLostError
-        """
+        """Return whether neither setpoints nor planner can have the motors run; blocks."""
         state = self.read()
         is_streamed = self._setpoints.runs_motors
         latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)

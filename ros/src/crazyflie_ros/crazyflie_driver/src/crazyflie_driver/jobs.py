@@ -18,19 +18,7 @@ MOST_JOBS = 64
 
 @dataclass(eq=False)
 class Job:
-    """A call that takes time.
-
-    Attributes
-    ----------
-    work : callable
-        ``work(job)`` is called in a thread of `Jobs`.
-    is_flight : bool
-        Whether an urgent job supersedes it.
-    superseded_by : str
-        What has superseded it; empty if nothing has.
-    done : Future
-        Of its result.
-    """
+    """A call ``work(job)``, which takes time; an urgent job supersedes one that is for a flight."""
 
     work: Callable[["Job"], Any]
     is_flight: bool = False

@@ -27,14 +27,9 @@ PAUSE = 1.0
 
 
 class NoLift(NamedTuple):
-    """A vehicle that has not lifted off.
+    """A vehicle that has not lifted off to a height (m).
 
-    Attributes
-    ----------
-    height : float
-        Height that it was told, m.
-    is_certain : bool
-        Whether its estimate says that it is on the ground; otherwise only that it does not fly.
+    It is certain if its estimate says that it is on the ground, not only that it does not fly.
     """
 
     height: float
@@ -59,11 +54,7 @@ class LiftWatch:
     def command(self, now: float, height: float | None) -> None:
         """Take note of a setpoint that was sent.
 
-        Parameters
-        ----------
-        now : float
-        height : float or None
-            Height that it asks for, m, in the frame of the estimate; None if for none.
+        Its height is in m, in the frame of the estimate; None if it asks for none.
         """
         if self._latest is not None and now - self._latest > PAUSE:
             self.end()
@@ -80,13 +71,8 @@ class LiftWatch:
     ) -> NoLift | None:
         """Return what is wrong, once in an attempt; None if nothing is.
 
-        Parameters
-        ----------
-        now : float
-        is_flying : bool or None
-            Whether the supervisor says so; None if it says nothing.
-        height, speed : float or None
-            The vehicle's estimate, m, and its vertical speed, m/s; None if not known.
+        Whether the supervisor reports a flight, the estimate's height (m) and vertical speed (m/s)
+        are None while they are not known.
         """
         if self._begin is None and is_flying is False:
             self._is_on_ground, self._ground = True, height

@@ -73,10 +73,7 @@ class LogTopics:
     def start(self) -> None:
         """Announce the topics and start the log blocks; blocks.
 
-        Raises
-        ------
-        CrazyflieError
-            A custom block is not possible, or the vehicle does not reply.
+        Raises `CrazyflieError` if a custom block is not possible.
         """
         parameters = self._parameters
         if "packets" in parameters.topics:
@@ -96,12 +93,9 @@ class LogTopics:
                 self._start_custom(block)
 
     def next_state(self, limit: float) -> SupervisorState | None:
-        """Return the state that comes next; None if none comes; blocks.
+        """Return the state that comes next within a limit (s); None if none comes; blocks.
 
-        Parameters
-        ----------
-        limit : float
-            How long to wait, s; not at all if the vehicle has no log variable of its state.
+        It returns at once if the vehicle has no log variable of its state.
         """
         if not self._logs_state:
             return None

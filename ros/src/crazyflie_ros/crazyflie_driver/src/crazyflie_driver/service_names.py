@@ -32,15 +32,10 @@ class ServiceNames:
     _prefix: str
 
     def wait_for_controllers(self, is_over: Callable[[], bool]) -> None:
-        """Wait for the services of controllers that are about to come.
+        """Wait for the services of controllers that are about to come, until ``is_over()``.
 
-        Their parameters are set before they start. They may also have been left by
-        controllers that ended long ago: therefore the wait has a limit.
-
-        Parameters
-        ----------
-        is_over : callable
-            Whether nobody waits any more.
+        Their parameters are set before they start. They may also have been left by controllers that
+        ended long ago: therefore the wait has a limit.
         """
         names = self._handle.get_param(self._prefix or "/", _Controllers(), frozenset())
         awaited = {f"{self._prefix}/{name}" for name in names}

@@ -115,15 +115,10 @@ class SetpointTopics:
         self._setpoints_stopped()
 
     def open_thrust_lock(self, state: SupervisorState | None) -> None:
-        """Send zero thrust to a vehicle that is known to be on the ground; blocks.
+        """Send zero thrust to a vehicle whose state, if known, is on the ground; blocks.
 
         It would take a vehicle out of the air that flies by itself, or that was flying when the
         link was lost.
-
-        Parameters
-        ----------
-        state : SupervisorState or None
-            None if it is not known.
         """
         if state is None or SupervisorState.FLYING in state:
             self._handle.warn(
@@ -136,12 +131,8 @@ class SetpointTopics:
     def notify_setpoints_stop(self, remain_valid_ms: int = 0, at_once: bool = False) -> None:
         """Announce that setpoints stop, so that the vehicle accepts high-level commands.
 
-        Parameters
-        ----------
-        remain_valid_ms : int
-            How long the last setpoint still counts, ms.
-        at_once : bool
-            In the calling thread, which has to be the one that sends: see `Subsystem.guarded`.
+        The last setpoint still counts for some ms. At once means in the calling thread, which has
+        to be the one that sends: see `Subsystem.guarded`.
         """
         setpoints = self._crazyflie.setpoints
         if at_once:

@@ -36,14 +36,9 @@ class Shutdown:
     _warn: Callable[[str], None]
 
     def land_or_stop(self, limit: float) -> str:
-        """Return what could not be done, empty if nothing; blocks.
+        """Return what could not be done within a limit (s), empty if nothing; blocks.
 
         After an emergency stop only the vehicle's confirmation is waited for.
-
-        Parameters
-        ----------
-        limit : float
-            Time limit of the landing, s.
         """
         problem = ""
         crazyflie = self._crazyflie

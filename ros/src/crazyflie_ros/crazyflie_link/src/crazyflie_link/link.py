@@ -85,10 +85,7 @@ class Link:
     def open(self) -> None:
         """Connect: find the vehicle, read its tables and parameters; blocks.
 
-        Raises
-        ------
-        CrazyflieError
-            With the reason and what to do; the link is closed.
+        Raises `CrazyflieError` with the reason and what to do; the link is closed then.
         """
         try:
             self._open()
@@ -139,13 +136,7 @@ class Link:
 
     @property
     def monitor(self) -> LinkMonitor:
-        """Signs of life of the vehicle.
-
-        Raises
-        ------
-        LinkLostError
-            The link is not set up.
-        """
+        """Signs of life of the vehicle; `LinkLostError` if the link is not set up."""
         if self._monitor is None:
             raise LinkLostError(f"{self.address.uri}: not connected yet")
         return self._monitor
@@ -196,14 +187,7 @@ class Link:
     ) -> bytes:
         """Send a request and return the data of its answer; see `RequestReply.request`.
 
-        Parameters
-        ----------
-        send : callable or bytes
-            Sends the request; or its data, for the same port and channel.
-        request : Request
-            What answer is expected.
-        put : callable, optional
-            Instead of `put`.
+        What is sent is a call, or data for the port and channel of the answer.
         """
         if isinstance(send, bytes):
             data = packet(request.port, request.channel, send)

@@ -84,12 +84,7 @@ class RequestReply:
     def request(self, send: Send, request: Request) -> bytes:
         """Send a request and return the data of the answer; blocks.
 
-        Raises
-        ------
-        NoReplyError
-            No answer within the limit.
-        LinkLostError
-            The link ended meanwhile.
+        Raises `NoReplyError` after the limit, `LinkLostError` if the link ends meanwhile.
         """
         what = request.what
         pending = _Pending(request)

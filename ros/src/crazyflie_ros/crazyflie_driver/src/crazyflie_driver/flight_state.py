@@ -22,7 +22,7 @@ _LOGGED_STATE_LIMIT = 1.0
 
 @dataclass(eq=False)
 class FlightState:
-    """Tell flights by the high-level commander from all else that has FLYING in it.
+    """Distinguish flights by the high-level commander from other states with FLYING.
 
     FLYING holds until 2 s after the motors have stopped, and a landing that is commanded then
     starts them again: a flight needs HIGH_LEVEL_ACTIVE, too. Of firmware that does not report it

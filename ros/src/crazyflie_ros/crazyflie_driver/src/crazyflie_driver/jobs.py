@@ -50,14 +50,8 @@ class Jobs:
     """Two threads that do jobs in their order, and do not outlive the process.
 
     Urgent jobs have a thread of their own. They supersede every flight job that was submitted
-    before them: a queued one is given up, a running one is marked.
-
-    Parameters
-    ----------
-    name : str
-        For the threads.
-    on_error : callable
-        ``on_error(text)`` is called, in a thread of a job, when the job fails.
+    before them: a queued one is given up, a running one is marked. When a job fails,
+    ``on_error(text)`` is called in its thread.
     """
 
     def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):

@@ -119,16 +119,19 @@ class LogTopics:
     def _start_status(self, known, rssi_publisher):
         variables = tuple(variable for variable in STATUS_VARIABLES if variable in known)
         self._logs_state = "supervisor.info" in known
-        if variables:
-            self._add(
-                "status",
-                STATUS_PERIOD_MS,
-                variables,
-                lambda _, values: self._note_status(
-                    dict(zip(variables, values, strict=True)), rssi_publisher
-                ),
-                lambda values: self._note_state(dict(zip(variables, values, strict=True))),
-            )
+        if not variables:
+            return
+
+        def named(values):
+            return dict(zip(variables, values, strict=True))
+
+        def receive(_, values):
+            self._note_status(named(values), rssi_publisher)
+
+        def note(values):
+            self._note_state(named(values))
+
+        self._add("status", STATUS_PERIOD_MS, variables, receive, note)
 
     def _note_state(self, latest):
         # In the link's thread: the state is waited for where no callback has its turn.

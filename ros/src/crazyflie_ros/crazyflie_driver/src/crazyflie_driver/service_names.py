@@ -1,8 +1,8 @@
 """Names for a vehicle's services, such that no service of another node is taken away.
 
-rosmaster gives a name to whoever comes last, and the callers of the other node are then told
-that the md5 sums differ. A controller in the vehicle's namespace, such as crazyflie_controller,
-has services takeoff and land as well.
+rosmaster gives a name to the node that registers it last, and the callers of the other node then
+get the error that the md5 sums differ. A controller in the vehicle's namespace, such as
+crazyflie_controller, has services takeoff and land as well.
 """
 
 import time

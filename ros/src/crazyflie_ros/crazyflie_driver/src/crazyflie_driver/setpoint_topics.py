@@ -104,7 +104,7 @@ class SetpointTopics:
         return sum(1 for time in self._times if now - time <= _RATE_WINDOW) / _RATE_WINDOW
 
     def can_land_autonomously(self) -> bool:
-        """Return whether the vehicle's planner can land it, as far as its inputs tell."""
+        """Return whether the vehicle's planner can land it, as far as its inputs show."""
         fed = self._external_time
         is_fed = fed is not None and self._handle.time() - fed <= _RATE_WINDOW
         return is_fed or self.control is not Control.THRUST
@@ -161,9 +161,9 @@ class SetpointTopics:
             words.append(f"height {log.height:.2f} m")
         if log.heading is not None:
             words.append(f"yaw {log.heading:.0f} degrees")
-        told = f"{self._topic}, {finding.height:.2f} m"
+        command = f"{self._topic}, {finding.height:.2f} m"
         if self._commanded_yaw is not None:
-            told += f", yaw {self._commanded_yaw:.0f} degrees"
+            command += f", yaw {self._commanded_yaw:.0f} degrees"
         advice = "is it free, do all propellers turn, and is it told its own yaw?"
         if finding.is_certain:
             self.gate.handle(Event.NOT_LIFTED)
@@ -172,7 +172,7 @@ class SetpointTopics:
                 self.notify_setpoints_stop()
             advice += " Its motors are stopped, since it might leap; pause the stream to try again"
         self._handle.warn(
-            f"{self._parameters.name}: was told to fly ({told}), and has not lifted off within "
+            f"{self._parameters.name}: was told to fly ({command}), and has not lifted off within "
             f"{LIMIT:g} s ({', '.join(words)}): {advice}"
         )
 

@@ -25,7 +25,7 @@ class Shutdown:
     """Land a vehicle that flies and can land by itself, stop the motors of any other.
 
     The firmware lands without a link, too; zero thrust would stop it in the air: so nothing is sent
-    to a vehicle of which neither supervisor nor log tell whether it flies.
+    to a vehicle of which neither supervisor nor log report whether it flies.
     """
 
     _crazyflie: Crazyflie

@@ -211,7 +211,7 @@ class Crazyflie:
         return link
 
     def _start_blocks(self):
-        # Other firmware may have been installed; its pilot needs a link all the same.
+        # Other firmware may have been installed; the vehicle needs a link all the same.
         refused = ""
         with self._blocks_lock:
             for block in self._blocks:

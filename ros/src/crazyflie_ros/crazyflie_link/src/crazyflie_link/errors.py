@@ -57,7 +57,7 @@ UNANSWERED = "too many packets lost"
 """What the radio driver says, in small letters, when it goes on all the same."""
 
 _CAUSES = (
-    # Text of a driver (lower case), error, what to tell the operator.
+    # Text of a driver (lower case), error, advice to the operator.
     (
         (
             "cannot find a crazyradio dongle",

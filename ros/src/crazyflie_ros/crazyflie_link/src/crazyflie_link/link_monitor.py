@@ -154,5 +154,5 @@ class LinkMonitor:
         # The answer to a ping may have come just after the last log packet; both are missing then.
         if self._received - self._logged < 0.5 * self._log_limit:
             return LinkHealth.ALIVE
-        # Until its log data come, too, nobody knows.
+        # Until its log data come, too, that is not known.
         return LinkHealth.RESTARTED if now - self._heard_since > _HEARD_FOR else LinkHealth.SILENT

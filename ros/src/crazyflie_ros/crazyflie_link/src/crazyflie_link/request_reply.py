@@ -2,7 +2,7 @@
 
 CRTP has no request numbers: an answer is known by its port, its channel and its
 first bytes, and by what it repeats of the request. A late answer to an earlier, equal request
-cannot be told from the expected one.
+cannot be distinguished from the expected one.
 """
 
 import threading

@@ -104,7 +104,7 @@ class SafeCrazyflie(CflibCrazyflie):
         self._on_error = on_error
         self._setup_begun = False
         self._disconnecting = threading.Lock()
-        # Unlike cflib's own, it knows who holds it; see `send_packet`.
+        # Unlike cflib's own, only its owner can release it; see `send_packet`.
         self._send_lock = threading.RLock()
         guarded = _Guarded()
         guarded.callbacks = self.packet_received.callbacks
@@ -138,7 +138,7 @@ class SafeCrazyflie(CflibCrazyflie):
             # Not every error comes while it is taken.
             with contextlib.suppress(RuntimeError):
                 self._send_lock.release()
-            # Without a link it was closed meanwhile, which whoever did it knows.
+            # Without a link it was closed on purpose meanwhile.
             if self.link is not None:
                 self._on_error(f"cannot send: {error}")
 

@@ -68,7 +68,7 @@ class Supervisor(Subsystem):
     def wait_for_emergency_stop(self, limit: float) -> bool:
         """Return whether the vehicle has obeyed an emergency stop within a limit (s); blocks.
 
-        Firmware before protocol 12 does not tell: there it means that the stop has been sent
+        Firmware before protocol 12 does not report it: there it means that the stop has been sent
         several times while the vehicle was heard.
         """
         return self._emergency.wait(limit)

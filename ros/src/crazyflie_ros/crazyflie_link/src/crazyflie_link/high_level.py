@@ -140,22 +140,10 @@ class HighLevel(Subsystem):
         is_reversed: bool = False,
         group_mask: int = ALL_GROUPS,
     ) -> None:
-        """Fly a trajectory that was defined before.
+        """Fly a trajectory that was defined before; a time scale of 2.0 takes twice as long.
 
-        The firmware answers "done" for one that was not, and does nothing: therefore it is
-        refused here.
-
-        Parameters
-        ----------
-        trajectory_id : int
-            0 to 255.
-        time_scale : float
-            2.0 takes twice as long.
-        relative : bool
-            Shift it so that it begins at the present setpoint.
-        is_reversed : bool
-            From its end to its beginning.
-        group_mask : int
+        The firmware answers "done" for one that was not, and does nothing: therefore it is refused
+        here. A relative one is shifted so that it begins at the present setpoint.
         """
         check_byte("trajectory number", trajectory_id)
         check_positive("time scale", time_scale)

@@ -40,16 +40,8 @@ OnPacket = Callable[[int, int, bytes], None]
 class Link:
     """A connection that is opened once and closed once.
 
-    Parameters
-    ----------
-    address : Address
-    limits : Limits
-    cache : str or None
-        Folder of the tables.
-    on_packet : callable, optional
-        ``on_packet(port, channel, data)`` for every packet, from cflib's thread.
-    backend : callable
-        What makes the object of cflib: ``backend(cache, on_error)``.
+    The cache is the folder of the tables; ``on_packet(port, channel, data)`` is called for every
+    packet, in cflib's thread; ``backend(cache, on_error)`` makes the object of cflib.
     """
 
     def __init__(

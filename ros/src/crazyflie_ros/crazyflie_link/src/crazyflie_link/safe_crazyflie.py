@@ -87,13 +87,8 @@ class _LogErrors(dict[int, str]):
 class SafeCrazyflie(CflibCrazyflie):
     """cflib's Crazyflie for a single connection; a new one is made for the next.
 
-    Parameters
-    ----------
-    cache : str or None
-        Folder of the tables.
-    on_error : callable
-        ``on_error(text)``, from one of cflib's threads and maybe several times, when a
-        driver gives up.
+    ``on_error(text)`` is called, in one of cflib's threads and maybe several times, when a driver
+    gives up.
     """
 
     link: CRTPDriver | None

@@ -140,7 +140,9 @@ class Link:
 
     def health(self) -> tuple[LinkHealth, str]:
         """Return what the vehicle's packets show, and the same in words."""
-        state = self.monitor.state(time.monotonic())
+        if self._monitor is None:
+            return LinkHealth.ALIVE, "not connected yet"
+        state = self._monitor.state(time.monotonic())
         if state is LinkHealth.ALIVE:
             return state, "connected"
         if state is LinkHealth.RESTARTED:

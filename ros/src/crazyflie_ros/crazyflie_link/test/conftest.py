@@ -84,6 +84,23 @@ def shared(tmp_path_factory):
         yield vehicle, link, dict(PARAMETERS)
 
 
+@pytest.fixture
+def target(shared):
+    """Return the module's vehicle as if it were new."""
+    vehicle, _, parameters = shared
+    vehicle.parameters.update(parameters)
+    vehicle.answers.clear()
+    vehicle.flight.restart()
+    vehicle.received.clear()
+    return vehicle
+
+
+@pytest.fixture
+def flying(shared):
+    """Return the link to the module's vehicle."""
+    return shared[1]
+
+
 class States:
     """The states that a link goes through, to be waited for."""
 

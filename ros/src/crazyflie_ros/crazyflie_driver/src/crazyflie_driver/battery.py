@@ -13,14 +13,9 @@ class Charge(enum.IntEnum):
 
 
 class Battery:
-    """Judge voltages as they come.
+    """Judge voltages as they come, by limits in V.
 
-    Parameters
-    ----------
-    low, critical : float
-        Voltages, V.
-    critical_time : float
-        How long the voltage has to be below the critical one, s: it sinks under load.
+    It is critical after a time (s) below the critical limit: the voltage sinks under load.
     """
 
     def __init__(self, low: float, critical: float, critical_time: float):

@@ -11,18 +11,9 @@ TAKEOFF, LAND, STOP = "takeoff", "land", "stop"
 
 @dataclass(frozen=True)
 class Command:
-    """A high-level command.
+    """A high-level command: ``send(high_level)`` blocks until the vehicle has replied.
 
-    Attributes
-    ----------
-    name : str
-        Of its service.
-    send : callable
-        ``send(high_level)`` blocks until the vehicle has replied.
-    duration : float
-        How long the vehicle will be at it, s.
-    group_mask : int
-        Groups of vehicles that it is for.
+    The name is that of its service, the duration how long it is carried out, s.
     """
 
     name: str

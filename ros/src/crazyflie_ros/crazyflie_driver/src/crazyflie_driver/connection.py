@@ -26,23 +26,8 @@ def connect_within(
 ) -> None:
     """Call ``connect()`` again and again while the vehicle does not answer; blocks.
 
-    Parameters
-    ----------
-    limit : float
-        Time after which no new attempt is made, s; there is always one.
-    connect : callable
-        Makes one attempt.
-    is_leaving : callable
-        Whether the vehicle is being removed, which ends the attempts.
-    clock, sleep : callable
-        For tests.
-
-    Raises
-    ------
-    NoAnswerError
-        The vehicle has not answered within the limit.
-    CrazyflieError
-        Another error of an attempt, which is not repeated.
+    Raises the last `NoAnswerError` after a limit (s) or once ``is_leaving()``; other errors at
+    once.
     """
     end = clock() + limit
     while True:
@@ -58,14 +43,8 @@ def connect_within(
 class Connection:
     """Connect to a vehicle once, follow its link, and end the connection.
 
-    Attributes
-    ----------
-    text : str
-        Why the link is in its state.
-    is_leaving : bool
-        Whether the vehicle is being removed.
-    is_established : bool
-        Whether the vehicle has been connected, and its topics and services are there.
+    It is established once the vehicle has been connected, and its topics and services are there.
+    The text says why the link is in its state; ``_publish()`` publishes the vehicle's status.
     """
 
     # Of the server, and of the vehicle; the second one is closed in the end.
@@ -90,14 +69,10 @@ class Connection:
     def connect(
         self, limit: float, prepare: Callable[[], None], announce: Callable[[], None]
     ) -> None:
-        """Connect, or end everything and raise; blocks.
+        """Connect within a limit (s), or end everything and raise; blocks.
 
-        Parameters
-        ----------
-        limit : float
-            See `connect_within`.
-        prepare, announce : callable
-            Are called with a link, the second one only if the vehicle is not being removed.
+        With a link ``prepare()`` is called, then ``announce()`` if the vehicle is not being
+        removed.
         """
         try:
             connect_within(limit, self._crazyflie.connect, lambda: self.is_leaving)
@@ -118,15 +93,7 @@ class Connection:
     def leave(self, before: Callable[[], str]) -> Future[str]:
         """End the connection, also while it is being set up; does not block.
 
-        Parameters
-        ----------
-        before : callable
-            ``before()`` is called first, in a thread; it returns what could not be done.
-
-        Returns
-        -------
-        Future of str
-            The same.
+        First ``before()`` is called, in a thread; what it returns is the result.
         """
         self.is_leaving = True
         self._gate.handle(Event.REMOVAL)
@@ -154,15 +121,9 @@ class Connection:
         self._jobs.close()
 
     def on_state(self, state: LinkState, text: str, resume: Callable[[], None]) -> None:
-        """Take note of the link's state; from the link's own thread.
+        """Take note of the link's state, and why it is that; from the link's own thread.
 
-        Parameters
-        ----------
-        state : LinkState
-        text : str
-            Why it is in this state.
-        resume : callable
-            Is called, as a job, after a new set-up; the link of before needs none.
+        After a new set-up ``resume()`` is called as a job; the link of before needs none.
         """
         # At the end nothing may wait for the callbacks' turn, since the node waits for the end.
         self.text = text

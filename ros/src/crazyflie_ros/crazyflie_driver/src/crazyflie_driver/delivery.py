@@ -15,14 +15,8 @@ MAX_WAITING = 1000
 class Delivery:
     """A thread that has callbacks called in their turn with all others of the node.
 
-    `NodeHandle.submit` returns when a callback has run, which takes as long as all callbacks
-    before it. A link whose thread blocks on that hears neither its vehicle nor replies.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    name : str
-        For the thread.
+    `NodeHandle.submit` returns when a callback has run, which takes as long as all callbacks before
+    it. A link whose thread blocks on that hears neither its vehicle nor replies.
     """
 
     def __init__(self, handle: NodeHandle, name: str):

@@ -74,15 +74,10 @@ class FlightCommands:
     def send(self, command: Command, response: Result) -> Future[Result]:
         """Have a command sent, after the notice that setpoints stop if they were streamed.
 
-        All that would have it refused, or be without effect, is checked before anything is
-        sent that ends a stream. Landing and stopping supersede all commands and uploads
-        before them. A landing of a vehicle that lands already is a success.
-
-        Parameters
-        ----------
-        command : Command
-        response
-            The result of the future.
+        All that would have it refused, or be without effect, is checked before anything is sent
+        that ends a stream. Landing and stopping supersede all commands and uploads before them. A
+        landing of a vehicle that lands already is a success. The result of the future is
+        ``response``.
         """
 
         def work(job: Job) -> Result:
@@ -115,13 +110,7 @@ class FlightCommands:
             self.land_with_retry("battery")
 
     def notify(self, remain_valid_ms: int) -> None:
-        """Announce that setpoints stop: at once on the ground, in flight with the next command.
-
-        Raises
-        ------
-        CrazyflieError
-            It cannot be sent.
-        """
+        """Announce that setpoints stop: at once on the ground, in flight with the next command."""
         may_fly = self._flight.supervisor is None or self._flight.is_flying
         if not (may_fly and self._setpoints.runs_motors):
             self._setpoints.notify_setpoints_stop(remain_valid_ms)

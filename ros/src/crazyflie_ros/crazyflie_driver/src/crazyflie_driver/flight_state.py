@@ -22,7 +22,7 @@ _LOGGED_STATE_LIMIT = 1.0
 
 @dataclass(eq=False)
 class FlightState:
-    """Tell flights by the high-level commander from all else that has FLYING in it.
+    """Distinguish flights by the high-level commander from other states with FLYING.
 
     FLYING holds until 2 s after the motors have stopped, and a landing that is commanded then
     starts them again: a flight needs HIGH_LEVEL_ACTIVE, too. Of firmware that does not report it
@@ -52,10 +52,6 @@ class FlightState:
         """Return the state, from supervisor or log; None if neither reports it; blocks.
 
         Before protocol 12 the supervisor cannot be asked; very old firmware does not log it either.
-
-        Raises
-        ------
-        LinkLostError
         """
         try:
             state = self._crazyflie.supervisor.read()
@@ -76,12 +72,7 @@ class FlightState:
         return state is not None and SupervisorState.FLYING in state and self._may_move(state)
 
     def is_on_ground(self) -> bool:
-        """Return whether neither setpoints nor planner can have the motors run; blocks.
-
-        Raises
-        ------
-        LinkLostError
-        """
+        """Return whether neither setpoints nor planner can have the motors run; blocks."""
         state = self.read()
         is_streamed = self._setpoints.runs_motors
         latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)

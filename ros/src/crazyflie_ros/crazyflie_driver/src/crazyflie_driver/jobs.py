@@ -18,19 +18,7 @@ MOST_JOBS = 64
 
 @dataclass(eq=False)
 class Job:
-    """A call that takes time.
-
-    Attributes
-    ----------
-    work : callable
-        ``work(job)`` is called in a thread of `Jobs`.
-    is_flight : bool
-        Whether an urgent job supersedes it.
-    superseded_by : str
-        What has superseded it; empty if nothing has.
-    done : Future
-        Of its result.
-    """
+    """A call ``work(job)``, which takes time; an urgent job supersedes one that is for a flight."""
 
     work: Callable[["Job"], Any]
     is_flight: bool = False
@@ -62,14 +50,8 @@ class Jobs:
     """Two threads that do jobs in their order, and do not outlive the process.
 
     Urgent jobs have a thread of their own. They supersede every flight job that was submitted
-    before them: a queued one is given up, a running one is marked.
-
-    Parameters
-    ----------
-    name : str
-        For the threads.
-    on_error : callable
-        ``on_error(text)`` is called, in a thread of a job, when the job fails.
+    before them: a queued one is given up, a running one is marked. When a job fails,
+    ``on_error(text)`` is called in its thread.
     """
 
     def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):

@@ -1,8 +1,8 @@
-"""Whether a vehicle that is told to fly lifts off.
+"""Whether a vehicle lifts off when setpoints ask for it.
 
 While the ground holds a vehicle, the firmware's integrators wind up: it stands with running
 motors, and leaps as soon as what has held it goes away. So it does when a position is asked for
-with another heading than its own. The supervisor's FLYING does not tell, since it is set by thrust.
+with another heading than its own. The supervisor's FLYING does not show it: thrust sets it.
 
 Nothing is certain of a vehicle whose estimate moves. Where motion capture is frozen, the estimate
 hardly rises, but its vertical speed, which the accelerometer drives, is that of the flight.
@@ -27,14 +27,9 @@ PAUSE = 1.0
 
 
 class NoLift(NamedTuple):
-    """A vehicle that has not lifted off.
+    """A vehicle that has not lifted off to a height (m).
 
-    Attributes
-    ----------
-    height : float
-        Height that it was told, m.
-    is_certain : bool
-        Whether its estimate says that it is on the ground; otherwise only that it does not fly.
+    It is certain if its estimate says that it is on the ground, not only that it does not fly.
     """
 
     height: float
@@ -47,7 +42,7 @@ class LiftWatch:
     def __init__(self) -> None:
         self._is_on_ground = False
         self._ground: float | None = None
-        self._told = 0.0
+        self._height = 0.0
         self._latest: float | None = None
         self._begin: float | None = None
         self._is_reported = False
@@ -59,11 +54,7 @@ class LiftWatch:
     def command(self, now: float, height: float | None) -> None:
         """Take note of a setpoint that was sent.
 
-        Parameters
-        ----------
-        now : float
-        height : float or None
-            Height that it asks for, m, in the frame of the estimate; None if for none.
+        Its height is in m, in the frame of the estimate; None if it asks for none.
         """
         if self._latest is not None and now - self._latest > PAUSE:
             self.end()
@@ -71,7 +62,7 @@ class LiftWatch:
         if height is None or not self._is_on_ground or height - (self._ground or 0.0) < MIN_CLIMB:
             self._begin = None
             return
-        self._told = height
+        self._height = height
         if self._begin is None:
             self._begin = now
 
@@ -80,13 +71,8 @@ class LiftWatch:
     ) -> NoLift | None:
         """Return what is wrong, once in an attempt; None if nothing is.
 
-        Parameters
-        ----------
-        now : float
-        is_flying : bool or None
-            Whether the supervisor says so; None if it says nothing.
-        height, speed : float or None
-            The vehicle's estimate, m, and its vertical speed, m/s; None if not known.
+        Whether the supervisor reports a flight, the estimate's height (m) and vertical speed (m/s)
+        are None while they are not known.
         """
         if self._begin is None and is_flying is False:
             self._is_on_ground, self._ground = True, height
@@ -97,7 +83,7 @@ class LiftWatch:
         if now - self._begin < LIMIT or now - self._latest > MAX_GAP:
             return None
         self._is_reported = True
-        return NoLift(self._told, height is not None and speed is not None)
+        return NoLift(self._height, height is not None and speed is not None)
 
     def _has_left(self, is_flying, height, speed):
         if height is None or speed is None or self._ground is None:

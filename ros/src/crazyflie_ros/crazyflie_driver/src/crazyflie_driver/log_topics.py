@@ -73,10 +73,7 @@ class LogTopics:
     def start(self) -> None:
         """Announce the topics and start the log blocks; blocks.
 
-        Raises
-        ------
-        CrazyflieError
-            A custom block is not possible, or the vehicle does not reply.
+        Raises `CrazyflieError` if a custom block is not possible.
         """
         parameters = self._parameters
         if "packets" in parameters.topics:
@@ -96,12 +93,9 @@ class LogTopics:
                 self._start_custom(block)
 
     def next_state(self, limit: float) -> SupervisorState | None:
-        """Return the state that comes next; None if none comes; blocks.
+        """Return the state that comes next within a limit (s); None if none comes; blocks.
 
-        Parameters
-        ----------
-        limit : float
-            How long to wait, s; not at all if the vehicle has no log variable of its state.
+        It returns at once if the vehicle has no log variable of its state.
         """
         if not self._logs_state:
             return None
@@ -125,16 +119,19 @@ class LogTopics:
     def _start_status(self, known, rssi_publisher):
         variables = tuple(variable for variable in STATUS_VARIABLES if variable in known)
         self._logs_state = "supervisor.info" in known
-        if variables:
-            self._add(
-                "status",
-                STATUS_PERIOD_MS,
-                variables,
-                lambda _, values: self._note_status(
-                    dict(zip(variables, values, strict=True)), rssi_publisher
-                ),
-                lambda values: self._note_state(dict(zip(variables, values, strict=True))),
-            )
+        if not variables:
+            return
+
+        def named(values):
+            return dict(zip(variables, values, strict=True))
+
+        def receive(_, values):
+            self._note_status(named(values), rssi_publisher)
+
+        def note(values):
+            self._note_state(named(values))
+
+        self._add("status", STATUS_PERIOD_MS, variables, receive, note)
 
     def _note_state(self, latest):
         # In the link's thread: the state is waited for where no callback has its turn.

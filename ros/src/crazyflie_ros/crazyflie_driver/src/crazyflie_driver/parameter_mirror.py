@@ -27,14 +27,7 @@ class ParameterMirror:
     def reapply_parameters(self) -> list[str]:
         """Write what `write` has written since the start: a vehicle that was off has forgotten it.
 
-        Returns
-        -------
-        list of str
-            Why a parameter could not be written; all are tried.
-
-        Raises
-        ------
-        LinkLostError
+        Returns why parameters could not be written; all are tried, unless the link is lost.
         """
         problems = []
         for name, value in self._written.items():
@@ -63,12 +56,8 @@ class ParameterMirror:
     def write(self, names: list[str]) -> None:
         """Write parameters, named GROUP/NAME, with the values of the ROS parameters.
 
-        All are tried; the ROS parameters are then what the firmware has confirmed.
-
-        Raises
-        ------
-        ServiceError
-            With the text of every one that could not be written.
+        All are tried, and a `ServiceError` names those that could not be written; the ROS
+        parameters are then what the firmware has confirmed.
         """
         problems = []
         for name in names:

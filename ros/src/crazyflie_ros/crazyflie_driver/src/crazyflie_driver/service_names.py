@@ -1,8 +1,8 @@
 """Names for a vehicle's services, such that no service of another node is taken away.
 
-rosmaster gives a name to whoever comes last, and the callers of the other node are then told
-that the md5 sums differ. A controller in the vehicle's namespace, such as crazyflie_controller,
-has services takeoff and land as well.
+rosmaster gives a name to the node that registers it last, and the callers of the other node then
+get the error that the md5 sums differ. A controller in the vehicle's namespace, such as
+crazyflie_controller, has services takeoff and land as well.
 """
 
 import time
@@ -32,15 +32,10 @@ class ServiceNames:
     _prefix: str
 
     def wait_for_controllers(self, is_over: Callable[[], bool]) -> None:
-        """Wait for the services of controllers that are about to come.
+        """Wait for the services of controllers that are about to come, until ``is_over()``.
 
-        Their parameters are set before they start. They may also have been left by
-        controllers that ended long ago: therefore the wait has a limit.
-
-        Parameters
-        ----------
-        is_over : callable
-            Whether nobody waits any more.
+        Their parameters are set before they start. They may also have been left by controllers that
+        ended long ago: therefore the wait has a limit.
         """
         names = self._handle.get_param(self._prefix or "/", _Controllers(), frozenset())
         awaited = {f"{self._prefix}/{name}" for name in names}

@@ -152,18 +152,21 @@ class VehicleServices:
         return self._jobs.submit("arming", work)
 
     def _on_update_params(self, request):
-        def work(_):
-            self._mirror.write(request.params)
-            return srv.UpdateParamsResponse()
-
-        return self._jobs.submit("update_params", work)
+        return self._submit("update_params", srv.UpdateParams, self._mirror.write, request.params)
 
     def _on_set_group_mask(self, request):
-        def work(_):
-            self._crazyflie.high_level.set_group_mask(request.groupMask)
-            return srv.SetGroupMaskResponse()
+        set_mask = self._crazyflie.high_level.set_group_mask
+        return self._submit("set_group_mask", srv.SetGroupMask, set_mask, request.groupMask)
 
-        return self._jobs.submit("set_group_mask", work)
+    def _on_reboot(self, _):
+        return self._submit("reboot", Empty, self._reboot)
+
+    def _submit(self, name, service_type, call, *arguments):
+        def work(_):
+            call(*arguments)
+            return service_type._response_class()
+
+        return self._jobs.submit(name, work)
 
     def _on_upload_trajectory(self, request):
         pieces = [
@@ -180,15 +183,7 @@ class VehicleServices:
 
         return self._jobs.submit("upload_trajectory", work, is_flight=True)
 
-    def _on_reboot(self, _):
-        def work(_):
-            self._refuse_to_reboot_in_flight()
-            self._crazyflie.reboot()
-            return EmptyResponse()
-
-        return self._jobs.submit("reboot", work)
-
-    def _refuse_to_reboot_in_flight(self):
+    def _reboot(self):
         try:
             state = self._flight.read()
         except LinkLostError:
@@ -204,3 +199,4 @@ class VehicleServices:
                 "no reboot: the vehicle flies (until 2 s after a landing it says so) and would "
                 f"fall; its state is: {state.words()}"
             )
+        self._crazyflie.reboot()

@@ -105,13 +105,7 @@ class SetpointGate:
             return self._commands
 
     def resume(self, command: int) -> None:
-        """Let setpoints pass again, as a command was not carried out; not if one has followed.
-
-        Parameters
-        ----------
-        command : int
-            Its number, from `high_level`.
-        """
+        """Let setpoints pass again, as a command (its number) failed; not if one has followed."""
         with self._lock:
             if command == self._commands:
                 self._high_level_since = None
@@ -123,13 +117,7 @@ class SetpointGate:
 
     @contextlib.contextmanager
     def passing(self, now: float, is_zero: bool) -> Iterator[str]:
-        """Decide about a setpoint that is sent within the block; nothing changes meanwhile.
-
-        Yields
-        ------
-        str
-            See `refusal`.
-        """
+        """Yield the `refusal` of a setpoint sent within the block; nothing changes meanwhile."""
         with self._lock:
             yield self.refusal(now, is_zero)
 
@@ -141,11 +129,7 @@ class SetpointGate:
     def refusal(self, now: float, is_zero: bool) -> str:
         """Return why a setpoint must not be sent; empty if it may.
 
-        Parameters
-        ----------
-        now : float
-        is_zero : bool
-            Whether it has the motors stand still.
+        A zero has the motors stand still.
         """
         with self._lock:
             before, self._latest = self._latest, now

@@ -104,7 +104,7 @@ class SetpointTopics:
         return sum(1 for time in self._times if now - time <= _RATE_WINDOW) / _RATE_WINDOW
 
     def can_land_autonomously(self) -> bool:
-        """Return whether the vehicle's planner can land it, as far as its inputs tell."""
+        """Return whether the vehicle's planner can land it, as far as its inputs show."""
         fed = self._external_time
         is_fed = fed is not None and self._handle.time() - fed <= _RATE_WINDOW
         return is_fed or self.control is not Control.THRUST
@@ -115,15 +115,10 @@ class SetpointTopics:
         self._setpoints_stopped()
 
     def open_thrust_lock(self, state: SupervisorState | None) -> None:
-        """Send zero thrust to a vehicle that is known to be on the ground; blocks.
+        """Send zero thrust to a vehicle whose state, if known, is on the ground; blocks.
 
         It would take a vehicle out of the air that flies by itself, or that was flying when the
         link was lost.
-
-        Parameters
-        ----------
-        state : SupervisorState or None
-            None if it is not known.
         """
         if state is None or SupervisorState.FLYING in state:
             self._handle.warn(
@@ -136,12 +131,8 @@ class SetpointTopics:
     def notify_setpoints_stop(self, remain_valid_ms: int = 0, at_once: bool = False) -> None:
         """Announce that setpoints stop, so that the vehicle accepts high-level commands.
 
-        Parameters
-        ----------
-        remain_valid_ms : int
-            How long the last setpoint still counts, ms.
-        at_once : bool
-            In the calling thread, which has to be the one that sends: see `Subsystem.guarded`.
+        The last setpoint still counts for some ms. At once means in the calling thread, which has
+        to be the one that sends: see `Subsystem.guarded`.
         """
         setpoints = self._crazyflie.setpoints
         if at_once:
@@ -170,9 +161,9 @@ class SetpointTopics:
             words.append(f"height {log.height:.2f} m")
         if log.heading is not None:
             words.append(f"yaw {log.heading:.0f} degrees")
-        told = f"{self._topic}, {finding.height:.2f} m"
+        command = f"{self._topic}, {finding.height:.2f} m"
         if self._commanded_yaw is not None:
-            told += f", yaw {self._commanded_yaw:.0f} degrees"
+            command += f", yaw {self._commanded_yaw:.0f} degrees"
         advice = "is it free, do all propellers turn, and is it told its own yaw?"
         if finding.is_certain:
             self.gate.handle(Event.NOT_LIFTED)
@@ -181,7 +172,7 @@ class SetpointTopics:
                 self.notify_setpoints_stop()
             advice += " Its motors are stopped, since it might leap; pause the stream to try again"
         self._handle.warn(
-            f"{self._parameters.name}: was told to fly ({told}), and has not lifted off within "
+            f"{self._parameters.name}: was told to fly ({command}), and has not lifted off within "
             f"{LIMIT:g} s ({', '.join(words)}): {advice}"
         )
 

@@ -25,7 +25,7 @@ class Shutdown:
     """Land a vehicle that flies and can land by itself, stop the motors of any other.
 
     The firmware lands without a link, too; zero thrust would stop it in the air: so nothing is sent
-    to a vehicle of which neither supervisor nor log tell whether it flies.
+    to a vehicle of which neither supervisor nor log report whether it flies.
     """
 
     _crazyflie: Crazyflie
@@ -36,14 +36,9 @@ class Shutdown:
     _warn: Callable[[str], None]
 
     def land_or_stop(self, limit: float) -> str:
-        """Return what could not be done, empty if nothing; blocks.
+        """Return what could not be done within a limit (s), empty if nothing; blocks.
 
         After an emergency stop only the vehicle's confirmation is waited for.
-
-        Parameters
-        ----------
-        limit : float
-            Time limit of the landing, s.
         """
         problem = ""
         crazyflie = self._crazyflie

@@ -26,6 +26,10 @@ PERIOD = 1.0
 _LINKS = {name: value for value, name in status.LINK_NAMES.items()}
 
 
+_STATES = ("text", "link", "supervisor", "has_supervisor", "is_emergency", "battery", "is_streamed")
+"""Fields that are published when they change."""
+
+
 class ConnectionState(Protocol):
     """What is published of a connection; see `Connection`."""
 
@@ -45,7 +49,7 @@ class StatusPublisher:
     _setpoints: SetpointTopics
     _battery: Battery
     _connection: ConnectionState
-    _published: tuple[object, ...] = ()
+    _published: VehicleStatus | None = None
     _is_connected: bool = False
 
     def __post_init__(self) -> None:
@@ -95,11 +99,10 @@ class StatusPublisher:
     def publish(self) -> None:
         """Publish what is new."""
         message = self.status()
-        state = message.text, message.link, message.supervisor, message.has_supervisor
-        before, self._published = self._published, state
-        if state != before:
+        before, self._published = self._published, message
+        if any(getattr(message, name) != getattr(before, name, None) for name in _STATES):
             self._typed.publish(message)
-        if state[:1] != before[:1]:
+        if before is None or message.text != before.text:
             self._text.publish(String(message.text))
         is_ready = self._connection.is_established and not self._connection.is_leaving
         self.publish_connected(is_ready and message.link == VehicleStatus.CONNECTED)

@@ -21,18 +21,9 @@ _UNKNOWN = -1.0
 
 
 class StandardTopic(NamedTuple):
-    """A topic that every vehicle has.
+    """A topic that every vehicle has; ``convert(header, values)`` returns its message.
 
-    Attributes
-    ----------
-    name : str
-    message_type : type
-    period_ms : int
-    variables : tuple of str
-    convert : callable
-        ``convert(header, values)`` returns the message.
-    in_world : bool
-        Whether its frame is the fixed one, not the vehicle's.
+    Its frame is the fixed one if it is in the world, or else the vehicle's.
     """
 
     name: str
@@ -99,18 +90,8 @@ def packed(
 ) -> tuple[list[list[StandardTopic]], dict[str, list[str]]]:
     """Put the variables of topics that have the same period into common log blocks.
 
-    Parameters
-    ----------
-    topics : list of StandardTopic
-    known : container of str
-        Variables that the vehicle has.
-
-    Returns
-    -------
-    groups : list of list of StandardTopic
-        Each fits in a log packet.
-    missing : dict
-        Name of a topic that the vehicle cannot fill -> variables that it lacks.
+    Returns groups of topics that fit in a log packet each, and for every topic that the vehicle
+    cannot fill the variables that it lacks.
     """
     missing: dict[str, list[str]] = {}
     groups: list[list[StandardTopic]] = []

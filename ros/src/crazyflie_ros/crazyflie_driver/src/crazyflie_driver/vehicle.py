@@ -26,21 +26,8 @@ from crazyflie_utils import NodeHandle
 class DriverVehicle:
     """A vehicle that is being connected, is connected, or has lost its link.
 
-    What takes time are jobs of the vehicle's own, so that no vehicle blocks another.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-        Of the server.
-    parameters : VehicleParameters
-        How to connect it.
-    server : CrazyflieServerParameters
-        What all vehicles have in common.
-
-    Raises
-    ------
-    CrazyflieError
-        The address is malformed.
+    What takes time are jobs of the vehicle's own, so that no vehicle blocks another. Raises
+    `CrazyflieError` if the address is malformed.
     """
 
     def __init__(
@@ -110,17 +97,9 @@ class DriverVehicle:
     def leave(self, limit: float) -> Future[str]:
         """Land, stop the motors, end the link, take topics and services down.
 
-        Also while the vehicle is being connected, or its jobs are blocked by it.
-
-        Parameters
-        ----------
-        limit : float
-            Time limit of a landing, s; the vehicle lands without its link, too.
-
-        Returns
-        -------
-        Future of str
-            What could not be done; empty if nothing.
+        Also while the vehicle is being connected, or its jobs are blocked by it. The limit (s) is
+        that of a landing: the vehicle lands without its link, too. The result is what could not be
+        done.
         """
         self._connection.is_leaving = True
         self.status.publish_connected(False)

@@ -178,13 +178,7 @@ class VehicleParameters(Parameters):
 
     @classmethod
     def from_request(cls, request: AddCrazyflieRequest) -> Self:
-        """Return the parameters in a request.
-
-        Raises
-        ------
-        ServiceError
-            With a text about everything in it that makes no sense.
-        """
+        """Return the parameters of a request; `ServiceError` names all that makes no sense."""
 
         def get(name: str) -> Any:
             if name in _LOG_BLOCK_FIELDS:

@@ -27,15 +27,7 @@ _HIGHEST_PORT = 65535
 
 @dataclass(frozen=True)
 class Address:
-    """A vehicle's address, known to be well formed.
-
-    Attributes
-    ----------
-    uri : str
-        As cflib takes it.
-    scheme : str
-        radio, udp, tcp or usb.
-    """
+    """A vehicle's address as cflib takes it, known to be well formed: radio, udp, tcp or usb."""
 
     uri: str
     scheme: str
@@ -47,13 +39,7 @@ class Address:
 
     @classmethod
     def parse(cls, uri: str) -> "Address":
-        """Return the address that a text stands for.
-
-        Raises
-        ------
-        AddressError
-            The text is no address.
-        """
+        """Return the address that a text stands for; raise `AddressError` if it is none."""
         text = str(uri).strip()
         scheme = text.partition("://")[0]
         match = _FORMS[scheme].fullmatch(text) if scheme in _FORMS else None

@@ -5,13 +5,7 @@ from collections.abc import Callable
 
 
 class Console:
-    """Put the pieces together to lines.
-
-    Parameters
-    ----------
-    on_line : callable
-        ``on_line(text)`` for every line, without its end.
-    """
+    """Put the pieces together to lines: ``on_line(text)`` is called for each, without its end."""
 
     def __init__(self, on_line: Callable[[str], None]):
         self._on_line = on_line

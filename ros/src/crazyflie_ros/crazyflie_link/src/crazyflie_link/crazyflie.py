@@ -126,32 +126,17 @@ class Crazyflie:
         return self._reconnector.connection_count
 
     def connect(self) -> None:
-        """Connect for the first time; blocks.
-
-        Raises
-        ------
-        CrazyflieError
-            With the reason and what to do.
-        """
+        """Connect for the first time; blocks. A `CrazyflieError` has the reason and what to do."""
         self._reconnector.connect()
 
     def link(self) -> Link:
-        """Return the link on which the vehicle is heard.
-
-        Raises
-        ------
-        LinkLostError
-            There is none.
-        """
+        """Return the link on which the vehicle is heard; `LinkLostError` if there is none."""
         return self._reconnector.link()
 
     def add_log_block(self, block: LogBlock) -> None:
         """Have the vehicle send a block, now and after every reconnection; blocks.
 
-        Raises
-        ------
-        CrazyflieError
-            The block is not possible.
+        Raises `CrazyflieError` if the block is not possible.
         """
         self.log.start(block)
         with self._blocks_lock:
@@ -183,19 +168,9 @@ class Crazyflie:
         return self.link().monitor.age(time.monotonic())
 
     def reboot(self, mode: str = "firmware") -> None:
-        """Restart the vehicle, or switch it off; only by radio. Blocks.
+        """Restart the vehicle, or switch it off; see `crazyflie_link.reboot`. Blocks.
 
         The link is lost by that: it is taken up again if `reconnect` is set.
-
-        Parameters
-        ----------
-        mode : str
-            One of `crazyflie_link.reboot.MODES`.
-
-        Raises
-        ------
-        CrazyflieError
-            Not a radio link, or the vehicle has not acknowledged it.
         """
         reboot(self.address, lambda: self._reconnector.close_link("the vehicle is restarted"), mode)
 
@@ -211,7 +186,7 @@ class Crazyflie:
         return link
 
     def _start_blocks(self):
-        # Other firmware may have been installed; its pilot needs a link all the same.
+        # Other firmware may have been installed; the vehicle needs a link all the same.
         refused = ""
         with self._blocks_lock:
             for block in self._blocks:

@@ -29,7 +29,7 @@ PERIOD = 0.05
 """Between two repetitions, s."""
 
 BLIND_REPEATS = 5
-"""How many repetitions are sent to a vehicle that is heard, but does not tell its state."""
+"""How many repetitions are sent to a vehicle that is heard, but does not report its state."""
 
 _STREAM = "emergency"
 _STOP_SETPOINT = packet(CRTPPort.COMMANDER_GENERIC, 0, b"\0")
@@ -86,7 +86,7 @@ class EmergencyStop:
                 self._note_obeyed()
 
     def wait(self, limit: float) -> bool:
-        """Wait until it has been sent and, if the firmware tells, obeyed; at most ``limit`` s."""
+        """Wait until it was sent and, if the firmware reports that, obeyed; at most ``limit`` s."""
         with self._changed:
             return self._changed.wait_for(lambda: self._is_obeyed, limit)
 

@@ -57,7 +57,7 @@ UNANSWERED = "too many packets lost"
 """What the radio driver says, in small letters, when it goes on all the same."""
 
 _CAUSES = (
-    # Text of a driver (lower case), error, what to tell the operator.
+    # Text of a driver (lower case), error, advice to the operator.
     (
         (
             "cannot find a crazyradio dongle",
@@ -107,20 +107,7 @@ _CAUSES = (
 
 
 def explain(uri: str, text: str) -> CrazyflieError:
-    """Return the error that a text of one of cflib's drivers stands for.
-
-    Parameters
-    ----------
-    uri : str
-        Address of the vehicle.
-    text : str
-        As cflib gave it, maybe with a traceback.
-
-    Returns
-    -------
-    CrazyflieError
-        With the address and the cause; not raised.
-    """
+    """Return the error that a text of a driver of cflib, maybe with a traceback, stands for."""
     lower = text.lower()
     for patterns, error_type, advice in _CAUSES:
         if any(pattern in lower for pattern in patterns):

@@ -30,15 +30,7 @@ _BUSY = 1
 
 @dataclass
 class _Knowledge:
-    """What the vehicle was told, which it cannot be asked for.
-
-    Attributes
-    ----------
-    defined : set of int
-        Trajectories.
-    groups : int or None
-        Groups that it belongs to, a bit each; None if nobody has set them here.
-    """
+    """Trajectories that were defined, and groups (bits, None if unknown); both cannot be read."""
 
     defined: set[int] = field(default_factory=set)
     groups: int | None = None
@@ -90,9 +82,7 @@ class HighLevel(Subsystem):
 
     def take_off(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
         """Climb to a height (m) in a duration (s), keeping position and heading."""
-        check_finite("takeoff", height)
-        check_positive("takeoff", duration)
-        check_byte("group mask", group_mask)
+        _check("takeoff", duration, group_mask, height)
         self._command(
             "the takeoff command",
             HighLevelCommander.COMMAND_TAKEOFF_2,
@@ -102,15 +92,10 @@ class HighLevel(Subsystem):
     def land(self, height: float, duration: float, group_mask: int = ALL_GROUPS) -> None:
         """Sink to a height (m) in a duration (s), keeping position and heading.
 
-        The firmware obeys on the ground, too, and starts the motors there.
-
-        Raises
-        ------
-        AlreadyLandingError
+        The firmware obeys on the ground, too, and starts the motors there. A vehicle that lands
+        refuses it: `AlreadyLandingError`.
         """
-        check_finite("landing", height)
-        check_positive("landing", duration)
-        check_byte("group mask", group_mask)
+        _check("landing", duration, group_mask, height)
         self._command(
             "the land command",
             HighLevelCommander.COMMAND_LAND_2,
@@ -138,9 +123,7 @@ class HighLevel(Subsystem):
     ) -> None:
         """Fly to a position (x, y, z in m) and a yaw (rad) in a duration (s)."""
         x, y, z = position
-        check_finite("go-to", x, y, z, yaw)
-        check_positive("go-to", duration)
-        check_byte("group mask", group_mask)
+        _check("go-to", duration, group_mask, x, y, z, yaw)
         is_new = self._current_link().protocol >= _GO_TO_2_PROTOCOL
         self._command(
             "the go-to command",
@@ -157,22 +140,10 @@ class HighLevel(Subsystem):
         is_reversed: bool = False,
         group_mask: int = ALL_GROUPS,
     ) -> None:
-        """Fly a trajectory that was defined before.
+        """Fly a trajectory that was defined before; a time scale of 2.0 takes twice as long.
 
-        The firmware answers "done" for one that was not, and does nothing: therefore it is
-        refused here.
-
-        Parameters
-        ----------
-        trajectory_id : int
-            0 to 255.
-        time_scale : float
-            2.0 takes twice as long.
-        relative : bool
-            Shift it so that it begins at the present setpoint.
-        is_reversed : bool
-            From its end to its beginning.
-        group_mask : int
+        The firmware answers "done" for one that was not, and does nothing: therefore it is refused
+        here. A relative one is shifted so that it begins at the present setpoint.
         """
         check_byte("trajectory number", trajectory_id)
         check_positive("time scale", time_scale)
@@ -240,3 +211,9 @@ class HighLevel(Subsystem):
         if state is None or not state.reports_planner:
             return True
         return SupervisorState.HIGH_LEVEL_ACTIVE in state
+
+
+def _check(what: str, duration: float, group_mask: int, *values: float) -> None:
+    check_finite(what, *values)
+    check_positive(what, duration)
+    check_byte("group mask", group_mask)

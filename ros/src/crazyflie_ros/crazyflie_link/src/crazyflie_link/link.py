@@ -40,16 +40,8 @@ OnPacket = Callable[[int, int, bytes], None]
 class Link:
     """A connection that is opened once and closed once.
 
-    Parameters
-    ----------
-    address : Address
-    limits : Limits
-    cache : str or None
-        Folder of the tables.
-    on_packet : callable, optional
-        ``on_packet(port, channel, data)`` for every packet, from cflib's thread.
-    backend : callable
-        What makes the object of cflib: ``backend(cache, on_error)``.
+    The cache is the folder of the tables; ``on_packet(port, channel, data)`` is called for every
+    packet, in cflib's thread; ``backend(cache, on_error)`` makes the object of cflib.
     """
 
     def __init__(
@@ -85,10 +77,7 @@ class Link:
     def open(self) -> None:
         """Connect: find the vehicle, read its tables and parameters; blocks.
 
-        Raises
-        ------
-        CrazyflieError
-            With the reason and what to do; the link is closed.
+        Raises `CrazyflieError` with the reason and what to do; the link is closed then.
         """
         try:
             self._open()
@@ -139,13 +128,7 @@ class Link:
 
     @property
     def monitor(self) -> LinkMonitor:
-        """Signs of life of the vehicle.
-
-        Raises
-        ------
-        LinkLostError
-            The link is not set up.
-        """
+        """Signs of life of the vehicle; `LinkLostError` if the link is not set up."""
         if self._monitor is None:
             raise LinkLostError(f"{self.address.uri}: not connected yet")
         return self._monitor
@@ -157,7 +140,9 @@ class Link:
 
     def health(self) -> tuple[LinkHealth, str]:
         """Return what the vehicle's packets show, and the same in words."""
-        state = self.monitor.state(time.monotonic())
+        if self._monitor is None:
+            return LinkHealth.ALIVE, "not connected yet"
+        state = self._monitor.state(time.monotonic())
         if state is LinkHealth.ALIVE:
             return state, "connected"
         if state is LinkHealth.RESTARTED:
@@ -196,14 +181,7 @@ class Link:
     ) -> bytes:
         """Send a request and return the data of its answer; see `RequestReply.request`.
 
-        Parameters
-        ----------
-        send : callable or bytes
-            Sends the request; or its data, for the same port and channel.
-        request : Request
-            What answer is expected.
-        put : callable, optional
-            Instead of `put`.
+        What is sent is a call, or data for the port and channel of the answer.
         """
         if isinstance(send, bytes):
             data = packet(request.port, request.channel, send)

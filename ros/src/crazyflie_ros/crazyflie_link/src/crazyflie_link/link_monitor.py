@@ -55,15 +55,7 @@ class Uptime:
         self._late_ms = 0.0
 
     def has_restarted(self, time_ms: int, now: float) -> bool:
-        """Return whether the clock has begun anew since the last call.
-
-        Parameters
-        ----------
-        time_ms : int
-            The vehicle's, in 24 bits.
-        now : float
-            s.
-        """
+        """Return whether the clock (ms, 24 bits) has begun anew since the last call (s)."""
         if self._latest is None:
             self._latest = time_ms, now
             return False
@@ -80,14 +72,8 @@ class Uptime:
 class LinkMonitor:
     """The age of the last sign of life, and how many pings were answered.
 
-    All times are in s, of one steady clock.
-
-    Parameters
-    ----------
-    now : float
-        The link is alive at this moment.
-    limit : float
-        Age of the last sign of life at which the link is lost, s.
+    All times are in s, of one steady clock. The link is alive at first, and lost when the last sign
+    of life is older than the limit.
     """
 
     def __init__(self, now: float, limit: float = LOST_AFTER):
@@ -168,5 +154,5 @@ class LinkMonitor:
         # The answer to a ping may have come just after the last log packet; both are missing then.
         if self._received - self._logged < 0.5 * self._log_limit:
             return LinkHealth.ALIVE
-        # Until its log data come, too, nobody knows.
+        # Until its log data come, too, that is not known.
         return LinkHealth.RESTARTED if now - self._heard_since > _HEARD_FOR else LinkHealth.SILENT

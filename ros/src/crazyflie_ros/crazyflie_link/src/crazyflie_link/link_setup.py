@@ -64,10 +64,7 @@ class LinkSetup:
     def check(self, protocol: int) -> None:
         """Raise `NoAnswerError` or `SetupError` if the set-up cannot succeed any more.
 
-        Parameters
-        ----------
-        protocol : int
-            Version that the vehicle speaks; negative while it is not known.
+        The protocol is negative while it is not known.
         """
         now, limits = time.monotonic(), self._limits
         if 0 <= protocol < OLDEST_PROTOCOL:

@@ -64,12 +64,7 @@ class Log(Subsystem):
     def check(self, block: LogBlock) -> None:
         """Check that the vehicle can send a block.
 
-        Raises
-        ------
-        UnknownNameError
-            A variable is not in the vehicle's table.
-        ValueRangeError
-            The period, the number or the size of the variables is out of range.
+        Raises `UnknownNameError` for a variable, `ValueRangeError` for period, number or size.
         """
         is_in_range = SHORTEST_PERIOD_MS <= block.period_ms <= LONGEST_PERIOD_MS
         if not is_in_range or block.period_ms % PERIOD_STEP_MS:
@@ -95,14 +90,7 @@ class Log(Subsystem):
             )
 
     def start(self, block: LogBlock) -> None:
-        """Have the vehicle send a block; blocks until it has agreed.
-
-        Raises
-        ------
-        CrazyflieError
-            The block is not possible (see `check`), the vehicle has refused it, or
-            has not replied.
-        """
+        """Have the vehicle send a block; blocks until it has agreed, or raises `CrazyflieError`."""
         self.check(block)
         link = self._current_link()
         backend = link.cflib

@@ -32,13 +32,7 @@ class FirmwareParameters(Subsystem):
         }
 
     def read(self, name: str) -> int | float:
-        """Ask the vehicle for a parameter, such as "ring.effect"; blocks.
-
-        Raises
-        ------
-        CrazyflieError
-            There is no such parameter, or no reply.
-        """
+        """Ask the vehicle for a parameter, such as "ring.effect"; blocks."""
         link = self._current_link()
         element = self._find(link, name)
         ident = struct.pack("<H", element.ident)
@@ -50,14 +44,7 @@ class FirmwareParameters(Subsystem):
         return self._keep(link, element, answer[3:])
 
     def write(self, name: str, value: int | float) -> int | float:
-        """Set a parameter and return the value that the vehicle confirms; blocks.
-
-        Raises
-        ------
-        CrazyflieError
-            There is no such parameter, it cannot be written, the value does not
-            fit its type, the vehicle keeps another, or no reply.
-        """
+        """Set a parameter and return the value that the vehicle confirms; blocks."""
         link = self._current_link()
         element = self._find(link, name)
         if element.access != ParamTocElement.RW_ACCESS:

@@ -22,20 +22,10 @@ the main processor and the decks off or on again, switch everything off."""
 def reboot(
     address: Address, before: Callable[[], None] = lambda: None, mode: str = "firmware"
 ) -> None:
-    """Restart a vehicle or switch it off, without a connection; only by radio. Blocks.
+    """Restart a vehicle or switch it off, as one of `MODES`; only by radio; blocks.
 
-    Parameters
-    ----------
-    address : Address
-    before : callable
-        Called once it is clear that the link can do it.
-    mode : str
-        One of `MODES`.
-
-    Raises
-    ------
-    CrazyflieError
-        Not a radio link, or the vehicle has not acknowledged it.
+    ``before()`` is called once it is clear that the link can do it. Raises `CrazyflieError` if it
+    is not a radio link, or the vehicle has not acknowledged it.
     """
     if not address.is_radio:
         raise RefusedError(

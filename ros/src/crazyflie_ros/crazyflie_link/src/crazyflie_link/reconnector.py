@@ -40,7 +40,7 @@ class Reconnector:
     """Keep a link to a vehicle; the first `connect` succeeds or raises.
 
     ``make_link()`` returns a new `Link`; ``restore()`` does on one that was opened anew what the
-    vehicle has forgotten, and returns what it could not do; ``is_urgent()`` tells whether to
+    vehicle has forgotten, and returns what it could not do; ``is_urgent()`` returns whether to
     connect again without pauses.
 
     Attributes

@@ -2,7 +2,7 @@
 
 CRTP has no request numbers: an answer is known by its port, its channel and its
 first bytes, and by what it repeats of the request. A late answer to an earlier, equal request
-cannot be told from the expected one.
+cannot be distinguished from the expected one.
 """
 
 import threading
@@ -84,12 +84,7 @@ class RequestReply:
     def request(self, send: Send, request: Request) -> bytes:
         """Send a request and return the data of the answer; blocks.
 
-        Raises
-        ------
-        NoReplyError
-            No answer within the limit.
-        LinkLostError
-            The link ended meanwhile.
+        Raises `NoReplyError` after the limit, `LinkLostError` if the link ends meanwhile.
         """
         what = request.what
         pending = _Pending(request)

@@ -87,13 +87,8 @@ class _LogErrors(dict[int, str]):
 class SafeCrazyflie(CflibCrazyflie):
     """cflib's Crazyflie for a single connection; a new one is made for the next.
 
-    Parameters
-    ----------
-    cache : str or None
-        Folder of the tables.
-    on_error : callable
-        ``on_error(text)``, from one of cflib's threads and maybe several times, when a
-        driver gives up.
+    ``on_error(text)`` is called, in one of cflib's threads and maybe several times, when a driver
+    gives up.
     """
 
     link: CRTPDriver | None
@@ -104,7 +99,7 @@ class SafeCrazyflie(CflibCrazyflie):
         self._on_error = on_error
         self._setup_begun = False
         self._disconnecting = threading.Lock()
-        # Unlike cflib's own, it knows who holds it; see `send_packet`.
+        # Unlike cflib's own, only its owner can release it; see `send_packet`.
         self._send_lock = threading.RLock()
         guarded = _Guarded()
         guarded.callbacks = self.packet_received.callbacks
@@ -138,7 +133,7 @@ class SafeCrazyflie(CflibCrazyflie):
             # Not every error comes while it is taken.
             with contextlib.suppress(RuntimeError):
                 self._send_lock.release()
-            # Without a link it was closed meanwhile, which whoever did it knows.
+            # Without a link it was closed on purpose meanwhile.
             if self.link is not None:
                 self._on_error(f"cannot send: {error}")
 

@@ -16,25 +16,11 @@ DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"
 def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError]]:
     """Look for vehicles on all interfaces; takes some seconds with a radio.
 
-    On UDP the ports 19850 to 19859 of 127.0.0.1, or of the environment variable
-    SCAN_ADDRESS, are tried.
+    On UDP the ports 19850 to 19859 of 127.0.0.1, or of the environment variable SCAN_ADDRESS, are
+    tried; by radio an address of up to 10 hexadecimal digits, or else `AddressError` is raised.
 
-    Parameters
-    ----------
-    address : str
-        Radio address to call, up to 10 hexadecimal digits.
-
-    Returns
-    -------
-    found : list of str
-        Addresses of vehicles.
-    problems : list of CrazyflieError
-        Interfaces that could not be searched, such as a missing Crazyradio.
-
-    Raises
-    ------
-    AddressError
-        The address is none.
+    Returns the addresses that were found, and an error for each interface that could not be
+    searched, such as a missing Crazyradio.
     """
     try:
         number = int(address, 16)

@@ -119,14 +119,9 @@ class Setpoints(Subsystem):
         sent.wait(_SENT_LIMIT)
 
     def notify_setpoints_stop(self, remain_valid_ms: int = 0) -> None:
-        """Announce that no more setpoints follow: high-level commands are accepted again.
+        """Announce that no more setpoints follow; the last one still counts for some ms.
 
-        Without it the firmware ignores them after a streamed setpoint.
-
-        Parameters
-        ----------
-        remain_valid_ms : int
-            How long the last setpoint still counts, ms.
+        Without it the firmware ignores high-level commands after a streamed setpoint.
         """
         if not 0 <= remain_valid_ms < 2**32:
             raise ValueRangeError(f"{remain_valid_ms} ms is not in 0 to 2^32 - 1")

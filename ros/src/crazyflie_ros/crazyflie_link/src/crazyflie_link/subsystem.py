@@ -38,25 +38,13 @@ class _GuardedLink:
 
 
 class Subsystem:
-    """A part of the firmware, spoken to over the vehicle's present link.
-
-    Parameters
-    ----------
-    current_link : callable
-        Returns the `Link` on which the vehicle is heard, or raises `LinkLostError`.
-    """
+    """A part of the firmware, spoken to over the vehicle's present link."""
 
     def __init__(self, current_link: Callable[[], Link]):
         self._current_link = current_link
 
     def guarded(self, may_send: MaySend) -> Self:
-        """Return the same subsystem, but its commands and requests go out only if ``may_send()``.
-
-        Parameters
-        ----------
-        may_send : callable
-            Is called by the thread that sends, right before each packet.
-        """
+        """Return the same subsystem, whose commands and requests go out only if ``may_send()``."""
         guarded, current_link = copy.copy(self), self._current_link
         guarded._current_link = lambda: cast(Link, _GuardedLink(current_link(), may_send))
         return guarded

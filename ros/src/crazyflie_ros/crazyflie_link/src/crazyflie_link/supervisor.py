@@ -24,11 +24,7 @@ _WATCHDOG = "watchdog"
 class Supervisor(Subsystem):
     """The supervisor: the part of the firmware that arms and stops the motors.
 
-    Parameters
-    ----------
-    current_link : callable
-        Returns the living `Link`, or raises `LinkLostError`.
-    emergency : EmergencyStop
+    All that blocks raises `CrazyflieError` without a link or a reply.
     """
 
     def __init__(self, current_link: Callable[[], Link], emergency: EmergencyStop):
@@ -36,26 +32,14 @@ class Supervisor(Subsystem):
         self._emergency = emergency
 
     def read(self) -> SupervisorState | None:
-        """Ask for the state; blocks. None when the firmware is too old to report it.
-
-        Raises
-        ------
-        CrazyflieError
-            No link or no reply.
-        """
+        """Ask for the state; blocks. None when the firmware is too old to report it."""
         return read_state(self._current_link())
 
     def arm(self, do_arm: bool = True) -> None:
         """Arm or disarm the motors; blocks until the vehicle has confirmed it.
 
-        Firmware before protocol 12 confirms nothing.
-
-        Raises
-        ------
-        RefusedError
-            The vehicle cannot be armed now; the text says why.
-        CrazyflieError
-            No link or no reply.
+        Firmware before protocol 12 confirms nothing. A vehicle that cannot be armed now refuses it,
+        and the error says why.
         """
         link = self._current_link()
         if link.protocol < SUPERVISOR_PROTOCOL:
@@ -65,13 +49,7 @@ class Supervisor(Subsystem):
         self._command(link, bytes([CMD_ARM_SYSTEM, do_arm]), verb)
 
     def recover(self) -> None:
-        """Let a vehicle that has crashed be armed again; blocks until it has confirmed it.
-
-        Raises
-        ------
-        CrazyflieError
-            As `arm`.
-        """
+        """Let a vehicle that has crashed be armed again; blocks until it has confirmed it."""
         link = self._current_link()
         if link.protocol < SUPERVISOR_PROTOCOL:
             link.put(link.cflib.supervisor.send_crash_recovery_request)
@@ -88,28 +66,18 @@ class Supervisor(Subsystem):
         self._emergency.begin()
 
     def wait_for_emergency_stop(self, limit: float) -> bool:
-        """Wait until the vehicle has obeyed an emergency stop; return whether it has.
+        """Return whether the vehicle has obeyed an emergency stop within a limit (s); blocks.
 
-        Firmware before protocol 12 does not tell: there it means that the stop has been sent
+        Firmware before protocol 12 does not report it: there it means that the stop has been sent
         several times while the vehicle was heard.
-
-        Parameters
-        ----------
-        limit : float
-            How long to wait, s.
         """
         return self._emergency.wait(limit)
 
     def feed_watchdog(self) -> None:
         """Feed the emergency-stop watchdog; does not block.
 
-        It begins with the first feed and cannot be ended: 1 s after the last one the vehicle
-        stops its motors and is locked until it is restarted, also on the ground.
-
-        Raises
-        ------
-        LinkLostError
-            Nothing can be sent.
+        It begins with the first feed and cannot be ended: 1 s after the last one the vehicle stops
+        its motors and is locked until it is restarted, also on the ground.
         """
         link = self._current_link()
         link.put_latest(_WATCHDOG, link.cflib.supervisor.send_emergency_stop_watchdog)

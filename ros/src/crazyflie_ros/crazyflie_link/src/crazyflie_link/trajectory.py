@@ -39,23 +39,11 @@ class Trajectories(Subsystem):
         pieces: Sequence[PolynomialPiece],
         check: Callable[[], None] = lambda: None,
     ) -> None:
-        """Write pieces to the vehicle's memory and define a trajectory of them; blocks.
+        """Write pieces to the vehicle's memory and define a trajectory (0 to 255) of them; blocks.
 
-        Parameters
-        ----------
-        trajectory_id : int
-            0 to 255.
-        piece_offset : int
-            Where in the memory it begins, counted in pieces.
-        pieces : sequence of PolynomialPiece
-            At least one.
-        check : callable
-            Called before every packet; ends the upload by raising.
-
-        Raises
-        ------
-        CrazyflieError
-            The pieces do not fit, the vehicle refuses them or does not reply.
+        The offset in the memory is counted in pieces. ``check()`` is called before every packet,
+        and ends the upload by raising. Raises `CrazyflieError` if the pieces do not fit, the
+        vehicle refuses them or does not reply.
         """
         if not pieces:
             raise ValueRangeError(f"trajectory {trajectory_id} has no pieces")

@@ -33,12 +33,8 @@ class TransmitQueue:
     def put(self, send: Send, urgent: bool = False) -> None:
         """Have ``send()`` called after the commands before it.
 
-        An urgent one goes first, and discards all streams.
-
-        Raises
-        ------
-        LinkLostError
-            The queue is closed, or full: the link is stuck.
+        An urgent one goes first, and discards all streams. `LinkLostError` if the queue is closed,
+        or full: the link is stuck.
         """
         with self._wake:
             self._check_open()

@@ -1,0 +1,101 @@
+"""Poses, the supervisor, parameters and packets of one's own, byte by byte."""
+
+import struct
+
+import pytest
+from wire_helpers import only_packet
+
+from crazyflie_link.errors import RefusedError, UnknownNameError, ValueRangeError
+
+NAN = float("nan")
+
+
+def test_external_pose(target, flying):
+    flying.localization.position(1.0, 2.0, 3.0)
+    assert only_packet(target, 6, 0) == struct.pack("<fff", 1, 2, 3)
+    flying.localization.pose((1.0, 2.0, 3.0), (0.0, 0.0, 3.0, 4.0))
+    kind, *numbers = struct.unpack("<B7f", only_packet(target, 6, 1))
+    assert kind == 8
+    assert numbers == pytest.approx([1, 2, 3, 0, 0, 0.6, 0.8])
+    for quaternion in ((0, 0, 0, 0), (0, 0, NAN, 1)):
+        with pytest.raises(ValueRangeError):
+            flying.localization.pose((0, 0, 0), quaternion)
+    for x in (NAN, 1e39):
+        with pytest.raises(ValueRangeError):
+            flying.localization.position(x, 0, 0)
+
+
+def test_arming_and_the_supervisor(target, flying):
+    flying.supervisor.arm()
+    flying.supervisor.arm(False)
+    flying.supervisor.recover()
+    assert target.packets(9, 1) == [b"\x01\x01", b"\x01\x00", b"\x02"]
+    target.answers[9, 0, 0x0C] = b"\x8c\x12\x00"
+    assert flying.supervisor.read().words() == "armed, flying"
+    target.answers[9, 1, 1] = b"\x81\x00\x00"
+    with pytest.raises(RefusedError, match="arming: .* its state is: armed, flying"):
+        flying.supervisor.arm()
+
+
+@pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWarning")
+def test_arming_before_protocol_12(make_vehicle, make_link):
+    target = make_vehicle(protocol=10)
+    link = make_link(target.uri)
+    link.connect()
+    assert link.supervisor.read() is None
+    link.supervisor.arm()
+    assert only_packet(target, 13, 0) == b"\x01\x01"
+    link.supervisor.emergency_stop()
+    assert set(target.wait_for_packets(6, 1, 5)) == {b"\x03"}
+
+
+def test_parameters_are_written_in_their_type(target, flying):
+    parameters = flying.parameters
+    assert parameters.values() == {
+        "cpu.id0": 2**32 - 1,
+        "motor.trim": -3,
+        "pid_rate.roll_kp": 0.25,
+        "ring.effect": 6,
+        "sound.freq": 4000,
+    }
+    assert parameters.write("ring.effect", 7) == 7
+    assert parameters.write("pid_rate.roll_kp", 2) == 2.0
+    assert parameters.write("motor.trim", -100.0) == -100
+    assert target.packets(2, 2) == [
+        b"\x00\x00\x07",
+        b"\x01\x00" + struct.pack("<f", 2.0),
+        b"\x04\x00" + struct.pack("<b", -100),
+    ]
+    assert parameters.values()["motor.trim"] == -100
+    target.parameters["sound.freq"] = ("H", 5000, 0)
+    assert parameters.read("sound.freq") == 5000
+    assert parameters.types()["cpu.id0"] == ("uint32_t", False)
+
+
+IMPOSSIBLE_PARAMETERS = [
+    ("ring.effect", 256, ValueRangeError),
+    ("ring.effect", 1.5, ValueRangeError),
+    ("ring.effect", "on", ValueRangeError),
+    ("ring.effect", float("inf"), ValueRangeError),
+    ("pid_rate.roll_kp", 1e300, ValueRangeError),
+    ("cpu.id0", 1, RefusedError),
+    ("ring.effekt", 1, UnknownNameError),
+    ("ring", 1, UnknownNameError),
+]
+
+
+def test_parameters_that_cannot_be_written(target, flying):
+    for name, value, error in IMPOSSIBLE_PARAMETERS:
+        with pytest.raises(error, match=name):
+            flying.parameters.write(name, value)
+    assert target.packets(2, 2) == []
+
+
+def test_own_packets(target, flying):
+    flying.send_packet(13, 2, b"hello")
+    assert only_packet(target, 13, 2) == b"hello"
+    flying.send_packet(13, 3, bytes(30))
+    assert only_packet(target, 13, 3) == bytes(30)
+    for arguments in ((16, 0, b""), (0, 4, b""), (0, 0, bytes(31))):
+        with pytest.raises(ValueRangeError):
+            flying.send_packet(*arguments)

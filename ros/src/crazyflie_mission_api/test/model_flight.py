@@ -66,7 +66,7 @@ def _follow(starts, places, velocities, gains):
         limited = np.clip(
             u, [-MAX_TILT, -MAX_TILT, -9.0, MIN_THRUST], [MAX_TILT, MAX_TILT, 9.0, MAX_THRUST]
         )
-        x = model.on_ground(rk4_step(model.rates, k * STEP, x, [*limited.T], STEP))
+        x = model.apply_ground_contact(rk4_step(model.rates, k * STEP, x, [*limited.T], STEP))
         errors.append(np.linalg.norm(error[:, :3], axis=1).max())
         distances.append(pdist(np.stack(x[:3], axis=-1)).min())
         at_limit.append((u != limited).mean())

@@ -180,7 +180,7 @@ def test_the_quaternion_keeps_its_norm(quaternion, rates, speeds):
 @given(quaternion=QUATERNIONS, fall=st.floats(0.0, 5.0))
 def test_on_the_ground_it_stands_upright_and_keeps_its_heading(quaternion, fall):
     before = state((1, 2, -0.01), (1, 1, -fall), quaternion, (1, 2, 3), 500.0)
-    x = join(AIRFRAME.on_ground(split(before)))
+    x = join(AIRFRAME.apply_ground_contact(split(before)))
     np.testing.assert_array_equal(x[[0, 1, 2, 3, 4, 5, 6, 7, 10, 11, 12]], [1, 2] + [0] * 9)
     np.testing.assert_array_equal(x[13:], 500.0)
     assert np.hypot(*x[8:10]) == pytest.approx(1.0)
@@ -191,7 +191,7 @@ def test_on_the_ground_it_stands_upright_and_keeps_its_heading(quaternion, fall)
 
 
 def test_upside_down_on_the_ground_heading_is_lost():
-    x = AIRFRAME.on_ground(split(state((0, 0, -1), quaternion=(1, 0, 0, 0))))
+    x = AIRFRAME.apply_ground_contact(split(state((0, 0, -1), quaternion=(1, 0, 0, 0))))
     assert x[6:10] == [0.0, 0.0, 0.0, 1.0]
 
 

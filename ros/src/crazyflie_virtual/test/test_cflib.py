@@ -188,7 +188,7 @@ def test_emergency_stop_and_power_cycle(connect):
     switch.stm_power_up()
     switch.close()
     wait_until(lambda: vehicle.board not in (None, before))
-    wait_until(lambda: vehicle.board.firmware.supervisor.state is State.READY)
+    wait_until(lambda: vehicle.board.firmware.supervisor.state is State.READY_TO_FLY)
 
 
 def test_arming(connect):
@@ -197,7 +197,7 @@ def test_arming(connect):
     assert supervisor.can_be_armed
     assert not supervisor.is_armed
     supervisor.send_arming_request(True)
-    wait_until(lambda: vehicle.board.firmware.supervisor.state is State.READY)
+    wait_until(lambda: vehicle.board.firmware.supervisor.state is State.READY_TO_FLY)
     wait_until(lambda: supervisor.is_armed)
 
 

@@ -71,7 +71,7 @@ def test_it_says_what_is_no_setpoint():
     assert "CMD: no setpoints of type 63" in said(bench)
 
 
-def test_thrust_without_unlocking_is_remarked():
+def test_thrust_without_unlocking_prints_a_warning():
     bench = Bench()
     bench.stream(attitude(thrust=50000), 0.2)
     assert "CMD: thrust is locked" in said(bench)
@@ -91,7 +91,7 @@ def test_a_goal_that_is_not_a_number_ends_in_levelling_out(goal):
     assert all(map(math.isfinite, bench.physics.position))
     if not math.isfinite(sum(goal)):
         assert SupervisorState.HIGH_LEVEL_DISABLED in bench.firmware.info
-        assert bench.firmware.supervisor.state is State.LEVELLING
+        assert bench.firmware.supervisor.state is State.WARNING_LEVEL_OUT
         bench.run(1.5)
         assert bench.firmware.supervisor.state is State.LOCKED
         assert "not a number" in said(bench)
@@ -131,7 +131,7 @@ def test_motors_idle_where_the_client_arms():
     bench.ask(Port.SUPERVISOR, 1, b"\x01\x01")
     bench.run(0.2)
     assert bench.firmware.stabilizer.commands == (7000.0,) * 4
-    assert State.READY is bench.firmware.supervisor.state
+    assert State.READY_TO_FLY is bench.firmware.supervisor.state
 
 
 def test_motors_idle_in_the_moment_of_arming_already():
@@ -140,7 +140,7 @@ def test_motors_idle_in_the_moment_of_arming_already():
     # Setpoints are not flown yet.
     bench.unlock()
     bench.ask(*attitude(thrust=30000))
-    while bench.firmware.supervisor.state is State.CHECKED:
+    while bench.firmware.supervisor.state is State.PRE_FL_CHECKS_PASSED:
         assert not bench.motors_run
         bench.run(STEP)
     assert bench.firmware.supervisor.state is State.ARMING

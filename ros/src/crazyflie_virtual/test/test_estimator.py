@@ -118,7 +118,7 @@ def test_at_rest_the_attitude_returns_to_the_initial_one(estimator, initial_yaw)
     before = Rotation.from_euler("ZYX", [initial_yaw + 0.7, 0.4, -0.5])
     estimator.correct_attitude(*before.as_quat(), 1e-6)
     for _ in range(500):
-        estimator.rest(0.01)
+        estimator.correct_on_ground(0.01)
     initial = Rotation.from_euler("Z", initial_yaw)
     # Along the great circle between the two quaternions, at sin(angle / 2) / 10 s.
     angle = (initial.inv() * before).magnitude()

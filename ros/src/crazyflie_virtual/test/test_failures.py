@@ -108,7 +108,7 @@ def test_silence_while_streaming_meets_the_watchdogs(serve, client):
     stream_until(lambda: server.vehicle.physics.position[2] > 0.2)
     # Its answer is silenced, too.
     someone.cf.param.set_value("virtual.silence", 1000.0)
-    stream_until(lambda: supervisor.state is State.LEVELLING)
+    stream_until(lambda: supervisor.state is State.WARNING_LEVEL_OUT)
     stream_until(lambda: supervisor.state is State.LOCKED)
     stream_until(lambda: server.vehicle.physics.position[2] == 0.0)
 

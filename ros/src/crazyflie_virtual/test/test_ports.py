@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from virtual_bench import Bench
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.link.crtp import Port
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.parameter_table import parameter_specs
@@ -36,7 +37,24 @@ def test_rubbish_is_not_answered(bench):
 
 def test_versions(bench):
     assert bench.ask_one(Port.PLATFORM, 1, b"\0") == b"\0" + struct.pack("<i", 12)
-    assert Bench(protocol=8).ask_one(Port.PLATFORM, 1, b"\0") == b"\0" + struct.pack("<i", 8)
+    assert Bench(protocol=11).ask_one(Port.PLATFORM, 1, b"\0") == b"\0" + struct.pack("<i", 11)
+
+
+def test_protocol_11_has_no_supervisor_port():
+    bench = Bench(protocol=11, auto_arm=False)
+    assert bench.ask(Port.SUPERVISOR, 0, b"\x0c") == []
+    assert bench.ask(Port.SUPERVISOR, 1, b"\1\1") == []
+    assert not bench.firmware.supervisor.is_armed
+    assert bench.ask_one(Port.PLATFORM, 0, b"\1\1") == b"\1\1\1"
+
+
+@pytest.mark.parametrize("protocol", [11, 12])
+def test_the_high_level_commander_is_reported_from_protocol_12_on(protocol):
+    bench = Bench(protocol=protocol)
+    bench.ask_one(Port.HIGH_LEVEL, 0, struct.pack("<BBff?f", 7, 0, 0.5, 0.0, True, 1.0))
+    bench.run(0.5)
+    assert SupervisorState.CAN_FLY in bench.firmware.info
+    assert bench.firmware.info.reports_planner is (protocol == 12)
     assert bench.ask_one(Port.PLATFORM, 1, b"\2") == b"\2Crazyflie 2.1"
     assert bench.ask(Port.PLATFORM, 1, b"\x63") == []
 

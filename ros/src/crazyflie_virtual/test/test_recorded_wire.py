@@ -13,7 +13,7 @@ from crazyflie_virtual.tables.parameter_table import parameter_specs
 
 TABLE, READ, WRITE, MISC = 0, 1, 2, 3
 CONTROL, DATA = 1, 2
-NOBODY = struct.pack("<H", 9999)
+UNKNOWN = struct.pack("<H", 9999)
 
 PARAMETERS = [f"{spec.group}.{spec.name}" for spec in parameter_specs()]
 VARIABLES = [f"{variable.group}.{variable.name}" for variable in log_variables()]
@@ -51,7 +51,7 @@ class Client:
         return self.ask(Port.PARAMETERS, MISC, bytes([command]) + number(name), name)
 
     def misc_unknown(self, command):
-        return self.ask(Port.PARAMETERS, MISC, bytes([command]) + NOBODY)
+        return self.ask(Port.PARAMETERS, MISC, bytes([command]) + UNKNOWN)
 
     def by_name(self, name, type_and_value):
         group, parameter = name.encode().split(b".")
@@ -91,8 +91,8 @@ def test_parameters(client):
         "read_after_long": lambda: client.read(gain),
         "write_nan": lambda: client.write(gain, f32(math.nan)),
         "read_after_nan": lambda: client.read(gain),
-        "read_unknown": lambda: client.ask(Port.PARAMETERS, READ, NOBODY),
-        "write_unknown": lambda: client.ask(Port.PARAMETERS, WRITE, NOBODY + one),
+        "read_unknown": lambda: client.ask(Port.PARAMETERS, READ, UNKNOWN),
+        "write_unknown": lambda: client.ask(Port.PARAMETERS, WRITE, UNKNOWN + one),
         "write_read_only": lambda: write_read_only(client, read_only),
         "write_u8_300_as_u16": lambda: client.write("ring.effect", struct.pack("<H", 300)),
         "name_ok": lambda: client.by_name(gain, b"\6" + f32(249.0)),

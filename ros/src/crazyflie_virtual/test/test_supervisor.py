@@ -35,7 +35,7 @@ class Hand:
 @pytest.fixture
 def flying():
     hand = Hand()
-    assert hand.run(0.2) is State.READY
+    assert hand.run(0.2) is State.READY_TO_FLY
     hand.motors_run = True
     assert hand.run(0.2) is State.FLYING
     return hand
@@ -57,7 +57,7 @@ def test_motors_that_stop_are_no_landing_when_the_stream_ends():
     hand.run(1.5)
     # Streamed for 0.9 s without thrust, then nothing.
     hand.setpoint_age = 0.6
-    assert hand.run(0.6) is State.LEVELLING
+    assert hand.run(0.6) is State.WARNING_LEVEL_OUT
     hand.setpoint_age = 2.1
     assert hand.run(2 * PERIOD) is State.LOCKED
     assert hand.said == ["SUP: Locked, reboot required"]
@@ -67,7 +67,7 @@ def test_motors_that_stop_under_a_stream_are_a_landing(flying):
     flying.motors_run = False
     assert flying.run(2.1) is State.LANDED
     flying.setpoint_age = 60.0
-    assert flying.run(10.0) is State.READY
+    assert flying.run(10.0) is State.READY_TO_FLY
 
 
 def test_levelling_overrides_all_but_the_height(flying):
@@ -81,7 +81,7 @@ def test_levelling_overrides_all_but_the_height(flying):
 
 def test_levelling_ends_with_a_setpoint_and_disarming_it_is_no_emergency(flying):
     flying.setpoint_age = 1.0
-    assert flying.run(PERIOD) is State.LEVELLING
+    assert flying.run(PERIOD) is State.WARNING_LEVEL_OUT
     flying.setpoint_age = 0.0
     assert flying.run(PERIOD) is State.FLYING
     flying.setpoint_age = 1.0
@@ -140,15 +140,15 @@ def test_tumble_check_can_be_switched_off(flying):
 
 def test_armed_by_the_client():
     hand = Hand(auto_arm=False)
-    assert hand.run(1.0) is State.CHECKED
+    assert hand.run(1.0) is State.PRE_FL_CHECKS_PASSED
     assert hand.supervisor.arm(True)
-    assert hand.run(2 * PERIOD) is State.READY
+    assert hand.run(2 * PERIOD) is State.READY_TO_FLY
     hand.motors_run = True
     assert hand.run(PERIOD) is State.FLYING
     hand.motors_run = False
     assert hand.run(2.5) is State.LANDED
     # Disarmed 3 s after landing.
-    assert hand.run(3.0) is State.CHECKED
+    assert hand.run(3.0) is State.PRE_FL_CHECKS_PASSED
     assert not hand.supervisor.is_armed
 
 
@@ -163,8 +163,8 @@ def test_armed_and_not_flown():
     hand = Hand(auto_arm=False)
     hand.run(0.2)
     hand.supervisor.arm(True)
-    assert hand.run(29.0) is State.READY
-    assert hand.run(1.2) is State.CHECKED
+    assert hand.run(29.0) is State.READY_TO_FLY
+    assert hand.run(1.2) is State.PRE_FL_CHECKS_PASSED
 
 
 def test_one_that_arms_by_itself_cannot_fly_for_a_moment_each_30_s():
@@ -181,5 +181,5 @@ def test_lying_on_the_back_it_cannot_be_armed():
     hand = Hand(auto_arm=False)
     hand.force = (0.0, 0.0, -1.0)
     hand.run(0.4)
-    assert hand.run(0.4) is State.NOT_READY
+    assert hand.run(0.4) is State.PRE_FL_CHECKS_NOT_PASSED
     assert not hand.supervisor.arm(True)

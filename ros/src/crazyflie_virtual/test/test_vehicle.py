@@ -113,7 +113,7 @@ def test_without_setpoints_it_levels_out_and_then_falls(flying):
     assert flying.firmware.supervisor.state is State.FLYING
     assert flying.firmware.estimate.roll == pytest.approx(10.0, abs=3.0)
     flying.run(0.4)
-    assert flying.firmware.supervisor.state is State.LEVELLING
+    assert flying.firmware.supervisor.state is State.WARNING_LEVEL_OUT
     assert flying.firmware.estimate.roll == pytest.approx(0.0, abs=3.0)
     assert flying.motors_run
     flying.run(1.0)
@@ -131,7 +131,7 @@ def test_without_setpoints_it_levels_out_and_then_falls(flying):
 def test_a_setpoint_in_time_ends_the_levelling(flying):
     flying.stream(HOLD, 1.0)
     flying.run(1.5)
-    assert flying.firmware.supervisor.state is State.LEVELLING
+    assert flying.firmware.supervisor.state is State.WARNING_LEVEL_OUT
     flying.stream(HOLD, 1.0)
     assert flying.firmware.supervisor.state is State.FLYING
     assert flying.height > 0.5

@@ -17,7 +17,7 @@ Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
 _SMALLEST_COSINE = 1e-6
-"""Of a pitch from which roll and yaw can still be told apart."""
+"""Of a pitch at which roll and yaw are distinct."""
 
 
 @overload

@@ -55,7 +55,7 @@ class Dynamics(ABC):
         """
 
     @abstractmethod
-    def on_ground(self, x: Vector[Number]) -> Vector[Number]:
+    def apply_ground_contact(self, x: Vector[Number]) -> Vector[Number]:
         """Return the state with the ground, z = 0, taken into account.
 
         A vehicle below the ground is put on it and loses its downward speed.
@@ -75,7 +75,7 @@ class Dynamics(ABC):
         x, u : list
             State, and control, constant over the step.
         """
-        return self.on_ground(rk4_step(self.rates, count * STEP, x, u, STEP))
+        return self.apply_ground_contact(rk4_step(self.rates, count * STEP, x, u, STEP))
 
     def derivative(self, t: float, x: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
         """Return the time derivative of states as arrays.
@@ -104,8 +104,8 @@ class SevenDimensional(Dynamics):
         x, y, z = position
         return [x, y, z, 0.0, 0.0, 0.0, 0.0]
 
-    def on_ground(self, x: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.on_ground`; the ground also takes horizontal speed, by friction.
+    def apply_ground_contact(self, x: Vector[Number]) -> Vector[Number]:
+        """See `Dynamics.apply_ground_contact`; the ground also takes horizontal speed, by friction.
 
         It takes `GROUND_FRICTION` times the downward speed that it takes (Coulomb's law: the
         impulse of the friction is at most so many times that of the contact). At rest that is
@@ -166,7 +166,7 @@ class NearHover(SevenDimensional):
         px, py, pz, _, _, _, yaw = x
         vx, vy, vz, ax, ay, az, yaw_dot = self.rates(count * STEP, x, u)
         half = STEP / 2.0
-        return self.on_ground(
+        return self.apply_ground_contact(
             [
                 px + STEP * (vx + half * ax),
                 py + STEP * (vy + half * ay),

@@ -67,7 +67,7 @@ def spiral_piece(
     Parameters
     ----------
     start : Goal
-        Its position and heading tell where the axis is.
+        Its position and heading determine the axis.
     angle : float
         rad; negative to fly backwards.
     radii : tuple, 2 components

@@ -207,13 +207,13 @@ class Airframe:
         qx, qy, qz, qw = x[6:10]
         norm = functions(qx).sqrt(qx * qx + qy * qy + qz * qz + qw * qw)
         x[6:10] = qx / norm, qy / norm, qz / norm, qw / norm
-        return self.on_ground(x)
+        return self.apply_ground_contact(x)
 
-    def on_ground(self, x: Vector[Number]) -> Vector[Number]:
-        """Return the state with the ground, z = 0, taken into account.
+    def apply_ground_contact(self, x: Vector[Number]) -> Vector[Number]:
+        """Return the state after contact with the ground, z = 0.
 
-        A vehicle that is not above the ground stands on it, upright and still;
-        it keeps its heading and an upward speed, and its rotors may turn.
+        A vehicle on the ground is upright and at rest, with its heading and an upward
+        speed kept; its rotors may turn.
         """
         on_ground = x[2] <= 0.0
         if on_ground is False:

@@ -70,9 +70,9 @@ class StabilizedQuadrotor(Dynamics):
         body = self.airframe.rates(t, x[:BODY_DIM], x[-4:] + [*self._wind(t)])
         return body + [0.0] * (self.x_dim - BODY_DIM)
 
-    def on_ground(self, x: Vector[Number]) -> Vector[Number]:
-        """See `Dynamics.on_ground` and `Airframe.on_ground`."""
-        return self.airframe.on_ground(x[:BODY_DIM]) + x[BODY_DIM:]
+    def apply_ground_contact(self, x: Vector[Number]) -> Vector[Number]:
+        """See `Dynamics.apply_ground_contact` and `Airframe.apply_ground_contact`."""
+        return self.airframe.apply_ground_contact(x[:BODY_DIM]) + x[BODY_DIM:]
 
     @override
     def pose(self, x: Sequence[float], u: Sequence[float]) -> tuple[Triple, Quaternion]:
@@ -90,7 +90,7 @@ class StabilizedQuadrotor(Dynamics):
     def _sample(self, body, memory, u):
         attitude = zyx_from_quaternion(body[6:10])
         # A real vehicle rocks on its feet until its loops are content. This one
-        # stands upright, so its loops rest, or they would wind up.
+        # is held upright, so its loops are reset: they would wind up.
         standing = body[2] <= 0.0
         resting = inner_loops.initial_memory(attitude[2])
         memory = [where(standing, a, b) for a, b in zip(resting, memory, strict=True)]

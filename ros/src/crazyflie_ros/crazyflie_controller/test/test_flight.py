@@ -243,7 +243,7 @@ def test_a_landing_under_way_is_made_faster(moment):
     assert loop.pose().z > 4.5
     loop.flight.land()
     loop.run(moment)
-    loop.flight.hurry(7.0)
+    loop.flight.land_within(7.0)
     track = loop.run_until(lambda: loop.flight.state is State.IDLE, 10.0)
     assert track[-1, 2] == 0.0
     assert contact_speed(track) < 1.0
@@ -252,7 +252,7 @@ def test_a_landing_under_way_is_made_faster(moment):
 def test_only_a_landing_is_made_faster():
     loop = flying()
     loop.run(5.0)
-    loop.flight.hurry(7.0)
+    loop.flight.land_within(7.0)
     loop.run(5.0)
     assert loop.flight.state is State.AUTOMATIC
     assert loop.pose().z == pytest.approx(1.0, abs=0.12)

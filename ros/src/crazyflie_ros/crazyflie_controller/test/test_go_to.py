@@ -86,7 +86,7 @@ def test_a_forgotten_error_has_no_slope():
     controller = GoToController(pids())
     controller.reset(HOVER)
     controller.update(HERE, HERE, 0.0)
-    controller.forget_error()
+    controller.restart_derivatives()
     assert controller.update(HERE._replace(x=0.1), HERE, 0.0).pitch == pytest.approx(-4.0)
 
 

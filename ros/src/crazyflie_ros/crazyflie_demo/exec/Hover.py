@@ -22,7 +22,7 @@ RATE = 20.0
 
 
 class Crazyflie:
-    """A vehicle that is told velocities and a height.
+    """A vehicle that flies by velocities and a height.
 
     Every method blocks until the vehicle should be there, and repeats its setpoints meanwhile. If
     the next one does not follow at once, and when the script is ended in flight, the vehicle falls.

@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""A keyboard that stands for a joystick."""
+"""A keyboard in the place of a joystick."""
 
 from crazyflie_utils import run
 

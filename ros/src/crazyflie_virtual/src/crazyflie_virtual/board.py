@@ -1,10 +1,11 @@
 """The microcontroller: firmware and ports, from power-up on."""
 
 from collections.abc import Callable
+from typing import Any
 
 from crazyflie_virtual.body.physics import MotorCommands, Physics
 from crazyflie_virtual.faults import FaultSwitches
-from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
 from crazyflie_virtual.firmware.localization import DECK
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.ports.high_level import HighLevelPort
@@ -24,7 +25,7 @@ _ADDRESS_PREFIX = 0xE7E7E7E700
 
 
 class Storage:
-    """What outlives a restart: memories and stored parameters.
+    """Memories and stored parameters, which persist over a restart.
 
     Parameters
     ----------
@@ -66,9 +67,9 @@ class Board:
         supervisor = SupervisorPort(firmware)
         self._log = LogPort(firmware)
         lighthouse = LighthouseMemory(storage.lighthouse)
-        ports = (
-            LinkPort(firmware.remark),
-            PlatformPort(settings.protocol, supervisor, firmware.remark),
+        ports: list[Any] = [
+            LinkPort(firmware.warn),
+            PlatformPort(settings.protocol, supervisor, firmware.warn),
             self._log,
             ParameterPort(firmware, storage.parameters),
             MemoryPort(
@@ -79,14 +80,15 @@ class Board:
                     lighthouse,
                     storage.one_wire,
                 ),
-                firmware.remark,
+                firmware.warn,
             ),
             AttitudeSetpointPort(firmware),
             GenericSetpointPort(firmware),
             HighLevelPort(firmware),
             LocalizationPort(firmware, settings.address, lighthouse),
-            supervisor,
-        )
+        ]
+        if settings.protocol >= SUPERVISOR_PROTOCOL:
+            ports.append(supervisor)
         self._handlers: dict[int, Callable[[Packet], list[Packet]]] = {
             port.port: port.handle for port in ports
         }
@@ -104,11 +106,11 @@ class Board:
         return self.firmware.step(voltage)
 
     def _no_port(self, packet):
-        self.firmware.remark("port", f"CRTP: nothing listens on port {packet.port}")
+        self.firmware.warn("port", f"CRTP: nothing listens on port {packet.port}")
         return []
 
     def unsolicited(self) -> list[Packet]:
-        """Return the packets that are sent without being asked for: log and console."""
+        """Return the packets that answer no request: log data and console."""
         packets = self._log.collect()
         firmware = self.firmware
         while firmware.link_statistics.is_connected:

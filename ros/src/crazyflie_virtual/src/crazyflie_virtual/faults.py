@@ -19,7 +19,7 @@ class FaultSwitches:
     low_battery : int
         Not 0: the battery is nearly empty. Emptying cannot be undone.
     motor_failure : int
-        Number of the motor that stands still, 1 to 4; 0 for none.
+        Number of the failed motor, 1 to 4; 0 for none.
     """
 
     loss: float = 0.0

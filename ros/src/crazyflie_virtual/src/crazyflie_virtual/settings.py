@@ -26,13 +26,13 @@ class VehicleSettings(Parameters):
 
     host: str = parameter(TEXT, "address to listen on", "127.0.0.1")
     port: int = parameter(_UDP_PORT, "UDP port; 0 takes a free one, which is printed", FIRST_PORT)
-    init_x: float = parameter(METRES, "where it stands at the beginning", 0.0, "init/x")
-    init_y: float = parameter(METRES, "where it stands at the beginning", 0.0, "init/y")
-    init_yaw: float = parameter(Number("rad"), "its heading there", 0.0, "init/yaw")
+    init_x: float = parameter(METRES, "initial position", 0.0, "init/x")
+    init_y: float = parameter(METRES, "initial position", 0.0, "init/y")
+    init_yaw: float = parameter(Number("rad"), "initial heading", 0.0, "init/yaw")
     positioning: str = parameter(
         Text((DECK, NONE)),
-        "what the estimate rests on without external poses: the true pose, as from a "
-        "positioning deck, or nothing but the inertial sensors",
+        "source of the estimate without external poses: the true pose, as from a "
+        "positioning deck, or the inertial sensors only",
         DECK,
     )
     multiranger: bool = parameter(
@@ -45,7 +45,7 @@ class VehicleSettings(Parameters):
     )
     auto_arm: bool = parameter(
         BOOLEAN,
-        "arm by itself, as a Crazyflie 2.1; else the client arms, as with brushless motors",
+        "arm automatically, as a Crazyflie 2.1; else the client arms, as with brushless motors",
         True,
     )
     sensor_noise: bool = parameter(BOOLEAN, "noise of gyroscope, accelerometer and barometer", True)
@@ -59,7 +59,12 @@ class VehicleSettings(Parameters):
     battery: float = parameter(
         Number(minimum=0.0, maximum=1.0), "state of charge at the beginning", 1.0
     )
-    protocol: int = parameter(Integer(4, 255), "CRTP protocol version that it reports", 12)
+    protocol: int = parameter(
+        Integer(11, 12),
+        "CRTP protocol version; 11 has no supervisor port (9), and its supervisor.info no flags of "
+        "the high-level commander",
+        12,
+    )
     address: int = parameter(Integer(0, 255), "last byte of the radio's address, E7E7E7E7xx", 0xE7)
     observer_host: str = parameter(
         TEXT, "where the true pose is sent", "127.0.0.1", "observer/host"
@@ -112,7 +117,7 @@ class VehicleSettings(Parameters):
     )
     motor_failure: int = parameter(
         Integer(0, 4),
-        "the motor that stands still, 1 to 4; 0 for none",
+        "the failed motor, 1 to 4; 0 for none",
         0,
         "fault/motor_failure",
         live=True,

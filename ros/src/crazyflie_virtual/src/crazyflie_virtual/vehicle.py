@@ -1,4 +1,4 @@
-"""A whole virtual Crazyflie, without sockets and with the time given to it."""
+"""A virtual Crazyflie without sockets and clock."""
 
 import logging
 import math
@@ -22,7 +22,7 @@ _ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
 _BATTERY_STEPS = 10
 
 _RESTART_TIME = 1.0
-"""How long the microcontroller is not there after a failed assertion, s: assumed."""
+"""Time of a restart after a failed assertion, s: assumed."""
 
 _STOPPED: MotorCommands = (0.0, 0.0, 0.0, 0.0)
 
@@ -44,7 +44,7 @@ class VirtualVehicle:
     Attributes
     ----------
     physics : Physics
-        The truth.
+        The true state.
     battery : Battery
     faults : FaultSwitches
     board : Board or None
@@ -73,7 +73,7 @@ class VirtualVehicle:
 
     @property
     def time(self) -> float:
-        """How far the vehicle has come, s."""
+        """Simulated time, s."""
         return self._steps * STEP
 
     def receive(self, datagram: bytes) -> list[bytes]:
@@ -83,7 +83,7 @@ class VirtualVehicle:
             return []
         if packet.port == Port.LINK and packet.channel == _RADIO_CHANNEL:
             self._command_radio(packet.data)
-            # Whoever scans, or switches the power, waits for any packet.
+            # Clients that scan, or switch the power, expect any packet.
             return [Packet(Port.LINK, _RADIO_CHANNEL, b"").encode()]
         if self.board is None:
             return []
@@ -94,17 +94,17 @@ class VirtualVehicle:
             return []
         except Exception as error:
             text = f"{type(error).__name__} in packet {datagram.hex()}: {error}"
-            if self.board.firmware.remark("error", f"SYS: {text}"):
+            if self.board.firmware.warn("error", f"SYS: {text}"):
                 _LOGGER.exception("virtual vehicle: %s", text)
             return []
 
     def advance_to(self, time: float) -> list[bytes]:
-        """Go on to the last whole step before ``time`` (s).
+        """Advance to the last whole step before ``time`` (s).
 
         Returns
         -------
         list of bytes
-            Datagrams for the client that it has not asked for.
+            Datagrams for the client that answer no request.
         """
         datagrams = []
         for _ in range(math.floor(time / STEP + 1e-6) - self._steps):
@@ -123,10 +123,10 @@ class VirtualVehicle:
             except Exception as error:
                 failure = f"{type(error).__name__} in a step: {error}"
                 _LOGGER.exception("virtual vehicle: %s; it restarts", failure)
-                # What has failed once would fail in the next step, too.
+                # It would fail in the next step, too.
                 self._restart(failure)
         if math.isnan(sum(commands)):
-            # As the processor converts what is no number to a whole one.
+            # The processor converts NaN to zero.
             commands = _STOPPED
         failed = self.faults.motor_failure
         if failed:

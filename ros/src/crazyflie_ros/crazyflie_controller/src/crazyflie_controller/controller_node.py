@@ -17,7 +17,7 @@ from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.refusal import RefusalError
 
 _LEAVE_LIMIT = 7.0
-"""How long the descent may take when the process is to end, s: it lives on for 10 s."""
+"""Longest descent at a shutdown, s: the process is killed after 10 s."""
 
 
 class ControllerParameters(PoseParameters):
@@ -49,7 +49,7 @@ class ControllerParameters(PoseParameters):
 
 
 class ControllerNode(Node):
-    """Fly the vehicle that tf knows to the goal of a topic."""
+    """Fly a vehicle, by its pose from tf, to the goal of a topic."""
 
     needed_in_flight = True
 
@@ -74,11 +74,11 @@ class ControllerNode(Node):
 
     @override
     def prepare_shutdown(self) -> None:
-        """Land: the process is to end."""
+        """Land before the process ends."""
         # On the ground, or landing already.
         with contextlib.suppress(RefusalError):
             self._flight.land()
-        self._flight.hurry(_LEAVE_LIMIT)
+        self._flight.land_within(_LEAVE_LIMIT)
 
     def _reconfigure(self, parameters):
         self._controller.reconfigure(parameters.pids)

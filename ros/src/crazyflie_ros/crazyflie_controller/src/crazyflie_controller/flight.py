@@ -1,7 +1,6 @@
 """A flight from the ground to a goal and back, as a state machine driven by `GoToFlight.tick`.
 
-Times are s of any clock that does not run backwards; if it is reset, what was
-under way goes on from there.
+Times are s of any monotonic clock; after a reset of the clock, a manoeuvre continues.
 """
 
 import math
@@ -14,7 +13,7 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
 
 TAKEOFF_RATE = 10000.0
-"""How fast the thrust of a takeoff grows, PWM/s."""
+"""Rate of the thrust in a takeoff, PWM/s."""
 
 LIFT_OFF_HEIGHT = 0.05
 """Height above the start, m, at which a takeoff ends, and a landing's last part begins."""
@@ -22,37 +21,37 @@ LIFT_OFF_HEIGHT = 0.05
 LIFT_OFF_EXCESS = TAKEOFF_RATE * (6.0 * LIFT_OFF_HEIGHT * HOVER_PWM / (GRAVITY * TAKEOFF_RATE)) ** (
     1.0 / 3.0
 )
-"""How much more than its weight lifts a vehicle when it has reached `LIFT_OFF_HEIGHT`, PWM.
+"""Thrust beyond that of hover when a vehicle has reached `LIFT_OFF_HEIGHT`, PWM.
 
 With a thrust that grows at a constant rate it climbs by g rate t^3 / (6 hover), so that
 the time since it left the ground depends on its weight by the cube root only."""
 
 HOVER_HEIGHT = 0.5
-"""Height above the start, m, at which a vehicle waits that has never been given a goal."""
+"""Height above the start at which a vehicle hovers before the first goal, m."""
 
 DESCENT_SPEED = 0.3
 """Speed of a landing, m/s."""
 
 PRESS_DEPTH = 0.3
-"""How far below the start the goal of a landing sinks, m, so that the vehicle meets the
-ground with its speed also when it hangs above the goal."""
+"""Depth of a landing's last goal below the start, m, so that the vehicle touches down with the
+speed of the descent also when it flies above the goal."""
 
 DESCENT_MARGIN = 3.0
-"""How much longer than calculated a descent may take, s: the floor may be higher there."""
+"""Longest delay of a descent over its calculated duration, s: the floor may be higher there."""
 
 TOUCHDOWN_RATE = 20000.0
-"""How fast the thrust decreases in the last part of a landing, PWM/s."""
+"""Rate of the decreasing thrust in the last part of a landing, PWM/s."""
 
 TOUCHDOWN_DURATION = 1.0
-"""How long it does, s; zero thrust follows."""
+"""Duration of that part, s; zero thrust follows."""
 
 
 _UNKNOWN = Pose(0.0, 0.0, 0.0, 0.0)
-"""Stands for a pose that is not known yet; it is not used while there is none."""
+"""Placeholder before the first pose; never used for control."""
 
 
 class State(Enum):
-    """What the controller is doing."""
+    """States of the controller, with the words of its messages."""
 
     IDLE = "idle"
     TAKING_OFF = "taking off"
@@ -63,9 +62,9 @@ class State(Enum):
 class GoToFlight:
     """One vehicle's flights.
 
-    Without a pose that is new within `HOLD_LIMIT` a vehicle in the air is given no
-    setpoints, so that its own watchdog levels it out; when that has lasted for
-    `OFF_AGE` its motors are off, and the flight has ended.
+    Without a new pose within `HOLD_LIMIT`, a vehicle in the air gets no setpoints, so
+    that its own watchdog levels it out. After `OFF_AGE` its motors are off, and the
+    flight has ended.
 
     Parameters
     ----------
@@ -92,25 +91,25 @@ class GoToFlight:
 
     @property
     def state(self) -> State:
-        """What the controller is doing."""
+        """The state after the last tick or command."""
         return self._state
 
     def take_warning(self) -> str | None:
-        """Return what an operator should know of the last tick, once; or None."""
+        """Return the warning of the last tick, once; or None."""
         warning, self._warning = self._warning, None
         return warning
 
     def set_goal(self, goal: Pose) -> None:
-        """Fly there, now or after the next takeoff."""
+        """Set the goal of this flight, or of the next one."""
         self._goal = goal
 
     def take_off(self) -> None:
-        """Begin to take off.
+        """Start a takeoff.
 
         Raises
         ------
         RefusalError
-            The vehicle is in flight, or nobody knows where it is.
+            The vehicle is in flight, or there is no new pose.
         """
         if self._state is not State.IDLE:
             raise RefusalError(f"the controller is {self._state.value}; land first")
@@ -120,7 +119,7 @@ class GoToFlight:
         self._enter(State.TAKING_OFF)
 
     def land(self) -> None:
-        """Begin to land where the vehicle is.
+        """Start a landing at the vehicle's position.
 
         Raises
         ------
@@ -136,29 +135,29 @@ class GoToFlight:
             self._touch_down()
         self._enter(State.LANDING)
 
-    def hurry(self, within: float) -> None:
-        """Have a descent that is under way end within a time, s; anything else goes on as it is."""
+    def land_within(self, within: float) -> None:
+        """Speed a descent up to end within a time (s); other states are not affected."""
         if self._state is State.LANDING and self._touchdown is None:
             self._descent_from = self._descent_from._replace(z=self._pose.z)
             self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / within)
             self._enter(State.LANDING)
 
     def tick(self, time: float, stamp: float | None, pose: Pose | None) -> Setpoint | None:
-        """Go on.
+        """Return the setpoint for this time.
 
         Parameters
         ----------
         time : float
             Now, s.
         stamp : float or None
-            When the pose was measured, s of any clock; the same stamp is the same pose.
+            Of the pose, s of any clock; the same stamp is the same pose.
         pose : Pose or None
             The latest one; None when there is none.
 
         Returns
         -------
         Setpoint or None
-            None when the vehicle is better left to its own watchdog.
+            None to leave the vehicle to its own watchdog.
         """
         self._follow_clock(time)
         self._update_pose(stamp, pose)
@@ -246,7 +245,7 @@ class GoToFlight:
             return
         interval = math.inf if self._stamp is None else stamp - self._stamp
         if not 0.0 < interval <= HOLD_LIMIT:
-            self._controller.forget_error()
+            self._controller.restart_derivatives()
             interval = 0.0
         self._interval = interval
         self._stamp, self._pose, self._pose_time = stamp, pose, self._time

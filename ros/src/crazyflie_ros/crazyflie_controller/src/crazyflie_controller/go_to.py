@@ -63,7 +63,7 @@ class GoToController:
         return self._pids[2].parameters.max_output
 
     def reconfigure(self, parameters: dict[str, PidParameters]) -> None:
-        """Take other gains and limits; the integrals' parts in the setpoint stay.
+        """Set gains and limits; the integrals' parts in the setpoint stay.
 
         They change as little as the new limits allow, and vanish where ki is 0.
         """
@@ -71,13 +71,13 @@ class GoToController:
             pid.parameters = parameters[axis]
 
     def reset(self, thrust: float) -> None:
-        """Begin anew with the integrals empty but for that of Z, which gives ``thrust`` (PWM)."""
+        """Set all integrals to zero but that of Z, which gives ``thrust`` (PWM)."""
         for pid, output in zip(self._pids, (0.0, 0.0, thrust, 0.0), strict=True):
             pid.reset(output)
-        self.forget_error()
+        self.restart_derivatives()
 
-    def forget_error(self) -> None:
-        """Take no rate of change from the next error: it is not a sequel of the last one."""
+    def restart_derivatives(self) -> None:
+        """Compute no rate of change with the next error, which does not continue the last one."""
         self._error = None
 
     def update(self, pose: Pose, goal: Pose, interval: float) -> Setpoint:
@@ -87,8 +87,8 @@ class GoToController:
         ----------
         pose, goal : Pose
         interval : float
-            Time between the last pose and this one, s; > 0 unless the error has
-            been forgotten.
+            Time between the last pose and this one, s; > 0 except after
+            `restart_derivatives`.
         """
         error = [*(g - p for g, p in zip(goal[:3], pose[:3], strict=True))]
         error.append(wrap_to_pi(goal.yaw - pose.yaw))
@@ -114,6 +114,6 @@ class GoToController:
 
 
 def _in_heading_frame(error, yaw):
-    # The slope is turned after it has been taken, so that the vehicle's own turning
-    # is not taken for a motion of the goal.
+    # The slope is computed before the rotation, so that a turn of the vehicle does not look
+    # like a motion of the goal.
     return [*rotate_by_yaw(error[0], error[1], -yaw), *error[2:]]

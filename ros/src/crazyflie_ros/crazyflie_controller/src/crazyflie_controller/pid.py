@@ -4,11 +4,11 @@ from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import Number
 
 INTEGRATED_ERROR = 0.2
-"""What of an error enters the integral at most, m or rad.
+"""Largest error that is integrated, m or rad.
 
-On the way to a goal far away the integral would otherwise gather what it can only get rid
-of beyond the goal. With the gains of Z in config/crazyflie2.yaml a step of 1 m overshoots
-by 0.6 m without this limit and by 0.3 m with it; errors below it are not affected."""
+It limits the overshoot at a goal far away. With the gains of Z in config/crazyflie2.yaml a step
+of 1 m overshoots by 0.6 m without this limit and by 0.3 m with it; errors below it are not
+affected."""
 
 _INTEGRAL = Number("m s or rad s")
 
@@ -41,8 +41,8 @@ class PidParameters(Parameters):
 class SaturatedPid:
     """output = kp error + kd slope + ki integral, within limits.
 
-    The limits of the integral, which are those of the integral itself and not of its part
-    in the output, keep an error that lasts from winding it up; see also `INTEGRATED_ERROR`.
+    The integral itself, not its part in the output, is limited against windup; see also
+    `INTEGRATED_ERROR`.
 
     Parameters
     ----------
@@ -66,10 +66,9 @@ class SaturatedPid:
         self.reset(output)
 
     def reset(self, output: float = 0.0) -> None:
-        """Forget what has been; the integral is what gives ``output`` without an error.
+        """Set the integral that gives ``output`` without an error, within its limits.
 
-        Without an integral gain, and beyond the limits of the integral, it is as near to
-        that as it can be.
+        Without an integral gain it is zero.
         """
         self._integral = 0.0
         if self._parameters.ki != 0.0:

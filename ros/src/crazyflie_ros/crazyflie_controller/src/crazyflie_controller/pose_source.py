@@ -1,4 +1,4 @@
-"""Where a vehicle is, as tf knows it."""
+"""The pose of a vehicle from tf."""
 
 from geometry_msgs.msg import Point, Quaternion, Vector3
 
@@ -26,7 +26,6 @@ class PoseSource:
     Parameters
     ----------
     handle : NodeHandle
-        The door to tf.
     parameters : PoseParameters
     """
 
@@ -36,7 +35,7 @@ class PoseSource:
         self._lookup = handle.listen_to_transforms()
 
     def latest(self) -> tuple[float, Pose] | tuple[None, None]:
-        """Return the latest pose in the world frame and when it was measured (s of ROS time)."""
+        """Return stamp (s of ROS time) and latest pose in the world frame, or None twice."""
         parameters = self._parameters
         try:
             found = self._lookup(parameters.world_frame, parameters.frame)
@@ -52,7 +51,7 @@ class PoseSource:
 
 
 def pose(position: Point | Vector3, orientation: Quaternion) -> Pose:
-    """Return the pose in two messages."""
+    """Return the pose of a position and an orientation."""
     q = orientation
     yaw = rpy_from_quaternion(q.x, q.y, q.z, q.w)[2]
     return Pose(position.x, position.y, position.z, yaw)

@@ -27,14 +27,14 @@ _WORLD = "world"
 """The fixed frame, unless the script's parameter ~frames/fixed says otherwise."""
 
 _TF_LIMIT = 10.0
-"""How long a position, or a voltage, is waited for, s."""
+"""Longest time until a position, or a voltage, is received, s."""
 
 _MAX_POSITION_AGE = 0.5
 """Of a position, s: tf keeps the last one of a vehicle that is not tracked any more."""
 
 _COMMANDER = "high_level"
-"""Below a vehicle's name: who offers the driver's services for one that a controller of this
-workspace flies, high_level_node of crazyflie_mission_api."""
+"""Namespace, below a vehicle's name, of crazyflie_mission_api's high_level_node, which offers the
+driver's services for a vehicle that a controller of this workspace flies."""
 
 _SETPOINTS = {
     "cmd_full_state": FullState,
@@ -60,14 +60,15 @@ _SERVICES = {
 class Crazyflie:
     """A vehicle that the driver flies, or a simulated one; waits until it is there.
 
-    A command returns when the vehicle has got it, not when it has been carried out.
+    A command returns when the vehicle has received it, not when it has been carried out.
 
     Parameters
     ----------
     prefix : str
         The vehicle's namespace, its tf_prefix.
     tf : str or tf.TransformListener or tf2_ros.Buffer
-        For `position` only: the vehicle's tf frame; or who answers for the frame ``prefix``.
+        For `position` only: the vehicle's tf frame; or a listener or buffer, which is asked for
+        the frame ``prefix``.
 
     Raises
     ------
@@ -219,11 +220,11 @@ class Crazyflie:
         Raises
         ------
         rospy.ROSException
-            Nobody has said so for 10 s.
+            No voltage was published for 10 s.
         """
         return rospy.wait_for_message(f"{self.prefix}/battery", Float32, _TF_LIMIT).data
 
-    # Setpoints: the firmware gives up 0.5 s after the last one.
+    # Setpoints: the firmware levels out 0.5 s after the last one.
 
     def cmdFullState(  # noqa: N802
         self,
@@ -274,7 +275,7 @@ class Crazyflie:
 
 
 def _commander(prefix):
-    """Return where the services of a vehicle are, as soon as they are there."""
+    """Return the namespace of a vehicle's services; blocks until there is one."""
     tops = (f"{prefix}/{_COMMANDER}", prefix)
     rospy.loginfo("waiting for update_params below %s or %s", *map(rospy.resolve_name, tops))
     while True:

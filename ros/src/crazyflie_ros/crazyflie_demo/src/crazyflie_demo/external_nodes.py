@@ -41,7 +41,7 @@ class _ExternalNode(Node):
 
 
 class ExternalPoseViconNode(_ExternalNode):
-    """Vicon's transform of a vehicle, as the pose that its estimator is told."""
+    """Vicon's transform of a vehicle, as an external pose for its estimator."""
 
     input_type, finite = TransformStamped, "transform"
     output, output_type = "external_pose", PoseStamped
@@ -56,7 +56,7 @@ class ExternalPoseViconNode(_ExternalNode):
 
 
 class ExternalPositionViconNode(_ExternalNode):
-    """Vicon's transform of a vehicle, as the position that its estimator is told."""
+    """Vicon's transform of a vehicle, as an external position for its estimator."""
 
     input_type, finite = TransformStamped, "transform"
     output, output_type = "external_position", PointStamped
@@ -68,7 +68,7 @@ class ExternalPositionViconNode(_ExternalNode):
 
 
 class ExternalPositionVrpnNode(_ExternalNode):
-    """A vehicle's pose from VRPN, as the position that its estimator is told."""
+    """A vehicle's pose from VRPN, as an external position for its estimator."""
 
     input_type, finite = PoseStamped, "pose"
     output, output_type = "external_position", PointStamped

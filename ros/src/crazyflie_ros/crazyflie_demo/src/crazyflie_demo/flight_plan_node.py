@@ -1,4 +1,4 @@
-"""What flights by high-level commands have in common: one service call after the other."""
+"""Base class of flights by high-level commands: one service call after the other."""
 
 from collections import deque
 from collections.abc import Mapping
@@ -22,15 +22,15 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import Number
 
 _LIMIT = 15.0
-"""How long a service may take, and at the beginning the driver to connect, s."""
+"""Longest time of a service call, and of the driver's connection before the first one, s."""
 
 _PAUSE = 0.5
 """Between the end of one manoeuvre and the next, s."""
 
 _LANDING = 1.5
-"""How much longer a landing takes than a takeoff: at its end the firmware stops the motors, and who
-follows with a lag is in the air then. From 0.5 m, the virtual vehicle falls the last 6 cm of a
-landing of 2 s, and touches down with 0.8 m/s; in one of 3 s, with 0.1 m/s."""
+"""Duration of a landing over that of a takeoff. At its end the firmware stops the motors, and the
+vehicle, which lags behind the setpoint, is still in the air: from 0.5 m, the virtual one falls the
+last 6 cm of a landing of 2 s and touches down with 0.8 m/s; in one of 3 s, with 0.1 m/s."""
 
 _HIGH_LEVEL = "commander/enHighLevel"
 
@@ -45,7 +45,7 @@ class Step(NamedTuple):
     service_type : type
     request : genpy.Message
     duration : float
-        How long what it begins takes, s.
+        Of the manoeuvre that it starts, s.
     parameters : dict of str to int
         Set before the call: name in the node's namespace -> value.
     """
@@ -74,7 +74,7 @@ class FlightPlanParameters(Parameters):
 
 
 class FlightPlanNode(Node):
-    """Carry out a plan: takeoff, what a subclass adds, landing; then end the process.
+    """Take off, carry out the steps of a subclass, land; then end the process.
 
     If a step fails, and when the process is ended in flight, the vehicle is landed.
     """
@@ -85,11 +85,11 @@ class FlightPlanNode(Node):
         self._is_flying = False
 
     def manoeuvres(self) -> list[Step]:
-        """Return what is done between takeoff and landing."""
+        """Return the steps between takeoff and landing."""
         raise NotImplementedError
 
     def preparations(self) -> list[Step]:
-        """Return what is done before the takeoff."""
+        """Return the steps before the takeoff."""
         return []
 
     @override
@@ -99,8 +99,8 @@ class FlightPlanNode(Node):
         takeoff = TakeoffRequest(height=height, duration=seconds(duration))
         self._steps = deque(
             [
-                # The first call waits for the driver, which sets all parameters when it has
-                # connected; before that nothing can be set for it.
+                # Answered when the driver has connected and read all parameters of the vehicle,
+                # which overwrites those that were set before.
                 Step("update_params", UpdateParams, UpdateParamsRequest()),
                 Step("update_params", UpdateParams, enable, parameters={_HIGH_LEVEL: 1}),
                 *self.preparations(),
@@ -127,7 +127,7 @@ class FlightPlanNode(Node):
         self._handle.info(f"{step.service}, {step.duration:g} s")
         for name, value in step.parameters.items():
             self._handle.set_param(name, value)
-        # A takeoff that is not answered may have begun all the same.
+        # A takeoff may have started although its call fails.
         self._is_flying |= step.service == "takeoff"
         answer = self._handle.call_service(step.service, step.service_type, step.request, _LIMIT)
         answer.add_done_callback(self._on_answer)

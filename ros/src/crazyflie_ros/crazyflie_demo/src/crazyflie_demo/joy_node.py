@@ -114,7 +114,7 @@ class JoyNode(Node):
         self._publish(self._joystick.release())
 
     def _repeat(self):
-        # Silence of the repetition tells others that there is no joystick.
+        # Subscribers detect a missing joystick by the missing repetition.
         if self._file is not None and self._published is not None:
             self._publish(self._joystick.state())
 

@@ -9,7 +9,7 @@ BUTTON, AXIS = 0x01, 0x02
 """Types of events."""
 
 INITIAL = 0x80
-"""Added to the type of events that only tell how a joystick was found."""
+"""Added to the type of events that report the state at the opening of the device."""
 
 _FULL = 32767
 """Value of an axis at its end."""
@@ -70,7 +70,7 @@ class Joystick:
         return states if is_complete else [*states, self.state()]
 
     def release(self) -> JoystickState:
-        """Let everything go back to zero, as when the joystick has been unplugged; return it."""
+        """Return the neutral state, all zero, for a joystick that has been unplugged."""
         self.axes = [0.0] * len(self.axes)
         self.buttons = [0] * len(self.buttons)
         self._rest = b""

@@ -1,7 +1,7 @@
 """A keyboard in the place of a joystick: keys come, axes and buttons go out.
 
-A terminal tells when a key is pressed and, while it is held, repeats it; it does
-not tell when it is let go. So a deflection lasts until the repetition would have come.
+A terminal reports a key when it is pressed and repeats it while it is held, but does not
+report its release. So a deflection lasts until the next repetition is due.
 """
 
 from collections.abc import Iterator

@@ -14,8 +14,8 @@ from crazyflie_utils.parameters.types import METRES, Number
 class PositionFlightParameters(SetpointParameters):
     """Parameters of `PositionFlightNode`."""
 
-    x: float = parameter(METRES, "where the vehicle stands", 0.0)
-    y: float = parameter(METRES, "where the vehicle stands", 0.0)
+    x: float = parameter(METRES, "start of the flight", 0.0)
+    y: float = parameter(METRES, "start of the flight", 0.0)
     height: float = parameter(Number("m", above=0.0, maximum=3.0), "how high it flies", 0.4)
     distance: float = parameter(METRES, "how far ahead and to the left it goes", 0.2)
     speed: float = parameter(Number("m/s", above=0.0, maximum=1.0), "of all ways", 0.2)

@@ -1,4 +1,4 @@
-"""What flights by a stream of setpoints have in common: a clock that starts with a listener."""
+"""Base class of flights by a stream of setpoints, which starts with its first subscriber."""
 
 from concurrent.futures import Future
 from functools import partial
@@ -13,27 +13,27 @@ from crazyflie_driver.srv import Land, LandRequest
 from crazyflie_utils import Node, NodeHandle
 
 _LANDING = 2.0
-"""How long a landing takes that ends an interrupted flight, s."""
+"""Duration of the landing after an interrupted flight, s."""
 
 _LIMIT = 15.0
-"""How long the driver may take to answer, s."""
+"""Longest time of a service call, s."""
 
 _FINISH_LIMIT = 10.0
-"""How long a landing that fails is asked for again, s."""
+"""Longest time in which a failed landing is requested again, s."""
 
 _RETRY_PERIOD = 1.0
-"""From one that has failed to the next, s."""
+"""Between two requests, s."""
 
 _MAX_ANSWER_TIME = OVERLAP / 2.0
-"""Of a landing, s. From `OVERLAP` after it the driver passes setpoints on again, which take the
-vehicle back from it: one that is accepted later than this is asked for again."""
+"""Longest time of a landing's service call, s. `OVERLAP` after the landing the driver passes
+setpoints on again, which override it: one that is accepted later is requested again."""
 
 
 class StreamNode(Node):
-    """Stream the setpoints of a flight, from when the driver listens; then end the process.
+    """Stream the setpoints of a flight as soon as the driver subscribes; then end the process.
 
-    The last one is repeated until the driver has accepted what follows: without setpoints the
-    firmware levels out after 0.5 s, and stops the motors after 2 s. If the node is ended in
+    The last setpoint is repeated until the driver has accepted `finish`: without setpoints the
+    firmware levels out after 0.5 s and stops the motors after 2 s. If the node is ended in
     flight, the vehicle is landed.
 
     Attributes
@@ -61,11 +61,11 @@ class StreamNode(Node):
         raise NotImplementedError
 
     def finish(self) -> Future[Any] | None:
-        """Do what follows the last setpoint; return the answer that the process waits for."""
+        """Request what follows the last setpoint; the process ends after the response."""
         return None
 
     def land(self) -> Future[Any]:
-        """Have the vehicle land by itself; return the answer."""
+        """Request a landing by the high-level commander; return the response."""
         prefix = self._handle.resolve(self.topic).rpartition("/")[0]
         request = LandRequest(height=0.0, duration=seconds(_LANDING))
         return self._handle.call_service(f"{prefix}/land", Land, request, _LIMIT)
@@ -86,7 +86,7 @@ class StreamNode(Node):
     def _on_timer(self):
         now = self._handle.time()
         if self._start is None:
-            # What is published to nobody is lost, and the flight would begin on its way.
+            # Setpoints without a subscriber are lost, and the flight would start in its middle.
             if not self._publisher.has_subscribers():
                 return
             self._start = now

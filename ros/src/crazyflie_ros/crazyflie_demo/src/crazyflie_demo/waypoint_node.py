@@ -76,7 +76,7 @@ class DemoNode(Node):
             self._stamp = stamp
             follower.update(self._handle.time(), pose[:3], pose.yaw)
         if follower.index != index:
-            self._handle.info(f"goes on to waypoint {follower.index}: {list(follower.goal)}")
+            self._handle.info(f"next is waypoint {follower.index}: {list(follower.goal)}")
         if follower.is_finished and not was_finished:
             self._handle.info("finished; the last waypoint remains the goal")
         x, y, z, yaw, _ = follower.goal

@@ -79,7 +79,7 @@ class WaypointFollower:
         return self._waypoints[self.index]
 
     def update(self, time: float, position: tuple[float, float, float], yaw: float) -> None:
-        """Take the pose of the vehicle, and go on if it is due.
+        """Update with the pose of the vehicle; advance to the next waypoint if it is due.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""What holds a vehicle that stands: its feet, until the rotors tip it over two of them.
+"""Contact of the feet, which hold a vehicle upright until the rotors tip it over two of them.
 
 The feet are below the motors. With mass m, thrust T and distance d from the centre to the line
 through two feet, the weight on the feet turns the body back with the torque (m g - T) d. Rotors
@@ -17,7 +17,7 @@ from crazyflie_model.units import GRAVITY
 def tip(
     airframe: Airframe, before: Vector[float], after: Vector[float], dt: float
 ) -> Vector[float]:
-    """Return the state of a vehicle that stands, with the tilt that its feet allow.
+    """Return the state of a vehicle on the ground, with the tilt that its feet allow.
 
     Parameters
     ----------

@@ -1,18 +1,18 @@
-"""Which setpoint holds: streamed ones come before the high-level commander."""
+"""The commander: priority of streamed setpoints over the high-level commander."""
 
 from crazyflie_virtual.firmware.planner import Planner
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
 
-NOBODY, HIGH_LEVEL, STREAMED = 0, 1, 2
-"""Priorities."""
+PRIORITY_DISABLE, PRIORITY_HIGHLEVEL, PRIORITY_CRTP = 0, 1, 2
+"""Priorities, named as in the firmware."""
 
 
 class Commander:
-    """The setpoint that holds.
+    """The setpoint with the highest priority.
 
-    A streamed setpoint stops the high-level commander and keeps it out until
-    `release`. Nothing else ends that: not age, not a new client. After `release`
-    a commander that was not told to do something new holds the motors off.
+    A streamed setpoint stops the high-level commander and overrides it until
+    `relax_priority`: neither age nor a new client ends that. Afterwards the high-level
+    commander holds the motors off until its next command.
 
     Parameters
     ----------
@@ -22,7 +22,7 @@ class Commander:
     ----------
     setpoint : Setpoint
     priority : int
-        Of the setpoint: `NOBODY`, `HIGH_LEVEL` or `STREAMED`.
+        Of the setpoint: `PRIORITY_DISABLE`, `PRIORITY_HIGHLEVEL` or `PRIORITY_CRTP`.
     high_level_enabled : int
         Parameter that the firmware has without effect: the commander is on.
     """
@@ -30,26 +30,26 @@ class Commander:
     def __init__(self, planner: Planner):
         self._planner = planner
         self.setpoint = Setpoint()
-        self.priority = NOBODY
+        self.priority = PRIORITY_DISABLE
         self.high_level_enabled = 1
 
     def stream(self, setpoint: Setpoint) -> None:
         """Take a setpoint from the client."""
         self.setpoint = setpoint
-        self.priority = STREAMED
+        self.priority = PRIORITY_CRTP
         self._planner.stop()
 
-    def release(self, estimate: Estimate) -> None:
-        """Let the high-level commander take over, from the vehicle's state."""
-        self.priority = min(self.priority, HIGH_LEVEL)
+    def relax_priority(self, estimate: Estimate) -> None:
+        """Permit high-level setpoints, beginning at the estimated state."""
+        self.priority = min(self.priority, PRIORITY_HIGHLEVEL)
         self._planner.tell_state(estimate)
 
     def update_from_planner(self, time: float, estimate: Estimate) -> None:
         """Take the high-level commander's setpoint for ``time`` (s)."""
         setpoint = self._planner.setpoint(time, estimate)
-        if setpoint is not None and self.priority <= HIGH_LEVEL:
+        if setpoint is not None and self.priority <= PRIORITY_HIGHLEVEL:
             self.setpoint = setpoint
-            self.priority = HIGH_LEVEL
+            self.priority = PRIORITY_HIGHLEVEL
 
     def age(self, time: float) -> float:
         """Return how old the setpoint is at ``time``, s."""

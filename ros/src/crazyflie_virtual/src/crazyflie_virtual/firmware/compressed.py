@@ -12,7 +12,7 @@ _ROOT_HALF = math.sqrt(0.5)
 def compress_quaternion(quaternion: Quaternion) -> int:
     """Return a unit quaternion (x, y, z, w) in 32 bits.
 
-    The two highest bits tell which component is largest; it is left out. The
+    The two highest bits are the index of the largest component, which is left out. The
     others follow in order, each as a sign and 9 bits of magnitude in units of
     ``sqrt(1/2) / 511``, in the sign that makes the largest positive.
     """

@@ -24,8 +24,7 @@ _UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)
 def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:
     """Return the pieces of a compressed trajectory.
 
-    It goes on until a segment of no duration, or until the end of the memory:
-    nothing else tells where it ends.
+    It ends with a segment of no duration, or with the memory.
 
     Parameters
     ----------

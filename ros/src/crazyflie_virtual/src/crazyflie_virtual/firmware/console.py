@@ -1,27 +1,54 @@
-"""What the firmware prints."""
+"""The console: what the firmware prints, and warnings about commands without effect."""
 
 from collections import deque
+from collections.abc import Callable, Hashable
 
 from crazyflie_virtual.link.crtp import MAX_DATA
 
-_KEPT = 100
-"""Pieces kept until a client reads them."""
+Warn = Callable[[Hashable, str], bool]
+"""See `Console.warn`."""
+
+_BUFFER_SIZE = 100
+"""Packets kept until a client is connected: the latest."""
+
+_WARNING_PERIOD = 1.0
+"""Between two warnings of one kind, s."""
 
 
 class Console:
     """Text on its way to the client.
 
-    What is printed before there is a client is kept, the latest of it.
+    Parameters
+    ----------
+    time : callable
+        ``time()`` returns the time, s.
     """
 
-    def __init__(self) -> None:
-        self._pieces: deque[bytes] = deque(maxlen=_KEPT)
+    def __init__(self, time: Callable[[], float]) -> None:
+        self._time = time
+        self._packets: deque[bytes] = deque(maxlen=_BUFFER_SIZE)
+        self._last_warning: dict[Hashable, float] = {}
 
     def write_line(self, line: str) -> None:
         """Print a line."""
         data = (line + "\n").encode("ascii", "replace")
-        self._pieces.extend(data[i : i + MAX_DATA] for i in range(0, len(data), MAX_DATA))
+        self._packets.extend(data[i : i + MAX_DATA] for i in range(0, len(data), MAX_DATA))
+
+    def warn(self, kind: Hashable, text: str) -> bool:
+        """Print a line, unless there was one of its kind within `_WARNING_PERIOD`.
+
+        Returns
+        -------
+        bool
+            Whether it was printed.
+        """
+        now = self._time()
+        if now - self._last_warning.get(kind, -_WARNING_PERIOD) < _WARNING_PERIOD:
+            return False
+        self._last_warning[kind] = now
+        self.write_line(text)
+        return True
 
     def pop(self) -> bytes | None:
-        """Return the next piece, at most a packet long; None when there is none."""
-        return self._pieces.popleft() if self._pieces else None
+        """Return the data of the next packet; None when there is none."""
+        return self._packets.popleft() if self._packets else None

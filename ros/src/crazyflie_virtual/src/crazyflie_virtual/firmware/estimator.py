@@ -1,12 +1,12 @@
-"""The vehicle's estimate of its state.
+"""The state estimator.
 
 Position and velocity: a Kalman filter per axis, predicted with the
 accelerometer and corrected with measured positions; the axes have one
 covariance. Attitude: the gyroscope's integral, corrected with measured
-attitudes in proportion to its variance, and, while the vehicle stands, pulled
+attitudes in proportion to its variance, and, on the ground, pulled
 towards the initial attitude.
 
-Between two predictions, 100 times a second, the estimate stands still, as the
+Between two predictions, 100 times a second, the estimate is constant, as the
 firmware's does (estimator_kalman.c, PREDICT_RATE). To the attitude controller,
 500 times a second, its rate of change is a pulse in one step of five, and in fast
 turns the limit of the outputs cuts off these pulses: the damping of a large
@@ -45,12 +45,12 @@ class Estimator:
     Parameters
     ----------
     estimate : Estimate
-        What is kept up to date.
+        Updated in place.
 
     Attributes
     ----------
     initial_x, initial_y, initial_z, initial_yaw : float
-        Where `reset` begins, m and rad.
+        Pose after `reset`, m and rad.
     variance_position, variance_velocity, variance_attitude : float
         m^2, m^2/s^2, rad^2.
     """
@@ -71,7 +71,7 @@ class Estimator:
         e.qz, e.qw = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
         self._covariance = _FIRST_VARIANCES
         self.variance_attitude = _FIRST_ATTITUDE_VARIANCE
-        self._forget_samples()
+        self._clear_samples()
         self._update_angles()
 
     @property
@@ -85,16 +85,16 @@ class Estimator:
         return self._covariance[2]
 
     def sample(self, sensors: Sensors) -> None:
-        """Take in what the inertial sensors measure, for the next `predict`."""
+        """Add a sample of the inertial sensors for the next `predict`."""
         s = sensors
         sample = (s.gyro_x, s.gyro_y, s.gyro_z, s.acc_x, s.acc_y, s.acc_z)
         self._sums = [a + b for a, b in zip(self._sums, sample, strict=True)]
         self._samples += 1
 
     def predict(self, dt: float) -> None:
-        """Move on by ``dt`` (s) with the mean of what was sampled in it."""
+        """Predict by ``dt`` (s) with the mean of its samples."""
         mean = [total / self._samples for total in self._sums]
-        self._forget_samples()
+        self._clear_samples()
         e = self._estimate
         x, y, z, w = e.qx, e.qy, e.qz, e.qw
         half = 0.5 * dt * math.pi / 180.0
@@ -120,12 +120,12 @@ class Estimator:
         e.vz += dvz
         self._update_angles()
 
-    def _forget_samples(self) -> None:
+    def _clear_samples(self) -> None:
         self._sums = [0.0] * 6
         self._samples = 0
 
     def grow_variances(self, dt: float) -> None:
-        """Let the variances grow by what ``dt`` (s) adds to them."""
+        """Add the process noise of ``dt`` (s) to the variances."""
         p, m, v = self._covariance
         q = _ACCELERATION_NOISE
         p += 2.0 * dt * m + dt * dt * v + q * dt**3 / 3.0
@@ -139,7 +139,7 @@ class Estimator:
         )
 
     def correct_position(self, x: float, y: float, z: float, deviation: float) -> None:
-        """Take in a measured position (m) with its standard deviation (m)."""
+        """Correct with a measured position (m) of a standard deviation (m)."""
         e = self._estimate
         p, m, v = self._covariance
         total = p + max(deviation * deviation, _LEAST_VARIANCE)
@@ -154,7 +154,7 @@ class Estimator:
         self._covariance = ((1.0 - gain_p) * p, (1.0 - gain_p) * m, v - gain_v * m)
 
     def correct_attitude(self, x: float, y: float, z: float, w: float, deviation: float) -> None:
-        """Take in a measured attitude, a unit quaternion, with its deviation (rad)."""
+        """Correct with a measured attitude, a unit quaternion, of a deviation (rad)."""
         e = self._estimate
         variance = max(deviation * deviation, _LEAST_VARIANCE)
         gain = self.variance_attitude / (self.variance_attitude + variance)
@@ -163,8 +163,8 @@ class Estimator:
         self._blend(x, y, z, w, gain)
         self.variance_attitude *= 1.0 - gain
 
-    def rest(self, dt: float) -> None:
-        """Take it that the vehicle stands: its attitude cannot be far from the initial one."""
+    def correct_on_ground(self, dt: float) -> None:
+        """Correct towards the initial attitude, which a vehicle on the ground is near."""
         e = self._estimate
         z, w = math.sin(self.initial_yaw / 2.0), math.cos(self.initial_yaw / 2.0)
         if e.qz * z + e.qw * w < 0.0:

@@ -1,4 +1,4 @@
-"""The firmware as a whole: all its parts, and the order in which they run."""
+"""The firmware: its parts and the order in which they run."""
 
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
@@ -9,9 +9,8 @@ from crazyflie_virtual.firmware.commander import Commander
 from crazyflie_virtual.firmware.console import Console
 from crazyflie_virtual.firmware.estimator import Estimator
 from crazyflie_virtual.firmware.localization import DECK, Localization
-from crazyflie_virtual.firmware.planner import Phase, Planner
+from crazyflie_virtual.firmware.planner import ACTIVE, Planner, TrajectoryState
 from crazyflie_virtual.firmware.power import PowerMonitor
-from crazyflie_virtual.firmware.remarks import Remarks
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
 from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, OFF, Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
@@ -20,6 +19,9 @@ from crazyflie_virtual.firmware.supervisor_states import State
 from crazyflie_virtual.link.statistics import LinkStatistics
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.memories import MemoryTester
+
+SUPERVISOR_PROTOCOL = 12
+"""The first protocol in which the supervisor has a port and reports the high-level commander."""
 
 POSITION_STEPS = 5
 """Steps between two updates of position controller and high-level commander: 100 Hz."""
@@ -31,26 +33,26 @@ _POSITION_PERIOD = POSITION_STEPS * STEP
 
 
 class Firmware:
-    """Everything between packets and motor commands, with its state.
+    """From packets to motor commands.
 
     Parameters
     ----------
     physics : Physics
-        What the sensors measure.
+        Measured by the sensors.
     faults : FaultSwitches
-        Switches, which are parameters of the virtual vehicle too.
+        Also firmware parameters of the group ``virtual``.
     settings : VehicleSettings
     failure : str
-        The assertion that has led to this start. After one the firmware does
-        not pass its self test: it is there for the client and does not fly
-        (system.c of the firmware), until it is turned off and on.
+        The assertion that has caused this restart. The firmware then does not
+        pass its self test: it answers the client and does not fly (system.c of
+        the firmware) until the power is switched off and on.
 
     Attributes
     ----------
     time : float
         Since the start, s.
     setpoint : Setpoint
-        What is flown.
+        The controllers' present setpoint.
     info : SupervisorState
         State of supervisor and high-level commander at the supervisor's last
         update, as clients see it.
@@ -67,10 +69,11 @@ class Firmware:
     ):
         self._physics = physics
         self.faults = faults
+        self._protocol = settings.protocol
         self._steps = 0
         self.time = 0.0
-        self.console = Console()
-        self.remark = Remarks(self.console.write_line, lambda: self.time)
+        self.console = Console(lambda: self.time)
+        self.warn = self.console.warn
         self.estimate = Estimate()
         self.sensors = Sensors(settings.sensor_noise, settings.seed)
         has_deck = settings.positioning == DECK
@@ -88,7 +91,7 @@ class Firmware:
         self.setpoint = Setpoint()
         self.reset_estimation = 0
         self.info = SupervisorState(0)
-        self._remarked_state: State | None = None
+        self._warned_state: State | None = None
         self.console.write_line("SYS: ----------------------------")
         self.console.write_line("SYS: Virtual Crazyflie 2.1 is up and running!")
         self.is_started = not failure
@@ -96,8 +99,7 @@ class Firmware:
             self.console.write_line("SYS: The system resumed after a failed assert [WARNING]")
             self.console.write_line(f"SYS: {failure}; no flight before power is off and on")
             return
-        # A client that connects at once is not to find the checks before the
-        # first flight unfinished.
+        # The pre-flight checks have passed before a client can connect.
         for _ in range(_STARTING_UPDATES):
             self._supervise()
         self.console.write_line("STAB: Ready to fly.")
@@ -108,7 +110,7 @@ class Firmware:
         return round(1000.0 * self.time)
 
     def step(self, voltage: float) -> MotorCommands:
-        """Take `STEP` and return the motor commands, PWM.
+        """Advance by `STEP`; return the motor commands, PWM.
 
         Parameters
         ----------
@@ -140,18 +142,18 @@ class Firmware:
         )
 
     def stream(self, setpoint: Setpoint) -> None:
-        """Take a setpoint from the client."""
+        """Process a setpoint of the client."""
         self.commander.stream(setpoint)
         state = self.supervisor.state
-        if not self.supervisor.can_fly and self._remarked_state is not state:
-            self._remarked_state = state
+        if not self.supervisor.can_fly and self._warned_state is not state:
+            self._warned_state = state
             self.console.write_line(f"CMD: setpoints have no effect: {state.value}")
         if not setpoint.is_finite:
-            self.remark("setpoint", "CMD: flies by a setpoint that is not a number")
+            self.warn("setpoint", "CMD: flies by a setpoint that is not a number")
 
     def _correct_estimate(self):
         if not self.estimate.is_finite:
-            self.remark("estimate", "ESTKALMAN: the state is no number, resetting")
+            self.warn("estimate", "ESTKALMAN: the state is no number, resetting")
             self.reset_estimation = 1
         if self.reset_estimation:
             self.reset_estimation = 0
@@ -159,7 +161,7 @@ class Firmware:
         self.estimator.grow_variances(_POSITION_PERIOD)
         self.localization.update(self.time)
         if not any(self.stabilizer.commands) and not self.supervisor.is_flying:
-            self.estimator.rest(_POSITION_PERIOD)
+            self.estimator.correct_on_ground(_POSITION_PERIOD)
 
     def _supervise(self):
         idle = self.stabilizer.idle_thrust
@@ -167,15 +169,17 @@ class Firmware:
         age = self.commander.age(self.time)
         self.supervisor.update(self.time, self.sensors, age, motors_run)
         if self.supervisor.can_fly:
-            self._remarked_state = None
-        phase = self.planner.phase
-        self.info = self.supervisor.flags | SupervisorState.of(
-            high_level_active=phase in (Phase.FLYING, Phase.LANDING),
-            trajectory_finished=self.planner.is_finished(self.time),
-            high_level_disabled=phase is Phase.DISABLED,
-        )
-        if phase is Phase.DISABLED:
-            self.remark("planner", "HLC: gives no setpoints: what was asked for is not a number")
+            self._warned_state = None
+        planner_state = self.planner.state
+        self.info = self.supervisor.flags
+        if self._protocol >= SUPERVISOR_PROTOCOL:
+            self.info |= SupervisorState.of(
+                high_level_active=planner_state in ACTIVE,
+                trajectory_finished=self.planner.is_finished(self.time),
+                high_level_disabled=planner_state is TrajectoryState.DISABLED,
+            )
+        if planner_state is TrajectoryState.DISABLED:
+            self.warn("planner", "HLC: gives no setpoints: what was asked for is not a number")
         self.planner.block(not self.supervisor.can_fly)
 
     def _watch_power(self, voltage):

@@ -1,4 +1,4 @@
-"""Where positions and attitudes from outside the inertial sensors come from.
+"""External positions and attitudes.
 
 The client sends external positions or poses, as real vehicles get them from a
 motion capture system. In their absence a positioning deck measures the true
@@ -10,10 +10,10 @@ from crazyflie_virtual.body.physics import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 
 DECK, NONE = "deck", "none"
-"""What a vehicle can carry."""
+"""Positioning systems."""
 
 EXTERNAL_AGE = 0.5
-"""How long after the last external measurement the deck keeps quiet, s."""
+"""The deck measures only when there was no external measurement for so long, s."""
 
 _DECK_POSITION_DEVIATION = 0.003
 """m."""
@@ -23,13 +23,13 @@ _DECK_ATTITUDE_DEVIATION = 0.003
 
 
 class Localization:
-    """Feeds the estimator.
+    """Corrects the estimator.
 
     Parameters
     ----------
     estimator : Estimator
     physics : Physics
-        What the deck measures.
+        Measured by the deck.
     has_deck : bool
         Whether the vehicle carries a positioning deck.
 
@@ -60,19 +60,19 @@ class Localization:
         return 0.0 if self.time is None else 1000.0 * self.time % 65536.0
 
     def take_position(self, time: float, position: Triple) -> None:
-        """Take in an external position (m)."""
+        """Process an external position (m)."""
         self.time = time
         self.x, self.y, self.z = position
         self._estimator.correct_position(*position, self.position_deviation)
 
     def take_pose(self, time: float, position: Triple, quaternion: Quaternion) -> None:
-        """Take in an external position (m) and attitude, a unit quaternion (x, y, z, w)."""
+        """Process an external position (m) and attitude, a unit quaternion (x, y, z, w)."""
         self.take_position(time, position)
         self.qx, self.qy, self.qz, self.qw = quaternion
         self._estimator.correct_attitude(*quaternion, self.attitude_deviation)
 
     def update(self, time: float) -> None:
-        """Let the deck measure, if there is one and nothing better."""
+        """Measure with the deck, if there is one and no external measurement."""
         is_external = self.time is not None and time - self.time < EXTERNAL_AGE
         if self.has_deck and not is_external:
             self._estimator.correct_position(*self._physics.position, _DECK_POSITION_DEVIATION)

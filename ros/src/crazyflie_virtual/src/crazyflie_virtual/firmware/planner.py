@@ -18,35 +18,39 @@ DEFINITIONS = 31
 """Trajectories that can be defined at one time."""
 
 IN_MEMORY = 1
-"""Where a trajectory can be."""
+"""The location of trajectories."""
 
 POLYNOMIALS, COMPRESSED = 0, 1
-"""What it can be."""
+"""Types of trajectories."""
 
 REFUSED = 1
-"""What a command returns that does not fit what the planner is doing."""
+"""Returned by a command that the state does not permit."""
 
-_SHORTEST = 0.01
-"""Least duration of a plan, s."""
+_MIN_DURATION = 0.01
+"""Of a plan, s."""
 
-_NOWHERE = PolynomialPiece(1.0, *[(math.nan,)] * 4)
-"""What the firmware's arithmetic makes of a plan with infinite numbers."""
+_NOT_A_NUMBER = PolynomialPiece(1.0, *[(math.nan,)] * 4)
+"""Result of the firmware's arithmetic for a plan with infinite numbers."""
 
-_LEAST_SPEED = 0.001
+_MIN_SPEED = 0.001
 """Of a climb, m/s: clients may set the speed to 0."""
 
 _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 
 
-class Phase(Enum):
-    """What the planner is doing."""
+class TrajectoryState(Enum):
+    """States of the planner; names as the firmware's TRAJECTORY_STATE."""
 
-    STOPPED = 0
-    """It holds the motors off."""
+    IDLE = 0
+    """Holds the motors off."""
     FLYING = 1
     LANDING = 2
     DISABLED = 3
-    """It gives no setpoints, as what it was told to do is not a number."""
+    """Gives no setpoints: a command contained a number that is not finite."""
+
+
+ACTIVE = (TrajectoryState.FLYING, TrajectoryState.LANDING)
+"""States with setpoints."""
 
 
 class Planner:
@@ -58,18 +62,18 @@ class Planner:
     ----------
     memory : bytearray
         Pieces of trajectories, uploaded by the client.
-    phase : Phase
+    state : TrajectoryState
     blocked : bool
-        Whether the vehicle cannot fly: then nothing may be planned.
+        Whether the vehicle cannot fly, and plans are refused.
     takeoff_speed, landing_speed : float
-        Where a command gives none, m/s.
+        Default of commands, m/s.
     groups : int
         Groups of vehicles that this one belongs to, a bit each.
     """
 
     def __init__(self) -> None:
         self.memory = bytearray(MEMORY_SIZE)
-        self.phase = Phase.STOPPED
+        self.state = TrajectoryState.IDLE
         self.blocked = False
         self.takeoff_speed = self.landing_speed = 0.5
         self.groups = 0
@@ -79,19 +83,19 @@ class Planner:
         self._last = at_rest((0.0, 0.0, 0.0))
 
     def is_finished(self, time: float) -> bool:
-        """Return whether what was planned last has come to its end."""
+        """Return whether the last plan has ended."""
         return self._trajectory is None or time >= self._begin + self._trajectory.duration
 
     def setpoint(self, time: float, estimate: Estimate) -> Setpoint | None:
-        """Return what the vehicle is to do at ``time`` (s); None when disabled."""
-        if self.phase is Phase.LANDING and self.is_finished(time):
-            self.phase = Phase.STOPPED
-        if self._trajectory is None or self.phase in (Phase.STOPPED, Phase.DISABLED):
+        """Return the setpoint for ``time`` (s); None when disabled."""
+        if self.state is TrajectoryState.LANDING and self.is_finished(time):
+            self.state = TrajectoryState.IDLE
+        if self._trajectory is None or self.state not in ACTIVE:
             self.tell_state(estimate)
-            return Setpoint(time=time) if self.phase is Phase.STOPPED else None
+            return Setpoint(time=time) if self.state is TrajectoryState.IDLE else None
         goal = self._trajectory.evaluate(time - self._begin)
         if not all(map(math.isfinite, goal.position)):
-            self.phase = Phase.DISABLED
+            self.state = TrajectoryState.DISABLED
             return None
         self._last = goal
         return Setpoint(
@@ -102,7 +106,7 @@ class Planner:
         ).with_motion(goal.position, goal.velocity, goal.acceleration)
 
     def tell_state(self, estimate: Estimate) -> None:
-        """Begin the next plan at the vehicle's state and not at the last setpoint."""
+        """Start the next plan at the estimated state instead of the last setpoint."""
         self._last = Goal(
             (estimate.x, estimate.y, estimate.z),
             (estimate.vx, estimate.vy, estimate.vz),
@@ -113,33 +117,33 @@ class Planner:
 
     def stop(self) -> int:
         """Hold the motors off."""
-        self.phase = Phase.STOPPED
+        self.state = TrajectoryState.IDLE
         return 0
 
     def block(self, is_blocked: bool) -> None:
-        """Stop what is flying, and plan nothing from now on; or allow it again."""
-        if is_blocked and self.phase in (Phase.FLYING, Phase.LANDING):
-            self.phase = Phase.STOPPED
+        """Stop the plan and refuse further ones; or accept them again."""
+        if is_blocked and self.state in ACTIVE:
+            self.state = TrajectoryState.IDLE
         self.blocked = is_blocked
 
     def take_off(self, time: float, height: float, yaw: float | None, duration: float) -> int:
         """Climb to ``height`` (m) in ``duration`` (s), turning to ``yaw`` (rad) unless None."""
-        if self.phase is not Phase.STOPPED:
+        if self.state is not TrajectoryState.IDLE:
             return REFUSED
-        return self._move_vertically(time, height, yaw, duration, Phase.FLYING)
+        return self._move_vertically(time, height, yaw, duration, TrajectoryState.FLYING)
 
     def land(self, time: float, height: float, yaw: float | None, duration: float) -> int:
         """Descend to ``height`` (m) in ``duration`` (s), then stop the motors."""
-        if self.phase is Phase.LANDING:
+        if self.state is TrajectoryState.LANDING:
             return REFUSED
-        return self._move_vertically(time, height, yaw, duration, Phase.LANDING)
+        return self._move_vertically(time, height, yaw, duration, TrajectoryState.LANDING)
 
     def climb_time(self, height: float, is_relative: bool, speed: float) -> tuple[float, float]:
         """Return height (m) and duration (s) of a climb at a mean speed (m/s)."""
         now = self._last.position[2]
         height = now + height if is_relative else height
-        if abs(speed) < _LEAST_SPEED:
-            speed = _LEAST_SPEED
+        if abs(speed) < _MIN_SPEED:
+            speed = _MIN_SPEED
         return height, abs(height - now) / speed
 
     def go_to(
@@ -159,8 +163,8 @@ class Planner:
             position = (dx + x, dy + y, dz + z)
             yaw += start.yaw
         plan = straight_piece if linear else smooth_piece
-        way = (start, position, yaw, max(duration, _SHORTEST))
-        return self._fly(time, Phase.FLYING, plan, *way)
+        move = (start, position, yaw, max(duration, _MIN_DURATION))
+        return self._fly(time, TrajectoryState.FLYING, plan, *move)
 
     def spiral(
         self,
@@ -176,8 +180,8 @@ class Planner:
         # In this order, what is no number stays none.
         angle = min(max(angle, -2.0 * math.pi), 2.0 * math.pi)
         radii = (max(radii[0], 0.0), max(radii[1], 0.0))
-        form = (angle, radii, ascent, max(duration, _SHORTEST), sideways, clockwise)
-        return self._fly(time, Phase.FLYING, spiral_piece, self._last, *form)
+        form = (angle, radii, ascent, max(duration, _MIN_DURATION), sideways, clockwise)
+        return self._fly(time, TrajectoryState.FLYING, spiral_piece, self._last, *form)
 
     def define(self, trajectory_id: int, location: int, kind: int, offset: int, pieces: int) -> int:
         """Define where a trajectory is; whether there is one shows at its start.
@@ -216,8 +220,8 @@ class Planner:
     ) -> int:
         """Fly a trajectory that was defined; ``relative`` to the present position (and yaw).
 
-        One that cannot be flown is no error: nothing happens. Nor is a time scale
-        that is not positive, with which the trajectory is at its end at once.
+        One that cannot be flown is ignored without an error. With a time scale that is not
+        positive the trajectory ends at once.
         """
         try:
             pieces, is_compressed = self._pieces(trajectory_id)
@@ -234,7 +238,7 @@ class Planner:
         if relative:
             yaw = self._last.yaw if relative_yaw and not is_compressed else None
             trajectory = trajectory.moved_to(self._last.position, yaw)
-        self._begin_at(time, trajectory, Phase.FLYING)
+        self._begin_at(time, trajectory, TrajectoryState.FLYING)
         return 0
 
     def _pieces(self, trajectory_id):
@@ -251,22 +255,22 @@ class Planner:
         chunks = (data[i * PIECE_SIZE :][:PIECE_SIZE] for i in range(count))
         return tuple(map(PolynomialPiece.unpack, chunks)), False
 
-    def _move_vertically(self, time, height, yaw, duration, phase):
+    def _move_vertically(self, time, height, yaw, duration, state):
         x, y, z = self._last.position
         start = at_rest((x, y, z), self._last.yaw)
         yaw = start.yaw if yaw is None else yaw
-        way = (start, (x, y, height), yaw, max(duration, _SHORTEST))
-        return self._fly(time, phase, smooth_piece, *way)
+        move = (start, (x, y, height), yaw, max(duration, _MIN_DURATION))
+        return self._fly(time, state, smooth_piece, *move)
 
-    def _fly(self, time, phase, plan, *way):
+    def _fly(self, time, state, plan, *move):
         try:
-            piece = plan(*way)
+            piece = plan(*move)
         except (ArithmeticError, ValueError):
-            piece = _NOWHERE
-        self._begin_at(time, Trajectory((piece,)), phase)
+            piece = _NOT_A_NUMBER
+        self._begin_at(time, Trajectory((piece,)), state)
         return 0
 
-    def _begin_at(self, time, trajectory, phase):
+    def _begin_at(self, time, trajectory, state):
         self._trajectory = trajectory
         self._begin = time
-        self.phase = phase
+        self.state = state

@@ -1,10 +1,10 @@
-"""Power management: what the firmware makes of the battery's voltage. 10 Hz."""
+"""Power management: states by the battery's voltage. 10 Hz."""
 
 ON_BATTERY, LOW = 0, 3
 """States; 1 and 2, charging and charged, do not occur."""
 
 _LOW_AFTER = 5.0
-"""How long the voltage is low until it counts, s."""
+"""Time of low voltage until the state `LOW`, s."""
 
 _LEVELS = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10)
 """Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C]."""
@@ -22,8 +22,7 @@ class PowerMonitor:
     state : int
         `ON_BATTERY` or `LOW`.
     low_voltage, critical_voltage : float
-        V. Nothing follows from the second: the firmware does not turn itself
-        off, unless it was built to.
+        V. The second has no effect: the default build does not switch off.
     """
 
     def __init__(self) -> None:
@@ -39,7 +38,7 @@ class PowerMonitor:
         return 1000.0 * self.voltage
 
     def update(self, time: float, voltage: float) -> None:
-        """Take in the voltage (V) at a time (s)."""
+        """Update with the voltage (V) at a time (s)."""
         self.voltage = voltage
         self.level = 10 * min(9, sum(voltage > level for level in _LEVELS))
         if voltage > self.low_voltage or self._good_time is None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
-from crazyflie_virtual.firmware.commander import NOBODY
+from crazyflie_virtual.firmware.commander import PRIORITY_DISABLE
 from crazyflie_virtual.firmware.compressed import decompress_quaternion
 from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Modes, Setpoint
 
@@ -54,12 +54,12 @@ class AttitudeDecoder:
         time : float
             s.
         """
-        # The firmware does not look at the size, and would go on with what an
+        # The firmware does not check the size, and would continue with what an
         # earlier packet has left in the memory behind a short one.
         if len(data) < _ATTITUDE.size:
             return None
         roll, pitch, yaw_rate, thrust = _ATTITUDE.unpack_from(data)
-        if priority == NOBODY:
+        if priority == PRIORITY_DISABLE:
             self.is_locked = True
         if thrust == 0:
             self.is_locked = False

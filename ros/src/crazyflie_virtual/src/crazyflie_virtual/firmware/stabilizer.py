@@ -64,7 +64,7 @@ class Stabilizer:
     roll_rate, pitch_rate, yaw_rate : float
         Desired body rates, deg/s.
     thrust, command_roll, command_pitch, command_yaw : float
-        What goes to the mixer, PWM.
+        Inputs of the mixer, PWM.
     requested, commands : tuple, 4 components
         Motor commands before and after their limits, PWM.
     idle_thrust : int
@@ -140,7 +140,7 @@ class Stabilizer:
 
     def _update_desired_yaw(self, setpoint, estimate):
         if setpoint.mode.yaw == VELOCITY:
-            # A commanded yaw rate moves the heading that is held.
+            # A commanded yaw rate changes the desired heading.
             yaw = self.yaw + setpoint.yaw_rate * PERIOD
             most = self.attitude.yaw_max_delta
             if most > 0.0:
@@ -172,8 +172,7 @@ class Stabilizer:
         self.command_roll, self.command_pitch, self.command_yaw = outputs
 
     def _idle(self, estimate):
-        # Without thrust the controllers are reset, and the heading that is
-        # held is the vehicle's.
+        # Without thrust the controllers are reset, and the desired heading is the vehicle's.
         self._reset(estimate)
         self.yaw = estimate.yaw
         self.command_roll = self.command_pitch = self.command_yaw = 0.0

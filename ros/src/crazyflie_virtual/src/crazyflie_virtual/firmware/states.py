@@ -1,4 +1,4 @@
-"""What the parts of the firmware hand to each other, in the firmware's units and signs.
+"""Setpoint and estimate, in the firmware's units and signs.
 
 Angles are in degrees, rates in degrees per second. The pitch of attitudes and of
 setpoints is the firmware's: positive is nose up, so that a *negative* pitch
@@ -18,7 +18,7 @@ DISABLED, ABSOLUTE, VELOCITY = 0, 1, 2
 
 
 class Modes(NamedTuple):
-    """What a setpoint controls: `DISABLED`, `ABSOLUTE` or `VELOCITY` for each axis."""
+    """Modes of a setpoint: `DISABLED`, `ABSOLUTE` or `VELOCITY` for each axis."""
 
     x: int = DISABLED
     y: int = DISABLED
@@ -59,7 +59,7 @@ class _Motion:
 
 @dataclass(slots=True)
 class Setpoint(_Motion):
-    """What the vehicle is to do. With all axes disabled and no thrust: nothing, motors off.
+    """A setpoint; with all axes disabled and no thrust, the motors are off.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Setpoint(_Motion):
     thrust : float
         PWM, used where z is disabled.
     time : float
-        When it was given, s.
+        Of its reception, s.
     """
 
     mode: Modes = Modes()
@@ -95,7 +95,7 @@ class Setpoint(_Motion):
 
     @property
     def is_finite(self) -> bool:
-        """Whether no number in it is infinite or none."""
+        """Whether all numbers are finite."""
         parts = (getattr(self, part.name) for part in fields(self))
         return all(math.isfinite(part) for part in parts if isinstance(part, float))
 
@@ -109,7 +109,7 @@ class Setpoint(_Motion):
 
 @dataclass(slots=True)
 class Estimate(_Motion):
-    """What the vehicle takes its state to be.
+    """The estimated state.
 
     Attributes
     ----------
@@ -124,7 +124,7 @@ class Estimate(_Motion):
 
     @property
     def is_finite(self) -> bool:
-        """Whether all of it is numbers: what is not spreads to the attitude or the position."""
+        """Whether all numbers are finite: others propagate to position or attitude."""
         return math.isfinite(self.x + self.y + self.z + self.vx + self.vy + self.vz + self.qw)
 
     @property

@@ -9,7 +9,7 @@ from crazyflie_virtual.firmware.states import Setpoint
 from crazyflie_virtual.firmware.supervisor_states import Condition, State, next_state
 
 EMERGENCY_WATCHDOG = 1.0
-"""How long one message holds off the emergency stop, s, once there has been one."""
+"""Longest time between watchdog messages, after the first one, s."""
 
 _LANDED_AFTER = 2.0
 """How long the motors are off until the vehicle is not flying, s."""
@@ -18,11 +18,11 @@ _TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
 """Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s."""
 
 _FREE_FALL = 0.1
-"""Accelerometer, g, below which in all axes the vehicle is falling: not tumbled."""
+"""Accelerometer, g, below which in all axes the vehicle is falling and not tumbled."""
 
-_RUNNING = (State.READY, State.FLYING, State.LANDED, State.LEVELLING)
+_RUNNING = (State.READY_TO_FLY, State.FLYING, State.LANDED, State.WARNING_LEVEL_OUT)
 _ARMED = (*_RUNNING, State.ARMING)
-_IN_AIR = (State.FLYING, State.LEVELLING)
+_IN_AIR = (State.FLYING, State.WARNING_LEVEL_OUT)
 
 
 class Supervisor:
@@ -33,8 +33,8 @@ class Supervisor:
     write_line : callable
         ``write_line(text)`` prints on the console.
     auto_arm : bool
-        Arm as soon as the checks have passed, as a Crazyflie 2.1 does; otherwise
-        wait for the client, as vehicles with brushless motors do.
+        Arm when the checks have passed, as a Crazyflie 2.1 does; otherwise
+        the client arms, as with brushless motors.
 
     Attributes
     ----------
@@ -46,14 +46,13 @@ class Supervisor:
         0 for none.
     preflight_timeout, landed_timeout : int
         ms after which a vehicle is disarmed when it does not take off, and
-        after landing. One that arms by itself cannot fly for the four updates
-        that this takes.
+        after landing. With automatic arming it cannot fly for four updates then.
     """
 
     def __init__(self, write_line: Callable[[str], None], auto_arm: bool = True):
         self._write_line = write_line
         self.auto_arm = auto_arm
-        self.state = State.NOT_READY
+        self.state = State.PRE_FL_CHECKS_NOT_PASSED
         self.is_armed = self.is_tumbled = self.is_crashed = False
         self.emergency_stop = 0
         self.tumble_check = 1
@@ -83,7 +82,7 @@ class Supervisor:
     def flags(self) -> SupervisorState:
         """The state as clients see it."""
         return SupervisorState.of(
-            can_be_armed=self.state is State.CHECKED,
+            can_be_armed=self.state is State.PRE_FL_CHECKS_PASSED,
             armed=self.is_armed,
             auto_armed=self.auto_arm,
             can_fly=self.can_fly,
@@ -95,7 +94,7 @@ class Supervisor:
 
     def arm(self, do_arm: bool) -> bool:
         """Arm or disarm; return whether that was possible."""
-        if do_arm and not self.is_armed and self.state is not State.CHECKED:
+        if do_arm and not self.is_armed and self.state is not State.PRE_FL_CHECKS_PASSED:
             return False
         self.is_armed = do_arm
         return True
@@ -112,11 +111,11 @@ class Supervisor:
         self._emergency = True
 
     def feed_watchdog(self, time: float) -> None:
-        """Hold off the emergency stop; from the first time on this must go on."""
+        """Restart the emergency watchdog, which runs from the first call on."""
         self._watchdog_time = time
 
     def update(self, time: float, sensors: Sensors, setpoint_age: float, motors_run: bool) -> None:
-        """Take the state at ``time`` (s) on by one step.
+        """Update the state at ``time`` (s).
 
         Parameters
         ----------
@@ -140,29 +139,29 @@ class Supervisor:
             self.is_crashed = True
         if state not in _ARMED:
             self.is_armed = False
-        if state is State.CHECKED and self.auto_arm:
+        if state is State.PRE_FL_CHECKS_PASSED and self.auto_arm:
             self.is_armed = True
         if state in (State.LOCKED, State.CRASHED):
             remedy = "reboot" if state is State.LOCKED else "recovery"
             self._write_line(f"SUP: {state.value}, {remedy} required")
 
     def override(self, setpoint: Setpoint) -> Setpoint:
-        """Return the setpoint that is flown in the place of the commander's."""
+        """Return the setpoint for the controllers: the commander's, levelled, or none."""
         if not self.can_fly:
             return Setpoint(time=setpoint.time)
-        return setpoint.leveled() if self.state is State.LEVELLING else setpoint
+        return setpoint.leveled() if self.state is State.WARNING_LEVEL_OUT else setpoint
 
     def _conditions(self, time, setpoint_age, runs):
         holding = {
             Condition.ARMED: self.is_armed,
-            Condition.FLYING: runs,
-            Condition.TUMBLED: self.is_tumbled,
-            Condition.SETPOINT_OLD: setpoint_age > LEVEL_AGE,
-            Condition.SETPOINT_TOO_OLD: setpoint_age > OFF_AGE,
-            Condition.EMERGENCY: self._is_emergency(time),
+            Condition.IS_FLYING: runs,
+            Condition.IS_TUMBLED: self.is_tumbled,
+            Condition.COMMANDER_WDT_WARNING: setpoint_age > LEVEL_AGE,
+            Condition.COMMANDER_WDT_TIMEOUT: setpoint_age > OFF_AGE,
+            Condition.EMERGENCY_STOP: self._is_emergency(time),
             Condition.CRASHED: self.is_crashed,
-            Condition.NOT_TAKEN_OFF: self._waited(time, self.preflight_timeout),
-            Condition.NOT_FLOWN_AGAIN: self._waited(time, self.landed_timeout),
+            Condition.PREFLIGHT_TIMEOUT: self._waited(time, self.preflight_timeout),
+            Condition.LANDING_TIMEOUT: self._waited(time, self.landed_timeout),
         }
         conditions = Condition.ALWAYS
         for condition, holds in holding.items():

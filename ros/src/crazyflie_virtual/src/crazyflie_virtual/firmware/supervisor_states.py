@@ -4,10 +4,10 @@ As in the firmware: docs/functional-areas/supervisor of crazyflie-firmware expla
 the scheme. States, conditions and their order are those of its
 supervisor_state_machine.c (the last version we could read is of 2024) with what
 came later: that disarming in the air is no emergency (pull request 1426), that an
-armed vehicle does not wait for ever (1441), and the state before `State.READY`
+arming has a time limit (1441), and the state before `State.READY_TO_FLY`
 (1641). The recorded flights (release 2026.08) confirm each transition but these, of
-which there is no record: the one out of `State.READY` by time, those out of
-`State.LANDED` by disarming and of `State.LEVELLING` by disarming and tumbling, and
+which there is no record: the one out of `State.READY_TO_FLY` by time, those out of
+`State.LANDED` by disarming and of `State.WARNING_LEVEL_OUT` by disarming and tumbling, and
 those of `State.CRASHED`.
 """
 
@@ -16,38 +16,38 @@ from typing import NamedTuple
 
 
 class State(Enum):
-    """Where the supervisor is."""
+    """States of the supervisor; names as the firmware's supervisorState_t, texts as it prints."""
 
-    NOT_READY = "Pre-flight checks not passed"
-    CHECKED = "Pre-flight checks passed"
+    PRE_FL_CHECKS_NOT_PASSED = "Pre-flight checks not passed"
+    PRE_FL_CHECKS_PASSED = "Pre-flight checks passed"
     ARMING = "Arming"
-    READY = "Ready to fly"
+    READY_TO_FLY = "Ready to fly"
     FLYING = "Flying"
     LANDED = "Landed"
     RESET = "Reset"
-    LEVELLING = "Warning, level out"
-    FREE_FALL = "Exception, free fall"
+    WARNING_LEVEL_OUT = "Warning, level out"
+    EXCEPT_FREE_FALL = "Exception, free fall"
     CRASHED = "Crashed"
     LOCKED = "Locked"
 
 
 class Condition(Flag):
-    """What decides on transitions."""
+    """Conditions of transitions; names as the firmware's SUPERVISOR_CB."""
 
     ARMED = auto()
-    FLYING = auto()
+    IS_FLYING = auto()
     """Some motor ran within the last 2 s."""
-    TUMBLED = auto()
-    SETPOINT_OLD = auto()
-    """For more than 0.5 s."""
-    SETPOINT_TOO_OLD = auto()
-    """For more than 2 s."""
-    EMERGENCY = auto()
+    IS_TUMBLED = auto()
+    COMMANDER_WDT_WARNING = auto()
+    """The setpoint is older than 0.5 s."""
+    COMMANDER_WDT_TIMEOUT = auto()
+    """The setpoint is older than 2 s."""
+    EMERGENCY_STOP = auto()
     CRASHED = auto()
     """Not recovered since the crash."""
-    NOT_TAKEN_OFF = auto()
+    PREFLIGHT_TIMEOUT = auto()
     """Armed for `Supervisor.preflight_timeout`."""
-    NOT_FLOWN_AGAIN = auto()
+    LANDING_TIMEOUT = auto()
     """Landed for `Supervisor.landed_timeout`."""
     ALWAYS = auto()
 
@@ -63,50 +63,51 @@ class Transition(NamedTuple):
 _S, _C = State, Condition
 
 TRANSITIONS: dict[State, tuple[Transition, ...]] = {
-    _S.NOT_READY: (
-        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
-        Transition(_S.CHECKED, unless=_C.TUMBLED),
+    _S.PRE_FL_CHECKS_NOT_PASSED: (
+        Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
+        Transition(_S.PRE_FL_CHECKS_PASSED, unless=_C.IS_TUMBLED),
     ),
-    _S.CHECKED: (
-        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
-        Transition(_S.NOT_READY, when=_C.TUMBLED),
+    _S.PRE_FL_CHECKS_PASSED: (
+        Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
+        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED),
         Transition(_S.ARMING, when=_C.ARMED),
     ),
     _S.ARMING: (
-        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
-        Transition(_S.NOT_READY, when=_C.TUMBLED, unless=_C.ARMED),
-        # Brushless vehicles with telegrams from their motors wait for these here.
-        Transition(_S.READY, when=_C.ALWAYS),
+        Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
+        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED, unless=_C.ARMED),
+        # Brushless vehicles with motor telemetry wait for it in this state.
+        Transition(_S.READY_TO_FLY, when=_C.ALWAYS),
     ),
-    _S.READY: (
-        Transition(_S.FREE_FALL, when=_C.EMERGENCY),
-        Transition(_S.NOT_READY, when=_C.TUMBLED, unless=_C.ARMED),
-        Transition(_S.FLYING, when=_C.FLYING),
-        Transition(_S.CHECKED, when=_C.NOT_TAKEN_OFF),
+    _S.READY_TO_FLY: (
+        Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
+        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.IS_TUMBLED, unless=_C.ARMED),
+        Transition(_S.FLYING, when=_C.IS_FLYING),
+        Transition(_S.PRE_FL_CHECKS_PASSED, when=_C.PREFLIGHT_TIMEOUT),
     ),
     _S.FLYING: (
-        Transition(_S.FREE_FALL, when=_C.SETPOINT_TOO_OLD | _C.EMERGENCY),
-        Transition(_S.CRASHED, when=_C.TUMBLED),
+        Transition(_S.EXCEPT_FREE_FALL, when=_C.COMMANDER_WDT_TIMEOUT | _C.EMERGENCY_STOP),
+        Transition(_S.CRASHED, when=_C.IS_TUMBLED),
         Transition(_S.RESET, unless=_C.ARMED),
-        Transition(_S.LEVELLING, when=_C.SETPOINT_OLD),
-        Transition(_S.LANDED, unless=_C.FLYING),
+        Transition(_S.WARNING_LEVEL_OUT, when=_C.COMMANDER_WDT_WARNING),
+        Transition(_S.LANDED, unless=_C.IS_FLYING),
     ),
     _S.LANDED: (
-        Transition(_S.RESET, when=_C.NOT_FLOWN_AGAIN, unless=_C.ARMED),
-        Transition(_S.FLYING, when=_C.FLYING),
+        Transition(_S.RESET, when=_C.LANDING_TIMEOUT, unless=_C.ARMED),
+        Transition(_S.FLYING, when=_C.IS_FLYING),
     ),
-    _S.RESET: (Transition(_S.NOT_READY, when=_C.ALWAYS),),
-    # There is no way from here to LANDED: with its motors off, too, a vehicle
-    # that gets no setpoints is locked.
-    _S.LEVELLING: (
-        Transition(_S.FREE_FALL, when=_C.SETPOINT_TOO_OLD | _C.TUMBLED | _C.EMERGENCY),
+    _S.RESET: (Transition(_S.PRE_FL_CHECKS_NOT_PASSED, when=_C.ALWAYS),),
+    # No transition to LANDED: without setpoints a vehicle is locked although its motors are off.
+    _S.WARNING_LEVEL_OUT: (
+        Transition(
+            _S.EXCEPT_FREE_FALL, when=_C.COMMANDER_WDT_TIMEOUT | _C.IS_TUMBLED | _C.EMERGENCY_STOP
+        ),
         Transition(_S.RESET, unless=_C.ARMED),
-        Transition(_S.FLYING, unless=_C.SETPOINT_OLD),
+        Transition(_S.FLYING, unless=_C.COMMANDER_WDT_WARNING),
     ),
-    _S.FREE_FALL: (Transition(_S.LOCKED, when=_C.ALWAYS),),
+    _S.EXCEPT_FREE_FALL: (Transition(_S.LOCKED, when=_C.ALWAYS),),
     _S.CRASHED: (
-        Transition(_S.NOT_READY, unless=_C.CRASHED),
-        Transition(_S.LOCKED, when=_C.EMERGENCY),
+        Transition(_S.PRE_FL_CHECKS_NOT_PASSED, unless=_C.CRASHED),
+        Transition(_S.LOCKED, when=_C.EMERGENCY_STOP),
     ),
     _S.LOCKED: (),
 }

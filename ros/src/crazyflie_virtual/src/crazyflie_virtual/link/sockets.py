@@ -37,7 +37,7 @@ def received(source: socket.socket) -> Iterator[tuple[bytes, Address]]:
         except BlockingIOError:
             return
         except ConnectionError:
-            # What was sent before has met nobody.
+            # Packets were sent before the port was open.
             continue
 
 

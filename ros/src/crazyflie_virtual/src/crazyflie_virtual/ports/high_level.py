@@ -4,7 +4,7 @@ import errno
 import struct
 from collections.abc import Callable
 
-from crazyflie_virtual.firmware.commander import STREAMED
+from crazyflie_virtual.firmware.commander import PRIORITY_CRTP
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 
@@ -36,20 +36,20 @@ class HighLevelPort:
     def _command(self, command, data):
         f = self._firmware
         if command not in _COMMANDS:
-            f.remark("command", f"HLC: unknown command {command}")
+            f.warn("command", f"HLC: unknown command {command}")
             return errno.ENOEXEC
         form, handler = _COMMANDS[command]
         if len(data) < struct.calcsize("<" + form):
-            f.remark("command", f"HLC: command {command} is too short")
+            f.warn("command", f"HLC: command {command} is too short")
             return errno.EINVAL
         values = struct.unpack_from("<" + form, data)
         if command in _FOR_ALL:
             return handler(self, *values)
         if command in _PLANS and self._planner.blocked:
-            f.remark("planner", f"HLC: refuses command {command}: {f.supervisor.state.value}")
+            f.warn("planner", f"HLC: refuses command {command}: {f.supervisor.state.value}")
             return errno.EBUSY
-        if command in _PLANS and f.commander.priority == STREAMED:
-            f.remark("planner", f"HLC: command {command} has no effect before setpoints stop")
+        if command in _PLANS and f.commander.priority == PRIORITY_CRTP:
+            f.warn("planner", f"HLC: command {command} has no effect before setpoints stop")
         group, *arguments = values
         is_meant = group == _ALL_GROUPS or group & self._planner.groups
         return handler(self, *arguments) if is_meant else 0

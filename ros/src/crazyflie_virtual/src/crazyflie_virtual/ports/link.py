@@ -1,6 +1,6 @@
 """Port 15: the link itself."""
 
-from crazyflie_virtual.firmware.remarks import Remarks
+from crazyflie_virtual.firmware.console import Warn
 from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
 
 _ECHO, _SOURCE, _SINK = 0, 1, 2
@@ -9,17 +9,18 @@ _IDENTITY = b"Bitcraze Crazyflie"
 
 
 class LinkPort:
-    """Echo, and who is there.
+    """Echo and identification.
 
     Parameters
     ----------
-    remark : Remarks
+    warn : callable
+        See `Console.warn`.
     """
 
     port = Port.LINK
 
-    def __init__(self, remark: Remarks):
-        self._remark = remark
+    def __init__(self, warn: Warn):
+        self._warn = warn
 
     def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
@@ -28,5 +29,5 @@ class LinkPort:
         if packet.channel == _SOURCE:
             return [Packet(Port.LINK, _SOURCE, _IDENTITY.ljust(MAX_DATA, b"\0"))]
         if packet.channel != _SINK:
-            self._remark("link", f"LINK: unknown channel {packet.channel}")
+            self._warn("link", f"LINK: unknown channel {packet.channel}")
         return []

@@ -51,7 +51,7 @@ class LocalizationPort:
             self._generic(data[0], data[1:])
         else:
             text = f"LOC: nothing done with {len(data)} bytes on channel {packet.channel}"
-            self._firmware.remark("location", text)
+            self._firmware.warn("location", text)
         return []
 
     def _generic(self, command, data):
@@ -69,7 +69,7 @@ class LocalizationPort:
         elif command == _EMERGENCY_WATCHDOG:
             supervisor.feed_watchdog(self._firmware.time)
         else:
-            self._firmware.remark("location", f"LOC: nothing done with a message {command}")
+            self._firmware.warn("location", f"LOC: nothing done with a message {command}")
 
     def _take_position(self, position):
         if all(map(math.isfinite, position)):
@@ -87,7 +87,7 @@ class LocalizationPort:
         self._firmware.localization.take_pose(self._firmware.time, position, unit)
 
     def _refuse(self):
-        self._firmware.remark("location", "LOC: a measurement that is not a number, or no rotation")
+        self._firmware.warn("location", "LOC: a measurement that is not a number, or no rotation")
 
 
 def _each(form, data):

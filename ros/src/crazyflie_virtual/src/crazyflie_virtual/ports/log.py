@@ -93,7 +93,7 @@ class LogPort:
             self._blocks[block_id] = _Block()
             return self._append(self._blocks[block_id], data)
         if command not in (_APPEND, _DELETE, _START, _STOP, _START_2):
-            self._firmware.remark("log", f"LOG: unknown command {command}")
+            self._firmware.warn("log", f"LOG: unknown command {command}")
             return errno.ENOEXEC
         block = self._blocks.get(block_id)
         if block is None:

@@ -5,7 +5,7 @@ import struct
 from collections.abc import Iterable
 
 from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
-from crazyflie_virtual.firmware.remarks import Remarks
+from crazyflie_virtual.firmware.console import Warn
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.tables.memories import Memory
 
@@ -23,14 +23,15 @@ class MemoryPort:
     ----------
     memories : iterable of Memory
         In the order of their numbers.
-    remark : Remarks
+    warn : callable
+        See `Console.warn`.
     """
 
     port = Port.MEMORY
 
-    def __init__(self, memories: Iterable[Memory], remark: Remarks):
+    def __init__(self, memories: Iterable[Memory], warn: Warn):
         self._memories = tuple(memories)
-        self._remark = remark
+        self._warn = warn
 
     def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
@@ -50,7 +51,7 @@ class MemoryPort:
         return self._unknown(data)
 
     def _unknown(self, data):
-        self._remark("memory", f"MEM: unknown request {data[:1].hex()}")
+        self._warn("memory", f"MEM: unknown request {data[:1].hex()}")
         return None
 
     def _read(self, data):
@@ -63,7 +64,7 @@ class MemoryPort:
         if number < len(self._memories):
             content = self._memories[number].read(address, count)
         if content is None:
-            self._remark("memory", f"MEM: {number} has no {count} bytes at {address:#x} to read")
+            self._warn("memory", f"MEM: {number} has no {count} bytes at {address:#x} to read")
             return data[:5] + bytes([errno.EIO])
         return data[:5] + b"\0" + content
 
@@ -74,7 +75,7 @@ class MemoryPort:
         content = data[5:]
         done = number < len(self._memories) and self._memories[number].write(address, content)
         if not done:
-            self._remark(
+            self._warn(
                 "memory", f"MEM: {number} has no {len(content)} bytes at {address:#x} to write"
             )
         return data[:5] + bytes([0 if done else errno.EIO])

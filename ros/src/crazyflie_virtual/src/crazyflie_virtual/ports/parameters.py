@@ -95,7 +95,7 @@ class ParameterPort:
     def __init__(self, firmware: Firmware, stored: dict[str, float]):
         self._parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
         self._stored = stored
-        self._remark = firmware.remark
+        self._warn = firmware.warn
         for parameter in self._parameters:
             if parameter.full_name in stored:
                 parameter.set(stored[parameter.full_name])
@@ -129,10 +129,10 @@ class ParameterPort:
     def _write(self, data):
         parameter = self._find(data)
         if parameter is None:
-            self._remark("parameter", f"PARAM: there is none with the number {data[:2].hex()}")
+            self._warn("parameter", f"PARAM: there is none with the number {data[:2].hex()}")
             return data[:2] + bytes([errno.ENOENT])
         if parameter.spec.read_only:
-            self._remark(parameter.full_name, f"PARAM: {parameter.full_name} is read-only")
+            self._warn(parameter.full_name, f"PARAM: {parameter.full_name} is read-only")
             return None
         self._set(parameter, data[2:])
         # As long as the request, whatever the value's size is.
@@ -144,11 +144,11 @@ class ParameterPort:
         value = number_type.unpack(data[: number_type.size].ljust(number_type.size, b"\0"))
         name = parameter.full_name
         if not parameter.has_effect and value != parameter.value:
-            self._remark(name, f"PARAM: {name} is kept, but a virtual vehicle does nothing with it")
+            self._warn(name, f"PARAM: {name} is kept, but a virtual vehicle does nothing with it")
         try:
             parameter.set(value)
         except ValueError as error:
-            self._remark(name, f"PARAM: {name} {error}")
+            self._warn(name, f"PARAM: {name} {error}")
 
     def _misc(self, data):
         if not data:
@@ -157,7 +157,7 @@ class ParameterPort:
             return self._set_by_name(data)
         handler = _MISC_HANDLERS.get(data[0])
         if handler is None or len(data) < 3:
-            self._remark("parameter command", f"PARAM: unknown command {data.hex()}")
+            self._warn("parameter command", f"PARAM: unknown command {data.hex()}")
             return None
         parameter = self._find(data, 1)
         return data[:3] + handler(self, parameter)

@@ -2,7 +2,7 @@
 
 import struct
 
-from crazyflie_virtual.firmware.remarks import Remarks
+from crazyflie_virtual.firmware.console import Warn
 from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
 from crazyflie_virtual.ports.supervisor import SupervisorPort
 
@@ -24,15 +24,16 @@ class PlatformPort:
         Version of the protocol to report.
     supervisor : SupervisorPort
         Which arms and recovers.
-    remark : Remarks
+    warn : callable
+        See `Console.warn`.
     """
 
     port = Port.PLATFORM
 
-    def __init__(self, protocol: int, supervisor: SupervisorPort, remark: Remarks):
+    def __init__(self, protocol: int, supervisor: SupervisorPort, warn: Warn):
         self._protocol = protocol
         self._supervisor = supervisor
-        self._remark = remark
+        self._warn = warn
 
     def handle(self, packet: Packet) -> list[Packet]:
         """Return the answers to a packet."""
@@ -47,7 +48,7 @@ class PlatformPort:
         elif packet.channel == _COMMAND and command in (_CONTINUOUS_WAVE, _NOTIFY):
             answer = data
         else:
-            self._remark("platform", f"PLATFORM: unknown command {packet.channel}/{command}")
+            self._warn("platform", f"PLATFORM: unknown command {packet.channel}/{command}")
         if answer is None:
             return []
         return [Packet(Port.PLATFORM, packet.channel, bytes([command]) + answer)]
@@ -58,5 +59,5 @@ class PlatformPort:
         texts = {_FIRMWARE: FIRMWARE, _DEVICE: DEVICE}
         if command in texts:
             return texts[command].encode()[: MAX_DATA - 1]
-        self._remark("platform", f"PLATFORM: unknown version {command}")
+        self._warn("platform", f"PLATFORM: unknown version {command}")
         return None

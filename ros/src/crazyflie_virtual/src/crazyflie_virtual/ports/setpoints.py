@@ -27,13 +27,13 @@ class AttitudeSetpointPort:
         if packet.channel == _SETPOINT:
             setpoint = f.attitude_decoder.decode(packet.data, f.commander.priority, f.time)
             if setpoint is None:
-                f.remark("setpoint", "CMD: an attitude setpoint of less than 14 bytes")
+                f.warn("setpoint", "CMD: an attitude setpoint of less than 14 bytes")
                 return []
             f.stream(setpoint)
             if f.attitude_decoder.is_locked:
-                f.remark("thrust", "CMD: thrust is locked until a setpoint without thrust comes")
+                f.warn("thrust", "CMD: thrust is locked until a setpoint without thrust comes")
         else:
-            f.remark("setpoint", f"CMD: unknown channel {packet.channel}")
+            f.warn("setpoint", f"CMD: unknown channel {packet.channel}")
         return []
 
 
@@ -56,12 +56,12 @@ class GenericSetpointPort:
         if packet.channel == _SETPOINT:
             setpoint = decode_generic(packet.data, f.time)
             if setpoint is None:
-                f.remark("setpoint", f"CMD: no setpoints of type {packet.data[:1].hex()}")
+                f.warn("setpoint", f"CMD: no setpoints of type {packet.data[:1].hex()}")
                 return []
             f.stream(setpoint)
         elif packet.channel == _META and packet.data[:1] == bytes([_SETPOINTS_STOP]):
-            f.commander.release(f.estimate)
+            f.commander.relax_priority(f.estimate)
         else:
             head = packet.data[:1].hex()
-            f.remark("setpoint", f"CMD: unknown command {packet.channel}/{head}")
+            f.warn("setpoint", f"CMD: unknown command {packet.channel}/{head}")
         return []

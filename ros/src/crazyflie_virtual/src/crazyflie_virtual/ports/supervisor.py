@@ -36,7 +36,7 @@ class SupervisorPort:
             answer = self.command(command, packet.data[1:])
         else:
             text = f"SUP: unknown command {packet.channel}/{command}"
-            self._firmware.remark("supervisor", text)
+            self._firmware.warn("supervisor", text)
         if answer is None:
             return []
         return [Packet(Port.SUPERVISOR, packet.channel, bytes([_RESPONSE | command]) + answer)]

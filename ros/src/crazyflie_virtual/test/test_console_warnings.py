@@ -1,4 +1,4 @@
-"""What a client does in vain is remarked on the console, and no more than once a second."""
+"""What a client does in vain is reported on the console, and no more than once a second."""
 
 import struct
 
@@ -81,7 +81,7 @@ def test_parameter_without_effect(bench):
     assert "led.bitmask is kept" in line
 
 
-def test_what_has_an_effect_is_not_remarked(bench):
+def test_what_has_an_effect_prints_no_warning(bench):
     lines(bench)
     bench.ask(*write("posCtlPid.xKp", struct.pack("<f", 1.5)))
     # It is 2 already.

@@ -1,4 +1,4 @@
-"""What happened in a flight, and figures to judge it by."""
+"""Recorded topics and events of a flight as arrays, and figures of merit."""
 
 import csv
 from dataclasses import dataclass, field

@@ -48,6 +48,27 @@ def test_velocities_are_those_of_the_heading():
     assert flown.velocity == pytest.approx((-0.5, 0.0, 0.0))
 
 
+@pytest.mark.parametrize("clockwise", [True, False])
+def test_a_circle_closes_and_has_its_radius(clockwise):
+    side = -1.0 if clockwise else 1.0
+    velocity = Velocity(x=0.3, yaw_dot=side * 0.3 / 0.5)
+    flown = reference()
+    now = fly(flown, velocity, 1.0)
+    begin = flown.pose
+    middle = (
+        begin.x - side * 0.5 * math.sin(begin.yaw),
+        begin.y + side * 0.5 * math.cos(begin.yaw),
+    )
+    period = 2.0 * math.pi * 0.5 / 0.3
+    quarter = fly(flown, velocity, period / 4.0, now)
+    turned = math.remainder(flown.pose.yaw - begin.yaw, 2.0 * math.pi)
+    assert turned == pytest.approx(side * math.pi / 2.0, abs=0.02)
+    for _ in range(3):
+        assert math.dist((flown.pose.x, flown.pose.y), middle) == pytest.approx(0.5, abs=1e-3)
+        quarter = fly(flown, velocity, period / 4.0, quarter)
+    assert (flown.pose.x, flown.pose.y) == pytest.approx((begin.x, begin.y), abs=0.03)
+
+
 @given(SPEED, SPEED, SPEED, SPEED)
 def test_limits(x, y, z, yaw_dot):
     flown = reference()

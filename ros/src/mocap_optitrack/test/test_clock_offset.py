@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mocap_optitrack.clock_offset import ClockOffset, Verdict
+from mocap_optitrack.clock_offset import ClockOffset, FrameOrder
 
 PERIOD = 0.01
 
@@ -108,8 +108,8 @@ def test_begins_anew_when_the_servers_clock_is_set(step):
     network.server += step
     network.offset -= step
     verdicts = [clock.update(*network.message()) for _ in range(10)]
-    assert verdicts[-1] is Verdict.RESTART
-    assert set(verdicts[:-1]) <= {Verdict.OLD, Verdict.FOREIGN}
+    assert verdicts[-1] is FrameOrder.RESTART
+    assert set(verdicts[:-1]) <= {FrameOrder.OLD, FrameOrder.FOREIGN}
     assert not clock.is_settled
     errors = network.run(clock, 3.0)
     assert errors
@@ -126,13 +126,13 @@ def settled():
 def test_a_message_that_comes_again_costs_nothing():
     clock, network = settled()
     first, second = network.message(), network.message()
-    assert clock.update(*first) is Verdict.NEW
+    assert clock.update(*first) is FrameOrder.NEW
     for _ in range(50):
-        assert clock.update(first[0], first[1] + 0.001) is Verdict.OLD
-    assert clock.update(*second) is Verdict.NEW
-    assert clock.update(first[0], second[1] + 0.001) is Verdict.OLD
+        assert clock.update(first[0], first[1] + 0.001) is FrameOrder.OLD
+    assert clock.update(*second) is FrameOrder.NEW
+    assert clock.update(first[0], second[1] + 0.001) is FrameOrder.OLD
     assert clock.is_settled
-    assert clock.update(*network.message()) is Verdict.NEW
+    assert clock.update(*network.message()) is FrameOrder.NEW
 
 
 def test_messages_that_were_overtaken_are_old():
@@ -143,7 +143,7 @@ def test_messages_that_were_overtaken_are_old():
     for k in range(0, 30, 3):
         for sent, _ in (messages[k + 2], messages[k], messages[k + 1]):
             verdicts.append(clock.update(sent, messages[k + 2][1]))
-    assert verdicts == [Verdict.NEW, Verdict.OLD, Verdict.OLD] * 10
+    assert verdicts == [FrameOrder.NEW, FrameOrder.OLD, FrameOrder.OLD] * 10
     assert clock.is_settled
 
 
@@ -152,8 +152,8 @@ def test_one_message_of_another_clock_changes_nothing(sent):
     clock, network = settled()
     before = clock.to_local(0.0)
     arrival = network.message()[1]
-    assert clock.update(sent, arrival) is Verdict.FOREIGN
-    assert clock.update(*network.message()) is Verdict.NEW
+    assert clock.update(sent, arrival) is FrameOrder.FOREIGN
+    assert clock.update(*network.message()) is FrameOrder.NEW
     assert clock.to_local(0.0) == pytest.approx(before, abs=1e-3)
 
 
@@ -162,8 +162,8 @@ def test_two_servers_are_told_apart():
     other = Network(-700.0)
     for _ in range(200):
         sent, arrival = network.message()
-        assert clock.update(sent, arrival) is Verdict.NEW
-        assert clock.update(other.message()[0], arrival) is Verdict.FOREIGN
+        assert clock.update(sent, arrival) is FrameOrder.NEW
+        assert clock.update(other.message()[0], arrival) is FrameOrder.FOREIGN
 
 
 def test_begins_anew_when_the_servers_clock_has_stood_still():
@@ -181,6 +181,6 @@ def test_a_pause_changes_nothing():
     network = Network(50.0)
     network.run(clock, 3.0)
     network.server += 60.0
-    assert clock.update(*network.message()) is Verdict.NEW
+    assert clock.update(*network.message()) is FrameOrder.NEW
     assert clock.is_settled
     assert clock.to_local(network.server) == pytest.approx(network.local(network.server), abs=2e-3)

@@ -32,9 +32,9 @@ def frame(*bodies, time=10.0):
     return Frame(None, None, time, bodies)
 
 
-def keys(sightings):
+def keys(poses):
     """Return the configured keys of what was seen."""
-    return [sighting.body.key for sighting in sightings]
+    return [pose.body.key for pose in poses]
 
 
 def test_bodies_are_found_by_number_and_by_name():

@@ -1,1 +1,1 @@
-"""Tools of those who develop the workspace: flights that are measured, pictures, test support."""
+"""Tools for developing the workspace: measured flights, pictures, benchmarks."""

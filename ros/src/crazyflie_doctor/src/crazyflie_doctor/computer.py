@@ -107,7 +107,7 @@ def _within(limit: float, work: Callable[[], T], otherwise: T) -> T:
     results: list[T] = []
 
     def attempt():
-        # A failure is told by ``otherwise``.
+        # After a failure ``otherwise`` is returned.
         with contextlib.suppress(OSError, UnicodeError):
             results.append(work())
 
@@ -135,7 +135,7 @@ def log_directory() -> tuple[str, bool, float]:
 
 
 def radio(root: Path = Path("/")) -> Radio:
-    """Return the Crazyradios of this computer, and who may use them."""
+    """Return the Crazyradios of this computer, and whether this user may use them."""
     dongles = {}
     for device in (root / "sys/bus/usb/devices").glob("*"):
         # Not everything there is a device with an identity, and any may be unplugged meanwhile.

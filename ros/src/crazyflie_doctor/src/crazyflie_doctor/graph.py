@@ -141,7 +141,7 @@ def check_connections(graph: Graph) -> Iterator[Finding]:
 
 
 def check_publishers(graph: Graph) -> Iterator[Finding]:
-    """Find topics that nobody publishes, and controls and references from two sources."""
+    """Find topics without a publisher, and controls and references from two sources."""
     for topic, parameters in sorted(graph.topics.items()):
         listeners = graph.subscribers.get(topic, set())
         if listeners and not graph.publishers.get(topic):

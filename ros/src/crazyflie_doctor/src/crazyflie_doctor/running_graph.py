@@ -29,7 +29,7 @@ def own_md5(kind: str, name: str) -> str | None:
     try:
         found = get(name)
     except Exception:
-        # Whatever goes wrong while somebody's module is imported.
+        # Importing a module of another workspace may raise anything.
         found = None
     return found and found._md5sum
 

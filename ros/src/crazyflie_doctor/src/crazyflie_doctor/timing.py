@@ -24,7 +24,7 @@ LONGEST_AGE = 0.1
 """Older poses, s, are too late for a controller."""
 
 FUTURE = 0.5
-"""Stamps further ahead of the clock than this, s, are no foresight: tf's own
+"""Stamps further ahead of the clock than this, s, are wrong: tf's own
 static_transform_publisher is ahead by its period."""
 
 OTHER_CLOCK = 1e6
@@ -41,7 +41,7 @@ class Transform:
     Attributes
     ----------
     parent, child, node : str
-        Frames, and who has published it.
+        Frames, and the publishing node.
     stamp, arrival : float
         ROS time, s.
     is_static : bool

@@ -114,7 +114,7 @@ class FlightOperator:
 
 @contextlib.contextmanager
 def ready_operator() -> Iterator[FlightOperator]:
-    """Yield an operator who is ready to take off, in a rostest's own process."""
+    """Yield an operator that is ready to take off, in a rostest's own process."""
     process = ros_process()
     operator = FlightOperator(process)
     operator.wait_until_ready()

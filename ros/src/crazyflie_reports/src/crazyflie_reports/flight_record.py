@@ -1,4 +1,4 @@
-"""What happened in a flight, and figures to judge it by."""
+"""Recorded topics and events of a flight as arrays, and figures of merit."""
 
 import csv
 from dataclasses import dataclass, field
@@ -79,8 +79,6 @@ class FlightRecord:
         What was published on these topics.
     toggles : list of float
         When in_flight was toggled.
-    order : list of str
-        Names of the above in the order in which their messages came.
     events : dict
         When something was done: "takeoff" and "land" (called), "flying" and
         "landed" (answered).
@@ -91,7 +89,6 @@ class FlightRecord:
     takeoff_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     reference: Series = field(default_factory=lambda: Series(STATE_FIELDS[:6]))
     toggles: list[float] = field(default_factory=list)
-    order: list[str] = field(default_factory=list)
     events: dict[str, float] = field(default_factory=dict)
 
     def position_error(self, point: ArrayLike) -> NDArray[np.float64]:

@@ -75,18 +75,17 @@ class FlightRecorderNode(Node):
 
         def append(message):
             row = to_vector(getattr(message, content))
-            self._record(name, lambda: series.append(message.header.stamp.to_sec(), row))
+            self._record(lambda: series.append(message.header.stamp.to_sec(), row))
 
         return append
 
     def _on_toggle(self, _):
         now = self._handle.stamp().to_sec()
-        self._record("toggles", lambda: self.record.toggles.append(now))
+        self._record(lambda: self.record.toggles.append(now))
 
-    def _record(self, name, append):
+    def _record(self, append):
         with self.received:
             if self._stopped:
                 return
-            self.record.order.append(name)
             append()
             self.received.notify_all()

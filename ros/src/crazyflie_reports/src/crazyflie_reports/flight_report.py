@@ -1,4 +1,4 @@
-"""The verdict on a hover flight."""
+"""Figures of merit of a hover flight, and their limits."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ HOVER_TOLERANCE = 0.01
 """Largest distance from the hover point of a good flight, m."""
 
 HOVER_WINDOW = 5.0
-"""How long before /land the hover is judged, s."""
+"""Time before /land from which the hover error is taken, s."""
 
 OVERSHOOT_LIMIT = 0.1
 """How far a good flight may rise above the hover point, m."""

@@ -1,4 +1,4 @@
-"""ROS interface of a world: shows it in RViz, and tells where its moving objects are."""
+"""ROS interface of a world: shows it in RViz, and publishes the poses of its moving objects."""
 
 from geometry_msgs.msg import PoseStamped, Quaternion, TransformStamped, Vector3
 from std_msgs.msg import String

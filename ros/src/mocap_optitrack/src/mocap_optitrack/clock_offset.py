@@ -29,8 +29,8 @@ _PATIENCE = 10
 """Messages in a row that contradict what is known, until the clock is taken to be set."""
 
 
-class Verdict(Enum):
-    """What a message is, by its times."""
+class FrameOrder(Enum):
+    """Order of a message among those before it, by its times."""
 
     NEW = "new"
     """Sent after all others."""
@@ -69,7 +69,7 @@ class ClockOffset:
         """Whether enough messages have come to rely on `to_local`."""
         return self._offset is not None
 
-    def update(self, sent: float, arrival: float) -> Verdict:
+    def update(self, sent: float, arrival: float) -> FrameOrder:
         """Take note of a message and return what it is.
 
         Parameters
@@ -80,16 +80,16 @@ class ClockOffset:
             s of the local clock; never before that of the last message.
         """
         difference = arrival - sent
-        verdict = self._judge(sent, difference)
-        if verdict is not Verdict.NEW:
+        order = self._classify(sent, difference)
+        if order is not FrameOrder.NEW:
             # The newest message again, however often, is no sign of another clock.
             self._contradictions += sent != self._newest
             if self._contradictions < _PATIENCE:
-                return verdict
-            verdict = Verdict.RESTART
+                return order
+            order = FrameOrder.RESTART
         elif self._has_lagged():
-            verdict = Verdict.RESTART
-        if verdict is Verdict.RESTART:
+            order = FrameOrder.RESTART
+        if order is FrameOrder.RESTART:
             self._forget()
         self._contradictions = 0
         self._newest = sent
@@ -101,7 +101,7 @@ class ClockOffset:
         elif self._is_plausible():
             self._offset = shortest
         self._updated = arrival
-        return verdict
+        return order
 
     def to_local(self, moment: float) -> float:
         """Return a moment of the server's clock (s) by the local clock (s).
@@ -126,12 +126,12 @@ class ClockOffset:
     def _shortest(self):
         return min(smallest for _, smallest in self._window)
 
-    def _judge(self, sent, difference):
+    def _classify(self, sent, difference):
         if self._newest is None:
-            return Verdict.NEW
+            return FrameOrder.NEW
         if sent < self._newest - _RESTART or difference < self._shortest() - _JUMP:
-            return Verdict.FOREIGN
-        return Verdict.OLD if sent <= self._newest else Verdict.NEW
+            return FrameOrder.FOREIGN
+        return FrameOrder.OLD if sent <= self._newest else FrameOrder.NEW
 
     def _has_lagged(self):
         # The server's clock was set back by a little, or has stood still.

@@ -108,26 +108,26 @@ class MocapNode(Node):
 
     def on_frame(self, frame: Frame) -> None:
         """Publish a frame."""
-        sightings = self._tracker.take(frame)
-        if not sightings:
+        poses = self._tracker.take(frame)
+        if not poses:
             return
-        stamp = self._handle.stamp(sightings[0].time)
+        stamp = self._handle.stamp(poses[0].time)
         if stamp < self._stamp:
             step = (self._stamp - stamp).to_sec()
             text = f"this machine's clock was set back by {step:.3f} s: stamps step back too"
             self._handle.warn(text, throttle=_REPEAT, key="clock")
         self._stamp = stamp
         transforms = []
-        for sighting in sightings:
-            body = sighting.body
+        for pose in poses:
+            body = pose.body
             header = Header(stamp=stamp, frame_id=body.parameters.parent_frame_id)
             if body.key in self._poses:
-                self._poses[body.key].publish(_pose(header, sighting))
+                self._poses[body.key].publish(_pose(header, pose))
             if body.key in self._poses2d:
-                x, y, _ = sighting.position
-                self._poses2d[body.key].publish(Pose2D(x, y, heading(sighting.quaternion)))
+                x, y, _ = pose.position
+                self._poses2d[body.key].publish(Pose2D(x, y, heading(pose.quaternion)))
             if body.parameters.child_frame_id is not None:
-                transforms.append(_transform(header, sighting))
+                transforms.append(_transform(header, pose))
         if transforms:
             self._broadcast(transforms)
 
@@ -173,15 +173,13 @@ def _private(topic):
     return topic if topic.startswith(("/", "~")) else "~" + topic
 
 
-def _pose(header, sighting):
-    pose = Pose(Point(*sighting.position), Quaternion(*sighting.quaternion))
+def _pose(header, body_pose):
+    pose = Pose(Point(*body_pose.position), Quaternion(*body_pose.quaternion))
     return PoseStamped(header, pose)
 
 
-def _transform(header, sighting):
-    transform = TransformStamped(
-        header=header, child_frame_id=sighting.body.parameters.child_frame_id
-    )
-    transform.transform.translation = Vector3(*sighting.position)
-    transform.transform.rotation = Quaternion(*sighting.quaternion)
+def _transform(header, pose):
+    transform = TransformStamped(header=header, child_frame_id=pose.body.parameters.child_frame_id)
+    transform.transform.translation = Vector3(*pose.position)
+    transform.transform.rotation = Quaternion(*pose.quaternion)
     return transform

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from mocap_optitrack.axes import normalized, to_z_up
-from mocap_optitrack.clock_offset import ClockOffset, Verdict
+from mocap_optitrack.clock_offset import ClockOffset, FrameOrder
 from mocap_optitrack.frames import Frame, Quaternion, Vector3
 from mocap_optitrack.health import Health
 from mocap_optitrack.parameters import RigidBody
@@ -18,7 +18,7 @@ _RESET = 1.0
 """By how much local time steps back when a simulation is reset, at least, s."""
 
 
-class Sighting(NamedTuple):
+class BodyPose(NamedTuple):
     """A rigid body where the cameras saw it.
 
     Attributes
@@ -77,12 +77,12 @@ class Tracker:
         """Take note that the server is another one, and so is its clock."""
         self._clock = ClockOffset()
 
-    def take(self, frame: Frame) -> list[Sighting]:
+    def take(self, frame: Frame) -> list[BodyPose]:
         """Return what is to be published of a frame.
 
         Returns
         -------
-        list of Sighting
+        list of BodyPose
             All of the same time, which is later than that of the frame before. Empty
             during the first half second of a server, in which its clock is learned.
         """
@@ -106,7 +106,7 @@ class Tracker:
             return []
         self._newest = time
         self._health.frame(frame.arrival, age)
-        sightings = []
+        poses = []
         for body in frame.bodies:
             wanted = self._wanted(body)
             if wanted is None:
@@ -115,20 +115,20 @@ class Tracker:
             pose = _pose(body, self._up_axis)
             self._health.body(wanted, frame.arrival, pose is not None)
             if pose is not None:
-                sightings.append(Sighting(wanted, time, *pose))
-        return sightings
+                poses.append(BodyPose(wanted, time, *pose))
+        return poses
 
     def _time_of(self, frame):
         if frame.exposure is None:
             return frame.arrival - frame.waited
-        verdict = self._clock.update(frame.sent, frame.arrival)
-        if verdict is Verdict.OLD:
+        order = self._clock.update(frame.sent, frame.arrival)
+        if order is FrameOrder.OLD:
             self._health.repeated()
             return None
-        if verdict is Verdict.FOREIGN:
+        if order is FrameOrder.FOREIGN:
             self._health.foreign()
             return None
-        if verdict is Verdict.RESTART:
+        if order is FrameOrder.RESTART:
             self._health.clock_set()
         if not self._clock.is_settled:
             self._health.learning()

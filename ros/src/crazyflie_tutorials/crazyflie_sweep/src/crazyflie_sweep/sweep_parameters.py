@@ -1,4 +1,4 @@
-"""What a sweep is told."""
+"""Parameters of a sweep."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""A velocity that somebody else says, and what to do when it cannot be used."""
+"""A velocity from a service, and what to do when it cannot be used."""
 
 
 class VelocitySource:

@@ -20,7 +20,7 @@ class TakeoffCallerParameters(Parameters):
 
 
 class TakeoffCallerNode(Node):
-    """Call takeoff as soon as somebody offers it, once."""
+    """Call takeoff once, as soon as the service is offered."""
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:

@@ -1,4 +1,4 @@
-"""A node that tells bright from dark."""
+"""A node that separates bright from dark pixels."""
 
 from typing_extensions import override
 

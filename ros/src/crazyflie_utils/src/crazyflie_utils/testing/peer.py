@@ -53,6 +53,12 @@ def listening(topic: str, message_type: type[genpy.Message]) -> Iterator[Receive
         subscriber.unregister()
 
 
+_publishers: dict[str, rospy.Publisher] = {}
+"""By topic, one for the life of the process. A rospy subscriber that is told of a new publisher of
+a process before it has noticed that the one before it hung up takes it for that one, and never
+connects."""
+
+
 def exchange(
     messages: dict[str, genpy.Message],
     answer_topic: str,
@@ -70,16 +76,14 @@ def exchange(
         There is no such answer within `LIMIT`.
     """
     end = time.monotonic() + LIMIT
-    with contextlib.ExitStack() as stack:
-        answers = stack.enter_context(listening(answer_topic, answer_type))
-        publishers = {}
-        for topic, message in messages.items():
-            publishers[topic] = rospy.Publisher(topic, type(message), queue_size=1)
-            stack.callback(publishers[topic].unregister)
+    for topic, message in messages.items():
+        if topic not in _publishers:
+            _publishers[topic] = rospy.Publisher(topic, type(message), queue_size=1)
+    with listening(answer_topic, answer_type) as answers:
         while time.monotonic() < end:
             for topic, message in messages.items():
-                publishers[topic].publish(message)
-            # At a pace: who answers at once must not be flooded.
+                _publishers[topic].publish(message)
+            # At a pace: an answer to each message must not become a flood.
             pause = time.monotonic() + 0.01
             with contextlib.suppress(queue.Empty):
                 while (rest := pause - time.monotonic()) > 0.0:

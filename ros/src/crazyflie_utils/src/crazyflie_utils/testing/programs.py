@@ -13,7 +13,7 @@ _END_LIMIT = 60.0
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
-    """Return a UDP (or, with SOCK_STREAM, a TCP) port of this machine that nobody uses now."""
+    """Return a UDP (or, with SOCK_STREAM, a TCP) port of this machine that is free now."""
     with socket.socket(socket.AF_INET, kind) as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]

@@ -1,4 +1,4 @@
-"""Files of users that are wrong, for the tests of those who read them."""
+"""Checks of how loaders of users' YAML files refuse wrong ones."""
 
 import re
 from collections.abc import Callable

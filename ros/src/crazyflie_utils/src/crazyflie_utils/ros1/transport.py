@@ -135,7 +135,7 @@ class RosTransport(Transport):
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Register a publisher with the master."""
         self._published[topic] += 1
-        patches.own_publication(topic, message_type)
+        patches.own_publication(topic, message_type, _QUEUE_SIZE, latch)
         publisher = rospy.Publisher(
             self._rospy_name(topic), message_type, latch=latch, queue_size=_QUEUE_SIZE
         )

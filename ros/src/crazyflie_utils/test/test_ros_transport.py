@@ -17,10 +17,10 @@ from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest, EmptyResponse
 
 from crazyflie_utils import ServiceError
-from crazyflie_utils.ros1 import patches
-from crazyflie_utils.ros1 import transport as ros_transport
+from crazyflie_utils.ros1 import calls, patches
+from crazyflie_utils.ros1.calls import wait_for_answer
 from crazyflie_utils.ros1.own_topics import OwnSubscription
-from crazyflie_utils.ros1.transport import RosTransport, wait_for_answer
+from crazyflie_utils.ros1.transport import RosTransport
 
 
 def ignore(text, key):
@@ -47,7 +47,7 @@ def test_caller_is_not_left_waiting_at_shutdown(monkeypatch):
 
 
 def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(monkeypatch):
-    monkeypatch.setattr(ros_transport, "_STALL_LIMIT", 0.05)
+    monkeypatch.setattr(calls, "_STALL_LIMIT", 0.05)
     with pytest.raises(ServiceError, match="/go: /clock stands still"):
         wait_for_answer(Future(), "/go", lambda: 7.0)
 

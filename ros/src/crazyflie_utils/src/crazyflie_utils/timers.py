@@ -248,15 +248,7 @@ class VaryingTimer:
 
 
 class SteadyTimers:
-    """A thread that runs a queue of timers by a steady clock.
-
-    Parameters
-    ----------
-    queue : TimerQueue
-        Whose timers are run.
-    clock : SteadyClock
-        By which they are due.
-    """
+    """A thread that runs a queue of timers by a steady clock."""
 
     def __init__(self, queue: TimerQueue, clock: SteadyClock):
         self._queue = queue

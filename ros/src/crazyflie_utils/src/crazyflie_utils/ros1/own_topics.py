@@ -106,10 +106,12 @@ class OwnSubscription(rospy.topics._SubscriberImpl):
 class OwnPublication(rospy.topics._PublisherImpl):
     """rospy's part of a topic that handles publish."""
 
-    def __init__(self, name: str, message_type: type):
+    def __init__(self, name: str, message_type: type, queue_size: int, latch: bool):
         super().__init__(name, message_type)
         self.resolved_name = self.name = name
-        self._limit = 0
+        # Now: as soon as the topic is registered, subscribers connect.
+        self._limit = queue_size
+        self.is_latch = latch
 
     @override
     def set_queue_size(self, queue_size: int) -> None:

@@ -3,12 +3,10 @@
 import contextlib
 import math
 import resource
-import threading
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator
-from concurrent.futures import Future, InvalidStateError, wait
+from concurrent.futures import Future
 from functools import partial
-from time import monotonic
 from typing import Any
 
 import genpy
@@ -19,6 +17,7 @@ from rosgraph_msgs.msg import Clock
 from crazyflie_utils.log import Throttle
 from crazyflie_utils.parameters.writer import ParameterWriter
 from crazyflie_utils.ros1 import patches
+from crazyflie_utils.ros1.calls import ServiceCaller, wait_for_answer
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
 from crazyflie_utils.transport import (
     ExternalPublisher,
@@ -30,16 +29,6 @@ from crazyflie_utils.transport import (
 _QUEUE_SIZE = 100
 """Messages kept for a listener that does not keep up: a simulation that runs as fast as it
 can fills a short queue faster than the listener gets its turn."""
-
-
-_STALL_LIMIT = 5.0
-"""How long, in s of the machine's clock, the caller of a service waits while simulated time
-stands still."""
-
-
-_MAX_CALLS = 8
-"""Calls of one service that may be without an answer. rospy waits for one without a limit, in
-a thread that nothing can end."""
 
 
 class _RosPublisher(ExternalPublisher):
@@ -94,8 +83,7 @@ class RosTransport(Transport):
         self._before_remapping = {name: first for first, name in self._remappings.items()}
         self._published: Counter[str] = Counter()
         self._sets_clock = False
-        self._calls: dict[str, threading.Semaphore] = {}
-        self._own_services: dict[str, rospy.Service] = {}
+        self._caller = ServiceCaller()
         self._parameter_writer = ParameterWriter(_write_param, partial(self.log, "warn"))
         self._services_at_start: dict[str, str] | None = None
         self._is_starting = False
@@ -147,7 +135,7 @@ class RosTransport(Transport):
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Register a publisher with the master."""
         self._published[topic] += 1
-        patches.own_publication(topic, message_type)
+        patches.own_publication(topic, message_type, _QUEUE_SIZE, latch)
         publisher = rospy.Publisher(
             self._rospy_name(topic), message_type, latch=latch, queue_size=_QUEUE_SIZE
         )
@@ -194,10 +182,10 @@ class RosTransport(Transport):
             service = rospy.Service(self._rospy_name(name), service_type, answer)
         except rospy.ServiceException as error:
             raise ServiceError(str(error)) from None
-        self._own_services[name] = service
+        self._caller.own[name] = service
 
         def end():
-            del self._own_services[name]
+            del self._caller.own[name]
             service.shutdown("no longer offered")
 
         return end
@@ -205,28 +193,8 @@ class RosTransport(Transport):
     def call_service(
         self, name: str, service_type: type, request: Any, limit: float
     ) -> Future[Any]:
-        """Call in a thread of its own, and give up on it after ``limit``.
-
-        A service of this process is called without a connection: a fleet's are a hundred at once.
-        """
-        own = self._own_services.get(name)
-        future: Future[Any] = Future()
-        calls = self._calls.setdefault(name, threading.Semaphore(_MAX_CALLS))
-        if not calls.acquire(blocking=False):
-            _fail(future, f"{name} has not answered {_MAX_CALLS} earlier calls")
-            return future
-        threading.Thread(
-            target=_call,
-            args=(self._rospy_name(name), service_type, request, limit, future, calls, own),
-            daemon=True,
-        ).start()
-        timer = threading.Timer(
-            limit, _fail, (future, f"{name} has not answered within {limit:g} s")
-        )
-        timer.daemon = True
-        timer.start()
-        future.add_done_callback(lambda _: timer.cancel())
-        return future
+        """Call in a thread of its own; see `ServiceCaller.call`."""
+        return self._caller.call(name, self._rospy_name(name), service_type, request, limit)
 
     def service_nodes(self) -> dict[str, str]:
         """Ask the master."""
@@ -272,56 +240,3 @@ _LOGGERS = {
     "error": rospy.logerr,
     "fatal": rospy.logfatal,
 }
-
-
-def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -> Any:
-    """Return the outcome of ``answer``, for the caller of the service ``name``.
-
-    Raises
-    ------
-    ServiceError
-        The service's; or the process ends, or ``time()`` stands still, before there
-        is an outcome.
-    """
-    seen, seen_at = time(), monotonic()
-    while not wait([answer], timeout=0.1).done:
-        if rospy.core.is_shutdown_requested():
-            raise ServiceError(f"{name}: the node is shutting down")
-        if time() != seen:
-            seen, seen_at = time(), monotonic()
-        elif monotonic() - seen_at > _STALL_LIMIT:
-            raise ServiceError(f"{name}: /clock stands still")
-    return answer.result()
-
-
-def _call(name, service_type, request, limit, future, calls, own):
-    try:
-        if own is not None and _answers(own):
-            response = own.handler(request)
-        else:
-            rospy.wait_for_service(name, timeout=limit)
-            response = rospy.ServiceProxy(name, service_type)(request)
-    except Exception as error:
-        # rospy has many, of which not all are its own.
-        _fail(future, str(error))
-    else:
-        with contextlib.suppress(InvalidStateError):
-            future.set_result(response)
-    finally:
-        calls.release()
-
-
-def _answers(own):
-    """Return whether the master has no other service of this name, or is gone."""
-    try:
-        return rosgraph.Master(rospy.get_name()).lookupService(own.resolved_name) == own.uri
-    except rosgraph.MasterException:
-        return False
-    except OSError:
-        return True
-
-
-def _fail(future, text):
-    # The answer and the limit may come at the same moment; the first one counts.
-    with contextlib.suppress(InvalidStateError):
-        future.set_exception(ServiceError(text))

@@ -8,11 +8,11 @@ import pytest
 import rospkg
 from geometry_msgs.msg import Twist, Vector3
 from sensor_msgs.msg import Joy
-from std_msgs.msg import String
 from std_srvs.srv import EmptyResponse
 
 from crazyflie_dev import launch_files
 from crazyflie_msgs.msg import (
+    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
@@ -46,7 +46,7 @@ def refer(process, x, y, z):
 
 def take_off(process):
     refer(process, 0.0, 0.0, 1.0)
-    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
 
 
 def fly(process, twist, duration):
@@ -92,7 +92,9 @@ def test_stops_half_a_second_after_the_last_velocity(process):
 def test_only_in_flight(process, state):
     refer(process, 0.0, 0.0, 1.0)
     if state:
-        process.publish("/in_flight_state", String(state))
+        process.publish(
+            "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
+        )
     fly(process, AHEAD, 1.0)
     assert len(references(process)) == 1
 
@@ -100,7 +102,7 @@ def test_only_in_flight(process, state):
 def test_a_landing_has_the_reference_for_itself(process):
     take_off(process)
     fly(process, Twist(linear=Vector3(x=0.4), angular=Vector3(z=0.5)), 2.0)
-    process.publish("/in_flight_state", String("descending"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.DESCENDING))
     yaw = references(process)[-1][6]
     count = len(references(process))
     for k in range(10):

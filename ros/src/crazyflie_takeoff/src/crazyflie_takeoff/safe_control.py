@@ -18,13 +18,16 @@ from crazyflie_takeoff.motion import Motion
 
 LONGEST_STEP = 0.05
 """More time than this never passes between two ticks, s: after a clock was set, or the process
-was stopped for a while, nobody has been silent for as long as it seems."""
+was stopped for a while, no silence is as long as it seems."""
 
 HOVER_RANGE = 0.25
 """How far the hover thrust may be from g, as a fraction."""
 
 AVERAGING = 2.0
 """Time constant of the mean of the commanded thrust, s."""
+
+MAX_LEARNING_SPEED = 0.3
+"""In a climb or a descent that is faster the drag would be taken for weight, m/s."""
 
 SINK_RATE = 0.3
 """How fast the target speed goes down in a descent, m/s^2: without a state the thrust is as much
@@ -57,7 +60,7 @@ MAX_SAFE_TILT = 0.15
 """Most roll and pitch of the filter's own, rad."""
 
 STOPPING_TIME = 0.5
-"""The place to keep is where a vehicle gets in this time with the speed that it has, s."""
+"""The place to keep is where a vehicle gets horizontally in this time with its speed, s."""
 
 HEIGHT_GAIN = 1.0
 """Target speed over height error, 1/s,"""
@@ -117,6 +120,8 @@ class HoverThrust:
         speed : float or None
             Measured z_dot, m/s.
         """
+        if speed is not None and abs(speed) > MAX_LEARNING_SPEED:
+            return
         share = step / (AVERAGING + step)
         vertical = control.thrust * math.cos(control.roll) * math.cos(control.pitch)
         self._thrust += share * (vertical - self._thrust)
@@ -205,9 +210,11 @@ class SafeControl:
             self._seen = measured
             self._velocity, self._yaw = measured.velocity, measured.yaw
         if self._place is None:
-            self._place = tuple(
-                x + STOPPING_TIME * v
-                for x, v in zip(measured.position, measured.velocity, strict=True)
+            (x, y, z), (x_dot, y_dot, z_dot) = measured.position, measured.velocity
+            self._place = (
+                x + STOPPING_TIME * x_dot,
+                y + STOPPING_TIME * y_dot,
+                z + z_dot * braking_time(z_dot) / 2.0,
             )
         return tuple(to - at for to, at in zip(self._place, measured.position, strict=True))
 
@@ -220,6 +227,11 @@ class SafeControl:
         self._velocity = tuple(
             v + step * a for v, a in zip(self._velocity, acceleration, strict=True)
         )
+
+
+def braking_time(z_dot: float) -> float:
+    """Return how long ending a vertical speed (m/s) takes, s."""
+    return z_dot / MAX_BRAKING if z_dot > 0.0 else -z_dot / MAX_CORRECTION
 
 
 def descent_time(motion: Motion, ground: float) -> float:

@@ -99,8 +99,8 @@ def limited(pids: list[int], quota: float) -> Iterator[None]:
             (group / "cgroup.procs").write_text(str(pid))
         yield
     finally:
-        for pid in (group / "cgroup.procs").read_text().split():
-            (parent / "cgroup.procs").write_text(pid)
+        for member in (group / "cgroup.procs").read_text().split():
+            (parent / "cgroup.procs").write_text(member)
         group.rmdir()
 
 

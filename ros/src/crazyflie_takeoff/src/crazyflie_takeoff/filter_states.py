@@ -2,7 +2,7 @@
 
 import enum
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.control_filter import ControlFilter
@@ -100,7 +100,11 @@ class FilterMachine:
     """
 
     def __init__(
-        self, timeouts: LossTimeouts, choice: ControlFilter, measured: Measurement, ground: Ground
+        self,
+        timeouts: LossTimeouts,
+        choice: ControlFilter[Any],
+        measured: Measurement,
+        ground: Ground,
     ):
         self._timeouts = timeouts
         self._choice, self._measured, self._ground = choice, measured, ground

@@ -5,7 +5,6 @@ from random import Random
 
 import pytest
 from geometry_msgs.msg import TransformStamped
-from std_msgs.msg import String
 from std_srvs.srv import EmptyRequest
 from tf2_msgs.msg import TFMessage
 
@@ -14,7 +13,7 @@ from crazyflie_dev.soak_faults import NODES, Flight
 from crazyflie_dev.soak_operator import LIVE_VALUES, live_parameters
 from crazyflie_dev.soak_watch import BLIND_LIMIT, Watch
 from crazyflie_model.units import GRAVITY
-from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose
 
@@ -150,7 +149,9 @@ def test_a_flight_as_it_should_be(watch):
     watch.may_fly = True
     watch.allow(1.0)
     for state in ("on_ground", "taking_off", "flying"):
-        watch.graph.publish("/in_flight_state", String(state))
+        watch.graph.publish(
+            "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
+        )
     for height in (0.0, 0.5, 1.1):
         is_at(watch, height, after=1.0)
         command(watch)
@@ -166,8 +167,8 @@ def test_complaints(watch):
     command(watch, thrust=math.nan)
     command(watch, thrust=17.0)
     command(watch, roll=0.5)
-    watch.graph.publish("/in_flight_state", String("on_ground"))
-    watch.graph.publish("/in_flight_state", String("flying"))
+    watch.graph.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.ON_GROUND))
+    watch.graph.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     watch.is_blind = True
     is_at(watch, 0.5)
     is_at(watch, 0.5, after=BLIND_LIMIT + 1.0)

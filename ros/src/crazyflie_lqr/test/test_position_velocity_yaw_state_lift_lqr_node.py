@@ -14,6 +14,7 @@ from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
 )
 from crazyflie_msgs.msg import (
+    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
@@ -315,8 +316,9 @@ def thrusts(process, duration, **state):
     ]
 
 
-def tell(process, state, topic="/in_flight_state"):
-    process.publish(topic, String(state))
+def tell(process, state):
+    status = FlightStatus(state=getattr(FlightStatus, state.upper()))
+    process.publish("/in_flight_flight_status", status)
 
 
 def test_on_the_ground_nothing_is_integrated_and_a_takeoff_begins_from_zero():
@@ -357,9 +359,16 @@ def test_without_a_flight_state_it_integrates_in_the_air_and_while_it_may_lift_o
     assert flying[-1] - flying[0] == pytest.approx(0.9 * 0.5 * 0.5)
 
 
-def test_the_topic_of_the_flight_state_can_be_chosen():
-    process = lifting(**{"topics/flight_state": "/cf1/in_flight_state"})
-    tell(process, "on_ground", "/cf1/in_flight_state")
+@pytest.mark.parametrize(
+    ("parameter", "message"),
+    [
+        ("topics/flight_state", String("on_ground")),
+        ("topics/flight_status", FlightStatus(state=FlightStatus.ON_GROUND)),
+    ],
+)
+def test_the_topic_of_the_flight_state_can_be_chosen(parameter, message):
+    process = lifting(**{parameter: "/cf1/state_of_flight"})
+    process.publish("/cf1/state_of_flight", message)
     refer(process, z=1.0)
     assert thrusts(process, 2.0) == pytest.approx([9.81 + 1.5] * 20)
 
@@ -407,9 +416,11 @@ def test_bad_gains_are_refused_and_the_old_ones_stay(process, tmp_path):
 
 @pytest.mark.parametrize(("state", "warnings"), [("flying", 1), ("landing", 0)])
 def test_the_end_of_a_descent_is_no_reason_to_warn(process, state, warnings):
-    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     refer(process, z=1.0, z_dot=-0.3)
-    process.publish("/in_flight_state", String(state))
+    process.publish(
+        "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
+    )
     process.advance(0.6)
     answer(process, z=1.0)
     assert len(process.logged("warn")) == warnings

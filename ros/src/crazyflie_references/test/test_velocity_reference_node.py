@@ -4,7 +4,6 @@ import math
 
 import pytest
 from geometry_msgs.msg import Twist, Vector3
-from std_msgs.msg import String
 
 from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_references.velocity_reference_node import VelocityReferenceNode
@@ -29,7 +28,7 @@ def refer(process, x, y, z):
 
 def take_off(process):
     refer(process, 0.0, 0.0, 1.0)
-    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
 
 
 def fly(process, twist, duration):
@@ -75,7 +74,9 @@ def test_stops_half_a_second_after_the_last_velocity(process):
 def test_only_in_flight(process, state):
     refer(process, 0.0, 0.0, 1.0)
     if state:
-        process.publish("/in_flight_state", String(state))
+        process.publish(
+            "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
+        )
     fly(process, AHEAD, 1.0)
     assert len(references(process)) == 1
 
@@ -83,7 +84,7 @@ def test_only_in_flight(process, state):
 def test_a_landing_has_the_reference_for_itself(process):
     take_off(process)
     fly(process, Twist(linear=Vector3(x=0.4), angular=Vector3(z=0.5)), 2.0)
-    process.publish("/in_flight_state", String("descending"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.DESCENDING))
     yaw = references(process)[-1][6]
     count = len(references(process))
     for k in range(10):

@@ -1,8 +1,7 @@
 """The takeoff server on a fake process, without a filter."""
 
-from std_msgs.msg import String
 from std_srvs.srv import EmptyRequest
-from takeoff_helpers import BARE, state
+from takeoff_helpers import BARE, filter_status, state
 
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.testing import FakeProcess
@@ -22,7 +21,7 @@ def on_ground(parameters=BARE, **changes):
     process = launch(parameters, **changes)
     if "topics/state" in parameters:
         process.publish("/state", state(0.0))
-    process.publish("/in_flight_filter", String("unknown"))
+    process.publish("/in_flight_filter_status", filter_status("unknown"))
     process.advance(0.02)
     assert states(process) == ["on_ground"]
     return process
@@ -31,7 +30,7 @@ def on_ground(parameters=BARE, **changes):
 def flying(parameters=BARE, **changes):
     """Return a process with a server that knows the vehicle in flight."""
     process = launch(parameters, **changes)
-    process.publish("/in_flight_filter", String("flying"))
+    process.publish("/in_flight_filter_status", filter_status("flying"))
     if "topics/state" in parameters:
         process.publish("/state", state(1.0))
     process.advance(0.02)

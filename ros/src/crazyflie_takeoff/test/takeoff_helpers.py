@@ -5,6 +5,8 @@ from std_srvs.srv import EmptyRequest
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
+    FilterStatus,
+    FlightStatus,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
@@ -48,6 +50,12 @@ def state(z, z_dot=0.0, stamp=None):
     if stamp is not None:
         message.header.stamp = stamp
     return message
+
+
+def filter_status(remembered="unknown", state=FilterStatus.PASSING, **fields):
+    """Return what a filter publishes that has heard a flight state last."""
+    code = getattr(FlightStatus, remembered.upper())
+    return FilterStatus(state=state, flight_state=code, **fields)
 
 
 class PointMass:
@@ -160,7 +168,7 @@ class Network:
     one be started in its place, which is told what is latched by those alive.
     """
 
-    LATCHED = ("/ref", "/in_flight_state", "/in_flight_filter")
+    LATCHED = ("/ref", "/in_flight_state", "/in_flight_flight_status", "/in_flight_filter_status")
     TICK = 0.01
 
     def __init__(self):

@@ -2,9 +2,9 @@
 
 import pytest
 from flight_words import until_on_ground, word
-from std_msgs.msg import Bool, Float32, String
+from std_msgs.msg import Bool, Float32
 from std_srvs.srv import EmptyRequest
-from takeoff_helpers import SERVER, state
+from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff.battery import Battery, Charge
@@ -19,7 +19,7 @@ def with_battery(z, said):
     process = FakeProcess()
     parameters = {**SERVER, "topics/battery": "/battery"}
     assert process.launch(TakeoffServerNode(), "/takeoff_server", parameters)
-    process.publish("/in_flight_filter", String(said))
+    process.publish("/in_flight_filter_status", filter_status(said))
     discharge(process, 4.0, 1.0, z)
     return process
 
@@ -84,7 +84,7 @@ def test_status_in_words():
     process = FakeProcess()
     assert process.launch(TakeoffServerNode(), "/takeoff_server", SERVER)
     process.advance(0.2)
-    process.publish("/in_flight_filter", String("on_ground"))
+    process.publish("/in_flight_filter_status", filter_status("on_ground"))
     process.publish("/in_flight_controller", Bool(True))
     process.advance(2.0)
     process.publish("/state", state(0.0))

@@ -20,7 +20,7 @@ def test_takeoff_control_is_always_passed_on(control_filter):
     assert control_filter.takeoff(0.0, "t1", 10.0) == "t1"
     control_filter.toggle()
     assert control_filter.takeoff(0.1, "t2", 10.0) == "t2"
-    control_filter.set_state(FLYING)
+    control_filter.state = FLYING
     assert control_filter.takeoff(0.2, "t3", 10.0) == "t3"
 
 
@@ -71,7 +71,7 @@ def test_a_takeoff_control_ends_the_listening():
 def test_the_flight_state_tells_a_listening_filter_to_pass_the_controller():
     control_filter = ControlFilter()
     assert control_filter.commanded(0.0, "c1") is None
-    control_filter.set_state(FLYING)
+    control_filter.state = FLYING
     assert control_filter.commanded(0.01, "c2") == "c2"
     # What has waited is older by now than what has been passed on.
     assert control_filter.stop_listening(0.2) is None
@@ -80,7 +80,7 @@ def test_the_flight_state_tells_a_listening_filter_to_pass_the_controller():
 @pytest.mark.parametrize("state", FlightState)
 def test_the_flight_state_decides(control_filter, state):
     control_filter.takeoff(0.0, "t", 10.0)
-    control_filter.set_state(state)
+    control_filter.state = state
     assert control_filter.commanded(0.1, "c") == ("c" if state in (FLYING, DESCENDING) else "t")
     assert control_filter.in_flight == state.in_flight
 
@@ -90,7 +90,7 @@ def test_state_and_toggle_of_one_event_do_not_cancel_each_other(control_filter, 
     def happen(state):
         if toggle_first:
             control_filter.toggle()
-        control_filter.set_state(state)
+        control_filter.state = state
         if not toggle_first:
             control_filter.toggle()
 
@@ -100,14 +100,14 @@ def test_state_and_toggle_of_one_event_do_not_cancel_each_other(control_filter, 
 
 
 def test_on_the_ground_the_controller_stays_out_when_the_server_dies(control_filter):
-    control_filter.set_state(ON_GROUND)
+    control_filter.state = ON_GROUND
     assert control_filter.commanded(0.0, "c") is None
     control_filter.takeoff(1.0, "zero", 0.0)
     assert control_filter.commanded(60.0, "c") == "zero"
 
 
 def test_a_server_without_flight_state_may_take_over(control_filter):
-    control_filter.set_state(ON_GROUND)
+    control_filter.state = ON_GROUND
     control_filter.takeoff(0.0, "zero", 0.0)
     control_filter.takeoff(60.0, "lift", 10.01)
     assert control_filter.commanded(60.4, "c") == "lift"
@@ -121,6 +121,6 @@ def test_remembers_what_it_has_been_told(control_filter):
     control_filter.toggle()
     assert control_filter.remembered is None
     for state in FlightState:
-        control_filter.set_state(state)
+        control_filter.state = state
         control_filter.toggle()
         assert control_filter.remembered is state

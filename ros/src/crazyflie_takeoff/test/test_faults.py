@@ -2,10 +2,10 @@
 
 import pytest
 from flight_words import states, thrusts, until_on_ground, word
-from std_msgs.msg import String
 from std_srvs.srv import EmptyRequest
-from takeoff_helpers import SERVER, ControllerNode, HoverNetwork, control, state
+from takeoff_helpers import SERVER, ControllerNode, HoverNetwork, control, filter_status, state
 
+from crazyflie_msgs.msg import FilterStatus
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.transport import ServiceError
@@ -122,10 +122,10 @@ def test_a_filter_that_is_still_down_does_not_end_the_next_takeoff():
     process = FakeProcess()
     assert process.launch(TakeoffServerNode(), "/takeoff_server", SERVER)
     process.publish("/state", state(0.0))
-    process.publish("/in_flight_filter", String("down from on_ground: brought down"))
+    process.publish("/in_flight_filter_status", filter_status("on_ground", FilterStatus.DOWN))
     process.advance(0.1)
     takeoff = process.call("/takeoff", EmptyRequest())
-    process.publish("/in_flight_filter", String("down from taking_off: brought down"))
+    process.publish("/in_flight_filter_status", filter_status("taking_off", FilterStatus.DOWN))
     process.advance(0.1)
     assert word(process) == "taking_off"
     assert not takeoff.done()

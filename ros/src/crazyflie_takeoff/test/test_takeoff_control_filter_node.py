@@ -6,6 +6,8 @@ import pytest
 from std_msgs.msg import Empty, String
 from takeoff_helpers import FILTER, control
 
+from crazyflie_msgs.msg import FilterStatus, FlightStatus
+from crazyflie_takeoff.filter_status_publisher import FLIGHT_STATES
 from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
 from crazyflie_utils.testing import FakeProcess
 
@@ -118,6 +120,32 @@ def test_remembers_the_flight_state_for_the_server(process):
     process.publish("/in_flight_state", String("flying"))
     process.publish("/in_flight", Empty())
     assert memory(process) == ["unknown", "taking_off", "flying"]
+
+
+def test_publishes_its_status(process):
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    process.advance(0.2)
+    process.advance(2.0)
+    statuses = process.published("/in_flight_filter_status")
+    assert [each.state for each in statuses] == [
+        FilterStatus.PASSING,
+        FilterStatus.PASSING,
+        FilterStatus.HOLDING,
+        FilterStatus.SINKING,
+    ]
+    assert [each.flight_state for each in statuses] == [FlightStatus.UNKNOWN] + 3 * [
+        FlightStatus.FLYING
+    ]
+    assert statuses[0].reason == statuses[1].reason == ""
+    assert statuses[-1].reason.startswith("no control came for")
+    assert [each.is_commanded for each in statuses] == [False] * 4
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.UNKNOWN))
+    assert process.published("/in_flight_filter_status") == statuses
+
+
+def test_the_flight_states_are_those_of_the_message():
+    names = [None if each is None else each.name for each in FLIGHT_STATES]
+    assert [getattr(FlightStatus, name) for name in names[1:]] == list(range(1, len(names)))
 
 
 def test_a_word_that_is_no_flight_state_is_ignored(process):

@@ -144,7 +144,7 @@ def test_a_fault_during_takeoff_tells_the_caller_and_lands():
     future = call(process, "/takeoff")
     process.advance(0.5)
     count = len(thrusts(process))
-    process.publish("/in_flight_filter", None)
+    process.publish("/in_flight_filter_status", None)
     with pytest.raises(ServiceError, match="/takeoff_server has failed"):
         future.result(timeout=0)
     assert len(process.logged("error")) == 1
@@ -158,7 +158,7 @@ def test_a_fault_during_landing_tells_the_caller_and_goes_on():
     process = flying()
     future = call(process, "/land")
     process.advance(0.5)
-    process.publish("/in_flight_filter", None)
+    process.publish("/in_flight_filter_status", None)
     with pytest.raises(ServiceError):
         future.result(timeout=0)
     process.advance(0.6)

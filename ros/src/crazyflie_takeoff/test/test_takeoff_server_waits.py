@@ -4,9 +4,9 @@ import math
 
 import pytest
 from lone_server import call, flying, launch, on_ground, states, thrusts, toggles
-from std_msgs.msg import Bool, String
+from std_msgs.msg import Bool
 from std_srvs.srv import EmptyResponse
-from takeoff_helpers import SERVER, state
+from takeoff_helpers import SERVER, filter_status, state
 
 from crazyflie_takeoff.driver_connection import MAX_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
@@ -25,7 +25,7 @@ def test_says_nothing_until_it_knows_where_the_flight_stands():
 
 def test_waits_for_the_height_if_there_is_one():
     process = launch(SERVER)
-    process.publish("/in_flight_filter", String("unknown"))
+    process.publish("/in_flight_filter_status", filter_status("unknown"))
     process.advance(0.5)
     assert states(process) == []
     process.publish("/state", state(0.1))
@@ -34,10 +34,10 @@ def test_waits_for_the_height_if_there_is_one():
     assert "0.10 m" in process.logged("info")[0]
 
 
-@pytest.mark.parametrize(("said", "begins"), [("unknown", "on_ground"), ("commanded", "flying")])
-def test_a_high_vehicle_is_flying_only_if_a_controller_has_long_been_speaking(said, begins):
+@pytest.mark.parametrize(("is_commanded", "begins"), [(False, "on_ground"), (True, "flying")])
+def test_a_high_vehicle_is_flying_only_if_a_controller_sends_commands(is_commanded, begins):
     process = launch(SERVER)
-    process.publish("/in_flight_filter", String(said))
+    process.publish("/in_flight_filter_status", filter_status(is_commanded=is_commanded))
     process.publish("/state", state(0.7))
     process.advance(0.02)
     assert states(process) == [begins]
@@ -56,12 +56,12 @@ def test_flies_if_only_the_height_says_so():
     assert toggles(process) == 0
 
 
-def test_a_word_that_is_no_flight_state_is_ignored():
+def test_a_state_that_does_not_exist_is_ignored():
     process = launch()
-    process.publish("/in_flight_filter", String("asleep"))
+    process.publish("/in_flight_filter_status", filter_status(state=77))
     process.advance(0.5)
     assert states(process) == []
-    assert "asleep" in process.logged("warn")[0]
+    assert "ignoring state 77" in process.logged("warn")[0]
 
 
 def test_calls_wait_until_it_is_known_where_the_flight_stands():
@@ -70,7 +70,7 @@ def test_calls_wait_until_it_is_known_where_the_flight_stands():
     process.advance(0.5)
     assert not first.done()
     assert not second.done()
-    process.publish("/in_flight_filter", String("on_ground"))
+    process.publish("/in_flight_filter_status", filter_status("on_ground"))
     process.advance(0.01)
     with pytest.raises(ServiceError, match="a takeoff is under way"):
         second.result(timeout=0)
@@ -78,7 +78,7 @@ def test_calls_wait_until_it_is_known_where_the_flight_stands():
     assert first.result() == EmptyResponse()
     process = launch()
     first = call(process, "/takeoff")
-    process.publish("/in_flight_filter", String("flying"))
+    process.publish("/in_flight_filter_status", filter_status("flying"))
     process.advance(0.01)
     with pytest.raises(ServiceError, match="in flight"):
         first.result(timeout=0)
@@ -86,7 +86,7 @@ def test_calls_wait_until_it_is_known_where_the_flight_stands():
 
 def test_what_the_filter_says_later_does_not_matter():
     process = on_ground()
-    process.publish("/in_flight_filter", String("flying"))
+    process.publish("/in_flight_filter_status", filter_status("flying"))
     process.advance(0.1)
     assert states(process) == ["on_ground"]
 
@@ -148,7 +148,7 @@ def test_takeoff_without_a_controller_is_refused():
 def started(parameters=SERVER):
     """Return a process with a server that knows the flight state, but has no state yet."""
     process = launch(parameters)
-    process.publish("/in_flight_filter", String("on_ground"))
+    process.publish("/in_flight_filter_status", filter_status("on_ground"))
     # It is published at the next tick.
     process.advance(RECOVERY_LIMIT + 0.01)
     assert states(process) == ["on_ground"]

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 import rospkg
-from std_msgs.msg import String
 from visualization_msgs.msg import Marker
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_world.world_node import WorldNode
 
@@ -51,15 +51,17 @@ def test_the_ball_moves_on_its_path():
 
 
 def test_paths_may_wait_for_a_flight():
-    process = launch(**{"topics/flight_state": "/in_flight_state"})
+    process = launch(**{"topics/flight_status": "/in_flight_flight_status"})
     for state in ("on_ground", "taking_off"):
-        process.publish("/in_flight_state", String(state))
+        process.publish(
+            "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
+        )
         process.advance(7.5)
         assert pose(process).pose.position.x == 1.2
-    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     process.advance(7.5)
     # A second flight does not begin them again.
-    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     assert pose(process).pose.position.y == pytest.approx(1.2)
 
 
@@ -77,9 +79,9 @@ def test_launch_file(composed):
     nodes, parameters = launch_files.expand(
         PACKAGE / "launch" / "world.launch",
         composed=composed,
-        world_flight_state_topic="/in_flight_state",
+        world_flight_status_topic="/in_flight_flight_status",
     )
     assert ("/world" in nodes) == (composed == "false")
     process = FakeProcess(parameters)
     assert process.launch(WorldNode(), "/world")
-    assert "/in_flight_state" in process.transport.subscribers
+    assert "/in_flight_flight_status" in process.transport.subscribers

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from std_msgs.msg import String
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.testing import FakeProcess
 from figure_eight.figure_eight import FigureEight
 from figure_eight.figure_eight_node import FigureEightNode
@@ -34,13 +34,13 @@ def process():
 
 
 def test_waits_for_the_flight(process):
-    process.publish("/in_flight_state", String("taking_off"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.TAKING_OFF))
     process.advance(1.0)
     assert process.published("/cmd_vel") == []
 
 
 def test_turns_to_the_right_then_to_the_left(process):
-    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     process.advance(1.0)
     assert process.published("/cmd_vel")[-1].angular.z == pytest.approx(-0.6)
     assert process.published("/figure_eight/circles")[-1].data == 0
@@ -50,9 +50,9 @@ def test_turns_to_the_right_then_to_the_left(process):
 
 
 def test_is_silent_after_the_flight(process):
-    process.publish("/in_flight_state", String("flying"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     process.advance(1.0)
-    process.publish("/in_flight_state", String("descending"))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.DESCENDING))
     count = len(process.published("/cmd_vel"))
     process.advance(1.0)
     assert len(process.published("/cmd_vel")) == count

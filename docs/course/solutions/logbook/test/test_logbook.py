@@ -1,9 +1,12 @@
 """The logbook, first the algorithm, then the node on a fake process."""
 
 import pytest
-from std_msgs.msg import String
 
-from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    FlightStatus,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_utils import ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.testing import FakeProcess
@@ -38,13 +41,14 @@ def process():
     """Return a process with a logbook, in which one flight of 3 s to x = 2 m has been flown."""
     fake = FakeProcess()
     assert fake.launch(LogbookNode(), "/logbook")
-    fake.publish("/in_flight_state", String("on_ground"))
-    for state, x in (("taking_off", 0.0), ("flying", 1.0), ("landing", 2.0)):
-        fake.publish("/in_flight_state", String(state))
+    fake.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.ON_GROUND))
+    states = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.LANDING)
+    for x, state in enumerate(states):
+        fake.publish("/in_flight_flight_status", FlightStatus(state=state))
         position = PositionVelocityYawState(x=x)
         fake.publish("/state", PositionVelocityYawStateStamped(state=position))
         fake.advance(1.0)
-    fake.publish("/in_flight_state", String("on_ground"))
+    fake.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.ON_GROUND))
     return fake
 
 

@@ -33,10 +33,10 @@ HOVER_HEIGHT = 1.0
 """Of the launch file, m."""
 
 _STEP = 0.05
-"""How often the operator looks, s."""
+"""Between two looks of the operator at the flight, s."""
 
-_PATIENCE = 30.0
-"""How long the operator waits for a call, or for the vehicle to come to rest, s."""
+_TIMEOUT = 30.0
+"""Longest wait for the reply to a call, or for the vehicle to come to rest, s."""
 
 
 FAULTS = (*soak_faults.FAULTS, *soak_operator.FAULTS, *soak_intruders.FAULTS)
@@ -44,7 +44,7 @@ FAULTS = (*soak_faults.FAULTS, *soak_operator.FAULTS, *soak_intruders.FAULTS)
 _SIMULATOR = "/simulator"
 
 _STRAY = 1.5
-"""Who comes to rest further away than this is carried back to the middle, m."""
+"""A vehicle that comes to rest further away than this is carried back to the middle, m."""
 
 
 class Soak:
@@ -63,7 +63,7 @@ class Soak:
     faults : collections.Counter
         Fault -> how often.
     refused, answered : int
-        Takeoffs that were refused, and those that were not.
+        Number of takeoffs that were refused, and of those that were not.
     """
 
     def __init__(self, seed: int, **arguments: object):
@@ -121,7 +121,7 @@ class Soak:
             self.watch.may_fly = True
             self.watch.allow(allow)
         outcome: Future[Any] = self.graph.call(service, EmptyRequest())
-        end = self.graph.time + _PATIENCE
+        end = self.graph.time + _TIMEOUT
         # A server that is killed never answers.
         while (
             not outcome.done() and self.graph.time < end and self.graph.is_alive("/takeoff_server")
@@ -134,7 +134,7 @@ class Soak:
                 self.refused += 1
 
     def _come_to_rest(self, timeline):
-        end = self.graph.time + _PATIENCE
+        end = self.graph.time + _TIMEOUT
         while self.watch.height > 0.01 or self.watch.state != "on_ground":
             self._wait(0.5, timeline)
             if self.watch.state == "flying":

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from crazyflie_model.units import GRAVITY
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.testing import FakeGraph
 
 MOST_THRUST = 16.0
@@ -42,6 +43,15 @@ HARD_LANDING = 2.0
 
 _AIRBORNE = 0.05
 """Height from which on a vehicle is in the air, m."""
+
+_STATES = {
+    FlightStatus.UNKNOWN: "",
+    FlightStatus.ON_GROUND: "on_ground",
+    FlightStatus.TAKING_OFF: "taking_off",
+    FlightStatus.FLYING: "flying",
+    FlightStatus.DESCENDING: "descending",
+    FlightStatus.LANDING: "landing",
+}
 
 _LEGAL = {
     # A takeoff that is aborted at once is never told.
@@ -104,7 +114,7 @@ class Watch:
         """Begin to listen."""
         self.graph.listen("/tf", self._on_tf)
         self.graph.listen("/control/final", self._on_control)
-        self.graph.listen("/in_flight_state", self._on_state)
+        self.graph.listen("/in_flight_flight_status", self._on_status)
 
     def allow(self, height: float) -> None:
         """Take note of a reference at ``height`` (m)."""
@@ -188,7 +198,7 @@ class Watch:
         if control.thrust > 1.2 * GRAVITY and not self.may_fly:
             self.say(f"thrust without a takeoff: {control.thrust:.2f} m/s^2")
 
-    def _on_state(self, message):
-        before, self.state = self.state, message.data
+    def _on_status(self, message):
+        before, self.state = self.state, _STATES[message.state]
         if before and self.state != before and self.state not in _LEGAL.get(before, ()):
             self.say(f"flight state went from {before} to {self.state}")

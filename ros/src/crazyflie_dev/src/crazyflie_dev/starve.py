@@ -1,8 +1,9 @@
 """Flies the software example while its nodes get only a share of their time.
 
 Every node is stopped (SIGSTOP) and goes on (SIGCONT) at moments of its own, as on a computer that
-is too busy. The vehicle has to stay near its hover point, or to come down. Run
-``python3 -m crazyflie_dev.starve --share 0.3``.
+is too busy; or all together get a quota of a core by a Linux control group, as in a container. The
+vehicle has to stay near its hover point, or to come down. Run
+``python3 -m crazyflie_dev.starve --share 0.3``, or ``--quota 0.1`` as root.
 """
 
 import argparse
@@ -11,6 +12,8 @@ import signal
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -66,25 +69,68 @@ def starve(pids: list[int], share: float, duration: float, seed: int) -> None:
             os.kill(pid, signal.SIGCONT)
 
 
+_GROUPS = Path("/sys/fs/cgroup")
+_PERIOD = 100_000
+"""In which a quota counts, microseconds: what Linux and container engines take by default."""
+
+
+@contextmanager
+def limited(pids: list[int], quota: float) -> Iterator[None]:
+    """Give processes together a quota of a core, by control groups of version 1 or 2.
+
+    Raises
+    ------
+    OSError
+        The system does not allow it, by permission or since there is no controller of the CPU.
+    """
+    has_version_1 = (_GROUPS / "cpu").is_dir()
+    parent = _GROUPS / "cpu" if has_version_1 else _GROUPS
+    group = parent / f"starve_{os.getpid()}"
+    group.mkdir()
+    try:
+        share = round(quota * _PERIOD)
+        if has_version_1:
+            (group / "cpu.cfs_period_us").write_text(str(_PERIOD))
+            (group / "cpu.cfs_quota_us").write_text(str(share))
+        else:
+            (parent / "cgroup.subtree_control").write_text("+cpu")
+            (group / "cpu.max").write_text(f"{share} {_PERIOD}")
+        for pid in pids:
+            (group / "cgroup.procs").write_text(str(pid))
+        yield
+    finally:
+        for member in (group / "cgroup.procs").read_text().split():
+            (parent / "cgroup.procs").write_text(member)
+        group.rmdir()
+
+
 def main() -> int:
     """Fly; print what was seen; exit with 1 when the vehicle was too high."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--share", type=float, default=0.3, help="of the time, for each node")
+    parser.add_argument("--quota", type=float, help="of a core, for all nodes, in place of a share")
     parser.add_argument("--duration", type=float, default=60.0, help="s")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--dynamics", default="quadrotor", help="of sw_hover.launch")
     options = parser.parse_args()
     if not 0.05 <= options.share < 1.0:
         parser.error(f"--share is {options.share:g}; expected 0.05 or more, and less than 1")
+    if options.quota is not None and not 0.01 <= options.quota <= 1.0:
+        parser.error(f"--quota is {options.quota:g}; expected 0.01 to 1")
     arguments = ["rviz:=false", f"dynamics:={options.dynamics}"]
     log = Path(tempfile.mkdtemp()) / "sw_hover.log"
     with roslaunch(["crazyflie_examples", "sw_hover.launch", *arguments], log):
         operator = FlightOperator(begin("starve"), limit=60.0)
         operator.wait_until_ready()
         operator.takeoff()
-        starve(process_ids(NODES), options.share, options.duration, options.seed)
-        operator.hover(5.0)
+        pids = process_ids(NODES)
         try:
+            if options.quota is None:
+                starve(pids, options.share, options.duration, options.seed)
+            else:
+                with limited(pids, options.quota):
+                    operator.hover(options.duration)
+            operator.hover(5.0)
             operator.land()
             outcome = "flown to the end"
         except FlightError as error:

@@ -2,12 +2,6 @@
 
 import math
 
-TAKING_OFF, FLYING, DESCENDING = "taking_off", "flying", "descending"
-"""Of the states that a takeoff server tells, those in which the control counts."""
-
-LANDING = "landing"
-"""After `DESCENDING`, when the takeoff server's thrust counts until the vehicle stands."""
-
 LIFTED = 0.05
 """A vehicle so far above the lowest height it has been at flies, m."""
 

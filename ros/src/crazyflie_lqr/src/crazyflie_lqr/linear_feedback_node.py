@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 from std_msgs.msg import String
 from typing_extensions import override
 
-from crazyflie_lqr.flight_phase import DESCENDING, FLYING, LANDING, TAKING_OFF, GroundGuess
+from crazyflie_lqr.flight_phase import GroundGuess
 from crazyflie_lqr.gain_file import MatrixFile, VectorFile
 from crazyflie_lqr.linear_feedback import LinearFeedback, at_rest
 from crazyflie_lqr.reference import GuardedReference
 from crazyflie_lqr.state_age import StateAge
 from crazyflie_model.limits import MAX_SPEED
-from crazyflie_msgs.msg import Control, ControlStamped
+from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import TOPIC, Integer, Number
@@ -52,11 +52,11 @@ class LinearFeedbackParameters(Parameters):
         None,
         name="topics/descent_reference",
     )
-    flight_state_topic: str = parameter(
-        TOPIC,
-        "where the takeoff server tells the flight state",
-        "in_flight_state",
-        name="topics/flight_state",
+    flight_status_topic: str = parameter(
+        TOPIC, "of the takeoff server", "in_flight_flight_status", name="topics/flight_status"
+    )
+    flight_state_topic: str | None = parameter(
+        TOPIC, "text of a takeoff server without flight status", None, name="topics/flight_state"
     )
     max_jump: float = parameter(
         Number("m", above=0.0),
@@ -121,7 +121,7 @@ class LinearFeedbackNode(Node):
 
     def __init__(self) -> None:
         self._reference = GuardedReference(self.yaw_index, report=self._warn_of_reference)
-        self._flight_state: str | None = None
+        self._flight_state: int = FlightStatus.UNKNOWN
         self._is_flown = False
         self._clocks_agree = False
         self._ground_guess = GroundGuess()
@@ -170,7 +170,13 @@ class LinearFeedbackNode(Node):
         handle.subscribe(
             parameters.descent_topic, self.reference_type, self._on_descent, finite="state"
         )
-        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(
+            parameters.flight_status_topic,
+            FlightStatus,
+            lambda message: self._set_flight_state(message.state),
+        )
+        if parameters.flight_state_topic is not None:
+            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
         handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
 
     def _reconfigure(self, parameters):
@@ -206,7 +212,7 @@ class LinearFeedbackNode(Node):
                 throttle=1.0,
                 key="old reference",
             )
-        elif self._flight_state == TAKING_OFF and not self._is_flown:
+        elif self._flight_state == FlightStatus.TAKING_OFF and not self._is_flown:
             self._is_flown = True
             self._controller.take_off()
 
@@ -223,10 +229,13 @@ class LinearFeedbackNode(Node):
         self._reference.descend(x_ref, self._handle.time())
 
     def _on_flight_state(self, message):
-        before, self._flight_state = self._flight_state, message.data
-        if before == message.data:
+        self._set_flight_state(getattr(FlightStatus, message.data.upper(), self._flight_state))
+
+    def _set_flight_state(self, state):
+        before, self._flight_state = self._flight_state, state
+        if state == before:
             return
-        if message.data in (FLYING, DESCENDING):
+        if state in (FlightStatus.FLYING, FlightStatus.DESCENDING):
             # Who did not see the takeoff does not know what the vehicle weighs, either.
             if not self._is_flown:
                 self._controller.take_off()
@@ -240,13 +249,13 @@ class LinearFeedbackNode(Node):
             return
         x = to_tuple(message.state)
         x_ref = self._reference.value(self._handle.time(), x)
-        if x_ref is None and self._flight_state == FLYING:
+        if x_ref is None and self._flight_state == FlightStatus.FLYING:
             # Started anew in flight; the reference may have been said once, long ago.
             self._reference.update(at_rest(x, self.yaw_index))
             x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None:
             return
-        if self._flight_state is None:
+        if self._flight_state == FlightStatus.UNKNOWN:
             self._guess_flight(x, x_ref)
         time = message.header.stamp.to_sec()
         u = self._law(x, x_ref, time)
@@ -285,7 +294,7 @@ class LinearFeedbackNode(Node):
 
     def _warn_of_reference(self, text):
         # The last reference of every descent has a velocity.
-        if self._flight_state == LANDING:
+        if self._flight_state == FlightStatus.LANDING:
             return
         self._handle.warn(text, throttle=1.0, key="reference")
 

@@ -7,6 +7,7 @@ from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_msgs.msg import (
+    FlightStatus,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
@@ -16,9 +17,6 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
 from crazyflie_utils.vectors import is_finite
-
-FLYING = "flying"
-"""Flight state of a vehicle that follows references."""
 
 _SPEED = Number("m/s", above=0.0)
 
@@ -58,8 +56,11 @@ class VelocityReferenceParameters(Parameters):
     controller_reference_topic: str = parameter(
         TOPIC, "references for the controller go here", name="topics/controller_reference"
     )
-    flight_state_topic: str = parameter(
-        TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
+    flight_status_topic: str = parameter(
+        TOPIC, "the takeoff server's", "in_flight_flight_status", "topics/flight_status"
+    )
+    flight_state_topic: str | None = parameter(
+        TOPIC, "text of a takeoff server without flight status", None, "topics/flight_state"
     )
     time_step: float = parameter(TIME_STEP, "between two references", 0.02)
     silence: float = parameter(
@@ -90,7 +91,7 @@ class VelocityReferenceNode(Node):
     needed_in_flight = True
 
     def __init__(self) -> None:
-        self._flight_state = ""
+        self._flight_state: int = FlightStatus.UNKNOWN
         self._time = 0.0
         self._is_moving = False
 
@@ -107,7 +108,13 @@ class VelocityReferenceNode(Node):
         self._publisher = handle.publisher(
             parameters.controller_reference_topic, PositionVelocityYawStateStamped, latch=True
         )
-        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(
+            parameters.flight_status_topic,
+            FlightStatus,
+            lambda message: self._set_flight_state(message.state),
+        )
+        if parameters.flight_state_topic is not None:
+            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
         handle.subscribe(
             parameters.reference_topic,
             PositionVelocityStateStamped,
@@ -130,8 +137,11 @@ class VelocityReferenceNode(Node):
         self._reference.silence = parameters.silence
 
     def _on_flight_state(self, message):
-        self._flight_state = message.data
-        if message.data != FLYING:
+        self._set_flight_state(getattr(FlightStatus, message.data.upper(), FlightStatus.UNKNOWN))
+
+    def _set_flight_state(self, state):
+        self._flight_state = state
+        if state != FlightStatus.FLYING:
             self._is_moving = False
             self._reference.stop()
 
@@ -153,7 +163,7 @@ class VelocityReferenceNode(Node):
     def _on_timer(self):
         now = self._handle.time()
         dt, self._time = max(now - self._time, 0.0), now
-        if self._flight_state != FLYING or self._reference.pose is None:
+        if self._flight_state != FlightStatus.FLYING or self._reference.pose is None:
             return
         if not self._is_moving and not self._reference.is_commanded(now):
             return

@@ -33,7 +33,7 @@ class Callers:
         self._changes: deque[float] = deque(maxlen=tolerance + 1)
 
     def hear(self, time: float, caller: str, overlap: float = OVERLAP) -> None:
-        """Take note of a message.
+        """Take a message.
 
         Parameters
         ----------

@@ -13,31 +13,37 @@ Control = TypeVar("Control")
 
 
 class ControlFilter(Generic[Control]):
-    """Pass takeoff controls always, commanded ones when the vehicle is the controller's.
+    """Selects takeoff controls always, commanded ones when the vehicle is the controller's.
 
     That is in flight, or when the last takeoff control is older than
     `TAKEOFF_CONTROL_LIMIT`. Otherwise the last takeoff control is repeated.
 
-    Whether the vehicle is in flight is what the toggle says, until a flight
-    state is known; from then on only the flight state counts, so that a
-    toggle and a state that tell the same event cannot cancel each other. Who
-    knows by the flight state that the vehicle is on the ground also keeps the
-    controller out when zero thrust is no longer repeated, because the server
-    has died: the controller may hold a reference high above.
+    Whether the vehicle is in flight is what the toggle says, until a flight state is known; from
+    then on only the flight state counts, so that a toggle and a state of the same event cannot
+    cancel each other. A flight state of a vehicle on the ground also keeps the controller out when
+    zero thrust is no longer repeated, because the server has died: the controller may hold a
+    reference high above.
 
-    A filter that has just started does not know yet how old the last takeoff
-    control is. So it listens first, until one comes or `stop_listening` is called; only
-    the flight state can tell it before that the controller is to be passed.
+    A filter that has just started does not know yet how old the last takeoff control is. So it
+    listens first, until one comes or `stop_listening` is called; before that only a flight state
+    can select the controller.
 
-    Controls are passed on as they are; they can be of any type.
+    Controls can be of any type.
+
+    Attributes
+    ----------
+    state : FlightState or None
+        As the server has published it last.
+    is_commanded : bool
+        Whether a commanded control has ever come.
     """
 
     def __init__(self) -> None:
-        self._state: FlightState | None = None
+        self.state: FlightState | None = None
+        self.is_commanded = False
         self._toggled = False
         self._listening = True
         self._waiting: Control | None = None
-        self._is_commanded = False
         self._takeoff_control: Control | None = None
         self._takeoff_thrust = 0.0
         self._takeoff_time = math.inf
@@ -45,24 +51,7 @@ class ControlFilter(Generic[Control]):
     @property
     def in_flight(self) -> bool:
         """Whether the vehicle is in flight, as far as is known."""
-        return self._toggled if self._state is None else self._state.in_flight
-
-    def is_controllers(self, time: float, tolerance: float) -> bool:
-        """Tell whether the vehicle would fall at ``time`` (s) without the controller.
-
-        So it is in flight, unless a takeoff control has come in the last ``tolerance`` (s); and
-        between takeoff and flight, or when the server has died above the ground, once the last
-        takeoff control is older than `TAKEOFF_CONTROL_LIMIT`.
-        """
-        self._takeoff_time = min(self._takeoff_time, time)
-        age = math.inf if self._takeoff_control is None else time - self._takeoff_time
-        if self.in_flight:
-            return age > tolerance
-        return not self.is_on_ground and age > TAKEOFF_CONTROL_LIMIT
-
-    def takeoff_age(self, time: float) -> float:
-        """Return how old the last takeoff control is at ``time``, s; infinite without one."""
-        return math.inf if self._takeoff_control is None else time - self._takeoff_time
+        return self._toggled if self.state is None else self.state.in_flight
 
     @property
     def is_on_ground(self) -> bool:
@@ -70,54 +59,54 @@ class ControlFilter(Generic[Control]):
         if self.in_flight or self._takeoff_thrust > 0.0:
             return False
         # A landing that has come to zero thrust is one of a vehicle on the ground.
-        return self._state is not FlightState.TAKING_OFF
+        return self.state is not FlightState.TAKING_OFF
 
     @property
-    def stands(self) -> bool:
+    def server_reports_ground(self) -> bool:
         """Whether the server says by zero thrust that the vehicle is on the ground."""
-        is_told = self._takeoff_control is not None and self._takeoff_thrust <= 0.0
-        return is_told and not self.in_flight and self._state in (None, FlightState.ON_GROUND)
-
-    @property
-    def is_commanded(self) -> bool:
-        """Whether a commanded control has ever come."""
-        return self._is_commanded
+        sends_zero = self._takeoff_control is not None and self._takeoff_thrust <= 0.0
+        return sends_zero and not self.in_flight and self.state in (None, FlightState.ON_GROUND)
 
     @property
     def remembered(self) -> FlightState | None:
-        """The flight state to tell a server that has been restarted; None if unknown.
+        """The flight state for a server that has been restarted; None if unknown.
 
-        A toggle that says "on the ground" is not remembered: who has missed
-        one takes flight for ground.
+        A toggle to the ground is not remembered: after a toggle that was missed it means flight.
         """
-        if self._state is None and self._toggled:
+        if self.state is None and self._toggled:
             return FlightState.FLYING
-        return self._state
+        return self.state
+
+    def selects_controller(self, time: float, tolerance: float) -> bool:
+        """Whether the vehicle would fall at ``time`` (s) without the controller.
+
+        So it is in flight, unless a takeoff control has come in the last ``tolerance`` (s); and
+        between takeoff and flight, or when the server has died above the ground, once the last
+        takeoff control is older than `TAKEOFF_CONTROL_LIMIT`.
+        """
+        if self.in_flight:
+            return self.takeoff_age(time) > tolerance
+        return not self.is_on_ground and self.takeoff_age(time) > TAKEOFF_CONTROL_LIMIT
+
+    def takeoff_age(self, time: float) -> float:
+        """Return how old the last takeoff control is at ``time``, s; infinite without one."""
+        return math.inf if self._takeoff_control is None else time - self._takeoff_time
+
+    def advance(self, time: float) -> None:
+        """Let time pass until ``time`` (s); after a reset of the clock ages count from there."""
+        self._takeoff_time = min(self._takeoff_time, time)
 
     def end_flight(self) -> None:
-        """Take note that the vehicle is on the ground, whatever toggles have said."""
+        """Set the flight to ended, whatever toggles have said."""
         self._toggled = False
         self._takeoff_thrust = 0.0
 
     def toggle(self) -> None:
-        """Take note of a toggle of in_flight."""
+        """Take a toggle of in_flight."""
         self._toggled = not self._toggled
 
-    def set_state(self, state: FlightState) -> None:
-        """Take note of the server's flight state."""
-        self._state = state
-
     def takeoff(self, time: float, control: Control, thrust: float) -> Control:
-        """Return what to pass on when a takeoff control has come.
-
-        Parameters
-        ----------
-        time : float
-            Now, s.
-        control : object
-        thrust : float
-            Its thrust, m/s^2.
-        """
+        """Return what to pass on when a takeoff control with a thrust (m/s^2) has come."""
         self._listening = False
         self._waiting = None
         self._takeoff_control = control
@@ -127,29 +116,22 @@ class ControlFilter(Generic[Control]):
 
     def commanded(self, time: float, control: Control) -> Control | None:
         """Return what to pass on when a commanded control has come at ``time`` (s), or None."""
-        # After a reset of the clock the age counts from there.
-        self._takeoff_time = min(self._takeoff_time, time)
-        self._is_commanded = True
+        self.advance(time)
+        self.is_commanded = True
         self._waiting = None
         if self.in_flight:
             return control
         if self._takeoff_control is None and self._listening:
             self._waiting = control
             return None
-        if self._is_kept_on_ground():
+        # A thrust above zero came from a server that lifts the vehicle off without publishing a
+        # flight state; the state that is known is then old.
+        is_kept_down = self.state is FlightState.ON_GROUND and self._takeoff_thrust <= 0.0
+        if is_kept_down or self.takeoff_age(time) <= TAKEOFF_CONTROL_LIMIT:
             return self._takeoff_control
-        if self._takeoff_control is None:
-            return control
-        if time - self._takeoff_time > TAKEOFF_CONTROL_LIMIT:
-            return control
-        return self._takeoff_control
+        return control
 
     def stop_listening(self, time: float) -> Control | None:
         """Return what to pass on of what has waited until now, ``time`` (s), or None."""
         self._listening = False
         return None if self._waiting is None else self.commanded(time, self._waiting)
-
-    def _is_kept_on_ground(self):
-        # A thrust above zero came from a server that lifts the vehicle off
-        # without telling a flight state; the state that is known is then old.
-        return self._state is FlightState.ON_GROUND and self._takeoff_thrust <= 0.0

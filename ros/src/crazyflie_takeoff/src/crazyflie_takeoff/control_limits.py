@@ -1,9 +1,10 @@
-"""What a control may ask of the vehicle, whoever has made it."""
+"""Limits of controls: ranges, climb, and how long the vehicle keeps one."""
 
 import math
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
 from crazyflie_model.units import GRAVITY
+from crazyflie_takeoff.limits import Debounce
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import Setpoint, limited
 
@@ -19,7 +20,7 @@ RETURN_RATE = 0.5
 LANDING_CLIMB = 0.5
 """Climb of a vehicle that is to land, m/s."""
 
-CLIMB_PATIENCE = 2.0
+CLIMB_TIMEOUT = 2.0
 """Controls that ask for too much climb for longer than this are not obeyed any more, s."""
 
 MAX_SPEED_CHANGE = 0.5
@@ -73,7 +74,7 @@ class ClimbLimit:
     def __init__(self, climb: float):
         self._climb = climb
         self._complaint = ""
-        self._lasted = 0.0
+        self._debounce = Debounce(CLIMB_TIMEOUT)
 
     def apply(
         self,
@@ -115,8 +116,7 @@ class ClimbLimit:
 
     def advance(self, step: float) -> str:
         """Let time pass (s); return what has been asked for too long, or an empty text."""
-        self._lasted = self._lasted + step if self._complaint else 0.0
-        return self._complaint if self._lasted > CLIMB_PATIENCE else ""
+        return self._debounce.advance(step, self._complaint)
 
 
 class RunGaps:
@@ -144,7 +144,7 @@ class RunGaps:
         return self._longest
 
     def run(self, time: float) -> None:
-        """Take note that the filter runs at ``time`` (s)."""
+        """Update the gaps: the filter runs at ``time`` (s)."""
         gap = time - self._time
         self._time = time
         if gap > 0.0:

@@ -1,4 +1,4 @@
-"""The geofence's box, as its node tells it."""
+"""The geofence's box, as its node publishes it."""
 
 import math
 from collections.abc import Callable
@@ -18,7 +18,7 @@ def follow_box(handle: NodeHandle, topic: str, callback: Callable[[Box], None]) 
     ----------
     handle : NodeHandle
     topic : str
-        Where the geofence tells its live parameters, latched.
+        The geofence's live parameters, latched.
     callback : callable
     """
     # Here, since most flights have no fence.

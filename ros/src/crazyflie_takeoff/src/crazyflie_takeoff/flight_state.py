@@ -38,16 +38,3 @@ SEPARATOR = ": "
 
 ORIGIN = " from "
 """Between what a filter has done and the flight state that it heard last."""
-
-
-class Takeover(enum.Enum):
-    """What a filter publishes before the flight state when it has taken the vehicle over.
-
-    Such as "sinking from flying". Nobody gets the vehicle back: a flight ends with either.
-    `REFUSING` is that of a vehicle on the ground, which is not to take off.
-    """
-
-    REFUSING = "refusing"
-    SINKING = "sinking"
-    DOWN = "down"
-    EMERGENCY = "emergency"

@@ -1,20 +1,52 @@
-"""What is wrong with a flight: why it is ended, and what is passed on of its controls."""
+"""What is wrong with a flight, and why it is ended."""
 
 import math
 
 from crazyflie_takeoff.callers import OVERLAP, Callers
-from crazyflie_takeoff.control_limits import ClimbLimit, RunGaps, in_range
-from crazyflie_takeoff.descent_watch import DescentWatch
-from crazyflie_takeoff.limits import Limits, Persistence, Walls
-from crazyflie_takeoff.motion import Motion
-from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.control_limits import ClimbLimit, RunGaps
+from crazyflie_takeoff.limits import Debounce, Limits, Walls
+from crazyflie_takeoff.motion import MAX_STATE_AGE, Motion
 
 HANDOVER = 3
 """So many changes of the controller are a handover from one to the other."""
 
+CRASH_DURATION = 0.1
+"""How long a limit has to be exceeded, s: a single measurement that is wrong is no crash."""
+
+DESCENT_TIMEOUT = 1.5
+"""How long a vehicle that is to land may stay up, s."""
+
+PROGRESS = 0.02
+"""Less than this below where it was highest is no descent, m."""
+
+
+class DescentWatch:
+    """Notices when a vehicle that is to land does not come down."""
+
+    def __init__(self) -> None:
+        self._highest: float | None = None
+        self._debounce = Debounce(DESCENT_TIMEOUT)
+
+    def advance(self, step: float, height: float | None) -> str:
+        """Let time pass; return in words what is wrong, or an empty text.
+
+        Parameters
+        ----------
+        step : float
+            s.
+        height : float or None
+            m; None while the vehicle is not to land, or its height is not known.
+        """
+        complaint = ""
+        if height is not None and self._highest is not None and height > self._highest - PROGRESS:
+            height = max(self._highest, height)
+            complaint = f"the vehicle has not come down for {DESCENT_TIMEOUT:g} s of a landing"
+        self._highest = height
+        return self._debounce.advance(step, complaint)
+
 
 class FlightWatch:
-    """Keeps the controls of a flight within limits, and notices those that are not to be obeyed.
+    """Watches position, climb, descent, publishers of controls, and the computer's load.
 
     Parameters
     ----------
@@ -24,6 +56,7 @@ class FlightWatch:
     ----------
     walls : Walls
     gaps : RunGaps
+    climb : ClimbLimit
     is_tilted : bool
         Whether the vehicle is tilted as only one that crashes is.
     """
@@ -32,17 +65,18 @@ class FlightWatch:
         self.walls = Walls(limits)
         self.gaps = RunGaps()
         self.is_tilted = False
-        self._position_limit = Persistence()
-        self._climb = ClimbLimit(limits.climb)
+        self._position_complaint, self._position_age = "", math.inf
+        self._position_debounce = Debounce(CRASH_DURATION)
+        self.climb = ClimbLimit(limits.climb)
         self._descent = DescentWatch()
         # The server is silent in flight: another one at once is a second one.
         self._takeoff_callers = Callers("takeoff controls", 0)
         self._commanded_callers = Callers("commanded controls", HANDOVER)
 
     @property
-    def is_calm(self) -> bool:
+    def is_nominal(self) -> bool:
         """Whether nothing has been measured that would stop the motors."""
-        return not (self.is_tilted or self._position_limit.is_wrong)
+        return not (self.is_tilted or self._position_complaint)
 
     @property
     def contention(self) -> str:
@@ -51,34 +85,19 @@ class FlightWatch:
 
     def measure(self, motion: Motion, age: float) -> None:
         """Take a state that was measured ``age`` s ago."""
-        self._position_limit.measure(self.walls.complaint(motion.position), age)
+        self._position_complaint = self.walls.complaint(motion.position)
+        self._position_age = age
 
     def hear_takeoff(self, time: float, caller: str, is_on_ground: bool) -> None:
-        """Take note of who has sent a takeoff control at ``time`` (s)."""
+        """Take the name of the node that has sent a takeoff control at ``time`` (s)."""
         self._takeoff_callers.hear(time, caller, OVERLAP if is_on_ground else math.inf)
 
     def hear_commanded(self, time: float, caller: str) -> None:
-        """Take note of who has sent a commanded control at ``time`` (s)."""
+        """Take the name of the node that has sent a commanded control at ``time`` (s)."""
         self._commanded_callers.hear(time, caller)
 
-    def allowed(
-        self,
-        control: Setpoint,
-        lowest: float,
-        hover: float,
-        motion: Motion | None,
-        highest: float,
-        is_landing: bool,
-        is_ramp: bool,
-    ) -> Setpoint:
-        """Return what is passed on of a control; see `in_range`, `ClimbLimit` and `RunGaps`."""
-        control = in_range(control, lowest)
-        thrust = self._climb.apply(control.thrust, hover, motion, highest, is_landing)
-        speed = 0.0 if motion is None else motion.velocity[2]
-        return self.gaps.apply(control._replace(thrust=thrust), hover, speed, is_ramp)
-
     def advance(self, time: float, step: float, height: float | None) -> tuple[str, str]:
-        """Let time pass until ``time``, of which ``step`` (s) counts.
+        """Let time pass until ``time``, of which ``step`` counts.
 
         Parameters
         ----------
@@ -95,8 +114,10 @@ class FlightWatch:
         self.gaps.run(time)
         for callers in (self._takeoff_callers, self._commanded_callers):
             callers.advance(time)
-        crash = self._position_limit.advance(step)
+        self._position_age += step
+        is_fresh = self._position_age < MAX_STATE_AGE
+        crash = self._position_debounce.advance(step, self._position_complaint if is_fresh else "")
         if self.is_tilted:
             crash = "the vehicle has tilted over"
-        objection = self._climb.advance(step) or self.gaps.complaint
+        objection = self.climb.advance(step) or self.gaps.complaint
         return crash, self._descent.advance(step, height) or objection

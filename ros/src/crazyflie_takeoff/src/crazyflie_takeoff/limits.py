@@ -3,11 +3,6 @@
 import math
 from dataclasses import dataclass
 
-from crazyflie_takeoff.motion import FRESHNESS
-
-PERSISTENCE = 0.1
-"""How long a limit has to be exceeded, s: a single measurement that is wrong is no crash."""
-
 
 @dataclass(frozen=True)
 class Box:
@@ -37,20 +32,20 @@ NO_BOX = Box((-math.inf,) * 3, (math.inf,) * 3)
 
 @dataclass(frozen=True)
 class Limits:
-    """What a vehicle in flight does not exceed.
+    """Limits of a vehicle in flight.
 
     Attributes
     ----------
     box : Box
-        At the beginning.
+        Of the geofence at the start.
     outside : float
-        How far outside the box is too far, m.
+        Largest distance outside the box, m.
     floor : float
         Lowest z, m, fixed frame.
     climb : float
-        Most z_dot that controls are obeyed for, m/s.
+        Largest z_dot that controls may reach, m/s.
     height : float
-        The same for the height above the ground, m.
+        Largest height above the ground that controls may reach, m.
     """
 
     box: Box
@@ -99,27 +94,20 @@ class Walls:
         return min(ground + self._limits.height, ceiling)
 
 
-class Persistence:
-    """A complaint that is renewed with every measurement, and how long it has lasted."""
+class Debounce:
+    """Lets a complaint through that lasts.
 
-    def __init__(self) -> None:
-        self._text = ""
-        self._age = math.inf
+    Parameters
+    ----------
+    duration : float
+        s.
+    """
+
+    def __init__(self, duration: float):
+        self._duration = duration
         self._lasted = 0.0
 
-    @property
-    def is_wrong(self) -> bool:
-        """Whether the latest measurement was wrong."""
-        return bool(self._text)
-
-    def measure(self, text: str, age: float = 0.0) -> None:
-        """Take what is wrong by the latest measurement, ``age`` s old, or an empty text."""
-        self._text = text
-        self._age = age
-
-    def advance(self, step: float) -> str:
-        """Let time pass (s); return what has been wrong for `PERSISTENCE`, or an empty text."""
-        self._age += step
-        is_wrong = self._text and self._age < FRESHNESS
-        self._lasted = self._lasted + step if is_wrong else 0.0
-        return self._text if self._lasted > PERSISTENCE else ""
+    def advance(self, step: float, complaint: str) -> str:
+        """Let time pass (s); return the complaint if it has lasted long enough, else no text."""
+        self._lasted = self._lasted + step if complaint else 0.0
+        return complaint if self._lasted > self._duration else ""

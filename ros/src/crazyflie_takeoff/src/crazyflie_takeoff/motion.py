@@ -3,8 +3,8 @@
 import math
 from typing import NamedTuple
 
-FRESHNESS = 0.2
-"""A measurement that is older does not count, s."""
+MAX_STATE_AGE = 0.2
+"""A state that is older does not count, s."""
 
 DRIFT = 0.1
 """How fast the age that is taken for usual may grow, s/s."""
@@ -53,8 +53,8 @@ class Measurement:
 
     @property
     def fresh(self) -> Motion | None:
-        """The state, unless it is older than `FRESHNESS`."""
-        return self.within(FRESHNESS)
+        """The state, unless it is older than `MAX_STATE_AGE`."""
+        return self.within(MAX_STATE_AGE)
 
 
 class Delay:

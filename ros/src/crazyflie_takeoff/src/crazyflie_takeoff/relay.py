@@ -1,23 +1,24 @@
-"""What is passed on of the controls that come: which one, how much of it, and for how long."""
+"""What is passed on of the controls that come: which one, within which limits, and for how long."""
 
 import math
 from typing import Generic
 
 from crazyflie_model.limits import MIN_THRUST
 from crazyflie_takeoff.control_filter import TAKEOFF_CONTROL_LIMIT, Control, ControlFilter
+from crazyflie_takeoff.control_limits import in_range
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.flight_watch import FlightWatch
+from crazyflie_takeoff.ground import TOUCHDOWN_HEIGHT, Ground
 from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Measurement, Motion
 from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, Setpoint
-from crazyflie_takeoff.server_table import TOUCHDOWN_HEIGHT
 
 LEARNING_STEP = 0.2
-"""Controls that are further apart, s, do not tell the thrust of hover."""
+"""Nothing is learned from controls that are further apart, s."""
 
 
 class Relay(Generic[Control]):
-    """Chooses between controls, limits them, and lets those fade whose successors are late.
+    """Chooses between controls, limits them, and fades late ones to hover.
 
     A control counts in full for half of ``hold``, and is level hover from ``hold`` on.
 
@@ -32,15 +33,14 @@ class Relay(Generic[Control]):
     choice : ControlFilter
     watch : FlightWatch
     measured : Measurement
-    ground : float
-        z of the ground, m, fixed frame.
+    ground : Ground
     """
 
     def __init__(self, limits: Limits, hold: float):
         self.choice: ControlFilter[Control] = ControlFilter()
         self.watch = FlightWatch(limits)
         self.measured = Measurement()
-        self.ground = 0.0
+        self.ground = Ground()
         self._hold = hold
         self._hover = HoverThrust()
         self._time = math.nan
@@ -62,25 +62,24 @@ class Relay(Generic[Control]):
         return Setpoint(0.0, 0.0, 0.0, self.hover)
 
     @property
-    def is_landing(self) -> bool:
-        """Whether the controller is to bring the vehicle down."""
+    def _is_landing(self):
         return self.choice.remembered is FlightState.DESCENDING
 
     @property
     def landing_height(self) -> float | None:
         """Height of a vehicle that its controller is to bring down, m; None of any other."""
         motion = self.measured.fresh
-        if motion is None or not self.is_landing:
+        if motion is None or not self._is_landing:
             return None
-        height = motion.position[2] - self.ground
+        height = self.ground.height(motion)
         return height if height > TOUCHDOWN_HEIGHT else None
 
-    def measure(self, motion: Motion, age: float) -> None:
+    def measure(self, motion: Motion, age: float = 0.0) -> None:
         """Take a state that was measured ``age`` s ago."""
         self.measured.update(motion, age)
         self.watch.measure(motion, age)
-        if self.choice.stands:
-            self.ground = motion.position[2]
+        if self.choice.server_reports_ground:
+            self.ground.z = motion.position[2]
 
     def takeoff(self, time: float, control: Control, setpoint: Setpoint) -> Control | Setpoint:
         """Return what to pass on of a takeoff control."""
@@ -89,24 +88,16 @@ class Relay(Generic[Control]):
         return control if self._takeoff == setpoint else self._takeoff
 
     def choose(self, time: float, control: Control, setpoint: Setpoint) -> Control | None:
-        """Return which control has its turn now that a commanded one has come; or None."""
+        """Return the control that is selected when a commanded one has come, or None."""
         self._commanded = setpoint
         return self.choice.commanded(time, control)
 
     def commanded(
         self, time: float, control: Control, age: float, is_on_ground: bool
     ) -> Control | Setpoint:
-        """Return what to pass on of the last commanded control.
+        """Return what to pass on of the last commanded control, which is ``age`` s old.
 
-        Parameters
-        ----------
-        time : float
-            Now, s.
-        control : object
-        age : float
-            How much earlier than now it counts as having come, s.
-        is_on_ground : bool
-            Whether it flies the vehicle.
+        On the ground nothing is learned from it.
         """
         allowed = self._allowed(self._commanded, MIN_THRUST if self.choice.in_flight else 0.0)
         step = time - self._time
@@ -132,16 +123,9 @@ class Relay(Generic[Control]):
         return self._faded(self._takeoff, age)
 
     def late(self, time: float, silence: float, is_needed: bool) -> Setpoint | None:
-        """Return what is to be published while the next control is late, or None.
+        """Return what replaces a control that is late, or None.
 
-        Parameters
-        ----------
-        time : float
-            Now, s.
-        silence : float
-            Age of the last commanded control, s.
-        is_needed : bool
-            Whether the vehicle is the controller's; else it is the takeoff server's.
+        It is that of the controller, ``silence`` s old, if it ``is_needed``, else the server's.
         """
         if is_needed:
             is_late = silence > 0.5 * self._hold and math.isfinite(self._time)
@@ -153,11 +137,12 @@ class Relay(Generic[Control]):
         return self._faded(self._takeoff, age)
 
     def _allowed(self, setpoint, lowest, is_ramp=False):
-        highest = self.watch.walls.highest(self.ground)
-        motion = self.measured.fresh
-        return self.watch.allowed(
-            setpoint, lowest, self.hover, motion, highest, self.is_landing, is_ramp
-        )
+        watch, motion, hover = self.watch, self.measured.fresh, self.hover
+        control = in_range(setpoint, lowest)
+        highest = watch.walls.highest(self.ground.z)
+        thrust = watch.climb.apply(control.thrust, hover, motion, highest, self._is_landing)
+        speed = 0.0 if motion is None else motion.velocity[2]
+        return watch.gaps.apply(control._replace(thrust=thrust), hover, speed, is_ramp)
 
     def _faded(self, setpoint, age):
         weight = min(max(age / (0.5 * self._hold) - 1.0, 0.0), 1.0)

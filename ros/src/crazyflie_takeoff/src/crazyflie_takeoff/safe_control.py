@@ -18,7 +18,7 @@ from crazyflie_takeoff.motion import Motion
 
 LONGEST_STEP = 0.05
 """More time than this never passes between two ticks, s: after a clock was set, or the process
-was stopped for a while, nobody has been silent for as long as it seems."""
+was stopped for a while, no silence is as long as it seems."""
 
 HOVER_RANGE = 0.25
 """How far the hover thrust may be from g, as a fraction."""

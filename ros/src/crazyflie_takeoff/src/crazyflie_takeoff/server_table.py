@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.descent import Descent, Position
 from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.ground import TOUCHDOWN_HEIGHT
 from crazyflie_takeoff.server_states import NO_FILTER, STOPS, Event, FilterReport, ServerState
 from crazyflie_takeoff.transition_table import Table, Transition
 
@@ -23,9 +24,6 @@ RAMP_DURATION = 1.0
 
 TOUCHDOWN_LIMIT = 2.0
 """How long after the ramp a vehicle may take to come down, s."""
-
-TOUCHDOWN_HEIGHT = 0.05
-"""A vehicle less than this above the ground counts as down, m."""
 
 FLYING_HEIGHT = 0.15
 """A vehicle above this height is in flight if no flight state is remembered, m."""

@@ -1,8 +1,7 @@
 """The states of server and filter as messages have them."""
 
 from crazyflie_msgs.msg import FilterStatus, FlightStatus
-from crazyflie_takeoff.filter_report import parse
-from crazyflie_takeoff.flight_state import FlightState, Takeover
+from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.server_states import Event, FilterReport
 
 CODES: dict[FlightState | None, int] = {
@@ -34,27 +33,3 @@ def report_of(message: FilterStatus) -> FilterReport:
     if message.takeoff_refusal and event in (Event.FILTER_PASSES, Event.FILTER_DOWN):
         event, reason = Event.FILTER_REFUSES, message.takeoff_refusal
     return FilterReport(event, _FLIGHT_STATES[message.flight_state], message.is_commanded, reason)
-
-
-_TAKEOVERS = {
-    Takeover.REFUSING: Event.FILTER_REFUSES,
-    Takeover.SINKING: Event.FILTER_SINKS,
-    Takeover.DOWN: Event.FILTER_DOWN,
-    Takeover.EMERGENCY: Event.FILTER_EMERGENCY,
-}
-
-
-def report_of_text(text: str) -> FilterReport:
-    """Return what a filter's text means to the server.
-
-    Raises
-    ------
-    ValueError
-        It is none of a filter's.
-    """
-    told = parse(text)
-    if told.takeover is not None:
-        event = _TAKEOVERS[told.takeover]
-    else:
-        event = Event.FILTER_HOLDS if told.is_held else Event.FILTER_PASSES
-    return FilterReport(event, told.remembered, told.is_commanded, told.reason)

@@ -98,7 +98,8 @@ class StatusPublisher:
         """Publish the status, typed and in words, if it has changed."""
         status = self._flight_status()
         content = (status.state, status.reason, status.takeoff_refusal)
-        if content != self._published:
+        # A server that takes the place of another one does not take back what is known.
+        if content != self._published and status.state != FlightStatus.UNKNOWN:
             self._published = content
             self._status.publish(status)
         if (text := _text(status)) != self._published_text:

@@ -1,31 +1,33 @@
 """ROS interface of the choice between takeoff control and commanded control."""
 
-from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Bool, Empty, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
 
-from crazyflie_msgs.msg import Control, ControlStamped, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    Control,
+    ControlStamped,
+    FlightStatus,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.fence_box import follow_box
-from crazyflie_takeoff.filter_mode import Mode, Patience
-from crazyflie_takeoff.flight_state import COMMANDED, ORIGIN, UNKNOWN, FlightState
-from crazyflie_takeoff.flight_topics import FlightTopicParameters
-from crazyflie_takeoff.limits import Limits
+from crazyflie_takeoff.filter_status_publisher import FLIGHT_STATES, FilterStatusPublisher
+from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import Setpoint
 from crazyflie_takeoff.safe_filter import SafeFilter
-from crazyflie_utils import Node, NodeHandle, ServiceError, parameter
-from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
+from crazyflie_takeoff.takeoff_control_filter_parameters import TakeoffControlFilterParameters
+from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import stamped
 
 TIME_STEP = 0.01
 """Period of the controls that the filter makes itself, s."""
 
-CALM_TIME_STEP = 0.04
-"""How often it looks after a vehicle with which all is well, s."""
+NOMINAL_TIME_STEP = 0.04
+"""The same while nothing is wrong, s."""
 
 LISTENING_TIME = 0.4
 """How long a filter that has started listens before it passes a controller, s: some
@@ -33,90 +35,19 @@ periods of the zero thrust on the ground, and less than a vehicle flies on witho
 controls."""
 
 SERVER_LIMIT = 2.0
-"""How long it waits for the word of a server that is there but still finds out, s."""
+"""How long it waits for the flight state of a server that still recovers it, s."""
 
 FRESH_TIME = 5.0
 """How long after its start a filter does not take commands for a sign of flight, s."""
 
 CONTROLLER_POLL_PERIOD = 0.1
-"""How often it is looked whether there is a controller, s."""
-
+"""Between two looks for publishers of commanded controls, s."""
 
 BUSY_GAP = 0.1
-"""A filter that does not run for this long, s, is on a computer that is too busy."""
+"""The computer of a filter that does not run for this long, s, is too busy."""
 
 REPETITION = 10.0
-"""The same warning comes again after this, s, at the earliest."""
-
-
-class TakeoffControlFilterParameters(FlightTopicParameters):
-    """Parameters of `TakeoffControlFilterNode`."""
-
-    takeoff_control_topic: str = parameter(
-        TOPIC, "the takeoff server's control", name="topics/takeoff_control"
-    )
-    commanded_control_topic: str = parameter(
-        TOPIC, "the controller's control", name="topics/commanded_control"
-    )
-    final_control_topic: str = parameter(
-        TOPIC, "the one that is passed on", name="topics/final_control"
-    )
-    state_topic: str | None = parameter(
-        TOPIC, "where the vehicle is; without it the limits are not watched", None, "topics/state"
-    )
-    own_tilted_topic: str | None = parameter(
-        TOPIC, "by default the name of state + `_tilted`", None, "topics/tilted"
-    )
-    all_emergency_topic: str = parameter(
-        TOPIC, "stops the motors of all vehicles", "/all/emergency", "topics/all_emergency"
-    )
-    emergency_service: str = parameter(SERVICE, "stops the motors", "/emergency", "srv/emergency")
-    reset_service: str = parameter(
-        SERVICE, "ends an emergency", "/emergency_reset", "srv/emergency_reset"
-    )
-    hold: float = parameter(
-        DURATION, "control that is older in flight is replaced", 0.1, "loss/hold_after"
-    )
-    recovery: float = parameter(
-        DURATION,
-        "how long it may then stay away before the descent, while no state comes, either",
-        1.5,
-        "loss/return_limit",
-    )
-    place: float = parameter(
-        DURATION, "the same in flight while states come", 3.0, "loss/place_limit"
-    )
-    descent: float = parameter(
-        DURATION,
-        "the motors are stopped this long after the descent has begun; later by the time to "
-        "sink when the height is known",
-        5.0,
-        "loss/descent_limit",
-    )
-    floor: float = parameter(METRES, "lower is below the ground", -0.5, "limits/floor")
-    outside: float = parameter(
-        Number("m", minimum=0.0), "further outside the geofence is too far", 0.5, "limits/outside"
-    )
-    climb: float = parameter(
-        Number("m/s", above=0.0), "controls do not climb faster", 3.0, "limits/climb"
-    )
-    height: float = parameter(
-        Number("m", above=0.0),
-        "controls do not climb higher above the ground",
-        10.0,
-        "limits/height",
-    )
-
-    @property
-    def tilted_topic(self) -> str | None:
-        """Where the estimator tells that the vehicle is tilted as only one that crashes is."""
-        of_state = None if self.state_topic is None else f"{self.state_topic}_tilted"
-        return self.own_tilted_topic or of_state
-
-    def limits(self) -> Limits:
-        """Return where the motors are stopped."""
-        box = self.box.without_floor()
-        return Limits(box, self.outside, self.floor, self.climb, self.height)
+"""Shortest time between two warnings of the same kind, s."""
 
 
 class TakeoffControlFilterNode(Node):
@@ -125,8 +56,6 @@ class TakeoffControlFilterNode(Node):
     needed_in_flight = True
 
     def __init__(self) -> None:
-        self._published_state: str | None = None
-        self._logged_explanation = ""
         self._published_controller: bool | None = None
         self._is_fresh = True
         self._state_delay, self._control_delay = Delay(), Delay()
@@ -135,20 +64,16 @@ class TakeoffControlFilterNode(Node):
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = handle.load(TakeoffControlFilterParameters)
         self._parameters = parameters
-        patience = Patience(
-            parameters.hold, parameters.recovery, parameters.descent, parameters.place
-        )
         self._filter: SafeFilter[ControlStamped] = SafeFilter(
-            patience, parameters.limits(), parameters.state_topic is not None
+            parameters.timeouts(), parameters.limits(), parameters.state_topic is not None
         )
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         self._final = handle.publisher(parameters.final_control_topic, ControlStamped)
-        self._filter_state = handle.publisher(parameters.filter_state_topic, String, latch=True)
+        self._status = FilterStatusPublisher(handle, parameters)
         self._controller = handle.publisher(parameters.controller_topic, Bool, latch=True)
-        self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._publish_state()
         self._advertise(handle, parameters.emergency_service, self._on_emergency)
         self._advertise(handle, parameters.reset_service, self._on_reset)
@@ -156,6 +81,7 @@ class TakeoffControlFilterNode(Node):
         self._server = handle.subscribe(
             parameters.flight_state_topic, String, self._on_flight_state
         )
+        handle.subscribe(parameters.flight_status_topic, FlightStatus, self._on_flight_status)
         handle.subscribe(parameters.in_flight_topic, Empty, self._on_toggle)
         self._subscribe_measurements(handle)
         self._takeoffs = handle.subscribe(
@@ -210,11 +136,15 @@ class TakeoffControlFilterNode(Node):
         handle.timer(CONTROLLER_POLL_PERIOD, self._publish_controller, steady=True, stagger=True)
         handle.timer(diagnostics.PERIOD, self._publish_diagnostics, steady=True, stagger=True)
 
-    # What it hears.
+    # Inputs.
+
+    def _on_flight_status(self, message):
+        if state := FLIGHT_STATES[message.state]:
+            self._set_flight_state(state)
 
     def _on_flight_state(self, message):
         try:
-            self._filter.set_state(FlightState(message.data))
+            self._set_flight_state(FlightState(message.data))
         except ValueError:
             self._handle.warn(
                 f"ignoring {message.data!r}, which is no flight state, on "
@@ -222,6 +152,9 @@ class TakeoffControlFilterNode(Node):
                 throttle=1.0,
                 key="flight state",
             )
+
+    def _set_flight_state(self, state):
+        self._filter.choice.state = state
         self._publish_state()
         self._set_pace()
 
@@ -235,16 +168,16 @@ class TakeoffControlFilterNode(Node):
         motion = Motion(
             (state.x, state.y, state.z), (state.x_dot, state.y_dot, state.z_dot), state.yaw
         )
-        self._filter.measure(motion, self._excess(self._state_delay, message))
+        self._filter.relay.measure(motion, self._excess(self._state_delay, message))
 
     def _excess(self, delay, message):
         return delay.excess(message.header.stamp.to_sec(), self._handle.nanoseconds() * 1e-9)
 
     def _on_box(self, box):
-        self._filter.set_box(box.without_floor())
+        self._filter.watch.walls.change(box.without_floor())
 
     def _on_tilted(self, message):
-        self._filter.set_tilted(message.data)
+        self._filter.watch.is_tilted = message.data
         self._set_pace()
 
     def _on_takeoff_control(self, message):
@@ -283,7 +216,7 @@ class TakeoffControlFilterNode(Node):
         self._publish_state()
         return EmptyResponse()
 
-    # What time brings.
+    # Timers.
 
     def _on_timer(self):
         self._publish(self._filter.tick(self._handle.time()), self._handle.stamp())
@@ -291,7 +224,7 @@ class TakeoffControlFilterNode(Node):
         if gap > BUSY_GAP:
             self._handle.warn(
                 f"this computer is too busy: the filter has not run for {gap:.2f} s; expected "
-                f"every {CALM_TIME_STEP:g} s. Controls are kept near hover meanwhile",
+                f"every {NOMINAL_TIME_STEP:g} s. Controls are kept near hover meanwhile",
                 throttle=REPETITION,
                 key="busy",
             )
@@ -300,12 +233,12 @@ class TakeoffControlFilterNode(Node):
 
     def _set_pace(self):
         # With time enough to be quick again before the vehicle is taken over.
-        calm = max(TIME_STEP, min(CALM_TIME_STEP, 0.4 * self._parameters.hold))
-        self._timer.set_period(calm if self._filter.is_calm else TIME_STEP)
+        nominal = max(TIME_STEP, min(NOMINAL_TIME_STEP, 0.4 * self._parameters.hold))
+        self._timer.set_period(nominal if self._filter.is_nominal else TIME_STEP)
 
     def _stop_listening(self):
-        # A server that is there, and looks where the flight stands, soon tells.
-        if self._filter.remembered is not None or not self._server.has_publishers():
+        # A server that recovers the state of the flight soon publishes it.
+        if self._filter.choice.remembered is not None or not self._server.has_publishers():
             self._stop_waiting()
 
     def _stop_waiting(self):
@@ -318,7 +251,7 @@ class TakeoffControlFilterNode(Node):
         self._is_fresh = False
         self._publish_state()
 
-    # What it says.
+    # Outputs.
 
     def _publish(self, control, stamp):
         if isinstance(control, Setpoint):
@@ -329,44 +262,21 @@ class TakeoffControlFilterNode(Node):
     def _publish_controller(self):
         is_there = self._commands.has_publishers()
         if not is_there:
-            self._filter.controller_left()
-        has_controller = is_there and not self._filter.lacks_control
+            # The next one is new.
+            self._filter.machine.lacks_controller = False
+        has_controller = is_there and not self._filter.machine.lacks_controller
         if has_controller != self._published_controller:
             self._published_controller = has_controller
             self._controller.publish(Bool(has_controller))
 
     def _publish_state(self):
-        state = self._word() + self._filter.explanation
-        if state != self._published_state:
-            self._published_state = state
-            self._filter_state.publish(String(state))
-            # Once, however the flight state in front of it changes.
-            if self._filter.explanation not in ("", self._logged_explanation):
-                self._handle.warn(state)
-            self._logged_explanation = self._filter.explanation
-
-    def _word(self):
-        told = [each.value for each in (self._filter.takeover, self._filter.remembered) if each]
-        if told:
-            return ORIGIN.join(told)
+        status = self._filter.status
         # Commands that come right after a launch say nothing about the vehicle.
-        return COMMANDED if self._filter.is_commanded and not self._is_fresh else UNKNOWN
+        is_commanded = status.is_commanded and not self._is_fresh
+        self._status.publish(status._replace(is_commanded=is_commanded))
 
     def _publish_diagnostics(self):
-        mode = self._filter.mode
-        level = diagnostics.ERROR if mode.is_final else diagnostics.WARN
-        figures = {
-            "takeovers": str(self._filter.takeovers),
-            "hover thrust (m/s^2)": f"{self._filter.hover_thrust:.2f}",
-            "age of the commanded control (s)": f"{self._filter.control_age:.2f}",
-        }
-        is_acknowledged = self._filter.remembered is FlightState.ON_GROUND
-        is_good = mode is Mode.PASSING or (mode is Mode.DOWN and is_acknowledged)
-        text = self._word() + self._filter.explanation
-        report = diagnostics.report(
-            self._handle, diagnostics.OK if is_good else level, text, figures
-        )
-        self._diagnostics.publish(report)
+        self._status.publish_diagnostics(self._filter)
 
 
 def _setpoint(message):

@@ -2,7 +2,7 @@
 
 from concurrent.futures import Future
 
-from std_msgs.msg import Bool, Empty, Float32, String
+from std_msgs.msg import Bool, Empty, Float32
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
@@ -10,6 +10,7 @@ from typing_extensions import override
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
+    FilterStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
@@ -21,7 +22,7 @@ from crazyflie_takeoff.fence_box import follow_box
 from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.server_states import NO_FILTER, STOPS, TAKEOVERS, Event, ServerState
-from crazyflie_takeoff.status_messages import report_of_text
+from crazyflie_takeoff.status_messages import report_of
 from crazyflie_takeoff.status_publisher import StatusPublisher
 from crazyflie_takeoff.takeoff_checks import TakeoffChecks
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
@@ -84,7 +85,7 @@ class TakeoffServerNode(Node):
         self._status = StatusPublisher(handle, parameters, self._flight, checks)
         handle.advertise_service(parameters.takeoff_service, EmptyService, self._on_takeoff)
         handle.advertise_service(parameters.land_service, EmptyService, self._on_land)
-        handle.subscribe(parameters.filter_state_topic, String, self._on_filter_state)
+        handle.subscribe(parameters.filter_status_topic, FilterStatus, self._on_filter_status)
         handle.subscribe(
             parameters.controller_topic, Bool, lambda message: checks.set_controller(message.data)
         )
@@ -177,15 +178,16 @@ class TakeoffServerNode(Node):
 
     # Inputs.
 
-    def _on_filter_state(self, message):
+    def _on_filter_status(self, message):
         try:
-            report = report_of_text(message.data)
-        except ValueError:
+            report = report_of(message)
+        except KeyError:
             self._handle.warn(
-                f"ignoring {message.data!r}, which is no flight state, on "
-                f"{self._parameters.filter_state_topic}",
+                f"ignoring state {message.state}, flight_state {message.flight_state} on "
+                f"{self._parameters.filter_status_topic}; expected constants of FilterStatus and "
+                "FlightStatus",
                 throttle=1.0,
-                key="flight state",
+                key="filter status",
             )
             return
         if report.event in TAKEOVERS and self._flight.accepts(report.event):

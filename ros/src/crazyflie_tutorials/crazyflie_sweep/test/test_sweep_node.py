@@ -7,10 +7,13 @@ from pathlib import Path
 
 import pytest
 import rospkg
-from std_msgs.msg import String
 from std_srvs.srv import EmptyResponse, TriggerRequest
 
-from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import (
+    FlightStatus,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_sweep.sweep_node import SweepNode
 from crazyflie_sweep.velocity_server_node import VelocityServerNode
 from crazyflie_tutorial_msgs.msg import SweepReport
@@ -54,7 +57,9 @@ class Flight:
         self.calls.append(name)
         future = Future()
         future.set_result(EmptyResponse())
-        self.process.publish("/in_flight_state", String(state))
+        self.process.publish(
+            "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
+        )
         return future
 
     def step(self):
@@ -207,9 +212,9 @@ def test_without_states_it_hovers():
 def test_who_lands_ends_the_sweep():
     flight = Flight()
     flight.until(SweepReport.SWEEPING)
-    flight.process.publish("/in_flight_state", String("descending"))
+    flight.process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.DESCENDING))
     assert flight.report.state == SweepReport.FAILED
-    assert flight.report.reason == "the flight was ended: the takeoff server says descending"
+    assert flight.report.reason == "the flight was ended: the vehicle is landed"
     count = len(flight.process.published("/ref"))
     flight.for_seconds(3.0)
     assert len(flight.process.published("/ref")) == count
@@ -251,7 +256,7 @@ def test_waits_for_start_and_flies_again():
 
 def test_in_flight_it_does_not_take_off():
     flight = Flight({"start": False})
-    flight.process.publish("/in_flight_state", String("flying"))
+    flight.process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     flight.step()
     flight.process.call("/sweep/start", TriggerRequest())
     flight.until(SweepReport.DONE)

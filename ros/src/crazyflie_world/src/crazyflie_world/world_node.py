@@ -5,14 +5,12 @@ from std_msgs.msg import String
 from typing_extensions import override
 from visualization_msgs.msg import MarkerArray
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_world.markers import markers, pose
 from crazyflie_world.world import World
 from crazyflie_world.world_file import WorldFile
-
-FLYING = "flying"
-"""Flight state of a vehicle that follows references."""
 
 
 class WorldNodeParameters(Parameters):
@@ -25,9 +23,15 @@ class WorldNodeParameters(Parameters):
     poses_topic: str = parameter(
         TOPIC, "below it, each moving object has NAME/pose", "world", name="topics/poses"
     )
+    flight_status_topic: str | None = parameter(
+        TOPIC,
+        "the takeoff server's: paths begin when a vehicle flies; by default at once",
+        None,
+        name="topics/flight_status",
+    )
     flight_state_topic: str | None = parameter(
         TOPIC,
-        "the takeoff server's flight state: paths begin when a vehicle flies; by default at once",
+        "text of a takeoff server without flight status: as topics/flight_status",
         None,
         name="topics/flight_state",
     )
@@ -54,15 +58,25 @@ class WorldNode(Node):
         }
         self._broadcast = handle.broadcast_transforms()
         handle.publisher(parameters.markers_topic, MarkerArray, latch=True).publish(markers(world))
+        if parameters.flight_status_topic:
+            handle.subscribe(
+                parameters.flight_status_topic,
+                FlightStatus,
+                lambda message: self._set_flying(message.state == FlightStatus.FLYING),
+            )
         if parameters.flight_state_topic:
-            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
-        else:
+            handle.subscribe(
+                parameters.flight_state_topic,
+                String,
+                lambda message: self._set_flying(message.data == "flying"),
+            )
+        if not (parameters.flight_status_topic or parameters.flight_state_topic):
             self._begin = handle.time()
         if world.moving:
             handle.timer(parameters.time_step, self._on_timer)
 
-    def _on_flight_state(self, message):
-        if self._begin is None and message.data == FLYING:
+    def _set_flying(self, is_flying):
+        if self._begin is None and is_flying:
             self._begin = self._handle.time()
 
     def _on_timer(self):

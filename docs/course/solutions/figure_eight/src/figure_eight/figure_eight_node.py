@@ -1,9 +1,10 @@
 """The node: a subscriber that says when to begin, a timer, two publishers."""
 
 from geometry_msgs.msg import Twist
-from std_msgs.msg import String, UInt32
+from std_msgs.msg import UInt32
 from typing_extensions import override
 
+from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, Number
 from figure_eight.figure_eight import FigureEight
@@ -32,11 +33,11 @@ class FigureEightNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._velocities = handle.publisher("cmd_vel", Twist)
         self._circles = handle.publisher("~circles", UInt32, latch=True)
-        handle.subscribe("in_flight_state", String, self._on_flight_state)
+        handle.subscribe("in_flight_flight_status", FlightStatus, self._on_flight_status)
         handle.timer(self._parameters.time_step, self._on_timer)
 
-    def _on_flight_state(self, message):
-        if message.data != "flying":
+    def _on_flight_status(self, message):
+        if message.state != FlightStatus.FLYING:
             self._beginning = None
         elif self._beginning is None:
             self._beginning = self._handle.time()

@@ -1,9 +1,8 @@
 """The node: flight states and states in, flights out."""
 
-from std_msgs.msg import String
 from typing_extensions import override
 
-from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from logbook.logbook import FlightEntry, Logbook
@@ -22,12 +21,12 @@ class LogbookNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("~flight", Flight, latch=True)
         handle.advertise_service("~get_flight", GetFlight, self._on_get_flight)
-        handle.subscribe("in_flight_state", String, self._on_flight_state)
+        handle.subscribe("in_flight_flight_status", FlightStatus, self._on_flight_status)
         handle.subscribe("state", PositionVelocityYawStateStamped, self._on_state, finite="state")
 
-    def _on_flight_state(self, message):
+    def _on_flight_status(self, message):
         now = self._handle.time()
-        if message.data != "on_ground":
+        if message.state != FlightStatus.ON_GROUND:
             self._book.begin(now)
         elif entry := self._book.end(now):
             self._publisher.publish(_message(entry))

@@ -6,6 +6,7 @@ from typing_extensions import override
 from visualization_msgs.msg import MarkerArray
 
 from crazyflie_msgs.msg import (
+    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
@@ -33,9 +34,6 @@ STATE_LIMIT = 0.5
 FLIGHT_LIMIT = 120.0
 """The longest that takeoff or landing may take, s of the machine's clock."""
 
-FLYING = "flying"
-"""Flight state of a vehicle that follows references."""
-
 IDLE = (SweepReport.WAITING, SweepReport.DONE, SweepReport.FAILED)
 """States in which a sweep may begin."""
 
@@ -49,7 +47,7 @@ class SweepNode(Node):
         self._sweeper: Sweeper | None = None
         self._position: tuple[float, float, float] | None = None
         self._position_time = 0.0
-        self._flight_state = ""
+        self._flight_state: int = FlightStatus.UNKNOWN
         self._is_asking = False
         self._failure = ""
         self._begin = 0.0
@@ -70,7 +68,13 @@ class SweepNode(Node):
         self._velocity = handle.publisher(parameters.velocity_topic, Vel)
         self._markers = handle.publisher(parameters.markers_topic, MarkerArray, latch=True)
         handle.advertise_service("~start", Trigger, self._on_start)
-        handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        handle.subscribe(
+            parameters.flight_status_topic,
+            FlightStatus,
+            lambda message: self._set_flight_state(message.state, message.reason),
+        )
+        if parameters.flight_state_topic is not None:
+            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
         handle.subscribe(
             parameters.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
         )
@@ -112,7 +116,7 @@ class SweepNode(Node):
         self._begin = self._handle.time()
         self._end = None
         self._hovering = 0.0
-        if self._flight_state == FLYING:
+        if self._flight_state == FlightStatus.FLYING:
             self._sweep()
         else:
             self._set_state(SweepReport.TAKING_OFF)
@@ -133,7 +137,7 @@ class SweepNode(Node):
             self._finish("no state of the vehicle has come")
             return
         # It has to say so by itself: the answer of takeoff may come before this topic.
-        self._flight_state = FLYING
+        self._flight_state = FlightStatus.FLYING
         self._sweeper = Sweeper(self._parameters.plan(), self._position)
         self._source = VelocitySource(
             self._parameters.velocity_limit, self._parameters.velocity_most, self._handle.time()
@@ -172,9 +176,12 @@ class SweepNode(Node):
     # The flight.
 
     def _on_flight_state(self, message):
-        self._flight_state = message.data
-        if self._flight_state != FLYING and self._is_sweeping():
-            self._finish(f"the flight was ended: the takeoff server says {message.data}")
+        self._set_flight_state(getattr(FlightStatus, message.data.upper(), FlightStatus.UNKNOWN))
+
+    def _set_flight_state(self, state, reason=""):
+        self._flight_state = state
+        if state != FlightStatus.FLYING and self._is_sweeping():
+            self._finish(f"the flight was ended: {reason or 'the vehicle is landed'}")
 
     def _on_state(self, message):
         state = message.state

@@ -79,8 +79,11 @@ class SweepParameters(Parameters):
     )
     state_topic: str = parameter(TOPIC, "where states come from", name="topics/state")
     reference_topic: str = parameter(TOPIC, "where references go", name="topics/reference")
-    flight_state_topic: str = parameter(
-        TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
+    flight_status_topic: str = parameter(
+        TOPIC, "the takeoff server's", "in_flight_flight_status", "topics/flight_status"
+    )
+    flight_state_topic: str | None = parameter(
+        TOPIC, "text of a takeoff server without flight status", None, "topics/flight_state"
     )
     report_topic: str = parameter(TOPIC, "how the sweep stands", "~report", "topics/report")
     velocity_topic: str = parameter(

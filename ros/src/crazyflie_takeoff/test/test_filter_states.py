@@ -1,0 +1,119 @@
+"""The table of the filter's states, walked at random."""
+
+from random import Random
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from crazyflie_msgs.msg import FilterStatus
+from crazyflie_takeoff.control_filter import ControlFilter
+from crazyflie_takeoff.filter_states import Event, FilterMachine, FilterState, LossTimeouts
+from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.ground import Ground
+from crazyflie_takeoff.motion import Measurement, Motion
+
+TABLE = FilterMachine.TABLE
+LEGAL = {
+    FilterState.SINKING: {FilterState.DOWN, FilterState.EMERGENCY},
+    FilterState.DOWN: {FilterState.PASSING, FilterState.EMERGENCY},
+    FilterState.EMERGENCY: {FilterState.DOWN},
+}
+"""States that no control ends, and what follows them."""
+
+
+class World:
+    """A machine whose facts change at random."""
+
+    def __init__(self):
+        self.choice, self.measured, self.ground = ControlFilter(), Measurement(), Ground()
+        timeouts = LossTimeouts(0.1, 1.5, 5.0)
+        self.machine = FilterMachine(timeouts, self.choice, self.measured, self.ground)
+
+    def change(self, random):
+        """Let time pass, and facts change."""
+        step = random.choice([0.01, 0.01, 1.0, 3.0, 9.0])
+        self.machine.elapsed += step
+        self.machine.silence = random.choice([0.0, 0.2])
+        self.machine.is_needed = random.random() < 0.7
+        self.machine.takeoff_thrust = random.choice([0.0, 9.0, 10.0])
+        self.measured.advance(step)
+        if random.random() < 0.5:
+            position = (0.0, 0.0, random.choice([0.0, 0.07, 1.0]))
+            self.measured.update(Motion(position, (0.0, 0.0, random.choice([-0.4, 0.0]))), 0.0)
+        if random.random() < 0.3:
+            self.choice.state = random.choice([None, *FlightState])
+        if random.random() < 0.1:
+            self.choice.toggle()
+        if random.random() < 0.1:
+            self.choice.takeoff(0.0, "control", self.machine.takeoff_thrust)
+
+    def facts(self):
+        """Return all that guards could change."""
+        parts = (self.machine, self.choice, self.measured, self.ground)
+        return [vars(part).copy() for part in parts]
+
+    def rows(self, event):
+        """Return the rows of which any could be taken."""
+        machine = self.machine
+        return [
+            row
+            for row in TABLE
+            if row.state is machine.state and row.event is event
+            if row.guard is None or row.guard(machine)
+        ]
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.integers(0))
+def test_whatever_happens_the_table_decides(seed):
+    random, world = Random(seed), World()
+    machine = world.machine
+    for _ in range(50):
+        world.change(random)
+        event = random.choice(list(Event))
+        before = world.facts()
+        rows = world.rows(event)
+        # Guards change nothing, and all that hold lead to the same state.
+        assert world.facts() == before
+        assert len({row.next for row in rows}) <= 1
+        state = machine.state
+        assert machine.handle(event, "an event") == bool(rows)
+        assert machine.state is (rows[0].next if rows else state)
+        if machine.state is not state:
+            assert machine.elapsed == 0.0
+            assert machine.state in LEGAL.get(state, FilterState)
+        if state is FilterState.EMERGENCY and event is not Event.RESET:
+            assert machine.state is FilterState.EMERGENCY
+        if machine.state in (FilterState.DOWN, FilterState.EMERGENCY):
+            assert machine.is_on_ground
+        if machine.state is not FilterState.PASSING:
+            assert machine.reason
+
+
+def test_each_row_can_be_taken():
+    random, taken = Random(1), set()
+    for _ in range(500):
+        world = World()
+        for _ in range(30):
+            world.change(random)
+            event = random.choice(list(Event))
+            taken.update(TABLE.index(row) for row in world.rows(event)[:1])
+            world.machine.handle(event)
+    assert taken == set(range(len(TABLE)))
+
+
+def test_each_state_has_an_exit_and_an_entry():
+    exits = {row.state for row in TABLE if row.next is not row.state}
+    entries = {row.next for row in TABLE if row.next is not row.state}
+    assert exits == entries == set(FilterState)
+
+
+def test_an_emergency_comes_from_every_state():
+    stopped = {row.state for row in TABLE if row.event is Event.STOP and row.guard is None}
+    assert stopped == set(FilterState) - {FilterState.EMERGENCY}
+
+
+def test_states_are_those_of_the_message():
+    assert {each.name: each.value for each in FilterState} == {
+        name: getattr(FilterStatus, name) for name in FilterState.__members__
+    }

@@ -1,0 +1,173 @@
+"""The filter holds the vehicle and brings it down when no control comes."""
+
+import pytest
+from filter_flight import FLYING, LANDING, LIMITS, ON_GROUND, TAKING_OFF, TIMEOUTS, Flight, G, level
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from crazyflie_takeoff.filter_states import FilterState
+from crazyflie_takeoff.safe_control import (
+    SINK_SPEED,
+    Setpoint,
+)
+from crazyflie_takeoff.safe_filter import SafeFilter
+
+
+def test_a_controller_that_speaks_is_passed_on_as_it_is():
+    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    control_filter.choice.state = FLYING
+    messages = [object() for _ in range(500)]
+    for k, message in enumerate(messages):
+        assert control_filter.tick(k / 100) is None
+        assert control_filter.commanded(k / 100, message, level(12.0)) is message
+
+
+def test_holds_after_a_tenth_of_a_second_and_goes_on_without_a_step():
+    flight = Flight().run(3.0).lose()
+    flight.run(0.08)
+    assert flight.filter.state is FilterState.PASSING
+    flight.run(0.02)
+    assert flight.filter.state is FilterState.HOLDING
+    before = len(flight.flown)
+    flight.run(0.4)
+    assert len(flight.flown) == before + 40
+    assert flight.flown[before:] == pytest.approx([G] * 40, abs=0.05)
+    # The controller comes back with a burst.
+    returned = []
+    for k in range(30):
+        flight.ticks += 1
+        out = flight.filter.commanded(flight.time, 16.0, level(16.0))
+        returned.append(out.thrust if isinstance(out, Setpoint) else out)
+        assert flight.filter.tick(flight.time) is None
+        assert k == 0 or abs(returned[-1] - returned[-2]) < 0.4
+    assert returned[0] == pytest.approx(G, abs=0.1)
+    assert returned[-1] == 16.0
+    assert flight.filter.state is FilterState.PASSING
+
+
+@pytest.mark.parametrize(("height", "impact"), [(0.5, 0.65), (1.0, 0.85), (2.0, 1.15)])
+def test_comes_down_blindly(height, impact):
+    flight = Flight(height).run(3.0).lose()
+    duration = flight.run_until_off()
+    assert duration == pytest.approx(5.6 + height / SINK_SPEED, abs=0.1)
+    assert 0.3 < flight.vehicle.touchdown_speed < impact
+    assert flight.vehicle.z == 0.0
+    assert flight.flown[-1] == 0.0
+
+
+def test_a_height_that_was_never_known_makes_no_descent_longer():
+    flight = Flight()
+    flight.sees = False
+    assert flight.run(3.0).lose().run_until_off() == pytest.approx(5.6, abs=0.1)
+
+
+@pytest.mark.parametrize("height", [2.0, 2.5, 2.9])
+def test_a_blind_descent_lasts_for_the_last_known_height(height):
+    flight = Flight(height).run(3.0).lose()
+    # It has learned too much for the thrust of hover, and so sinks at half the rate.
+    flight.hover -= 0.15
+    flight.run_until_off()
+    assert 0.3 < flight.vehicle.touchdown_speed < 1.1
+    assert flight.vehicle.z == 0.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.3, 2.0), st.floats(0.8 * G, 1.2 * G), st.floats(-0.8, 1.0), st.booleans())
+def test_comes_down_whatever_it_weighs_and_however_it_moved(height, hover, speed, pose):
+    flight = Flight(height, hover).run(8.0)
+    flight.target = speed
+    flight.run(1.0)
+    flight.vehicle.z = height
+    flight.run(0.01).lose(pose)
+    lost = len(flight.flown)
+    top = 0.0
+    while flight.filter.state is not FilterState.DOWN:
+        flight.run(0.01)
+        top = max(top, flight.vehicle.z)
+        assert flight.time < 100.0
+    flight.run(0.3)
+    assert flight.vehicle.z == 0.0
+    assert top < height + 0.6
+    assert flight.vehicle.touchdown_speed < 1.6
+    assert max(flight.flown[lost:]) <= 1.25 * G + 1e-9
+
+
+def test_with_a_known_height_it_comes_down_at_a_known_speed_also_from_high_up():
+    flight = Flight(2.9).run(2.0).lose(pose=False)
+    duration = flight.run_until_off()
+    assert 0.3 < flight.vehicle.touchdown_speed < 0.5
+    assert duration > 7.0
+    assert flight.flown[-1] == 0.0
+
+
+@pytest.mark.parametrize("speed", [0.3, 0.6, 1.0])
+def test_a_climb_without_a_controller_ends_within_its_braking_distance(speed):
+    flight = Flight().run(3.0)
+    flight.vehicle.z_dot = flight.target = speed
+    begin = flight.run(0.01).lose(pose=False).vehicle.z
+    top = max(flight.run(0.01).vehicle.z for _ in range(200)) - begin
+    # 0.1 s until the filter takes over, then the speed is led to zero in 0.3 s.
+    assert top < 0.42 * speed
+
+
+def test_the_pose_that_comes_back_starts_nothing():
+    flight = Flight().run(2.0).lose().run(1.0)
+    assert flight.filter.state is FilterState.SINKING
+    flight.controls = flight.sees = True
+    flight.target = 2.0
+    flight.run_until_off()
+    flight.run(5.0)
+    assert flight.vehicle.z == 0.0
+    assert set(flight.flown[-400:]) == {0.0}
+    # A server that knows only the toggle lands, and says so.
+    flight.filter.toggle()
+    assert flight.filter.takeoff(flight.time, "ramp", level(G)) is None
+    flight.run(1.0)
+    assert flight.vehicle.z == 0.0
+    # It takes off again.
+    assert flight.filter.takeoff(flight.time, "lift", level(G + 0.2)) == "lift"
+    assert flight.filter.state is FilterState.PASSING
+
+
+def test_a_foreign_server_that_only_toggles():
+    flight = Flight(with_state=False)
+    assert flight.filter.takeoff(flight.time, "zero", level(0.0)) == "zero"
+    assert flight.filter.takeoff(flight.time, "lift", level(G + 0.2)) == "lift"
+    flight.run(1.0)
+    flight.filter.toggle()
+    flight.run(2.0).lose()
+    flight.run_until_off()
+    assert flight.flown[-1] == 0.0
+    assert flight.filter.choice.remembered is None
+
+
+def test_a_takeoff_without_a_controller_is_brought_down():
+    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    control_filter.choice.state = TAKING_OFF
+    modes = []
+    for k in range(500):
+        if k < 100:
+            control_filter.takeoff(k / 100, "lift", level(G + 0.2))
+        control_filter.tick(k / 100)
+        modes.append(control_filter.state)
+    assert modes.index(FilterState.HOLDING) == pytest.approx(150, abs=2)
+    assert modes.index(FilterState.SINKING) == pytest.approx(200, abs=3)
+
+
+def test_zero_thrust_on_the_ground_is_no_loss():
+    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    for state in (ON_GROUND, LANDING):
+        control_filter.choice.state = state
+        control_filter.takeoff(0.0, "zero", level(0.0))
+        assert [control_filter.tick(k / 100) for k in range(300)] == [None] * 300
+
+
+def test_who_was_stopped_has_not_waited():
+    flight = Flight().run(1.0)
+    flight.ticks += 3000
+    assert flight.filter.tick(flight.time) is None
+    flight.ticks -= 4000
+    assert flight.filter.tick(flight.time) is None
+    flight.run(1.0)
+    assert flight.filter.state is FilterState.PASSING
+    assert max(flight.flown) < G + 0.1

@@ -1,0 +1,53 @@
+"""What the filter flies by itself: thrust of hover, braking."""
+
+import math
+
+import pytest
+from filter_flight import G, level
+
+from crazyflie_takeoff.motion import Motion
+from crazyflie_takeoff.safe_control import (
+    MAX_BRAKING,
+    HoverThrust,
+    SafeControl,
+    Setpoint,
+)
+
+
+def test_learns_the_thrust_of_hover_also_from_a_climb():
+    hover = HoverThrust()
+    for k in range(1000):
+        hover.update(0.01, level(10.8 + (0.5 if k >= 900 else 0.0)), max(0.0, (k - 900) * 0.005))
+    assert hover.value == pytest.approx(10.8, abs=0.03)
+    for _ in range(1000):
+        hover.update(0.01, level(16.0), None)
+    assert hover.value == 1.25 * G
+
+
+def test_takes_no_drag_for_weight():
+    hover = HoverThrust()
+    z_dot = 0.0
+    for k in range(1000):
+        target = 1.0 if 600 <= k < 800 else 0.0
+        thrust = min(max(G + 5.0 * (target - z_dot), 4.0), 16.0)
+        hover.update(0.01, level(thrust), z_dot)
+        z_dot += 0.01 * (thrust - G - 0.2 * z_dot)
+        assert hover.value == pytest.approx(G, abs=0.06)
+
+
+def test_learns_the_vertical_part_of_a_tilted_thrust():
+    tilted = HoverThrust()
+    for _ in range(2000):
+        tilted.update(0.01, Setpoint(0.2, 0.0, 0.0, G / math.cos(0.2)), 0.0)
+    assert tilted.value == pytest.approx(G)
+
+
+def test_a_state_that_is_the_last_one_is_not_taken_again():
+    # 0.2 s at full thrust after it, the vehicle rises by 1.2 m/s more: that is braked at once.
+    motion = Motion((0.0, 0.0, 0.5), (0.0, 0.0, 0.4))
+    safe = SafeControl(G, motion, 0.2, Setpoint(0.0, 0.0, 0.0, 16.0))
+    thrusts = [safe.advance(0.01, motion, False).thrust for _ in range(3)]
+    assert max(thrusts) == pytest.approx(G - MAX_BRAKING)
+    # A new one counts.
+    slow = motion._replace(velocity=(0.0, 0.0, 0.0))
+    assert safe.advance(0.01, slow, False).thrust > G - 1.0

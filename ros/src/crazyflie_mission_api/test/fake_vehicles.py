@@ -1,7 +1,6 @@
 """Vehicles on a fake process: what a takeoff server and a controller do, and what a driver does."""
 
 from geometry_msgs.msg import PoseStamped, Quaternion
-from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyResponse
 
 from crazyflie_driver import srv
@@ -11,6 +10,7 @@ from crazyflie_msgs.msg import (
     FlightStatus,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
+    VehicleStatus,
 )
 from crazyflie_utils import ServiceError
 from crazyflie_utils.tf.poses import StampedPose
@@ -80,7 +80,7 @@ class DriverVehicle:
         self._handle = handle = process.handle(f"/{name}/driver")
         self._pose = handle.publisher("pose", PoseStamped)
         self._broadcast = handle.broadcast_poses()
-        self._status = handle.publisher("status", String, latch=True)
+        self._status = handle.publisher("vehicle_status", VehicleStatus, latch=True)
         for service, service_type in (
             ("takeoff", srv.Takeoff),
             ("land", srv.Land),
@@ -96,8 +96,16 @@ class DriverVehicle:
         handle.timer(0.05, self._on_timer)
 
     def tell(self, status):
-        """Say how the vehicle is."""
-        self._status.publish(String(status))
+        """Publish the vehicle's status: "flying", "ready" or "lost", and anything more."""
+        flies, lost = status.startswith("flying"), status.startswith("lost")
+        self._status.publish(
+            VehicleStatus(
+                link=VehicleStatus.LOST if lost else VehicleStatus.CONNECTED,
+                has_supervisor=not lost,
+                supervisor=VehicleStatus.FLYING if flies else VehicleStatus.ARMED,
+                text=status,
+            )
+        )
 
     def called(self):
         """Return the names of the services that were called."""

@@ -7,7 +7,6 @@ from typing import Any
 
 import genpy
 from geometry_msgs.msg import Point, PoseStamped
-from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
@@ -22,7 +21,7 @@ from crazyflie_mission_api.synchronized_start import SynchronizedStart
 from crazyflie_mission_api.timed_trajectory import START_SKEW
 from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces
-from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
 from crazyflie_utils.parameters.types import FINITE
 
@@ -33,13 +32,13 @@ MEMORY = 31
 """Pieces that the memory of a vehicle holds."""
 
 MAX_POSITION_AGE = 0.5
-"""A position older than this is not known, s; as `high_level_node.STATE_LIMIT`."""
+"""A position older than this is not known, s; as `high_level_node.MAX_STATE_AGE`."""
 
 _LANDED_HEIGHT = 0.1
 """Above the start, m: a vehicle below has landed."""
 
-_READY = "ready"
-"""Beginning of the driver's status of a vehicle that does not fly, as its supervisor says."""
+_FAULTS = VehicleStatus.TUMBLED | VehicleStatus.LOCKED | VehicleStatus.CRASHED
+"""States of the supervisor in which a vehicle cannot fly."""
 
 _SETTLING_TIME = 0.5
 """After the planned end of a landing, s."""
@@ -101,15 +100,15 @@ class RosVehicle(MissionVehicle):
         self._seen_at = -math.inf
         self._ground = 0.0
         self._landing_end = 0.0
-        self._status = ""
-        self._flight_state = FlightStatus.UNKNOWN
+        self._flight_status = FlightStatus()
+        self._driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
         self._lookup = None if frames is None else partial(handle.listen_to_poses(), *frames)
         if uses_driver:
             handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
-            handle.subscribe(f"{top}/status", String, self._on_status)
+            handle.subscribe(f"{top}/vehicle_status", VehicleStatus, self._on_driver_status)
             frame = "" if frames is None else frames[0]
             self._stream = SetpointStream(handle, f"{top}/cmd_full_state", frame, self._hold)
         else:
@@ -149,19 +148,28 @@ class RosVehicle(MissionVehicle):
     @override
     def fault(self) -> str:
         if self._stream is not None:
-            bad = ("lost", "cannot fly", "emergency", "disconnected")
-            return self._status if self._status.startswith(bad) else self._stream.fault()
-        if self._flight_state in _ENDED:
-            return f"it does not fly any more: {self._status or WORDS[self._flight_state]}"
+            status = self._driver_status
+            is_cut_off = status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
+            is_bad = is_cut_off or status.is_emergency or status.supervisor & _FAULTS
+            return status.text if is_bad else self._stream.fault()
+        status = self._flight_status
+        if status.state in _ENDED:
+            return f"it does not fly any more: {status.reason or WORDS[status.state]}"
         return ""
 
     @override
     def has_landed(self) -> bool:
         if not self._uses_driver:
-            return self._flight_state == FlightStatus.ON_GROUND
+            return self._flight_status.state == FlightStatus.ON_GROUND
         place = self.position()
         if place is None:
-            is_down = self._status.startswith(_READY)
+            status = self._driver_status
+            is_down = (
+                status.link == VehicleStatus.CONNECTED
+                and status.has_supervisor
+                and not status.is_emergency
+                and not status.supervisor & (_FAULTS | VehicleStatus.FLYING)
+            )
         else:
             is_down = place[2] < self._ground + _LANDED_HEIGHT
         # Then the mission stops the motors: not in the last centimetres.
@@ -176,11 +184,11 @@ class RosVehicle(MissionVehicle):
         s = message.state
         self._pose, self._seen_at = ((s.x, s.y, s.z), s.yaw), self._handle.time()
 
-    def _on_status(self, message):
-        self._status = message.data
-
     def _on_flight_status(self, message):
-        self._flight_state, self._status = message.state, message.reason
+        self._flight_status = message
+
+    def _on_driver_status(self, message):
+        self._driver_status = message
 
     # Commands.
 

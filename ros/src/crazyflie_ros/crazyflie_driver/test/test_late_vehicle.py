@@ -6,7 +6,7 @@ from safety_helpers import wait_for_words
 from std_msgs.msg import Bool
 
 from crazyflie_dev.programs import free_port
-from crazyflie_driver.connecting import connect_within
+from crazyflie_driver.connection import connect_within
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_link.errors import AddressError, NoAnswerError, NoDongleError, SetupError
 from crazyflie_utils import ServiceError

@@ -120,6 +120,7 @@ def test_without_logging_there_are_only_status_and_packets(server, log_block):
         "/cf1/connected",
         "/cf1/rssi",
         "/cf1/status",
+        "/cf1/vehicle_status",
         "/cf1/packets",
     }
 

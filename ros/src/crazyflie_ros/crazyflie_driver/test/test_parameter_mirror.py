@@ -28,13 +28,13 @@ def test_settings_are_written_again_and_commands_are_not():
     firmware = Firmware()
     crazyflie = SimpleNamespace(parameters=firmware)
     mirror = ParameterMirror(process.handle("/server"), "/cf1", crazyflie)
-    mirror.write_again()
+    mirror.reapply_parameters()
     assert firmware.written == []
     mirror.write(["ring/effect", "kalman/resetEstimation"])
     firmware.written.clear()
     # What somebody has set since, but not written, does not count.
     process.transport.set_param("/cf1/ring/effect", 8)
-    mirror.write_again()
+    mirror.reapply_parameters()
     assert firmware.written == [("ring.effect", 7)]
 
 
@@ -55,7 +55,7 @@ def mirror():
 def test_one_that_cannot_be_written_again_does_not_stop_the_others(mirror, error):
     mirror, firmware = mirror
     firmware.errors["ring.effect"] = error
-    assert mirror.write_again() == [str(error)]
+    assert mirror.reapply_parameters() == [str(error)]
     assert firmware.written == [("motor.trim", 7), ("sound.freq", 7)]
 
 
@@ -63,4 +63,4 @@ def test_a_link_that_is_lost_meanwhile_stops_them(mirror):
     mirror, firmware = mirror
     firmware.errors["motor.trim"] = LinkLostError("gone")
     with pytest.raises(LinkLostError):
-        mirror.write_again()
+        mirror.reapply_parameters()

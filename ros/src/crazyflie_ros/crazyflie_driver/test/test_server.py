@@ -172,7 +172,7 @@ def test_a_link_that_is_lost_and_comes_back(server, vehicle):
     vehicle.is_frozen = False
     wait_until(lambda: status(server).level == DiagnosticStatus.OK, "the link's return")
     # The vehicle stands: its thrust lock is opened again, unless it was heard again soon.
-    if server.node._vehicles[vehicle.uri].crazyflie.links == 1:
+    if server.node._vehicles[vehicle.uri].crazyflie.connection_count == 1:
         return
     wait_until(lambda: vehicle.packets(3, 0).count(ZERO) == 100, "zeros")
     server.call("/cf1/takeoff", TakeoffRequest(0, 1.0, Duration(2)))

@@ -114,7 +114,7 @@ def test_a_streamed_flight_survives_a_second_of_silence(flight):
     assert SupervisorState.FLYING in flight.state
     assert SupervisorState.LOCKED not in flight.state
     assert min(flight.heights[count:]) > 0.5 * HEIGHT
-    assert flight.crazyflie.links == 1
+    assert flight.crazyflie.connection_count == 1
 
 
 def test_a_setpoint_that_comes_after_cmd_stop_locks_nothing(flight):

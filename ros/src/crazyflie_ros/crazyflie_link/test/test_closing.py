@@ -7,10 +7,10 @@ import pytest
 from cflib.crtp.radiodriver import RadioManager
 
 from crazyflie_link.address import Address
-from crazyflie_link.backend import Backend
 from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import LinkLostError
 from crazyflie_link.link import Link
+from crazyflie_link.safe_crazyflie import SafeCrazyflie
 from crazyflie_utils.testing.waiting import wait_until
 
 URI = "udp://127.0.0.1:1"
@@ -32,14 +32,14 @@ def test_a_link_that_is_lost_at_the_moment_of_closing_is_closed(link_class):
 
     def fail():
         # As `close` does, before it looks.
-        vehicle._closed.set()
+        vehicle._reconnector._closed.set()
         taken.set()
         return LinkLostError("gone")
 
     type(link).error = PropertyMock(side_effect=fail)
     vehicle.connect()
     assert taken.wait(LIMIT)
-    wait_until(lambda: not vehicle._watcher.is_alive(), "the end of the watch")
+    wait_until(lambda: not vehicle._reconnector._watcher.is_alive(), "the end of the watch")
     link.close.assert_called()
 
 
@@ -66,24 +66,24 @@ def test_a_vehicle_that_is_closed_as_its_link_is_lost_closes_it_once_and_waits(l
     link.error = None
     vehicle = Crazyflie(URI)
     states = []
-    vehicle._on_state = lambda state, _: (
+    vehicle._reconnector._on_state = lambda state, _: (
         states.append(state) or (state is LinkState.LOST and vehicle.close())
     )
     vehicle.connect()
     link.error = LinkLostError("gone")
-    wait_until(lambda: not vehicle._watcher.is_alive(), "the end of the watch")
+    wait_until(lambda: not vehicle._reconnector._watcher.is_alive(), "the end of the watch")
     vehicle.close()
     link.close.assert_called()
 
 
-def test_dropping_a_link_does_not_wait_for_a_dongle_that_hangs():
+def test_ending_a_link_does_not_wait_for_a_dongle_that_hangs():
     """Opening one holds a lock of cflib as long as the USB device does not answer."""
-    backend = Backend(None, lambda text: None)
+    crazyflie = SafeCrazyflie(None, lambda text: None)
     with RadioManager._lock:
-        dropping = [threading.Thread(target=backend.drop, daemon=True) for _ in range(2)]
-        for thread in dropping:
+        threads = [threading.Thread(target=crazyflie.disconnect, daemon=True) for _ in range(2)]
+        for thread in threads:
             thread.start()
-        for thread in dropping:
+        for thread in threads:
             thread.join(10.0)
             assert not thread.is_alive()
 

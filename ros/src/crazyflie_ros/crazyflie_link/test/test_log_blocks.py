@@ -23,7 +23,7 @@ def test_a_start_that_the_vehicle_refuses_is_none(vehicle, make_link, states):
         link.add_log_block(log_block("refused"))
     # Its data are not missed.
     vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 10)
-    assert (link.state, link.links) == (LinkState.CONNECTED, 1)
+    assert (link.state, link.connection_count) == (LinkState.CONNECTED, 1)
 
 
 def test_an_error_code_that_nobody_knows_is_a_refusal(vehicle, link):

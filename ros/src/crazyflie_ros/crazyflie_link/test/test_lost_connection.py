@@ -9,11 +9,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from crazyflie_link.address import Address
-from crazyflie_link.backend import Backend, packet
 from crazyflie_link.crazyflie import LinkState
 from crazyflie_link.errors import LinkLostError, RefusedError
 from crazyflie_link.link import Link
 from crazyflie_link.log import LogBlock
+from crazyflie_link.safe_crazyflie import packet
 
 LIMIT = 60.0
 
@@ -51,7 +51,7 @@ def test_a_vehicle_that_is_heard_again_soon_needs_no_set_up(vehicle, make_link, 
     link.supervisor.emergency_stop()
     vehicle.is_frozen = False
     assert "is heard again" in states.wait_for(LinkState.CONNECTED)
-    assert link.links == 1
+    assert link.connection_count == 1
     assert vehicle.packets(13, 1) == []
     link.setpoints.stop()
     vehicle.wait_for_packets(7, 0)
@@ -110,7 +110,7 @@ def test_no_packet_ends_the_thread_that_receives(shared, packets):
     )
 )
 def test_no_packet_ends_the_set_up_without_a_reason(packets):
-    link = Link(Address.parse("udp://127.0.0.1:1"), backend=Backend)
+    link = Link(Address.parse("udp://127.0.0.1:1"))
     # What is asserted is that it raises nothing: that would end the thread that receives.
     for port, channel, data in packets:
         link.cflib.packet_received.call(packet(port, channel, data))

@@ -14,7 +14,8 @@ from crazyflie_link import scan
 from crazyflie_link.address import Address
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import AddressError, LinkLostError, NoAnswerError, NoDongleError
-from crazyflie_link.link import Limits, Link
+from crazyflie_link.link import Link
+from crazyflie_link.link_setup import Limits
 from crazyflie_link.reboot import MODES, reboot
 
 # cflib warns of one of its own attributes when a mock takes stock of them.
@@ -32,8 +33,8 @@ class Mock:
 
     def __call__(self, cache, on_error):
         self.cflib = MagicMock(spec=CflibCrazyflie())
-        self.cflib.ask_for_source = MagicMock()
-        self.cflib.drop = MagicMock()
+        self.cflib.request_source = MagicMock()
+        self.cflib.disconnect = MagicMock()
         self.cflib.platform.get_protocol_version.return_value = -1
         self.fail = on_error
         return self.cflib
@@ -57,7 +58,7 @@ def test_a_driver_that_gives_up_ends_the_attempt(mock, text, error):
     with pytest.raises(error):
         link.open()
     mock.cflib.open_link.assert_called_once_with(URI)
-    mock.cflib.drop.assert_called()
+    mock.cflib.disconnect.assert_called()
 
 
 def test_a_dongle_that_hangs_does_not_hang_us(mock):
@@ -66,20 +67,20 @@ def test_a_dongle_that_hangs_does_not_hang_us(mock):
     mock.cflib.open_link.side_effect = lambda uri: release.wait(60.0)
     with pytest.raises(NoAnswerError):
         link.open()
-    drops = mock.cflib.drop.call_count
-    assert drops == 1
+    calls = mock.cflib.disconnect.call_count
+    assert calls == 1
     # When it comes to life after all, what it opened is closed.
-    dropped = threading.Event()
-    mock.cflib.drop.side_effect = dropped.set
+    disconnected = threading.Event()
+    mock.cflib.disconnect.side_effect = disconnected.set
     release.set()
-    assert dropped.wait(30.0)
+    assert disconnected.wait(30.0)
 
 
 def test_the_first_request_is_repeated(mock):
     link = Link(Address.parse(URI), Limits(first_answer=1.0), backend=mock)
     with pytest.raises(NoAnswerError):
         link.open()
-    assert mock.cflib.ask_for_source.call_count >= 2
+    assert mock.cflib.request_source.call_count >= 2
 
 
 def test_an_error_in_flight_is_a_lost_link(mock):

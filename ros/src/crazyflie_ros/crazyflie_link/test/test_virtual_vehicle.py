@@ -77,8 +77,8 @@ def test_the_real_tables(client):
 
 def test_a_flight_by_commands_after_setpoints(client):
     link = client.link
-    link.setpoints.zeros()
-    link.setpoints.hand_over()
+    link.setpoints.send_zero_thrust()
+    link.setpoints.notify_setpoints_stop()
     link.high_level.take_off(0.4, 1.0)
     client.wait_until(lambda x, z, state, _: z > 0.35 and SupervisorState.FLYING in state)
     link.trajectories.upload(1, 3, [PolynomialPiece(1.0, (0.0, 0.3), (), (), ())])
@@ -94,7 +94,7 @@ def test_positive_yaw_rates_turn_clockwise(client):
     link.add_log_block(
         LogBlock("yaw", 20, ("stateEstimate.yaw",), lambda _, values: yaws.put(values[0]))
     )
-    link.setpoints.zeros()
+    link.setpoints.send_zero_thrust()
     for send, arguments, turned in (
         (link.setpoints.hover, (0.0, 0.0, 60.0, 0.4), lambda yaw: -60.0 < yaw < -30.0),
         (link.setpoints.velocity_world, (0.0, 0.0, 0.0, -60.0), lambda yaw: -20.0 < yaw < 30.0),
@@ -103,7 +103,7 @@ def test_positive_yaw_rates_turn_clockwise(client):
         while not turned(yaws.get(timeout=LIMIT)):
             send(*arguments)
             assert time.monotonic() < end
-    link.setpoints.hand_over()
+    link.setpoints.notify_setpoints_stop()
     link.high_level.land(0.0, 1.0)
     client.wait_until(lambda x, z, *_: z < 0.05)
 

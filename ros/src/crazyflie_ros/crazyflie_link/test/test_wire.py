@@ -103,17 +103,17 @@ def test_full_state_setpoint_is_in_thousandths_and_its_rates_in_milliradians(veh
     )
 
 
-def test_hand_over_takes_the_place_of_the_setpoint_that_waits(vehicle, flying):
+def test_notify_setpoints_stop_takes_the_place_of_the_setpoint_that_waits(vehicle, flying):
     entered, free = threading.Event(), threading.Event()
 
     def block():
         entered.set()
         free.wait(30.0)
 
-    flying.link().command(block)
+    flying.link().put(block)
     assert entered.wait(30.0)
     flying.setpoints.position(0.0, 0.0, 1.0, 0.0)
-    flying.setpoints.hand_over(1500)
+    flying.setpoints.notify_setpoints_stop(1500)
     free.set()
     assert sent(vehicle, 7, 1) == struct.pack("<BI", 0, 1500)
     # A setpoint that waited would be sent next.
@@ -122,7 +122,7 @@ def test_hand_over_takes_the_place_of_the_setpoint_that_waits(vehicle, flying):
 
 
 def test_a_hundred_zeros(vehicle, flying):
-    flying.setpoints.zeros()
+    flying.setpoints.send_zero_thrust()
     assert vehicle.wait_for_packets(3, 0, 100) == [struct.pack("<fffH", 0, 0, 0, 0)] * 100
 
 
@@ -136,7 +136,7 @@ IMPOSSIBLE_SETPOINTS = [
     lambda s: s.full_state((40, 0, 0), (0,) * 3, (0,) * 3, (0, 0, 0, 1), (0,) * 3),
     lambda s: s.full_state((NAN, 0, 0), (0,) * 3, (0,) * 3, (0, 0, 0, 1), (0,) * 3),
     lambda s: s.full_state((0,) * 3, (0,) * 3, (0,) * 3, (0, 0, 0, 0), (0,) * 3),
-    lambda s: s.hand_over(-1),
+    lambda s: s.notify_setpoints_stop(-1),
     # Beyond single precision.
     lambda s: s.attitude(1e39, 0, 0, 0),
     lambda s: s.attitude(0, -1e300, 0, 0),

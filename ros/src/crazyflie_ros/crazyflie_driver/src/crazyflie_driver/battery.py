@@ -4,12 +4,12 @@ import enum
 
 
 class Charge(enum.IntEnum):
-    """How much is left."""
+    """How much is left; the numbers are those of crazyflie_msgs/VehicleStatus."""
 
-    UNKNOWN = -1
-    GOOD = 0
-    LOW = 1
-    CRITICAL = 2
+    UNKNOWN = 0
+    GOOD = 1
+    LOW = 2
+    CRITICAL = 3
 
 
 class Battery:
@@ -47,6 +47,9 @@ class Battery:
 
     def words(self) -> str:
         """Return the state, such as "battery low: 3.12 V"; empty if nothing is wrong."""
-        if self.charge is Charge.CRITICAL:
-            return f"battery critical: {self.voltage:.2f} V"
-        return f"battery low: {self.voltage:.2f} V" if self.charge is Charge.LOW else ""
+        return "" if self.voltage is None else words(self.charge, self.voltage)
+
+
+def words(charge: Charge, voltage: float) -> str:
+    """Return a state, such as "battery low: 3.12 V"; empty if nothing is wrong."""
+    return f"battery {charge.name.lower()}: {voltage:.2f} V" if charge >= Charge.LOW else ""

@@ -3,35 +3,35 @@
 import contextlib
 import time
 from concurrent.futures import Future
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from crazyflie_driver.battery import Battery, Charge
 from crazyflie_driver.command import LAND, STOP, TAKEOFF, Command
-from crazyflie_driver.flight_state import FlightState
+from crazyflie_driver.emergency import Emergency
+from crazyflie_driver.flight_state import NOT_FLYABLE, FlightState
+from crazyflie_driver.jobs import Job, Jobs
 from crazyflie_driver.server_parameters import SafetyParameters
+from crazyflie_driver.setpoint_gate import Event
 from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_driver.status import NOT_FLYABLE
-from crazyflie_driver.worker import Job
+from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import AlreadyLandingError, CrazyflieError, LinkLostError
-from crazyflie_link.high_level import ALL_GROUPS
+from crazyflie_link.high_level import HighLevel
 from crazyflie_link.supervisor import Supervisor
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ServiceError
-
-if TYPE_CHECKING:
-    from crazyflie_driver.vehicle import DriverVehicle
+from crazyflie_utils.timers import Timer
 
 Result = TypeVar("Result")
 
-HOLD = 0.5
-"""How long a notice that setpoints stop waits for the command that it belongs to, s."""
+NOTIFY_WINDOW = 0.5
+"""Time in which a notice that setpoints stop needs the command that it belongs to, s."""
 
 _WATCHDOG_PERIOD = 0.2
 """The firmware gives up after 1 s without being fed."""
 
 _REARMING = 0.5
-"""How long a takeoff waits for a vehicle that arms itself, s. Firmware 2026.08 disarms and arms
-itself 3 s after a landing (0.16 s) and every 30 s on the ground (0.08 s)."""
+"""Time in which a vehicle arms itself, s. Firmware 2026.08 disarms and arms itself 3 s after a
+landing (0.16 s) and every 30 s on the ground (0.08 s)."""
 
 
 class FlightCommands:
@@ -43,43 +43,52 @@ class FlightCommands:
     Parameters
     ----------
     handle : NodeHandle
-    vehicle : DriverVehicle
+    name : str
+        Of the vehicle, for messages.
+    crazyflie : crazyflie_link.Crazyflie
     setpoints : SetpointTopics
-    battery : Battery
-    safety : SafetyParameters
-
-    Attributes
-    ----------
     flight : FlightState
+    battery : Battery
+    emergency : Emergency
+    jobs : Jobs
+    safety : SafetyParameters
     """
 
     def __init__(
         self,
         handle: NodeHandle,
-        vehicle: "DriverVehicle",
+        name: str,
+        crazyflie: Crazyflie,
         setpoints: SetpointTopics,
+        flight: FlightState,
         battery: Battery,
+        emergency: Emergency,
+        jobs: Jobs,
         safety: SafetyParameters,
     ):
-        self.flight = FlightState(handle, vehicle, setpoints)
         self._handle = handle
-        self._vehicle = vehicle
-        self._crazyflie = vehicle.crazyflie
+        self._name = name
+        self._crazyflie = crazyflie
         self._setpoints = setpoints
+        self._gate = setpoints.gate
+        self._flight = flight
         self._battery = battery
+        self._emergency = emergency
+        self._jobs = jobs
         self._safety = safety
-        self._held: int | None = None
-        self._holds = 0
+        # How long the last setpoint shall count, ms, in a notice that has not been sent yet.
+        self._pending_notify: int | None = None
+        self._notify_timer: Timer | None = None
         self._feeds_watchdog = False
         # By what has begun them.
         self._landings: dict[str, Future[None]] = {}
 
     @property
-    def are_flown(self) -> bool:
+    def is_high_level_flight_active(self) -> bool:
         """Whether the vehicle's log says that it flies on high-level commands."""
-        if self._vehicle.is_emergency or self._setpoints.is_streaming:
+        if self._emergency.is_latched or self._setpoints.is_streaming:
             return False
-        return self.flight.is_flight(self._vehicle.supervisor)
+        return self._flight.is_high_level(self._flight.supervisor)
 
     def start(self) -> None:
         """Begin to feed the watchdog, once there is a flight."""
@@ -87,11 +96,11 @@ class FlightCommands:
             self._handle.timer(_WATCHDOG_PERIOD, self._feed, steady=True)
 
     def send(self, command: Command, response: Result) -> Future[Result]:
-        """Have a command sent, after a hand-over if setpoints were streamed.
+        """Have a command sent, after the notice that setpoints stop if they were streamed.
 
-        All that would have it refused, or be without effect, is looked at before anything is
-        sent that ends a stream. Landing and stopping take the place of all commands and uploads
-        before them.
+        All that would have it refused, or be without effect, is checked before anything is
+        sent that ends a stream. Landing and stopping supersede all commands and uploads
+        before them. A landing of a vehicle that lands already is a success.
 
         Parameters
         ----------
@@ -101,42 +110,33 @@ class FlightCommands:
         """
 
         def work(job: Job) -> Result:
-            self._vehicle.refuse_in_emergency()
+            self._emergency.refuse()
             high_level = self._crazyflie.high_level
             command.send(high_level.dry_run())
-            if self._is_addressed(command):
-                if self._is_ready(command, job):
-                    self._execute(command, job)
-            else:
-                command.send(high_level.guarded(lambda: job.is_valid))
+            if not self._is_addressed(command):
+                _send(command, high_level.guarded(lambda: job.is_valid))
+            elif self._is_ready(command, job):
+                self._execute(command, job)
             return response
 
-        return self._vehicle.do(command.name, work, is_flight=True, urgent=command.ends_flight)
+        return self._jobs.submit(command.name, work, is_flight=True, urgent=command.ends_flight)
 
-    def land(
-        self, height: float, duration: float, group_mask: int, response: Result
-    ) -> Future[Result]:
-        """Land, in the place of everything else, unless the vehicle is on the ground or lands."""
-
-        def send(high_level):
-            with contextlib.suppress(AlreadyLandingError):
-                high_level.land(height, duration, group_mask)
-
-        return self.send(Command(LAND, send, duration, group_mask), response)
-
-    def land_at_last(self) -> None:
-        """Land; called again, it tries again what a silent link has prevented."""
-        self._try_to_land("end")
+    def land_with_retry(self, reason: str) -> None:
+        """Land; called again for the same reason, it lands again if that has failed."""
+        landing = self._landings.get(reason)
+        if landing is None or (landing.done() and landing.exception() is not None):
+            duration = self._safety.landing_duration
+            land = Command(LAND, lambda high_level: high_level.land(0.0, duration), duration)
+            self._landings[reason] = self.send(land, None)
 
     def check_battery(self) -> None:
-        """Land a high-level flight whose battery is critical; called again, see `land_at_last`."""
-        if not self.are_flown:
+        """Land a high-level flight whose battery is critical; see `land_with_retry`."""
+        if not self.is_high_level_flight_active:
             self._landings.clear()
         elif self._battery.charge is Charge.CRITICAL:
             if "battery" not in self._landings:
-                name = self._vehicle.parameters.name
-                self._handle.error(f"{name}: {self._battery.words()}: landing")
-            self._try_to_land("battery")
+                self._handle.error(f"{self._name}: {self._battery.words()}: landing")
+            self.land_with_retry("battery")
 
     def notify(self, remain_valid_ms: int) -> None:
         """Announce that setpoints stop: at once on the ground, in flight with the next command.
@@ -146,32 +146,32 @@ class FlightCommands:
         CrazyflieError
             It cannot be sent.
         """
-        state = self._vehicle.supervisor
-        may_fly = state is None or SupervisorState.FLYING in state
-        if not (may_fly and self._setpoints.is_flight):
-            self._setpoints.hand_over(remain_valid_ms)
+        may_fly = self._flight.supervisor is None or self._flight.is_flying
+        if not (may_fly and self._setpoints.runs_motors):
+            self._setpoints.notify_setpoints_stop(remain_valid_ms)
             return
         # Without a link nothing could be sent later, either.
         self._crazyflie.link()
-        self._held = remain_valid_ms
-        self._holds += 1
-        hold = self._holds
-        timer = self._handle.timer(HOLD, lambda: end())
+        self._pending_notify = remain_valid_ms
+        if self._notify_timer is not None:
+            self._notify_timer.stop()
+        self._notify_timer = self._handle.timer(NOTIFY_WINDOW, self._end_notify_window)
 
-        def end():
-            timer.stop()
-            if hold == self._holds and self._held is not None:
-                self._handle.warn(
-                    f"{self._vehicle.parameters.name}: notify_setpoints_stop was not sent: the "
-                    "vehicle flies on setpoints, and would drop; no high-level command has come "
-                    f"within {HOLD:g} s. It is sent together with the next one"
-                )
+    def _end_notify_window(self):
+        if self._notify_timer is not None:
+            self._notify_timer.stop()
+        if self._pending_notify is not None:
+            self._handle.warn(
+                f"{self._name}: notify_setpoints_stop was not sent: the vehicle flies on "
+                "setpoints, and would drop; no high-level command has come within "
+                f"{NOTIFY_WINDOW:g} s. It is sent together with the next one"
+            )
 
-    # What is looked at before a command.
+    # Checks before a command.
 
     def _is_addressed(self, command):
         is_addressed = self._crazyflie.high_level.is_addressed(command.group_mask)
-        if is_addressed is None and self._setpoints.is_flight:
+        if is_addressed is None and self._setpoints.runs_motors:
             raise ServiceError(
                 f"{command.name} is for the groups {command.group_mask:#x}, and it is not known "
                 "which ones the vehicle belongs to: it flies on setpoints, and would drop if it "
@@ -181,35 +181,27 @@ class FlightCommands:
 
     def _is_ready(self, command, job):
         if command.name == TAKEOFF:
-            self.make_ready(job)
+            self._check_and_arm(job)
         elif command.name == LAND:
-            if self.flight.is_on_ground():
+            if self._flight.is_on_ground():
                 self._handle.info(
-                    f"{self._vehicle.parameters.name}: land is not sent, the vehicle is on the "
-                    "ground: it would start its motors"
+                    f"{self._name}: land is not sent, the vehicle is on the ground: it would "
+                    "start its motors"
                 )
                 return False
         elif command.name != STOP:
-            self._refuse_to_leave_stream()
+            self._check_leaving_stream()
         return True
 
-    def _refuse_to_leave_stream(self):
-        state = self._vehicle.supervisor
-        if state is None or not self._setpoints.is_flight:
+    def _check_leaving_stream(self):
+        state = self._flight.supervisor
+        if state is None or not self._setpoints.runs_motors:
             return
         if state & NOT_FLYABLE or SupervisorState.CAN_FLY not in state:
             raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
 
-    def make_ready(self, job: Job) -> None:
-        """See to it that the vehicle can take off: arm it, if it is not armed; blocks.
-
-        Raises
-        ------
-        ServiceError
-            It cannot fly, or flies by its high-level commander, or the job was given up.
-        CrazyflieError
-            It refuses, or does not reply.
-        """
+    def _check_and_arm(self, job: Job) -> None:
+        # Arms a vehicle that is not armed; blocks.
         if self._battery.charge >= Charge.LOW:
             raise ServiceError(f"no takeoff, {self._battery.words()}: charge or change it")
         supervisor = self._crazyflie.supervisor.guarded(lambda: job.is_valid)
@@ -218,7 +210,7 @@ class FlightCommands:
             return
         if state & NOT_FLYABLE:
             raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
-        if state.reports_planner and self.flight.is_flight(state):
+        if state.reports_planner and self._flight.is_high_level(state):
             raise ServiceError(
                 "no takeoff: the vehicle flies on high-level commands already; use go_to"
             )
@@ -241,47 +233,46 @@ class FlightCommands:
 
     def _execute(self, command, job):
         job.check()
-        number = self._setpoints.gate.high_level(self._handle.time())
+        number = self._gate.high_level(self._handle.time())
+        high_level = self._crazyflie.high_level
         try:
-            command.send(
-                self._crazyflie.high_level.guarded(lambda: self._prepare_sending(command, job))
-            )
+            _send(command, high_level.guarded(lambda: self._prepare_sending(command, job)))
         except CrazyflieError:
-            self._setpoints.gate.resume(number)
+            self._gate.resume(number)
             job.check()
             raise
         self._setpoints.high_level_until(self._handle.time() + command.duration)
         if command.ends_flight:
-            self.flight.end_accepted(command.duration)
+            self._flight.end_accepted(command.duration)
         else:
-            self._setpoints.gate.open()
+            self._gate.handle(Event.FLIGHT_CALLED)
             self._feeds_watchdog = True
 
     def _prepare_sending(self, command, job):
         # In the thread that sends: what is sent next is the command itself.
-        if not job.is_valid or self._vehicle.is_emergency:
+        if not job.is_valid or self._emergency.is_latched:
             return False
         if self._setpoints.is_streaming:
             try:
-                self._setpoints.hand_over_now(self._held or 0)
+                self._setpoints.notify_setpoints_stop(self._pending_notify or 0, at_once=True)
             except LinkLostError:
                 return False
-        self._held = None
+        self._pending_notify = None
         if not command.ends_flight:
-            self.flight.motion_sent()
+            self._flight.motion_sent()
         return True
-
-    def _try_to_land(self, reason):
-        landing = self._landings.get(reason)
-        if landing is None or (landing.done() and landing.exception() is not None):
-            self._landings[reason] = self.land(0.0, self._safety.landing_duration, ALL_GROUPS, None)
 
     def _feed(self):
         # Also when the reply to the first command was lost.
-        self._feeds_watchdog = self._feeds_watchdog or self.are_flown
-        if self._feeds_watchdog and not self._vehicle.is_emergency:
+        self._feeds_watchdog = self._feeds_watchdog or self.is_high_level_flight_active
+        if self._feeds_watchdog and not self._emergency.is_latched:
             try:
                 self._crazyflie.supervisor.feed_watchdog()
             except CrazyflieError as error:
-                name = self._vehicle.parameters.name
-                self._handle.warn(f"{name}: watchdog not fed: {error}", 1.0, (name, "watchdog"))
+                key = (self._name, "watchdog")
+                self._handle.warn(f"{self._name}: watchdog not fed: {error}", 1.0, key)
+
+
+def _send(command: Command, high_level: HighLevel) -> None:
+    with contextlib.suppress(AlreadyLandingError):
+        command.send(high_level)

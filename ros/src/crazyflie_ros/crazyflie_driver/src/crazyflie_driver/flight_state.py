@@ -1,17 +1,22 @@
-"""Whether a vehicle is flown by its high-level commander."""
+"""Whether a vehicle flies, and by its high-level commander."""
 
 import math
-from typing import TYPE_CHECKING
 
+from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import NoReplyError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle
 
-if TYPE_CHECKING:
-    from crazyflie_driver.vehicle import DriverVehicle
+NOT_FLYABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
+"""States in which a vehicle cannot take off."""
 
 _REPORT_LAG = 0.2
 """How old a state may be, s: the firmware's supervisor runs at 25 Hz, and is logged at 10 Hz."""
+
+_LOGGED_STATE_LIMIT = 1.0
+"""Time limit of log data with the state, s; they come every 0.1 s."""
 
 
 class FlightState:
@@ -24,26 +29,57 @@ class FlightState:
     Parameters
     ----------
     handle : NodeHandle
-    vehicle : DriverVehicle
+        For the time.
+    crazyflie : crazyflie_link.Crazyflie
+    log : LogTopics
     setpoints : SetpointTopics
     """
 
-    def __init__(self, handle: NodeHandle, vehicle: "DriverVehicle", setpoints: SetpointTopics):
-        self._handle = handle
-        self._vehicle = vehicle
+    def __init__(
+        self, handle: NodeHandle, crazyflie: Crazyflie, log: LogTopics, setpoints: SetpointTopics
+    ):
+        self._time = handle.time
+        self._crazyflie = crazyflie
+        self._log = log
         self._setpoints = setpoints
-        # When the planner was last told to move, and when it holds the motors off.
+        # When the planner was commanded to move, and when it holds the motors off.
         self._planned, self._plan_end = -math.inf, math.inf
 
+    @property
+    def supervisor(self) -> SupervisorState | None:
+        """The state that was logged last; None if none was on the present link."""
+        return self._log.supervisor
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether the vehicle logs that it flies; so it does for 2 s after a landing."""
+        state = self.supervisor
+        return state is not None and SupervisorState.FLYING in state
+
+    def read(self) -> SupervisorState | None:
+        """Return the state, from supervisor or log; None if neither reports it; blocks.
+
+        Before protocol 12 the supervisor cannot be asked; very old firmware does not log it either.
+
+        Raises
+        ------
+        LinkLostError
+        """
+        try:
+            state = self._crazyflie.supervisor.read()
+        except NoReplyError:
+            state = None
+        return self._log.next_state(_LOGGED_STATE_LIMIT) if state is None else state
+
     def motion_sent(self) -> None:
-        """Take note that the planner is told to move."""
-        self._planned, self._plan_end = self._handle.time(), math.inf
+        """Take note that the planner is commanded to move."""
+        self._planned, self._plan_end = self._time(), math.inf
 
     def end_accepted(self, duration: float) -> None:
         """Take note that the planner holds the motors off after a duration (s)."""
-        self._plan_end = self._handle.time() + duration
+        self._plan_end = self._time() + duration
 
-    def is_flight(self, state: SupervisorState | None) -> bool:
+    def is_high_level(self, state: SupervisorState | None) -> bool:
         """Return whether a state, None if unknown, is a flight by the high-level commander."""
         return state is not None and SupervisorState.FLYING in state and self._may_move(state)
 
@@ -54,10 +90,10 @@ class FlightState:
         ------
         LinkLostError
         """
-        state = self._vehicle.read_state()
-        is_streamed = self._setpoints.is_flight
+        state = self.read()
+        is_streamed = self._setpoints.runs_motors
         latest = max(self._planned, self._setpoints.last_time if is_streamed else -math.inf)
-        if state is None or self._handle.time() - latest < _REPORT_LAG:
+        if state is None or self._time() - latest < _REPORT_LAG:
             return False
         return not (self._may_move(state) or (is_streamed and SupervisorState.FLYING in state))
 
@@ -66,4 +102,4 @@ class FlightState:
         if state.reports_planner:
             return SupervisorState.HIGH_LEVEL_ACTIVE in state
         is_latest = self._planned >= self._setpoints.last_time
-        return is_latest and self._handle.time() < self._plan_end
+        return is_latest and self._time() < self._plan_end

@@ -208,11 +208,11 @@ class LogTopics:
         self._add(block.topic_name, period, tuple(block.variables), publish)
 
     def _add(self, name, period_ms, variables, receive, note=lambda values: None):
-        def hand_over(time_ms, values):
+        def deliver(time_ms, values):
             note(values)
             self._delivery.submit_data(receive, self._stamp(time_ms), values)
 
-        self._crazyflie.add_log_block(LogBlock(name, period_ms, variables, hand_over))
+        self._crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
 
     def _publisher(self, name, message_type):
         return self._handle.publisher(f"{self._parameters.prefix}/{name}", message_type)

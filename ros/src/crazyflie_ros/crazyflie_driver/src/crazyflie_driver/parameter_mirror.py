@@ -30,7 +30,7 @@ class ParameterMirror:
         self._crazyflie = crazyflie
         self._written: dict[str, int | float] = {}
 
-    def write_again(self) -> list[str]:
+    def reapply_parameters(self) -> list[str]:
         """Write what `write` has written since the start: a vehicle that was off has forgotten it.
 
         Returns

@@ -14,6 +14,7 @@ from crazyflie_driver.srv import (
     RemoveCrazyflie,
     RemoveCrazyflieResponse,
 )
+from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_link.errors import CrazyflieError
@@ -67,14 +68,15 @@ class CrazyflieServerNode(Node):
         )
 
     def _follow_flights(self):
-        # Flights on setpoints are ended by who sends these.
-        flying = [each for each in self._vehicles.values() if each.commands.are_flown]
+        # Flights on setpoints are ended by the node that sends these.
+        commands = [vehicle.commands for vehicle in self._vehicles.values()]
+        flying = [each for each in commands if each.is_high_level_flight_active]
         if bool(flying) != self._in_flight:
             self._in_flight = bool(flying)
             self._announce_flight(self._in_flight)
         if self._is_leaving:
-            for vehicle in flying:
-                vehicle.commands.land_at_last()
+            for each in flying:
+                each.land_with_retry("shutdown")
 
     def _on_add(self, request):
         wanted = VehicleParameters.from_request(request)
@@ -120,7 +122,7 @@ class CrazyflieServerNode(Node):
         for vehicle in self._vehicles.values():
             name = vehicle.parameters.name
             try:
-                vehicle.stop_in_emergency()
+                vehicle.emergency.latch()
             except CrazyflieError as error:
                 self._handle.error(f"{name}: emergency stop, sent when there is a link: {error}")
             else:
@@ -147,14 +149,15 @@ class CrazyflieServerNode(Node):
         return answer
 
     def _publish_diagnostics(self):
-        now = self._handle.time()
         component = self._handle.name.strip("/")
         self._diagnostics.publish(
             DiagnosticArray(
                 header=Header(stamp=self._handle.stamp()),
                 status=[
-                    vehicle.status(now).message(
-                        f"{component}: {vehicle.parameters.name}", vehicle.parameters.uri
+                    diagnostics(
+                        vehicle.status.status(),
+                        f"{component}: {vehicle.parameters.name}",
+                        vehicle.parameters.uri,
                     )
                     for vehicle in self._vehicles.values()
                 ],

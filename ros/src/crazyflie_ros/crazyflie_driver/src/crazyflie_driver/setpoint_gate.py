@@ -1,11 +1,12 @@
 """Whether setpoints may be sent: after a lost link, or without a liftoff, a stream is blocked."""
 
 import contextlib
+import enum
 import threading
 from collections.abc import Iterator
 
 PAUSE = 1.0
-"""A stream that has been silent for so long, s, was begun anew by somebody who knows."""
+"""A stream that has been silent for so long, s, was begun anew on purpose."""
 
 OVERLAP = 0.5
 """After a high-level command or cmd_stop, setpoints that were on their way, since each topic has
@@ -13,63 +14,88 @@ a connection of its own, are not sent for so long, s: a single one would take th
 planner or start its motors, and lock it 2 s later."""
 
 
+class Block(enum.Flag):
+    """Why setpoints are not sent; several can hold, and the first one is named."""
+
+    EMERGENCY = enum.auto()
+    REMOVAL = enum.auto()
+    LINK_LOST = enum.auto()
+    UNCONFIRMED = enum.auto()
+    NOT_LIFTED = enum.auto()
+
+
+class Event(enum.Enum):
+    """What changes the blocks."""
+
+    EMERGENCY_STOP = enum.auto()
+    REMOVAL = enum.auto()
+    LINK_LOST = enum.auto()
+    LINK_BACK = enum.auto()
+    FLIGHT_REPORTED = enum.auto()
+    FLIGHT_CALLED = enum.auto()
+    NOT_LIFTED = enum.auto()
+    STREAM_BEGUN = enum.auto()
+
+
+_NONE = Block(0)
+_ON_TRIAL = Block.UNCONFIRMED | Block.NOT_LIFTED
+
+TRANSITIONS = {
+    Event.EMERGENCY_STOP: (_NONE, Block.EMERGENCY, _NONE),
+    Event.REMOVAL: (_NONE, Block.REMOVAL, _NONE),
+    Event.LINK_LOST: (_NONE, Block.LINK_LOST, Block.UNCONFIRMED),
+    # The vehicle may have been restarted, or its battery been changed, and be in a hand.
+    Event.LINK_BACK: (Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
+    # The vehicle says that it flies, which it does of thrust on the ground, too.
+    Event.FLIGHT_REPORTED: (_NONE, _NONE, Block.UNCONFIRMED),
+    # A call has the vehicle fly.
+    Event.FLIGHT_CALLED: (_NONE, _NONE, _ON_TRIAL),
+    # Setpoints were to have it fly, and it has not lifted off.
+    Event.NOT_LIFTED: (_NONE, Block.NOT_LIFTED, _NONE),
+    # After a pause, or with zero thrust.
+    Event.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL),
+}
+"""Event -> (blocks that have to hold, blocks that begin, blocks that end)."""
+
+_ADVICE = f"pause the stream for {PAUSE:g} s, send zero thrust or call a service"
+
+REASONS = {
+    Block.EMERGENCY: "emergency stop",
+    Block.REMOVAL: "the vehicle is being removed",
+    Block.LINK_LOST: "the link is lost",
+    Block.UNCONFIRMED: (
+        f"the link was lost, and the vehicle does not fly: {_ADVICE} that has it fly"
+    ),
+    Block.NOT_LIFTED: f"the vehicle was told to fly and did not lift off: {_ADVICE}",
+}
+"""What is said of each, in the order in which they count."""
+
+
 class SetpointGate:
     """Decide about each setpoint; times are s of one clock.
-
-    After a lost link, setpoints stay blocked: the vehicle may have been restarted, or its
-    battery been changed, and be in somebody's hand. What shows that they are meant is that the
-    vehicle still flies, a pause in the stream, zero thrust, or a call that has it fly.
 
     Callbacks, the link's thread and those of the vehicle's jobs use it at the same time.
     """
 
     def __init__(self) -> None:
         self._lock = threading.RLock()
+        self._blocks = _NONE
         self._commands = 0
-        self._is_emergency = False
-        self._is_leaving = False
-        self._is_down = False
-        self._is_waiting = False
-        self._has_not_lifted = False
         self._latest: float | None = None
         self._high_level_since: float | None = None
         self._stopped_since: float | None = None
 
-    def stop_for_good(self) -> None:
-        """Take note of an emergency stop."""
-        with self._lock:
-            self._is_emergency = True
+    @property
+    def is_emergency(self) -> bool:
+        """Whether there was an emergency stop."""
+        return Block.EMERGENCY in self._blocks
 
-    def leave(self) -> None:
-        """Take note that the vehicle is being removed."""
+    def handle(self, event: Event) -> None:
+        """Change the blocks as an event does."""
+        needed, begun, ended = TRANSITIONS[event]
         with self._lock:
-            self._is_leaving = True
-
-    def link_lost(self) -> None:
-        """Take note that the link was lost."""
-        with self._lock:
-            self._is_down = self._is_waiting = True
-
-    def link_back(self) -> None:
-        """Take note that there is a link again."""
-        with self._lock:
-            self._is_down = False
-
-    def open(self) -> None:
-        """Take note of a call that has the vehicle fly."""
-        with self._lock:
-            self._is_waiting = self._is_down
-            self._has_not_lifted = False
-
-    def flight_goes_on(self) -> None:
-        """Take note that the vehicle says that it flies, which thrust on the ground is, too."""
-        with self._lock:
-            self._is_waiting = self._is_down
-
-    def not_lifted(self) -> None:
-        """Take note that the vehicle was told to fly, and has not lifted off."""
-        with self._lock:
-            self._has_not_lifted = True
+            if needed in self._blocks:
+                self._blocks = self._blocks & ~ended | begun
 
     def high_level(self, now: float) -> int:
         """Take note that the vehicle is given a high-level command; return its number."""
@@ -108,8 +134,9 @@ class SetpointGate:
             yield self.refusal(now, is_zero)
 
     def is_blocking(self, now: float) -> bool:
-        """Return whether somebody streams setpoints that are blocked because of a lost link."""
-        return self._is_waiting and self._latest is not None and now - self._latest <= PAUSE
+        """Return whether a stream is blocked because the link was lost."""
+        is_streamed = self._latest is not None and now - self._latest <= PAUSE
+        return is_streamed and Block.UNCONFIRMED in self._blocks
 
     def refusal(self, now: float, is_zero: bool) -> str:
         """Return why a setpoint must not be sent; empty if it may.
@@ -121,32 +148,17 @@ class SetpointGate:
             Whether it has the motors stand still.
         """
         with self._lock:
-            return self._refusal(now, is_zero)
-
-    def _refusal(self, now, is_zero):
-        before, self._latest = self._latest, now
-        if self._is_emergency:
-            return "emergency stop"
-        if self._is_leaving:
-            return "the vehicle is being removed"
-        if self._is_down:
-            return "the link is lost"
-        is_new = before is None or now - before > PAUSE
-        if self._is_waiting and not (is_new or is_zero):
-            return (
-                "the link was lost, and the vehicle does not fly: pause the stream for "
-                f"{PAUSE:g} s, send zero thrust or call a service that has it fly"
-            )
-        if self._has_not_lifted and not (is_new or is_zero):
-            return (
-                "the vehicle was told to fly and did not lift off: pause the stream for "
-                f"{PAUSE:g} s, send zero thrust or call a service"
-            )
-        self._is_waiting = self._has_not_lifted = False
-        for since, event in (
-            (self._high_level_since, "given a high-level command"),
-            (self._stopped_since, "stopped by cmd_stop"),
-        ):
-            if since is not None and now - since < OVERLAP and not is_zero:
-                return f"the vehicle was just {event}"
-        return ""
+            before, self._latest = self._latest, now
+            if is_zero or before is None or now - before > PAUSE:
+                if not self._blocks & ~_ON_TRIAL:
+                    self.handle(Event.STREAM_BEGUN)
+            for block, reason in REASONS.items():
+                if block in self._blocks:
+                    return reason
+            for since, event in (
+                (self._high_level_since, "given a high-level command"),
+                (self._stopped_since, "stopped by cmd_stop"),
+            ):
+                if since is not None and now - since < OVERLAP and not is_zero:
+                    return f"the vehicle was just {event}"
+            return ""

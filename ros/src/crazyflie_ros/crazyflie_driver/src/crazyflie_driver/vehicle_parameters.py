@@ -23,6 +23,9 @@ from crazyflie_utils.parameters.types import (
 STATUS_TOPIC = "status"
 """Topic that says what state a vehicle is in."""
 
+VEHICLE_STATUS_TOPIC = "vehicle_status"
+"""The same with more details, as crazyflie_msgs/VehicleStatus."""
+
 CONNECTED_TOPIC = "connected"
 """Topic that says whether the driver is connected to a vehicle."""
 
@@ -61,7 +64,7 @@ class LogTopic(Namespace):
         name = super().__call__(value)
         if not name:
             raise ValueError
-        if name in (*STANDARD_TOPICS, "rssi", STATUS_TOPIC, CONNECTED_TOPIC):
+        if name in _OWN_TOPICS:
             raise ValueError(f"the driver itself has a topic {name!r}")
         return name
 
@@ -207,6 +210,9 @@ STANDARD_TOPICS = tuple(
     if declaration.name.startswith(_SWITCH)
 )
 """Topics that are switched by ``enable_logging_NAME``."""
+
+
+_OWN_TOPICS = (*STANDARD_TOPICS, "rssi", STATUS_TOPIC, VEHICLE_STATUS_TOPIC, CONNECTED_TOPIC)
 
 
 class CrazyflieAddParameters(VehicleParameters):

@@ -13,9 +13,9 @@ from cflib.crazyflie.supervisor import (
 )
 from cflib.crtp.crtpstack import CRTPPort
 
-from crazyflie_link.backend import packet
 from crazyflie_link.errors import LinkLostError
 from crazyflie_link.link import Link
+from crazyflie_link.safe_crazyflie import packet
 from crazyflie_model.supervisor import SupervisorState
 
 SUPERVISOR_PROTOCOL = 12
@@ -142,7 +142,7 @@ class EmergencyStop:
 
         with contextlib.suppress(LinkLostError):
             if urgent:
-                link.command(send, urgent=True)
+                link.put(send, urgent=True)
             else:
                 # One that could not be sent yet is replaced.
-                link.stream(_STREAM, send)
+                link.put_latest(_STREAM, send)

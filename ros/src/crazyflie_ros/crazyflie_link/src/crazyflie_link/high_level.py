@@ -11,8 +11,8 @@ from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.checks import check_byte, check_finite, check_positive
 from crazyflie_link.errors import AlreadyLandingError, RefusedError
-from crazyflie_link.exchange import REPLY_LIMIT, Request
 from crazyflie_link.link import Link
+from crazyflie_link.request_reply import REPLY_LIMIT, Request
 from crazyflie_link.subsystem import Subsystem
 from crazyflie_link.supervisor import read_state
 from crazyflie_model.supervisor import SupervisorState
@@ -223,7 +223,7 @@ class HighLevel(Subsystem):
             send(link.cflib.high_level_commander)
 
         request = Request(CRTPPort.SETPOINT_HL, 0, bytes([number]), what, resend)
-        answer = link.ask(transmit, request)
+        answer = link.request(transmit, request)
         # The first three bytes of the request, then the firmware's errno.
         code = answer[3] if len(answer) > 3 else 0
         if code and not (code == _BUSY and sent > 1 and self._is_carried_out(number)):

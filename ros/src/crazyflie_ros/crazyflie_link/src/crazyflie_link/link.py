@@ -4,63 +4,37 @@ import logging
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from functools import partial
 
-from cflib.crtp.crtpstack import CRTPPort
+from cflib.crazyflie.link_statistics import ECHO_CHANNEL
+from cflib.crazyflie.log import CHAN_LOGDATA
+from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
 
-from crazyflie_link import radios
 from crazyflie_link.address import Address
-from crazyflie_link.backend import Backend, init_drivers, packet
+from crazyflie_link.cflib_internals import forget_dead_radios
 from crazyflie_link.errors import (
     UNANSWERED,
     CrazyflieError,
     LinkLostError,
-    NoAnswerError,
-    SetupError,
     ValueRangeError,
     explain,
 )
-from crazyflie_link.exchange import Exchange, Request
-from crazyflie_link.liveness import LOST_AFTER, Life, Liveness
-from crazyflie_link.outbox import Outbox, Send
-from crazyflie_link.setup_progress import SetupProgress
+from crazyflie_link.link_monitor import LinkHealth, LinkMonitor
+from crazyflie_link.link_setup import Limits, LinkSetup
+from crazyflie_link.request_reply import Request, RequestReply
+from crazyflie_link.safe_crazyflie import SafeCrazyflie, init_drivers, packet
+from crazyflie_link.transmit_queue import Send, TransmitQueue
 
-OLDEST_PROTOCOL = 4
-"""The first protocol version with tables of more than 255 items."""
-
-LOG_DATA = (CRTPPort.LOGGING, 2)
+LOG_DATA = (CRTPPort.LOGGING, CHAN_LOGDATA)
 """Port and channel of log data."""
 
-_PING_CHANNEL = 0
+_PING = (CRTPPort.LINKCTRL, ECHO_CHANNEL)
 _SOURCE_PERIOD = 0.1
-_MOST_DATA = 30
 
 _log = logging.getLogger(__name__)
 
 OnPacket = Callable[[int, int, bytes], None]
 """Is called with port, channel and data."""
-
-
-@dataclass(frozen=True)
-class Limits:
-    """Time limits of a connection, s.
-
-    Attributes
-    ----------
-    first_answer : float
-        From opening the link to the first packet.
-    stall : float
-        Without progress, while tables and parameter values are read.
-    total : float
-        For the whole set-up.
-    lost : float
-        Age of the last sign of life at which a link is lost.
-    """
-
-    first_answer: float = 2.0
-    stall: float = 1.5
-    total: float = 30.0
-    lost: float = LOST_AFTER
 
 
 class Link:
@@ -84,24 +58,21 @@ class Link:
         limits: Limits | None = None,
         cache: str | None = None,
         on_packet: OnPacket | None = None,
-        backend: Callable[[str | None, Callable[[str], None]], Backend] = Backend,
+        backend: Callable[[str | None, Callable[[str], None]], SafeCrazyflie] = SafeCrazyflie,
     ):
         self.address = address
-        self._liveness: Liveness | None = None
         self._limits = limits or Limits()
         self._on_packet = on_packet
+        self._setup = LinkSetup(address.uri, self._limits)
+        self._monitor: LinkMonitor | None = None
         self._changed = threading.Condition()
         self._error: CrazyflieError | None = None
-        self._is_connected = False
         self._is_complete = False
-        self._progress = SetupProgress()
-        self._progress_time = 0.0
-        self._has_answered = False
-        self._radio_says = ""
+        self._radio_error = ""
         self._closing = threading.Lock()
         self._is_closed = False
-        self._exchange = Exchange()
-        self._outbox = Outbox()
+        self._request_reply = RequestReply()
+        self._transmit_queue = TransmitQueue()
         self.cflib = backend(cache, self._fail)
         self.cflib.packet_received.add_callback(self._on_received)
         self.cflib.packet_sent.add_callback(self._on_sent)
@@ -127,61 +98,32 @@ class Link:
 
     def _open(self):
         init_drivers()
-        begin = self._progress_time = time.monotonic()
+        self._setup.begin()
         # A dongle that hangs, or the search for a host's name, may block.
         threading.Thread(target=self._open_cflib, name="crazyflie-open", daemon=True).start()
-        asked = begin
+        asked = time.monotonic()
         with self._changed:
             while not self._is_complete:
                 self._changed.wait(0.05)
-                now = time.monotonic()
-                self._check_setup(now, begin)
-                if self.protocol < 0 and now - asked > _SOURCE_PERIOD:
-                    asked = now
-                    self._outbox.latest("source", self.cflib.ask_for_source)
+                if self._error is not None:
+                    raise self._error
+                self._setup.check(self.protocol)
+                if self.protocol < 0 and time.monotonic() - asked > _SOURCE_PERIOD:
+                    asked = time.monotonic()
+                    self.put_latest("source", self.cflib.request_source)
 
     def _open_cflib(self):
-        radios.forget_dead_radios()
+        forget_dead_radios()
         self.cflib.open_link(self.address.uri)
         # `open` may have given up meanwhile.
         if self._is_closed:
-            self.cflib.drop()
+            self.cflib.disconnect()
 
-    def _check_setup(self, now, begin):
-        uri = self.address.uri
-        if self._error is not None:
-            raise self._error
-        if 0 <= self.protocol < OLDEST_PROTOCOL:
-            raise SetupError(
-                f"{uri}: the firmware speaks protocol {self.protocol}, at least {OLDEST_PROTOCOL} "
-                "is needed: update the firmware"
-            )
-        if not self._has_answered:
-            if now - begin > self._limits.first_answer:
-                raise NoAnswerError(
-                    f"{uri}: nobody has answered within {self._limits.first_answer:g} s, although "
-                    "the address can be reached: is it a Crazyflie, is it on, and is nobody else "
-                    "connected to it?"
-                )
-        elif now - self._progress_time > self._limits.stall:
-            raise SetupError(
-                f"{uri}: the vehicle answers, but the connection is stuck ({self._progress}) for "
-                f"{self._limits.stall:g} s: restart the vehicle, come nearer or try another channel"
-            )
-        elif now - begin > self._limits.total:
-            raise SetupError(
-                f"{uri}: not connected after {self._limits.total:g} s ({self._progress}): the link "
-                "is too slow; try another channel or a higher data rate"
-            )
-
-    def _on_connected(self, _):
-        with self._changed:
-            self._is_connected = True
-            self._liveness = Liveness(time.monotonic(), self._limits.lost)
-            # Without a single parameter cflib never reports that it is complete.
-            if not self.cflib.param.toc.toc:
-                self._is_complete = True
-            self._changed.notify_all()
+    def _on_connected(self, uri):
+        self._monitor = LinkMonitor(time.monotonic(), self._limits.lost)
+        # Without a single parameter cflib never reports that it is complete.
+        if not self.cflib.param.toc.toc:
+            self._on_complete(uri)
 
     def _on_complete(self, _):
         with self._changed:
@@ -192,11 +134,11 @@ class Link:
 
     @property
     def protocol(self) -> int:
-        """Version of the protocol that the vehicle speaks."""
+        """Version of the protocol that the vehicle speaks; negative while it is not known."""
         return self.cflib.platform.get_protocol_version()
 
     @property
-    def liveness(self) -> Liveness:
+    def monitor(self) -> LinkMonitor:
         """Signs of life of the vehicle.
 
         Raises
@@ -204,51 +146,55 @@ class Link:
         LinkLostError
             The link is not set up.
         """
-        if self._liveness is None:
+        if self._monitor is None:
             raise LinkLostError(f"{self.address.uri}: not connected yet")
-        return self._liveness
+        return self._monitor
 
     @property
     def error(self) -> CrazyflieError | None:
-        """Why the link is at its end; None while it lives."""
+        """Why the link has ended; None while it is open."""
         return self._error
 
-    def life(self) -> tuple[Life, str]:
+    def health(self) -> tuple[LinkHealth, str]:
         """Return what the vehicle's packets show, and the same in words."""
-        if self._liveness is None:
-            return Life.ALIVE, "not connected yet"
-        state = self._liveness.state(time.monotonic())
-        if state is Life.ALIVE:
+        state = self.monitor.state(time.monotonic())
+        if state is LinkHealth.ALIVE:
             return state, "connected"
-        if state is Life.RESTARTED:
+        if state is LinkHealth.RESTARTED:
             text = "the log data have stopped although the vehicle answers: has it restarted?"
         else:
-            text = f"the vehicle has not been heard for {self._limits.lost:g} s{self._radio_says}"
+            text = f"the vehicle has not been heard for {self._limits.lost:g} s{self._radio_error}"
         return state, f"{self.address.uri}: {text}"
 
-    def stream(self, name: str, send: Send) -> None:
-        """Have ``send()`` called soon, in the place of what still waits under this name."""
-        self._outbox.latest(name, send)
+    def put(self, send: Send, urgent: bool = False) -> None:
+        """See `TransmitQueue.put`."""
+        self._transmit_queue.put(send, urgent)
 
-    def forget(self, name: str) -> None:
-        """Do not send what waits under this name."""
-        self._outbox.forget(name)
+    def put_latest(self, stream: str, send: Send) -> None:
+        """See `TransmitQueue.put_latest`."""
+        self._transmit_queue.put_latest(stream, send)
 
-    def command(self, send: Send, urgent: bool = False) -> None:
-        """Have ``send()`` called soon, after earlier commands, or before them if urgent."""
-        self._outbox.command(send, urgent)
+    def discard(self, stream: str) -> None:
+        """See `TransmitQueue.discard`."""
+        self._transmit_queue.discard(stream)
 
     def send(self, port: int, channel: int, data: bytes) -> None:
         """Send a packet with at most 30 bytes of data."""
-        if not (0 <= port <= 15 and 0 <= channel <= 3 and len(data) <= _MOST_DATA):
+        most = CRTPPacket.MAX_DATA_SIZE
+        if not (0 <= port <= 15 and 0 <= channel <= 3 and len(data) <= most):
             raise ValueRangeError(
                 f"no packet: port {port} (0 to 15), channel {channel} (0 to 3), {len(data)} bytes "
-                f"(at most {_MOST_DATA})"
+                f"(at most {most})"
             )
-        self.command(lambda: self.cflib.send_packet(packet(port, channel, data)))
+        self.put(partial(self.cflib.send_packet, packet(port, channel, data)))
 
-    def ask(self, send: Send | bytes, request: Request) -> bytes:
-        """Send a request and return the data of its answer; see `Exchange.ask`.
+    def request(
+        self,
+        send: Send | bytes,
+        request: Request,
+        put: Callable[[Send], None] | None = None,
+    ) -> bytes:
+        """Send a request and return the data of its answer; see `RequestReply.request`.
 
         Parameters
         ----------
@@ -256,18 +202,20 @@ class Link:
             Sends the request; or its data, for the same port and channel.
         request : Request
             What answer is expected.
+        put : callable, optional
+            Instead of `put`.
         """
         if isinstance(send, bytes):
             data = packet(request.port, request.channel, send)
-            transmit = lambda: self.cflib.send_packet(data)  # noqa: E731
+            transmit: Send = partial(self.cflib.send_packet, data)
         else:
             transmit = send
-        return self._exchange.ask(lambda: self.command(transmit), request)
+        return self._request_reply.request(partial(put or self.put, transmit), request)
 
     # End.
 
     def close(self, reason: str = "the link was closed") -> None:
-        """End the connection, once; requests that wait fail with the reason."""
+        """End the connection, once; pending requests fail with the reason."""
         with self._closing:
             if self._is_closed:
                 return
@@ -275,9 +223,9 @@ class Link:
         with self._changed:
             self._error = self._error or LinkLostError(reason)
             self._changed.notify_all()
-        self._outbox.close()
-        self._exchange.close(reason)
-        self.cflib.drop()
+        self._transmit_queue.close()
+        self._request_reply.close(reason)
+        self.cflib.disconnect()
 
     def _fail(self, text):
         with self._changed:
@@ -285,9 +233,9 @@ class Link:
                 cause = explain(self.address.uri, text)
                 if self._is_complete and UNANSWERED in text.lower():
                     # The driver goes on, and the vehicle may be heard again.
-                    self._radio_says = f" ({cause})"
+                    self._radio_error = f" ({cause})"
                     return
-                if self._is_connected:
+                if self._monitor is not None:
                     cause = LinkLostError(f"the link was lost: {cause}")
                 self._error = cause
             self._changed.notify_all()
@@ -295,20 +243,16 @@ class Link:
     # An exception in here would end cflib's receiving thread.
 
     def _on_received(self, received):
-        self._radio_says = ""
+        self._radio_error = ""
         port, channel, data = received.port, received.channel, bytes(received.data)
-        now = time.monotonic()
         if not self._is_complete:
-            is_progress = self._progress.receive(port, channel, data)
-            if is_progress or not self._has_answered:
-                self._progress_time = now
-            self._has_answered = True
-        if self._liveness is not None:
+            self._setup.receive(port, channel, data)
+        if self._monitor is not None:
             if (port, channel) == LOG_DATA:
-                self._liveness.log_received(now)
-            elif (port, channel) == (CRTPPort.LINKCTRL, _PING_CHANNEL):
-                self._liveness.ping_answered(data, now)
-        self._exchange.receive(port, channel, data)
+                self._monitor.log_received(time.monotonic())
+            elif (port, channel) == _PING:
+                self._monitor.ping_answered(data, time.monotonic())
+        self._request_reply.receive(port, channel, data)
         if self._on_packet is not None:
             try:
                 self._on_packet(port, channel, data)
@@ -316,8 +260,5 @@ class Link:
                 _log.exception("the callback for packets failed")
 
     def _on_sent(self, sent):
-        if self._liveness is not None and (sent.port, sent.channel) == (
-            CRTPPort.LINKCTRL,
-            _PING_CHANNEL,
-        ):
-            self._liveness.ping_sent(bytes(sent.data))
+        if self._monitor is not None and (sent.port, sent.channel) == _PING:
+            self._monitor.ping_sent(bytes(sent.data))

@@ -17,7 +17,7 @@ class Localization(Subsystem):
         """Send a position in the world, m."""
         check_finite("external position", x, y, z)
         link = self._current_link()
-        link.stream(_STREAM, lambda: link.cflib.loc.send_extpos((x, y, z)))
+        link.put_latest(_STREAM, lambda: link.cflib.loc.send_extpos((x, y, z)))
 
     def pose(self, position: Sequence[float], quaternion: Sequence[float]) -> None:
         """Send a position (m) and an attitude (x, y, z, w) in the world.
@@ -30,4 +30,4 @@ class Localization(Subsystem):
             raise ValueRangeError("external pose: the quaternion (0, 0, 0, 0) is no attitude")
         unit = [component / norm for component in quaternion]
         link = self._current_link()
-        link.stream(_STREAM, lambda: link.cflib.loc.send_extpose(position, unit))
+        link.put_latest(_STREAM, lambda: link.cflib.loc.send_extpose(position, unit))

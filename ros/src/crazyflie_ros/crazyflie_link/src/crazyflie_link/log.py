@@ -14,14 +14,11 @@ from crazyflie_link.errors import (
     ValueRangeError,
     unknown_name,
 )
-from crazyflie_link.exchange import REPLY_LIMIT
+from crazyflie_link.request_reply import REPLY_LIMIT
 from crazyflie_link.subsystem import Subsystem, elements
 
 SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS, PERIOD_STEP_MS = 10, 2540, 10
 """The firmware counts periods in 10 ms, in one byte of which 255 is not allowed."""
-
-MOST_BYTES = 26
-"""Bytes of values that fit in a log packet."""
 
 
 def quaternion_from_compressed(number: int) -> tuple[float, ...]:
@@ -91,10 +88,10 @@ class Log(Subsystem):
             size += LogTocElement.get_size_from_id(
                 LogTocElement.get_id_from_cstring(known[variable])
             )
-        if size > MOST_BYTES:
+        if size > LogConfig.MAX_LEN:
             raise ValueRangeError(
                 f"log block {block.name!r}: its {len(block.variables)} variables take {size} "
-                f"bytes; at most {MOST_BYTES} fit in a packet: make it two blocks"
+                f"bytes; at most {LogConfig.MAX_LEN} fit in a packet: make it two blocks"
             )
 
     def start(self, block: LogBlock) -> None:
@@ -143,4 +140,4 @@ class Log(Subsystem):
             )
         if refusals:
             raise RefusedError(f"log block {block.name!r}: the vehicle says: {refusals[0]}")
-        link.liveness.expect_log(block.period_ms / 1000.0, time.monotonic())
+        link.monitor.expect_log(block.period_ms / 1000.0, time.monotonic())

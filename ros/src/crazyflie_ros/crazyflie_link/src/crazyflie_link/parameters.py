@@ -2,15 +2,13 @@
 
 import struct
 
-from cflib.crazyflie.param import ParamTocElement
+from cflib.crazyflie.param import READ_CHANNEL, WRITE_CHANNEL, ParamTocElement
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import NoReplyError, RefusedError, ValueRangeError, unknown_name
-from crazyflie_link.exchange import Request
 from crazyflie_link.link import Link
+from crazyflie_link.request_reply import Request
 from crazyflie_link.subsystem import Subsystem, elements
-
-_READ_CHANNEL, _WRITE_CHANNEL = 1, 2
 
 
 class FirmwareParameters(Subsystem):
@@ -44,8 +42,8 @@ class FirmwareParameters(Subsystem):
         link = self._current_link()
         element = self._find(link, name)
         ident = struct.pack("<H", element.ident)
-        request = Request(CRTPPort.PARAM, _READ_CHANNEL, ident, f"reading {name}")
-        answer = link.ask(ident, request)
+        request = Request(CRTPPort.PARAM, READ_CHANNEL, ident, f"reading {name}")
+        answer = link.request(ident, request)
         # Identifier, status, value.
         if len(answer) < 3 or answer[2] != 0:
             raise RefusedError(f"reading {name}: the vehicle says {answer[2:].hex() or 'nothing'}")
@@ -72,9 +70,9 @@ class FirmwareParameters(Subsystem):
             return answer == data or len(answer) != len(data)
 
         what = f"writing {name}"
-        request = Request(CRTPPort.PARAM, _WRITE_CHANNEL, ident, what, accepts=accepts)
+        request = Request(CRTPPort.PARAM, WRITE_CHANNEL, ident, what, accepts=accepts)
         try:
-            answer = link.ask(data, request)
+            answer = link.request(data, request)
         except NoReplyError as error:
             return self._look_up(name, data[2:], error)
         if answer != data:

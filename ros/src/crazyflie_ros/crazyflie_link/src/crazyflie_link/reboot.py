@@ -5,8 +5,8 @@ from collections.abc import Callable
 from cflib.utils.power_switch import PowerSwitch
 
 from crazyflie_link.address import Address
-from crazyflie_link.backend import init_drivers
 from crazyflie_link.errors import RefusedError, explain
+from crazyflie_link.safe_crazyflie import init_drivers
 
 MODES = {
     "firmware": "reboot_to_fw",

@@ -4,11 +4,12 @@ import contextlib
 import io
 
 import cflib.crtp
+from cflib.crtp.radiodriver import DEFAULT_ADDR
 
-from crazyflie_link.backend import init_drivers
 from crazyflie_link.errors import AddressError, CrazyflieError, explain
+from crazyflie_link.safe_crazyflie import init_drivers
 
-DEFAULT_ADDRESS = "E7E7E7E7E7"
+DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"
 """Radio address that vehicles have when they are new."""
 
 

@@ -10,11 +10,16 @@ import threading
 import time
 from collections.abc import Sequence
 
+from cflib.crazyflie.commander import (
+    SET_SETPOINT_CHANNEL,
+    TYPE_HOVER_LEGACY,
+    TYPE_VELOCITY_WORLD_LEGACY,
+)
 from cflib.crtp.crtpstack import CRTPPort
 
-from crazyflie_link.backend import packet
 from crazyflie_link.checks import check_finite
 from crazyflie_link.errors import ValueRangeError
+from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.subsystem import Subsystem
 from crazyflie_model.limits import FULL_PWM
 
@@ -24,11 +29,6 @@ ZEROS = 100
 _SENT_LIMIT = 1.0
 _STREAM = "setpoint"
 _MOST_MILLI = 32.767
-
-_VELOCITY_WORLD, _HOVER = 1, 5
-"""Types of generic setpoints whose yaw rate the firmware negates. They are what
-crazyflie_cpp sends, and all firmware knows them; 8 and 10, which cflib sends from protocol
-9 on, are the same without the negation."""
 
 _FOUR_FLOATS = struct.Struct("<Bffff")
 
@@ -86,12 +86,12 @@ class Setpoints(Subsystem):
     def velocity_world(self, vx: float, vy: float, vz: float, yaw_rate: float) -> None:
         """Velocity in the world (m/s) and yaw rate (degrees/s, positive clockwise)."""
         check_finite("velocity setpoint", vx, vy, vz, yaw_rate)
-        self._stream_generic(_VELOCITY_WORLD, vx, vy, vz, yaw_rate)
+        self._stream_legacy(TYPE_VELOCITY_WORLD_LEGACY, vx, vy, vz, yaw_rate)
 
     def hover(self, vx: float, vy: float, yaw_rate: float, height: float) -> None:
         """Velocity in the heading (m/s), yaw rate (degrees/s, positive clockwise), height (m)."""
         check_finite("hover setpoint", vx, vy, yaw_rate, height)
-        self._stream_generic(_HOVER, vx, vy, yaw_rate, height)
+        self._stream_legacy(TYPE_HOVER_LEGACY, vx, vy, yaw_rate, height)
 
     def position(self, x: float, y: float, z: float, yaw: float) -> None:
         """Position in the world (m) and yaw (degrees)."""
@@ -102,23 +102,23 @@ class Setpoints(Subsystem):
         """Stop the motors."""
         self._stream(lambda c: c.send_stop_setpoint())
 
-    def zeros(self, count: int = ZEROS, period: float = 0.001) -> None:
+    def send_zero_thrust(self, count: int = ZEROS, period: float = 0.001) -> None:
         """Send zero thrust ``count`` times, every ``period`` seconds; blocks until they are sent.
 
         It opens the firmware's thrust lock, and stops a vehicle that flies on setpoints. In the
-        end they are handed over (`hand_over`): otherwise the vehicle would be locked 2 s later.
+        end "setpoints stop" is sent: otherwise the vehicle would be locked 2 s later.
         """
         link = self._current_link()
-        link.forget(_STREAM)
+        link.discard(_STREAM)
         sent = threading.Event()
         for _ in range(count):
-            link.command(lambda: link.cflib.commander.send_setpoint(0, 0, 0, 0))
+            link.put(lambda: link.cflib.commander.send_setpoint(0, 0, 0, 0))
             time.sleep(period)
-        self.hand_over()
-        link.command(sent.set)
+        self.notify_setpoints_stop()
+        link.put(sent.set)
         sent.wait(_SENT_LIMIT)
 
-    def hand_over(self, remain_valid_ms: int = 0) -> None:
+    def notify_setpoints_stop(self, remain_valid_ms: int = 0) -> None:
         """Announce that no more setpoints follow: high-level commands are accepted again.
 
         Without it the firmware ignores them after a streamed setpoint.
@@ -131,27 +131,26 @@ class Setpoints(Subsystem):
         if not 0 <= remain_valid_ms < 2**32:
             raise ValueRangeError(f"{remain_valid_ms} ms is not in 0 to 2^32 - 1")
         link = self._current_link()
-        link.forget(_STREAM)
-        link.command(lambda: link.cflib.commander.send_notify_setpoint_stop(remain_valid_ms))
+        link.discard(_STREAM)
+        link.put(lambda: link.cflib.commander.send_notify_setpoint_stop(remain_valid_ms))
 
-    def hand_over_now(self, remain_valid_ms: int = 0) -> None:
-        """Do the same at once: for the thread that sends, right before a command.
-
-        See `Subsystem.guarded`, whose ``may_send`` may do that.
-        """
+    def notify_setpoints_stop_now(self, remain_valid_ms: int = 0) -> None:
+        """Do the same at once, in the thread that sends: see `Subsystem.guarded`."""
         link = self._current_link()
-        link.forget(_STREAM)
+        link.discard(_STREAM)
         link.cflib.commander.send_notify_setpoint_stop(remain_valid_ms)
 
     def _stream(self, send):
         link = self._current_link()
-        link.stream(_STREAM, lambda: send(link.cflib.commander))
+        link.put_latest(_STREAM, lambda: send(link.cflib.commander))
 
-    def _stream_generic(self, kind, *values):
+    def _stream_legacy(self, kind, *values):
+        # What crazyflie_cpp sends, and all firmware knows; the firmware negates the yaw rate. From
+        # protocol 9 on cflib sends other types.
         link = self._current_link()
 
         def send():
             data = _FOUR_FLOATS.pack(kind, *values)
-            link.cflib.send_packet(packet(CRTPPort.COMMANDER_GENERIC, 0, data))
+            link.cflib.send_packet(packet(CRTPPort.COMMANDER_GENERIC, SET_SETPOINT_CHANNEL, data))
 
-        link.stream(_STREAM, send)
+        link.put_latest(_STREAM, send)

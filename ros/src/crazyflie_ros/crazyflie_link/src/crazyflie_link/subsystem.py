@@ -2,10 +2,39 @@
 
 import copy
 from collections.abc import Callable
-from typing import Protocol, Self, TypeVar, cast
+from typing import Any, Protocol, Self, TypeVar, cast
 
-from crazyflie_link.guarded_link import GuardedLink, MaySend
 from crazyflie_link.link import Link
+from crazyflie_link.request_reply import Request
+from crazyflie_link.transmit_queue import Send
+
+MaySend = Callable[[], bool]
+"""Is called by the thread that sends, right before each packet: whether it is sent. Of two queued
+packets, the second cannot overtake the first between this call and the sending."""
+
+
+class _GuardedLink:
+    """A `Link` whose commands and requests are sent only if ``may_send()``.
+
+    A request that is held back ends as one that is not answered does.
+    """
+
+    def __init__(self, link: Link, may_send: MaySend):
+        self._link = link
+        self._may_send = may_send
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._link, name)
+
+    def put(self, send: Send, urgent: bool = False) -> None:
+        def transmit():
+            if self._may_send():
+                send()
+
+        self._link.put(transmit, urgent)
+
+    def request(self, send: Send | bytes, request: Request) -> bytes:
+        return self._link.request(send, request, self.put)
 
 
 class Subsystem:
@@ -14,7 +43,7 @@ class Subsystem:
     Parameters
     ----------
     current_link : callable
-        Returns the living `Link`, or raises `LinkLostError`.
+        Returns the `Link` on which the vehicle is heard, or raises `LinkLostError`.
     """
 
     def __init__(self, current_link: Callable[[], Link]):
@@ -29,7 +58,7 @@ class Subsystem:
             Is called by the thread that sends, right before each packet.
         """
         guarded, current_link = copy.copy(self), self._current_link
-        guarded._current_link = lambda: cast(Link, GuardedLink(current_link(), may_send))
+        guarded._current_link = lambda: cast(Link, _GuardedLink(current_link(), may_send))
         return guarded
 
 

@@ -2,17 +2,22 @@
 
 from collections.abc import Callable
 
+from cflib.crazyflie.supervisor import (
+    CMD_ARM_SYSTEM,
+    CMD_GET_STATE_BITFIELD,
+    CMD_RECOVER_SYSTEM,
+    SUPERVISOR_CH_COMMAND,
+    SUPERVISOR_CH_INFO,
+)
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.emergency import ANSWER, SUPERVISOR_PROTOCOL, EmergencyStop
 from crazyflie_link.errors import RefusedError
-from crazyflie_link.exchange import Request
 from crazyflie_link.link import Link
+from crazyflie_link.request_reply import Request
 from crazyflie_link.subsystem import Subsystem
 from crazyflie_model.supervisor import SupervisorState
 
-_INFO_CHANNEL, _COMMAND_CHANNEL = 0, 1
-_GET_STATE, _ARM, _RECOVER = 0x0C, 0x01, 0x02
 _WATCHDOG = "watchdog"
 
 
@@ -54,10 +59,10 @@ class Supervisor(Subsystem):
         """
         link = self._current_link()
         if link.protocol < SUPERVISOR_PROTOCOL:
-            link.command(lambda: link.cflib.supervisor.send_arming_request(do_arm))
+            link.put(lambda: link.cflib.supervisor.send_arming_request(do_arm))
             return
         verb = "arming" if do_arm else "disarming"
-        self._command(link, bytes([_ARM, do_arm]), verb)
+        self._command(link, bytes([CMD_ARM_SYSTEM, do_arm]), verb)
 
     def recover(self) -> None:
         """Let a vehicle that has crashed be armed again; blocks until it has confirmed it.
@@ -69,9 +74,9 @@ class Supervisor(Subsystem):
         """
         link = self._current_link()
         if link.protocol < SUPERVISOR_PROTOCOL:
-            link.command(link.cflib.supervisor.send_crash_recovery_request)
+            link.put(link.cflib.supervisor.send_crash_recovery_request)
             return
-        self._command(link, bytes([_RECOVER]), "recovering from a crash")
+        self._command(link, bytes([CMD_RECOVER_SYSTEM]), "recovering from a crash")
 
     def emergency_stop(self) -> None:
         """Stop the motors at once, before anything else that waits to be sent; does not block.
@@ -107,37 +112,27 @@ class Supervisor(Subsystem):
             Nothing can be sent.
         """
         link = self._current_link()
-        link.stream(_WATCHDOG, link.cflib.supervisor.send_emergency_stop_watchdog)
+        link.put_latest(_WATCHDOG, link.cflib.supervisor.send_emergency_stop_watchdog)
 
     def _command(self, link: Link, data: bytes, what: str) -> None:
         def accepts(answer: bytes) -> bool:
             # Success, and the state of what was commanded: armed is not the answer to disarming.
             return len(answer) < 3 or len(data) < 2 or not answer[1] or answer[2] == data[1]
 
-        answer = self._ask(link, _COMMAND_CHANNEL, data, what, accepts)
+        prefix = bytes([ANSWER | data[0]])
+        request = Request(CRTPPort.SUPERVISOR, SUPERVISOR_CH_COMMAND, prefix, what, accepts=accepts)
+        answer = link.request(data, request)
         if len(answer) > 1 and not answer[1]:
             state = self.read()
             words = "unknown" if state is None else state.words()
             raise RefusedError(f"{what}: the vehicle refuses it; its state is: {words}")
 
-    @staticmethod
-    def _ask(
-        link: Link,
-        channel: int,
-        data: bytes,
-        what: str,
-        accepts: Callable[[bytes], bool] = lambda answer: True,
-    ) -> bytes:
-        prefix = bytes([ANSWER | data[0]])
-        return link.ask(data, Request(CRTPPort.SUPERVISOR, channel, prefix, what, accepts=accepts))
-
 
 def read_state(link: Link) -> SupervisorState | None:
-    """Return the state that is told over a link; see `Supervisor.read`."""
+    """Return the state that is reported over a link; see `Supervisor.read`."""
     if link.protocol < SUPERVISOR_PROTOCOL:
         return None
-    request = Request(
-        CRTPPort.SUPERVISOR, _INFO_CHANNEL, bytes([ANSWER | _GET_STATE]), "the supervisor's state"
-    )
-    answer = link.ask(bytes([_GET_STATE]), request)
+    prefix = bytes([ANSWER | CMD_GET_STATE_BITFIELD])
+    request = Request(CRTPPort.SUPERVISOR, SUPERVISOR_CH_INFO, prefix, "the supervisor's state")
+    answer = link.request(bytes([CMD_GET_STATE_BITFIELD]), request)
     return SupervisorState(int.from_bytes(answer[1:3], "little"))

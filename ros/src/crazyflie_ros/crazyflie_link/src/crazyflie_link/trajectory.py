@@ -4,21 +4,19 @@ import struct
 from collections.abc import Callable, Sequence
 from typing import Self
 
-from cflib.crazyflie.mem.memory_element import MemoryElement
+from cflib.crazyflie.mem import CHAN_WRITE, MemoryElement, _WriteRequest
 from cflib.crtp.crtpstack import CRTPPort
 from typing_extensions import override
 
 from crazyflie_link.checks import check_finite, check_positive
 from crazyflie_link.errors import RefusedError, ValueRangeError
-from crazyflie_link.exchange import Request
-from crazyflie_link.guarded_link import MaySend
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.link import Link
-from crazyflie_link.subsystem import Subsystem
+from crazyflie_link.request_reply import Request
+from crazyflie_link.subsystem import MaySend, Subsystem
 from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 
-_WRITE_CHANNEL = 2
-_CHUNK = 24
+_CHUNK = _WriteRequest.MAX_DATA_LENGTH
 
 
 class Trajectories(Subsystem):
@@ -101,7 +99,7 @@ def _write(link: Link, memory_id: int, address: int, data: bytes) -> None:
     # cflib's own writer never ends when a reply comes twice.
     where = struct.pack("<BI", memory_id, address)
     what = f"writing the trajectory, byte {address}"
-    answer = link.ask(where + data, Request(CRTPPort.MEM, _WRITE_CHANNEL, where, what))
+    answer = link.request(where + data, Request(CRTPPort.MEM, CHAN_WRITE, where, what))
     status = answer[5] if len(answer) > 5 else 0
     if status:
         raise RefusedError(f"{what}: the vehicle refuses it (error {status})")

@@ -5,7 +5,7 @@ import threading
 import pytest
 
 from crazyflie_link.errors import LinkLostError
-from crazyflie_link.outbox import Outbox
+from crazyflie_link.transmit_queue import TransmitQueue
 
 LIMIT = 60.0
 
@@ -14,7 +14,7 @@ class Radio:
     """A radio that sends nothing until it is let."""
 
     def __init__(self):
-        self.outbox = Outbox()
+        self.queue = TransmitQueue()
         self.sent = []
         self._free = threading.Event()
         entered = threading.Event()
@@ -23,7 +23,7 @@ class Radio:
             entered.set()
             self._free.wait(LIMIT)
 
-        self.outbox.command(block)
+        self.queue.put(block)
         assert entered.wait(LIMIT)
 
     def note(self, what):
@@ -32,7 +32,7 @@ class Radio:
     def let_go(self):
         """Let everything be sent that waits, and return it."""
         done = threading.Event()
-        self.outbox.latest("end", done.set)
+        self.queue.put_latest("end", done.set)
         self._free.set()
         assert done.wait(LIMIT)
         return self.sent
@@ -42,40 +42,40 @@ class Radio:
 def radio():
     radio = Radio()
     yield radio
-    radio.outbox.close()
+    radio.queue.close()
 
 
 def test_commands_keep_their_order(radio):
     for k in range(50):
-        radio.outbox.command(radio.note(k))
+        radio.queue.put(radio.note(k))
     assert radio.let_go() == list(range(50))
 
 
 def test_of_a_stream_only_the_latest_is_sent(radio):
     for k in range(1000):
-        radio.outbox.latest("setpoint", radio.note(f"setpoint {k}"))
-        radio.outbox.latest("position", radio.note(f"position {k}"))
+        radio.queue.put_latest("setpoint", radio.note(f"setpoint {k}"))
+        radio.queue.put_latest("position", radio.note(f"position {k}"))
     assert radio.let_go() == ["setpoint 999", "position 999"]
 
 
 def test_an_emergency_comes_first_and_alone(radio):
-    radio.outbox.latest("setpoint", radio.note("setpoint"))
-    radio.outbox.command(radio.note("command"))
-    radio.outbox.command(radio.note("stop"), urgent=True)
+    radio.queue.put_latest("setpoint", radio.note("setpoint"))
+    radio.queue.put(radio.note("command"))
+    radio.queue.put(radio.note("stop"), urgent=True)
     assert radio.let_go() == ["stop", "command"]
 
 
-def test_what_is_forgotten_is_not_sent(radio):
-    radio.outbox.latest("setpoint", radio.note("setpoint"))
-    radio.outbox.forget("setpoint")
+def test_what_is_discarded_is_not_sent(radio):
+    radio.queue.put_latest("setpoint", radio.note("setpoint"))
+    radio.queue.discard("setpoint")
     assert radio.let_go() == []
 
 
 def test_a_stuck_radio_is_an_error_and_no_memory_leak(radio):
     with pytest.raises(LinkLostError, match="wait to be sent"):
         for k in range(1000):
-            radio.outbox.command(radio.note(k))
-    radio.outbox.command(radio.note("stop"), urgent=True)
+            radio.queue.put(radio.note(k))
+    radio.queue.put(radio.note("stop"), urgent=True)
     assert radio.let_go()[0] == "stop"
 
 
@@ -83,15 +83,15 @@ def test_one_failure_does_not_end_it(radio, caplog):
     def fail():
         raise OSError("broken")
 
-    radio.outbox.command(fail)
-    radio.outbox.command(radio.note("next"))
+    radio.queue.put(fail)
+    radio.queue.put(radio.note("next"))
     assert radio.let_go() == ["next"]
     assert "broken" in caplog.text
 
 
 def test_nothing_is_taken_after_the_end(radio):
-    radio.outbox.close()
+    radio.queue.close()
     with pytest.raises(LinkLostError):
-        radio.outbox.command(radio.note(1))
+        radio.queue.put(radio.note(1))
     with pytest.raises(LinkLostError):
-        radio.outbox.latest("setpoint", radio.note(1))
+        radio.queue.put_latest("setpoint", radio.note(1))

@@ -1,7 +1,4 @@
-"""cflib's Crazyflie, safe to use from many threads and for many vehicles in one process.
-
-cflib is licensed under the GPL, version 3; nothing of it is copied here.
-"""
+"""cflib's Crazyflie, safe to use from many threads and for many vehicles in one process."""
 
 import contextlib
 import logging
@@ -12,15 +9,15 @@ from pathlib import Path
 
 import cflib.crtp
 from cflib.crazyflie import Crazyflie as CflibCrazyflie
+from cflib.crazyflie.platformservice import LINKSERVICE_SOURCE
 from cflib.crtp.crtpdriver import CRTPDriver
 from cflib.crtp.crtpstack import CRTPPacket, CRTPPort
 from cflib.utils.callbacks import Caller
 
-from crazyflie_link import radios
+from crazyflie_link.cflib_internals import forget_dead_radios, release
 
 _init_lock = threading.Lock()
 
-_LINK_SOURCE_CHANNEL = 1
 _UDP_RECEIVE_LIMIT = 0.1
 
 _JOIN_LIMIT = 0.3
@@ -87,7 +84,7 @@ class _LogErrors(dict[int, str]):
         return f"error {code}"
 
 
-class Backend(CflibCrazyflie):
+class SafeCrazyflie(CflibCrazyflie):
     """cflib's Crazyflie for a single connection; a new one is made for the next.
 
     Parameters
@@ -106,7 +103,7 @@ class Backend(CflibCrazyflie):
         super().__init__(rw_cache=cache)
         self._on_error = on_error
         self._setup_begun = False
-        self._dropping = threading.Lock()
+        self._disconnecting = threading.Lock()
         # Unlike cflib's own, it knows who holds it; see `send_packet`.
         self._send_lock = threading.RLock()
         guarded = _Guarded()
@@ -115,9 +112,9 @@ class Backend(CflibCrazyflie):
         self.log._err_codes = _LogErrors(self.log._err_codes)
         self.link_established.add_callback(self._tune_udp)
 
-    def ask_for_source(self) -> None:
+    def request_source(self) -> None:
         """Send the first request of the set-up again: cflib does not."""
-        self.send_packet(packet(CRTPPort.LINKCTRL, _LINK_SOURCE_CHANNEL, b"\0"))
+        self.send_packet(packet(CRTPPort.LINKCTRL, LINKSERVICE_SOURCE, b"\0"))
 
     def log_error(self, code: int) -> str:
         """Return the text of an error of a log block."""
@@ -145,13 +142,13 @@ class Backend(CflibCrazyflie):
             if self.link is not None:
                 self._on_error(f"cannot send: {error}")
 
-    def drop(self) -> None:
+    def disconnect(self) -> None:
         """End the connection without another packet; blocks for 2 s at most.
 
         cflib's own ``close_link`` sends a setpoint of zero thrust first, which would
         take a vehicle out of the air that flies by itself.
         """
-        with self._dropping:
+        with self._disconnecting:
             self.incoming.stop()
             link = self.link
             if link is not None:
@@ -162,11 +159,11 @@ class Backend(CflibCrazyflie):
             # A driver joins its threads, and cflib its own, without a limit; and cflib's lock of
             # the dongles is held for as long as one of them hangs.
             _run(lambda: self._close(link), CLOSE_LIMIT)
-            _run(radios.forget_dead_radios, _JOIN_LIMIT)
+            _run(forget_dead_radios, _JOIN_LIMIT)
 
     def _close(self, link):
         if link is not None:
-            radios.release(link)
+            release(link)
             link.close()
         self.disconnected.call(self.link_uri)
 
@@ -187,7 +184,7 @@ class Backend(CflibCrazyflie):
         if link is not None and link.get_name() == "udp":
             # cflib resends nothing over UDP: one lost packet would end the set-up.
             link.needs_resending = True
-            # Its receiver looks up once in this time, and `drop` waits for it.
+            # Its receiver looks up once in this time, and `disconnect` waits for it.
             link.socket.settimeout(_UDP_RECEIVE_LIMIT)
 
 

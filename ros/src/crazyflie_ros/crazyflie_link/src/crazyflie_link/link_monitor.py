@@ -35,7 +35,7 @@ _LATEST_FIRST_MS = 60_000.0
 """How late the quickest packet may have come, ms: this machine may have been busy."""
 
 
-class Life(enum.Enum):
+class LinkHealth(enum.Enum):
     """What the packets show."""
 
     ALIVE = "alive"
@@ -77,7 +77,7 @@ class Uptime:
         return late < -_LATEST_FIRST_MS
 
 
-class Liveness:
+class LinkMonitor:
     """The age of the last sign of life, and how many pings were answered.
 
     All times are in s, of one steady clock.
@@ -150,7 +150,7 @@ class Liveness:
             pings = list(self._pings.values())[-_LATEST - 1 : -1]
         return len(pings) == _LATEST and sum(pings) <= _FEW
 
-    def state(self, now: float) -> Life:
+    def state(self, now: float) -> LinkHealth:
         """Return what the packets show; to be called several times within the limit.
 
         When this call itself comes late, the machine was busy, and packets of the
@@ -162,11 +162,11 @@ class Liveness:
             self._received = max(self._received, now - 0.5 * self._limit)
             self._logged = max(self._logged, now - 0.5 * self._limit)
         if self.age(now) > self._limit:
-            return Life.SILENT
+            return LinkHealth.SILENT
         if self._log_limit is None or now - self._logged <= self._log_limit:
-            return Life.ALIVE
+            return LinkHealth.ALIVE
         # The answer to a ping may have come just after the last log packet; both are missing then.
         if self._received - self._logged < 0.5 * self._log_limit:
-            return Life.ALIVE
+            return LinkHealth.ALIVE
         # Until its log data come, too, nobody knows.
-        return Life.RESTARTED if now - self._heard_since > _HEARD_FOR else Life.SILENT
+        return LinkHealth.RESTARTED if now - self._heard_since > _HEARD_FOR else LinkHealth.SILENT

@@ -2,22 +2,22 @@
 
 CRTP has no request numbers: an answer is known by its port, its channel and its
 first bytes, and by what it repeats of the request. A late answer to an earlier, equal request
-cannot be told from the one that is waited for.
+cannot be told from the expected one.
 """
 
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from crazyflie_link.errors import LinkLostError, NoReplyError
-from crazyflie_link.outbox import Send
+from crazyflie_link.transmit_queue import Send
 
 REPLY_LIMIT = 1.0
-"""How long to wait for a reply, s."""
+"""Time limit of a reply, s."""
 
 RESEND_PERIOD = 0.2
-"""How long to wait before a request is sent again, s; as cflib does."""
+"""Time after which a request is sent again, s; as cflib does."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +36,10 @@ class Request:
         Whether the request may be sent again when no answer comes: not when
         doing it twice is different from doing it once.
     limit : float
-        How long to wait for the answer, s.
+        Time limit of the answer, s.
     accepts : callable
-        ``accepts(data)`` tells whether data that begin so are the answer, not that to an earlier
-        request.
+        ``accepts(data)`` returns whether data that begin so are the answer, not that to an
+        earlier request.
     """
 
     port: int
@@ -50,38 +50,38 @@ class Request:
     limit: float = REPLY_LIMIT
     accepts: Callable[[bytes], bool] = lambda data: True
 
-
-class _Waiter:
-    def __init__(self, request: Request):
-        self.request = request
-        self.answer: bytes | None = None
-        self.done = threading.Event()
-
-    def takes(self, port: int, channel: int, data: bytes) -> bool:
-        expected = self.request
-        is_same = (port, channel) == (expected.port, expected.channel)
-        return is_same and data.startswith(expected.prefix) and expected.accepts(data)
+    def is_answer(self, port: int, channel: int, data: bytes) -> bool:
+        """Return whether a packet is the answer."""
+        is_same = (port, channel) == (self.port, self.channel)
+        return is_same and data.startswith(self.prefix) and self.accepts(data)
 
 
-class Exchange:
-    """Pair answers with the requests that wait for them."""
+@dataclass(eq=False)
+class _Pending:
+    request: Request
+    answer: bytes | None = None
+    done: threading.Event = field(default_factory=threading.Event)
+
+
+class RequestReply:
+    """Pair answers with pending requests."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiters: list[_Waiter] = []
+        self._pending: list[_Pending] = []
         self._closed: str | None = None
 
     def receive(self, port: int, channel: int, data: bytes) -> None:
-        """Give a packet that arrived to the request that has waited for it longest."""
+        """Give a packet that arrived to the oldest request that it answers."""
         with self._lock:
-            for waiter in self._waiters:
-                if waiter.takes(port, channel, data):
-                    self._waiters.remove(waiter)
-                    waiter.answer = data
-                    waiter.done.set()
+            for pending in self._pending:
+                if pending.request.is_answer(port, channel, data):
+                    self._pending.remove(pending)
+                    pending.answer = data
+                    pending.done.set()
                     return
 
-    def ask(self, send: Send, request: Request) -> bytes:
+    def request(self, send: Send, request: Request) -> bytes:
         """Send a request and return the data of the answer; blocks.
 
         Raises
@@ -92,16 +92,18 @@ class Exchange:
             The link ended meanwhile.
         """
         what = request.what
-        waiter = _Waiter(request)
+        pending = _Pending(request)
         with self._lock:
             if self._closed is not None:
                 raise LinkLostError(f"{what}: {self._closed}")
-            self._waiters.append(waiter)
-        deadline = time.monotonic() + request.limit
+            self._pending.append(pending)
+        left = request.limit
+        deadline = time.monotonic() + left
         try:
             send()
-            while not waiter.done.wait(self._wait_time(deadline, request.resend)):
-                if time.monotonic() >= deadline:
+            while not pending.done.wait(min(RESEND_PERIOD, left) if request.resend else left):
+                left = deadline - time.monotonic()
+                if left <= 0.0:
                     raise NoReplyError(
                         f"{what}: the vehicle has not replied within {request.limit:g} s"
                         + ("" if request.resend else "; it may or may not have been carried out")
@@ -109,21 +111,16 @@ class Exchange:
                 send()
         finally:
             with self._lock:
-                if waiter in self._waiters:
-                    self._waiters.remove(waiter)
-        if waiter.answer is None:
+                if pending in self._pending:
+                    self._pending.remove(pending)
+        if pending.answer is None:
             raise LinkLostError(f"{what}: {self._closed}")
-        return waiter.answer
+        return pending.answer
 
     def close(self, reason: str) -> None:
-        """Have all requests that wait, and later ones, fail with `LinkLostError`."""
+        """Have all pending requests, and later ones, fail with `LinkLostError`."""
         with self._lock:
             self._closed = reason
-            waiters, self._waiters = self._waiters, []
-        for waiter in waiters:
-            waiter.done.set()
-
-    @staticmethod
-    def _wait_time(deadline: float, resend: bool) -> float:
-        left = max(0.0, deadline - time.monotonic())
-        return min(RESEND_PERIOD, left) if resend else left
+            closed, self._pending = self._pending, []
+        for pending in closed:
+            pending.done.set()

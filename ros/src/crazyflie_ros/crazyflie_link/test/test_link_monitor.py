@@ -4,136 +4,136 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from crazyflie_link.liveness import LOST_AFTER, Life, Liveness, Uptime
+from crazyflie_link.link_monitor import LOST_AFTER, LinkHealth, LinkMonitor, Uptime
 
 
-def watch(liveness, begin, end, step=0.05, bad=Life.SILENT):
+def watch(monitor, begin, end, step=0.05, bad=LinkHealth.SILENT):
     """Ask every ``step`` until ``end``; return when the link was first said to be lost."""
     for k in range(1, round((end - begin) / step) + 1):
-        if liveness.state(begin + k * step) is bad:
+        if monitor.state(begin + k * step) is bad:
             return begin + k * step
     return None
 
 
 def test_silence_is_noticed_within_half_a_second():
-    liveness = Liveness(10.0)
-    assert watch(liveness, 10.0, 12.0) <= 10.5 + 1e-9
-    assert liveness.age(12.0) == pytest.approx(2.0)
+    monitor = LinkMonitor(10.0)
+    assert watch(monitor, 10.0, 12.0) <= 10.5 + 1e-9
+    assert monitor.age(12.0) == pytest.approx(2.0)
 
 
 def test_a_packet_now_and_then_is_enough():
-    liveness = Liveness(0.0)
+    monitor = LinkMonitor(0.0)
     for k in range(1, 100):
-        liveness.received(0.4 * k)
-        assert watch(liveness, 0.4 * k, 0.4 * k + 0.4) is None
+        monitor.received(0.4 * k)
+        assert watch(monitor, 0.4 * k, 0.4 * k + 0.4) is None
 
 
 def test_when_the_machine_was_busy_the_vehicle_gets_a_new_period():
-    liveness = Liveness(0.0)
-    assert liveness.state(0.1) is Life.ALIVE
-    assert liveness.state(5.0) is Life.ALIVE
-    assert watch(liveness, 5.0, 6.0) == pytest.approx(5.25)
+    monitor = LinkMonitor(0.0)
+    assert monitor.state(0.1) is LinkHealth.ALIVE
+    assert monitor.state(5.0) is LinkHealth.ALIVE
+    assert watch(monitor, 5.0, 6.0) == pytest.approx(5.25)
 
 
 @given(st.lists(st.floats(0.01, 0.22), min_size=30, max_size=60))
 def test_a_silent_vehicle_is_always_noticed(pauses):
-    liveness, now = Liveness(0.0), 0.0
+    monitor, now = LinkMonitor(0.0), 0.0
     verdicts = []
     for pause in pauses:
         now += pause
-        verdicts.append(liveness.state(now) is Life.SILENT)
+        verdicts.append(monitor.state(now) is LinkHealth.SILENT)
         assert verdicts[-1] == (now > LOST_AFTER)
 
 
 def test_quality_is_the_share_of_answered_pings():
-    liveness = Liveness(0.0)
-    assert liveness.quality() == 1.0
+    monitor = LinkMonitor(0.0)
+    assert monitor.quality() == 1.0
     for k in range(100):
-        liveness.ping_sent(bytes([k]))
+        monitor.ping_sent(bytes([k]))
         if k % 4:
-            liveness.ping_answered(bytes([k]), 0.1 * k)
-    assert liveness.quality() == pytest.approx(0.75, abs=0.05)
+            monitor.ping_answered(bytes([k]), 0.1 * k)
+    assert monitor.quality() == pytest.approx(0.75, abs=0.05)
 
 
 def test_an_answer_under_way_is_not_lost():
-    liveness = Liveness(0.0)
-    liveness.ping_sent(b"1")
-    assert liveness.quality() == 1.0
-    liveness.ping_answered(b"1", 0.0)
-    liveness.ping_sent(b"2")
-    assert liveness.quality() == 1.0
-    liveness.ping_sent(b"3")
-    assert liveness.quality() == 0.5
-    liveness.ping_answered(b"2", 0.0)
-    assert liveness.quality() == 1.0
+    monitor = LinkMonitor(0.0)
+    monitor.ping_sent(b"1")
+    assert monitor.quality() == 1.0
+    monitor.ping_answered(b"1", 0.0)
+    monitor.ping_sent(b"2")
+    assert monitor.quality() == 1.0
+    monitor.ping_sent(b"3")
+    assert monitor.quality() == 0.5
+    monitor.ping_answered(b"2", 0.0)
+    assert monitor.quality() == 1.0
 
 
 def test_an_answer_may_be_received_before_the_ping_is_noted():
-    liveness = Liveness(0.0)
+    monitor = LinkMonitor(0.0)
     for content in (b"1", b"2", b"3"):
-        liveness.ping_answered(content, 0.0)
-        liveness.ping_sent(content)
-    assert liveness.quality() == 1.0
+        monitor.ping_answered(content, 0.0)
+        monitor.ping_sent(content)
+    assert monitor.quality() == 1.0
 
 
-def life(liveness, begin, end, pings, logs):
+def health(monitor, begin, end, pings, logs):
     """Receive for a while what is to come, at 10 Hz; return the states in between."""
     states = []
     for k in range(1, round((end - begin) / 0.1) + 1):
         now = begin + 0.1 * k
         if pings:
-            liveness.received(now)
+            monitor.received(now)
         if logs:
-            liveness.log_received(now)
-        states.append(liveness.state(now))
+            monitor.log_received(now)
+        states.append(monitor.state(now))
     return states
 
 
 def test_pings_without_log_data_are_a_restart():
-    liveness = Liveness(0.0)
-    liveness.expect_log(0.1, 0.0)
-    assert set(life(liveness, 0.0, 2.0, True, True)) == {Life.ALIVE}
-    states = life(liveness, 2.0, 3.0, True, False)
-    assert states.index(Life.RESTARTED) <= 4
+    monitor = LinkMonitor(0.0)
+    monitor.expect_log(0.1, 0.0)
+    assert set(health(monitor, 0.0, 2.0, True, True)) == {LinkHealth.ALIVE}
+    states = health(monitor, 2.0, 3.0, True, False)
+    assert states.index(LinkHealth.RESTARTED) <= 4
 
 
 def test_a_vehicle_that_is_frozen_between_log_data_and_ping_is_silent():
-    liveness = Liveness(0.0)
-    liveness.expect_log(0.01, 0.0)
-    assert set(life(liveness, 0.0, 2.0, True, True)) == {Life.ALIVE}
-    liveness.ping_answered(b"", 2.09)
-    assert watch(liveness, 2.09, 4.0, step=0.01, bad=Life.RESTARTED) is None
-    assert liveness.state(4.0) is Life.SILENT
+    monitor = LinkMonitor(0.0)
+    monitor.expect_log(0.01, 0.0)
+    assert set(health(monitor, 0.0, 2.0, True, True)) == {LinkHealth.ALIVE}
+    monitor.ping_answered(b"", 2.09)
+    assert watch(monitor, 2.09, 4.0, step=0.01, bad=LinkHealth.RESTARTED) is None
+    assert monitor.state(4.0) is LinkHealth.SILENT
 
 
 def test_slow_log_blocks_get_more_time():
-    liveness = Liveness(0.0)
-    liveness.expect_log(1.0, 0.0)
-    assert set(life(liveness, 0.0, 3.9, True, False)) == {Life.ALIVE}
-    assert Life.RESTARTED in life(liveness, 3.9, 4.5, True, False)
+    monitor = LinkMonitor(0.0)
+    monitor.expect_log(1.0, 0.0)
+    assert set(health(monitor, 0.0, 3.9, True, False)) == {LinkHealth.ALIVE}
+    assert LinkHealth.RESTARTED in health(monitor, 3.9, 4.5, True, False)
 
 
 def test_after_a_silence_log_data_may_come_a_little_later():
-    liveness = Liveness(0.0)
-    liveness.expect_log(0.1, 0.0)
-    assert life(liveness, 0.0, 0.8, False, False)[-1] is Life.SILENT
-    assert set(life(liveness, 0.8, 1.0, True, False)) == {Life.SILENT}
-    assert set(life(liveness, 1.0, 1.2, True, True)) == {Life.ALIVE}
-    assert life(liveness, 1.2, 2.0, False, False)[-1] is Life.SILENT
-    assert life(liveness, 2.0, 2.5, True, False)[-1] is Life.RESTARTED
+    monitor = LinkMonitor(0.0)
+    monitor.expect_log(0.1, 0.0)
+    assert health(monitor, 0.0, 0.8, False, False)[-1] is LinkHealth.SILENT
+    assert set(health(monitor, 0.8, 1.0, True, False)) == {LinkHealth.SILENT}
+    assert set(health(monitor, 1.0, 1.2, True, True)) == {LinkHealth.ALIVE}
+    assert health(monitor, 1.2, 2.0, False, False)[-1] is LinkHealth.SILENT
+    assert health(monitor, 2.0, 2.5, True, False)[-1] is LinkHealth.RESTARTED
 
 
 def test_half_of_the_packets_lost_is_a_poor_link_at_once():
-    liveness = Liveness(0.0)
+    monitor = LinkMonitor(0.0)
     for k in range(40):
-        liveness.ping_sent(bytes([k]))
-        liveness.ping_answered(bytes([k]), 0.1 * k)
-        assert not liveness.is_poor()
+        monitor.ping_sent(bytes([k]))
+        monitor.ping_answered(bytes([k]), 0.1 * k)
+        assert not monitor.is_poor()
     for k in range(40, 46):
-        liveness.ping_sent(bytes([k]))
+        monitor.ping_sent(bytes([k]))
         if k % 2:
-            liveness.ping_answered(bytes([k]), 0.1 * k)
-    assert liveness.is_poor()
+            monitor.ping_answered(bytes([k]), 0.1 * k)
+    assert monitor.is_poor()
 
 
 HOUR_MS = 3_600_000

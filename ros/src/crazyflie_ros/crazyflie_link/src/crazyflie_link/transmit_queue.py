@@ -1,4 +1,4 @@
-"""One thread per link that sends, so that no caller ever waits for a radio.
+"""One thread per link that sends, so that no caller ever blocks on a radio.
 
 cflib's radio driver blocks a sender for up to 2 s when the vehicle is out of
 range. A setpoint that is that old is worse than none; so of setpoints (and of
@@ -20,26 +20,25 @@ Send = Callable[[], None]
 """Sends something."""
 
 
-class Outbox:
-    """What is to be sent: commands in their order, and the latest of each stream."""
+class TransmitQueue:
+    """Packets to be sent: commands in their order, and the latest of each stream."""
 
     def __init__(self) -> None:
         self._commands: deque[Send] = deque()
         self._streams: dict[str, Send] = {}
         self._wake = threading.Condition()
         self._closed = False
-        self._thread = threading.Thread(target=self._run, name="crazyflie-outbox", daemon=True)
-        self._thread.start()
+        threading.Thread(target=self._run, name="crazyflie-transmit", daemon=True).start()
 
-    def command(self, send: Send, urgent: bool = False) -> None:
+    def put(self, send: Send, urgent: bool = False) -> None:
         """Have ``send()`` called after the commands before it.
 
-        An urgent one goes first, and what waits on streams is forgotten.
+        An urgent one goes first, and discards all streams.
 
         Raises
         ------
         LinkLostError
-            The outbox is closed, or too much waits in it: the link is stuck.
+            The queue is closed, or full: the link is stuck.
         """
         with self._wake:
             self._check_open()
@@ -52,15 +51,15 @@ class Outbox:
                 self._commands.append(send)
             self._wake.notify()
 
-    def latest(self, stream: str, send: Send) -> None:
-        """Have ``send()`` called, in the place of what still waits on this stream."""
+    def put_latest(self, stream: str, send: Send) -> None:
+        """Have ``send()`` called, in the place of what is still queued on this stream."""
         with self._wake:
             self._check_open()
             self._streams[stream] = send
             self._wake.notify()
 
-    def forget(self, stream: str) -> None:
-        """Do not send what waits on a stream."""
+    def discard(self, stream: str) -> None:
+        """Remove what is queued on a stream."""
         with self._wake:
             self._streams.pop(stream, None)
 
@@ -77,8 +76,7 @@ class Outbox:
     def _run(self):
         while True:
             with self._wake:
-                while not (self._closed or self._commands or self._streams):
-                    self._wake.wait()
+                self._wake.wait_for(lambda: self._closed or self._commands or self._streams)
                 if self._closed:
                     return
                 if self._commands:

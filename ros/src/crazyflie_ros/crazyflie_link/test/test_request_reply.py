@@ -5,75 +5,75 @@ import threading
 import pytest
 
 from crazyflie_link.errors import LinkLostError, NoReplyError
-from crazyflie_link.exchange import Exchange, Request
+from crazyflie_link.request_reply import Request, RequestReply
 
 
 def test_the_answer_is_the_first_packet_that_fits():
-    exchange = Exchange()
+    requests = RequestReply()
 
     def send():
-        exchange.receive(8, 1, b"\x07 other channel")
-        exchange.receive(9, 0, b"\x07 other port")
-        exchange.receive(8, 0, b"\x08 other command")
-        exchange.receive(8, 0, b"\x07 this one")
-        exchange.receive(8, 0, b"\x07 too late")
+        requests.receive(8, 1, b"\x07 other channel")
+        requests.receive(9, 0, b"\x07 other port")
+        requests.receive(8, 0, b"\x08 other command")
+        requests.receive(8, 0, b"\x07 this one")
+        requests.receive(8, 0, b"\x07 too late")
 
-    assert exchange.ask(send, Request(8, 0, b"\x07", "a test")) == b"\x07 this one"
+    assert requests.request(send, Request(8, 0, b"\x07", "a test")) == b"\x07 this one"
 
 
 def test_equal_requests_are_answered_in_their_order():
-    exchange = Exchange()
+    requests = RequestReply()
     answers = {}
     asked = threading.Semaphore(0)
 
     def ask(name):
-        answers[name] = exchange.ask(asked.release, Request(2, 1, b"\x01", name, resend=False))
+        answers[name] = requests.request(asked.release, Request(2, 1, b"\x01", name, resend=False))
 
     threads = [threading.Thread(target=ask, args=(name,)) for name in ("first", "second")]
     for thread in threads:
         thread.start()
         assert asked.acquire(timeout=120.0)
-    exchange.receive(2, 1, b"\x01 a")
-    exchange.receive(2, 1, b"\x01 b")
+    requests.receive(2, 1, b"\x01 a")
+    requests.receive(2, 1, b"\x01 b")
     for thread in threads:
         thread.join(timeout=120.0)
     assert answers == {"first": b"\x01 a", "second": b"\x01 b"}
 
 
 def test_a_lost_request_is_sent_again():
-    exchange = Exchange()
+    requests = RequestReply()
     sent = []
 
     def send():
         sent.append(True)
         if len(sent) == 3:
-            exchange.receive(4, 2, b"x")
+            requests.receive(4, 2, b"x")
 
-    assert exchange.ask(send, Request(4, 2, b"x", "a test", limit=60.0)) == b"x"
+    assert requests.request(send, Request(4, 2, b"x", "a test", limit=60.0)) == b"x"
 
 
 def test_what_must_not_be_done_twice_is_sent_once():
-    exchange = Exchange()
+    requests = RequestReply()
     sent = []
     with pytest.raises(NoReplyError, match="the jump: .* may or may not have been carried out"):
-        exchange.ask(
+        requests.request(
             lambda: sent.append(True), Request(8, 0, b"", "the jump", resend=False, limit=0.5)
         )
     assert len(sent) == 1
 
 
 def test_nobody_waits_for_an_answer_beyond_the_limit_or_the_end_of_the_link():
-    exchange = Exchange()
+    requests = RequestReply()
     with pytest.raises(NoReplyError, match="a test: the vehicle has not replied within 0.05 s"):
-        exchange.ask(lambda: None, Request(8, 0, b"", "a test", limit=0.05))
+        requests.request(lambda: None, Request(8, 0, b"", "a test", limit=0.05))
     with pytest.raises(LinkLostError, match="a test: gone"):
-        exchange.ask(lambda: exchange.close("gone"), Request(8, 0, b"", "a test", limit=30.0))
+        requests.request(lambda: requests.close("gone"), Request(8, 0, b"", "a test", limit=30.0))
     with pytest.raises(LinkLostError, match="a test: gone"):
-        exchange.ask(lambda: None, Request(8, 0, b"", "a test", limit=30.0))
+        requests.request(lambda: None, Request(8, 0, b"", "a test", limit=30.0))
 
 
 def test_an_answer_that_nobody_waits_for_is_nothing():
-    exchange = Exchange()
-    exchange.receive(8, 0, b"early")
+    requests = RequestReply()
+    requests.receive(8, 0, b"early")
     with pytest.raises(NoReplyError):
-        exchange.ask(lambda: None, Request(8, 0, b"early", "a test", limit=0.01))
+        requests.request(lambda: None, Request(8, 0, b"early", "a test", limit=0.01))

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from crazyflie_driver.worker import MOST_JOBS, Worker
+from crazyflie_driver.jobs import MOST_JOBS, Jobs
 from crazyflie_utils import ServiceError
 
 LIMIT = 60.0
@@ -25,71 +25,71 @@ class Slow:
 
 
 @pytest.fixture
-def worker():
-    worker = Worker("test")
-    yield worker
-    worker.close()
+def jobs():
+    jobs = Jobs("test")
+    yield jobs
+    jobs.close()
 
 
 @pytest.fixture
-def slow(worker):
+def slow(jobs):
     slow = Slow()
     yield slow
     slow.free.set()
 
 
-def test_jobs_keep_their_order(worker):
+def test_jobs_keep_their_order(jobs):
     done = []
     for k in range(20):
-        last = worker.submit(lambda _, k=k: done.append(k))
+        last = jobs.submit("test", lambda _, k=k: done.append(k))
     last.result(LIMIT)
     assert done == list(range(20))
 
 
-def test_an_urgent_job_does_not_wait_and_ends_what_it_overtakes(worker, slow):
-    upload = worker.submit(slow, is_flight=True)
-    go_to = worker.submit(lambda _: "flown", is_flight=True)
-    other = worker.submit(lambda _: "written")
+def test_an_urgent_job_does_not_wait_and_ends_what_it_overtakes(jobs, slow):
+    upload = jobs.submit("test", slow, is_flight=True)
+    go_to = jobs.submit("test", lambda _: "flown", is_flight=True)
+    other = jobs.submit("test", lambda _: "written")
     assert slow.has_begun.wait(LIMIT)
-    assert worker.submit_urgent("land", lambda _: "landed").result(LIMIT) == "landed"
+    assert jobs.submit("land", lambda _: "landed", urgent=True).result(LIMIT) == "landed"
     for given_up in (upload, go_to):
         with pytest.raises(ServiceError, match="given up for land"):
             given_up.result(LIMIT)
     assert other.result(LIMIT) == "written"
     # What comes later is another matter.
-    assert worker.submit(lambda _: "flown", is_flight=True).result(LIMIT) == "flown"
+    assert jobs.submit("test", lambda _: "flown", is_flight=True).result(LIMIT) == "flown"
 
 
-def test_an_urgent_job_goes_beside_one_that_cannot_be_given_up(worker, slow):
-    writing = worker.submit(slow)
+def test_an_urgent_job_goes_beside_one_that_cannot_be_given_up(jobs, slow):
+    writing = jobs.submit("test", slow)
     assert slow.has_begun.wait(LIMIT)
-    assert worker.submit_urgent("stop", lambda _: "stopped").result(LIMIT) == "stopped"
+    assert jobs.submit("stop", lambda _: "stopped", urgent=True).result(LIMIT) == "stopped"
     assert not writing.done()
     slow.free.set()
     assert writing.result(LIMIT) == "done"
 
 
-def test_an_error_is_the_callers(worker):
+def test_an_error_is_the_callers(jobs):
     def fail(_):
         raise ServiceError("no")
 
     with pytest.raises(ServiceError, match="no"):
-        worker.submit(fail).result(LIMIT)
-    assert worker.submit(lambda _: 1).result(LIMIT) == 1
+        jobs.submit("test", fail).result(LIMIT)
+    assert jobs.submit("test", lambda _: 1).result(LIMIT) == 1
 
 
-def test_calls_without_an_answer_leave_no_threads(worker, slow):
+def test_calls_without_an_answer_leave_no_threads(jobs, slow):
     count = threading.active_count()
-    waiting = [worker.submit(slow) for _ in range(3 * MOST_JOBS)]
+    waiting = [jobs.submit("test", slow) for _ in range(3 * MOST_JOBS)]
     assert threading.active_count() == count
     with pytest.raises(ServiceError, match=f"{MOST_JOBS} calls wait"):
         waiting[-1].result(LIMIT)
 
 
-def test_nothing_is_done_after_the_end(worker):
-    worker.close()
+def test_nothing_is_done_after_the_end(jobs):
+    jobs.close()
     with pytest.raises(ServiceError, match="removed"):
-        worker.submit(lambda _: 1).result(LIMIT)
+        jobs.submit("test", lambda _: 1).result(LIMIT)
     assert not any(
         thread.name.startswith("test") and thread.join(LIMIT) for thread in threading.enumerate()
     )

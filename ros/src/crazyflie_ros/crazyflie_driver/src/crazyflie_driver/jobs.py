@@ -1,0 +1,150 @@
+"""A vehicle's jobs, one after the other, and urgent ones beside them."""
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from crazyflie_link.errors import CrazyflieError
+from crazyflie_utils import ServiceError
+
+Result = TypeVar("Result")
+
+MOST_JOBS = 64
+"""Jobs that may be queued."""
+
+
+@dataclass(eq=False)
+class Job:
+    """A call that takes time.
+
+    Attributes
+    ----------
+    work : callable
+        ``work(job)`` is called in a thread of `Jobs`.
+    is_flight : bool
+        Whether an urgent job supersedes it.
+    superseded_by : str
+        What has superseded it; empty if nothing has.
+    done : Future
+        Of its result.
+    """
+
+    work: Callable[["Job"], Any]
+    is_flight: bool = False
+    superseded_by: str = ""
+    done: Future[Any] = field(default_factory=Future)
+
+    @property
+    def is_valid(self) -> bool:
+        """Whether nothing has superseded it."""
+        return not self.superseded_by
+
+    def check(self) -> None:
+        """Raise `ServiceError` if something has superseded it."""
+        if self.superseded_by:
+            raise ServiceError(f"given up for {self.superseded_by}")
+
+    def run(self) -> None:
+        """Call `work`; result or error go to `done`."""
+        try:
+            self.check()
+            result = self.work(self)
+        except BaseException as error:
+            self.done.set_exception(error)
+        else:
+            self.done.set_result(result)
+
+
+class Jobs:
+    """Two threads that do jobs in their order, and do not outlive the process.
+
+    Urgent jobs have a thread of their own. They supersede every flight job that was submitted
+    before them: a queued one is given up, a running one is marked.
+
+    Parameters
+    ----------
+    name : str
+        For the threads.
+    on_error : callable
+        ``on_error(text)`` is called, in a thread of a job, when the job fails.
+    """
+
+    def __init__(self, name: str, on_error: Callable[[str], None] = lambda text: None):
+        self._on_error = on_error
+        self._wake = threading.Condition()
+        self._queued: dict[bool, deque[Job]] = {False: deque(), True: deque()}
+        self._running: Job | None = None
+        self._is_closed = False
+        for urgent, suffix in ((False, ""), (True, "-urgent")):
+            threading.Thread(
+                target=self._run, args=(urgent,), name=name + suffix, daemon=True
+            ).start()
+
+    def submit(
+        self,
+        what: str,
+        work: Callable[[Job], Result],
+        is_flight: bool = False,
+        urgent: bool = False,
+    ) -> Future[Result]:
+        """Have ``work(job)`` done after the jobs before it; return the future of its result.
+
+        An urgent one is done after earlier urgent ones only. Errors of the link and
+        `ServiceError` are logged, and fail the future with `ServiceError`.
+        """
+
+        def run(job):
+            try:
+                return work(job)
+            except (CrazyflieError, ServiceError) as error:
+                self._on_error(f"{what} failed: {error}")
+                raise ServiceError(str(error)) from None
+
+        if urgent:
+            self.supersede(what)
+        job = Job(run, is_flight)
+        with self._wake:
+            queued = self._queued[urgent]
+            if self._is_closed:
+                job.done.set_exception(ServiceError("the vehicle has been removed"))
+            elif len(queued) >= MOST_JOBS:
+                job.done.set_exception(ServiceError(f"{MOST_JOBS} calls wait for the vehicle"))
+            else:
+                queued.append(job)
+                self._wake.notify_all()
+        return job.done
+
+    def supersede(self, what: str) -> None:
+        """Give up all flight jobs for something else."""
+        with self._wake:
+            queued = self._queued[False]
+            for job in [*queued, *([self._running] if self._running else [])]:
+                if job.is_flight:
+                    job.superseded_by = what
+            # Their turn may be far off, and their callers are blocked.
+            given_up = [job for job in queued if job.is_flight]
+            self._queued[False] = deque(job for job in queued if not job.is_flight)
+        for job in given_up:
+            job.run()
+
+    def close(self) -> None:
+        """Take no more jobs, and end after those that are queued."""
+        with self._wake:
+            self._is_closed = True
+            self._wake.notify_all()
+
+    def _run(self, urgent):
+        while True:
+            with self._wake:
+                self._wake.wait_for(lambda: self._queued[urgent] or self._is_closed)
+                if not self._queued[urgent]:
+                    return
+                job = self._queued[urgent].popleft()
+                if not urgent:
+                    self._running = job
+            job.run()
+            if not urgent:
+                self._running = None

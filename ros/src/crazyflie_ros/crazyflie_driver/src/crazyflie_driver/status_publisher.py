@@ -1,0 +1,136 @@
+"""The topics that say what state a vehicle is in, and whether the driver is connected to it."""
+
+import math
+from typing import Protocol
+
+from std_msgs.msg import Bool, Header, String
+
+from crazyflie_driver import status
+from crazyflie_driver.battery import Battery
+from crazyflie_driver.log_topics import LogTopics
+from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_driver.vehicle_parameters import (
+    CONNECTED_TOPIC,
+    STATUS_TOPIC,
+    VEHICLE_STATUS_TOPIC,
+)
+from crazyflie_link.crazyflie import Crazyflie
+from crazyflie_link.errors import LinkLostError
+from crazyflie_msgs.msg import VehicleStatus
+from crazyflie_utils import NodeHandle
+
+PERIOD = 1.0
+"""How often both are repeated, s: their absence shows that the driver is gone."""
+
+_LINKS = {name: value for value, name in status.LINK_NAMES.items()}
+
+
+class ConnectionState(Protocol):
+    """What is published of a connection; see `Connection`."""
+
+    text: str
+    is_leaving: bool
+    is_established: bool
+
+
+class StatusPublisher:
+    """Publish the status of a vehicle, in words and typed, and whether it is connected.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    prefix : str
+        Absolute namespace of the vehicle; empty for the root.
+    crazyflie : crazyflie_link.Crazyflie
+    log : LogTopics
+    setpoints : SetpointTopics
+    battery : Battery
+    connection : ConnectionState
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        prefix: str,
+        crazyflie: Crazyflie,
+        log: LogTopics,
+        setpoints: SetpointTopics,
+        battery: Battery,
+        connection: ConnectionState,
+    ):
+        self._handle = handle
+        self._crazyflie = crazyflie
+        self._log = log
+        self._setpoints = setpoints
+        self._gate = setpoints.gate
+        self._battery = battery
+        self._connection = connection
+        self._published: tuple[object, ...] = ()
+        self._is_connected = False
+        self._text = handle.publisher(f"{prefix}/{STATUS_TOPIC}", String, latch=True)
+        self._typed = handle.publisher(
+            f"{prefix}/{VEHICLE_STATUS_TOPIC}", VehicleStatus, latch=True
+        )
+        self._connected = handle.publisher(f"{prefix}/{CONNECTED_TOPIC}", Bool, latch=True)
+        self._connected.publish(Bool(False))
+        handle.timer(PERIOD, self._repeat)
+
+    def status(self) -> VehicleStatus:
+        """Return what is known of the vehicle now."""
+        crazyflie, battery = self._crazyflie, self._battery
+        state = self._log.supervisor
+        message = VehicleStatus(
+            header=Header(stamp=self._handle.stamp()),
+            link=_LINKS[crazyflie.state.value],
+            link_text=self._connection.text,
+            supervisor=int(state or 0),
+            has_supervisor=state is not None,
+            is_emergency=self._gate.is_emergency,
+            battery=int(battery.charge),
+            battery_voltage=_or_nan(battery.voltage),
+            link_quality=math.nan,
+            latency=math.nan,
+            last_heard=math.nan,
+            rssi=_or_nan(self._log.rssi),
+            is_streamed=self._setpoints.is_streaming,
+            setpoint_rate=self._setpoints.rate(),
+            setpoints_ignored=self._setpoints.ignored,
+            are_setpoints_blocked=self._gate.is_blocking(self._handle.time()),
+            restarts=crazyflie.restarts,
+        )
+        try:
+            message.link_quality = crazyflie.quality()
+            message.is_link_poor = crazyflie.is_poor()
+            message.latency = crazyflie.latency()
+            message.last_heard = crazyflie.age()
+        except LinkLostError:
+            # Without a link there are no figures.
+            pass
+        message.text = status.words(message)
+        return message
+
+    def publish(self) -> None:
+        """Publish what is new."""
+        message = self.status()
+        state = message.text, message.link, message.supervisor, message.has_supervisor
+        before, self._published = self._published, state
+        if state != before:
+            self._typed.publish(message)
+        if state[:1] != before[:1]:
+            self._text.publish(String(message.text))
+        is_ready = self._connection.is_established and not self._connection.is_leaving
+        self.publish_connected(is_ready and message.link == VehicleStatus.CONNECTED)
+
+    def publish_connected(self, is_connected: bool) -> None:
+        """Publish whether the vehicle is connected, if that is new."""
+        if is_connected != self._is_connected:
+            self._is_connected = is_connected
+            self._connected.publish(Bool(is_connected))
+
+    def _repeat(self):
+        self._typed.publish(self.status())
+        self._connected.publish(Bool(self._is_connected))
+
+
+def _or_nan(value):
+    return math.nan if value is None else value

@@ -1,0 +1,69 @@
+"""The typed status of a vehicle says what the words say, and more."""
+
+import math
+
+from safety_helpers import FLYING, LOCKED, is_, position, said, wait_for_words
+from std_srvs.srv import EmptyRequest
+
+from crazyflie_msgs.msg import VehicleStatus
+from crazyflie_utils.testing.waiting import wait_until
+
+
+def published(server):
+    return server.process.published("/cf1/vehicle_status")
+
+
+def test_the_link_from_the_first_moment_on(server):
+    vehicle = server.make_vehicle()
+    adding = server.begin_adding(vehicle.uri)
+    first = published(server)[0]
+    assert first.link == VehicleStatus.DISCONNECTED
+    assert "connecting to udp://" in first.link_text
+    assert not first.has_supervisor
+    assert math.isnan(first.latency)
+    adding.result(timeout=60.0)
+    wait_for_words(server, "ready")
+    latest = published(server)[-1]
+    assert (latest.link, latest.text) == (VehicleStatus.CONNECTED, said(server))
+    vehicle.is_frozen = True
+    wait_for_words(server, "lost")
+    latest = published(server)[-1]
+    assert latest.link == VehicleStatus.LOST
+    assert "has not been heard" in latest.link_text
+    assert not latest.has_supervisor
+
+
+def test_flight_battery_and_figures(server, vehicle):
+    is_(vehicle, FLYING)
+    wait_for_words(server, "flying: on high-level commands")
+    assert not published(server)[-1].is_streamed
+    position(server)
+    wait_for_words(server, "flying: on setpoints")
+    vehicle.log["pm.vbat"] = ("f", 3.125)
+    wait_for_words(server, "battery low")
+    latest = published(server)[-1]
+    assert latest.supervisor == FLYING
+    assert latest.supervisor & VehicleStatus.FLYING
+    assert latest.is_streamed
+    assert (latest.battery, latest.battery_voltage) == (VehicleStatus.BATTERY_LOW, 3.125)
+    assert latest.rssi == 47.0
+    assert 0.0 <= latest.link_quality <= 1.0
+    assert latest.last_heard < 1.0
+
+
+def test_states_that_end_a_flight(server, vehicle):
+    is_(vehicle, LOCKED)
+    wait_for_words(server, "cannot fly: locked")
+    assert published(server)[-1].supervisor & VehicleStatus.LOCKED
+    server.call("/cf1/emergency", EmptyRequest())
+    assert published(server)[-1].is_emergency
+
+
+def test_it_is_repeated_and_otherwise_published_when_it_changes(server, vehicle):
+    wait_for_words(server, "ready")
+    before = len(published(server))
+    wait_until(lambda: server.process.advance(0.1) or len(published(server)) >= before + 3)
+    texts = {message.text for message in published(server)[before:]}
+    assert texts == {said(server)}
+    stamps = [message.header.stamp.to_sec() for message in published(server)[before:]]
+    assert stamps == sorted(set(stamps))

@@ -117,11 +117,13 @@ class HighLevelNode(Node):
         self._measured_at = self._handle.time()
 
     def _on_flight_status(self, message):
-        took_off = self._flight_state == FlightStatus.TAKING_OFF
-        state = self._flight_state = message.state
+        before, state = self._flight_state, message.state
+        if state == before:
+            return
+        self._flight_state = state
         if state != FlightStatus.TAKING_OFF:
             self._hover = None
-            if took_off and state != FlightStatus.FLYING:
+            if before == FlightStatus.TAKING_OFF and state != FlightStatus.FLYING:
                 # A command during an aborted takeoff must not take effect after the next one.
                 self._next = None
         if state == FlightStatus.FLYING:

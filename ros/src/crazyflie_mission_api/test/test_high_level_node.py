@@ -2,80 +2,21 @@
 
 import math
 
-import genpy
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point
+from high_level_bench import SECONDS, TOP, Bench
 from std_msgs.msg import String
-from std_srvs.srv import EmptyResponse
 
 from crazyflie_driver import srv
 from crazyflie_driver.msg import Position
 from crazyflie_mission_api.conversions import full_state_message, setpoint_goal, to_message
-from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.minimum_snap import plan
 from crazyflie_model.polynomials import Goal
 from crazyflie_msgs.msg import (
-    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
-    PositionVelocityYawState,
-    PositionVelocityYawStateStamped,
 )
 from crazyflie_utils import ServiceError
-from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.vectors import to_vector
-
-TOP = "/cf1/high_level"
-SECONDS = genpy.Duration.from_sec
-
-
-class Bench:
-    """A node, and what it meets: takeoff server, estimator."""
-
-    def __init__(self, **parameters):
-        self.process = FakeProcess()
-        handle = self.process.handle("/cf1/takeoff_server")
-        self.called = []
-        for name in ("takeoff", "land", "emergency"):
-            handle.advertise_service(name, srv.Stop, lambda _, name=name: self._answer(name))
-        self.node = HighLevelNode()
-        assert self.process.launch(self.node, TOP, parameters)
-
-    def _answer(self, name):
-        self.called.append(name)
-        return EmptyResponse()
-
-    def be(self, state, position=(0.0, 0.0, 1.0)):
-        """Tell where the vehicle is, and its flight state."""
-        self.see(position)
-        status = FlightStatus(state=getattr(FlightStatus, state.upper()))
-        self.process.publish("/cf1/in_flight_flight_status", status)
-
-    def see(self, position, velocity=(0.0, 0.0, 0.0)):
-        """Tell where the vehicle is."""
-        state = PositionVelocityYawState(*position, *velocity, 0.0)
-        self.process.publish("/cf1/state", PositionVelocityYawStateStamped(state=state))
-
-    def call(self, service, service_type, *arguments):
-        """Call one of the services."""
-        return self.process.call(f"{TOP}/{service}", service_type._request_class(*arguments))
-
-    def go_to(self, goal, yaw=0.0, duration=2.0, relative=False):
-        """Call go_to."""
-        return self.call("go_to", srv.GoTo, 0, relative, Point(*goal), yaw, SECONDS(duration))
-
-    def fly(self, duration):
-        """Let a vehicle that follows its references fly, and return these."""
-        for _ in range(round(duration / 0.1)):
-            self.process.advance(0.1)
-            if self.references():
-                self.see(self.references()[-1][:3])
-        return np.array(self.references())
-
-    def references(self):
-        """Return all references so far."""
-        return [to_vector(message.state) for message in self.process.published("/cf1/ref")]
 
 
 @pytest.fixture
@@ -294,9 +235,21 @@ def test_who_does_not_fly_does_not_begin(bench):
     assert bench.process.logged("error") == [f"{TOP}: not started: the vehicle is on the ground"]
 
 
+def test_the_text_of_a_server_without_flight_status_is_read():
+    bench = Bench(**{"topics/flight_state": "in_flight_state"})
+    bench.see((0.0, 0.0, 1.0))
+    with pytest.raises(ServiceError, match="the vehicle is not known to fly; expected it to fly"):
+        bench.go_to((1.0, 0.0, 1.0))
+    bench.process.publish("/cf1/in_flight_state", String("flying"))
+    bench.go_to((1.0, 0.0, 1.0))
+    assert bench.fly(3.0)[-1][0] == pytest.approx(1.0)
+
+
 def test_the_servers_hover_point_is_replaced_by_one_above_the_vehicle(bench):
     bench.be("on_ground", (2.0, 0.0, 0.1))
     bench.call("takeoff", srv.Takeoff, 0, 0.5, SECONDS(2.0))
+    # A status of which something else than the state has changed.
+    bench.be("on_ground", (2.0, 0.0, 0.1))
     bench.be("taking_off", (2.0, 0.0, 0.1))
     bench.process.advance(1.0)
     # Nothing before the server has handed over: the controller takes it for the takeoff.

@@ -5,7 +5,7 @@ import math
 import pytest
 from geometry_msgs.msg import Twist, Vector3
 
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityState, PositionVelocityStateStamped
 from crazyflie_references.velocity_reference_node import VelocityReferenceNode
 from crazyflie_utils.testing import FakeProcess
 from crazyflie_utils.vectors import to_vector

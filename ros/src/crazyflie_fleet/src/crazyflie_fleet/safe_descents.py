@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_fleet.landing import free_place
-from crazyflie_fleet.straight_move import StraightMove, evaluate, shortest_duration
+from crazyflie_fleet.straight_move import shortest_duration
+from crazyflie_model.trajectory import minimum_jerk
 
 _MARGIN = 1.1
 """Duration of the move sideways, in the shortest possible ones."""
@@ -18,9 +19,11 @@ _MAX_GAP = 0.5
 
 @dataclass
 class _Descent:
-    """A move sideways, at the height of its start; times are in s."""
+    """A move from a start (x, y, z) to a landing place (x, y), m; times are in s."""
 
-    move: StraightMove
+    start: NDArray[np.float64]
+    place: NDArray[np.float64]
+    duration: float
     begin: float
     last: float
 
@@ -53,59 +56,41 @@ class SafeDescents:
         positions: NDArray[np.float64],
         is_landing: NDArray[np.bool_],
     ) -> float:
-        """Choose the landing place of a vehicle; return its distance, m.
+        """Choose the landing place of a vehicle at a time (s); return its distance, m.
 
         Parameters
         ----------
-        number : int
-        time : float
-            s.
         positions : (n, 3) array
             Of all vehicles, m; NaN where they are not known.
         is_landing : (n,) array of bool
             Which of them descend, or are on the ground.
         """
-        places = positions.copy()
+        start, places = positions[number].copy(), positions.copy()
         for other, descent in self._descents.items():
             if self.is_under_way(other, time):
-                places[other, :2] = descent.move.goal[:2]
+                places[other, :2] = descent.place
         known = np.asarray(np.isfinite(places).all(axis=1))
-        start = goal = np.nan_to_num(positions[number])
+        place = start[:2]
         if known[number]:
-            index = int(known[:number].sum())
-            limits = self._limits[np.ix_(known, known)]
-            goal = np.array(
-                [*free_place(index, places[known], is_landing[known], limits), start[2]]
-            )
-        duration = _MARGIN * shortest_duration(float(np.linalg.norm(goal - start)))
-        move = StraightMove(start, goal, max(duration, 1e-3))
-        self._descents[number] = _Descent(move, time, time)
-        return move.distance
+            index, limits = int(known[:number].sum()), self._limits[np.ix_(known, known)]
+            place = np.array(free_place(index, places[known], is_landing[known], limits))
+        distance = float(np.nan_to_num(np.linalg.norm(place - start[:2])))
+        duration = _MARGIN * shortest_duration(distance)
+        self._descents[number] = _Descent(start, place, duration, time, time)
+        return distance
 
     def reference(self, number: int, time: float, z: float, z_dot: float) -> list[float] | None:
         """Return x, y, z (m), x_dot, y_dot, z_dot (m/s); None if the vehicle lands where it is.
 
-        Parameters
-        ----------
-        number : int
-        time : float
-            s.
-        z, z_dot : float
-            Of the descent straight down, m and m/s. It takes effect as far as the move sideways
-            is done: at first the vehicle keeps its height.
+        The descent straight down, z (m) and z_dot (m/s) at a time (s), takes effect as far as the
+        move sideways is done: at first the vehicle keeps its height.
         """
         descent = self._descents[number]
         descent.last = time
-        move = descent.move
-        if move.distance == 0.0:
+        if descent.duration == 0.0:
             return None
-        (position,), (velocity,) = evaluate([move], [time - descent.begin])
-        done = float(np.linalg.norm(position - move.start)) / move.distance
-        rate = float(np.linalg.norm(velocity)) / move.distance
-        height = float(move.start[2])
-        return [
-            *position[:2].tolist(),
-            height + done * (z - height),
-            *velocity[:2].tolist(),
-            done * z_dot + rate * (z - height),
-        ]
+        s = min((time - descent.begin) / descent.duration, 1.0)
+        done, slope = minimum_jerk(s)
+        path = np.array([*descent.place, z]) - descent.start
+        velocity = slope / descent.duration * path + done * np.array([0.0, 0.0, z_dot])
+        return [*(descent.start + done * path).tolist(), *velocity.tolist()]

@@ -26,7 +26,7 @@ DESCENT, SAFE_DESCENT = f"{REFERENCE}_descent", f"{REFERENCE}_descent_safe"
 STATE, LQR_CONTROL = "state", "control/lqr"
 TAKEOFF_CONTROL, FINAL_CONTROL = "control/takeoff", "control/final"
 IN_FLIGHT = "in_flight"
-FLIGHT_STATE, FLIGHT_STATUS = f"{IN_FLIGHT}_state", f"{IN_FLIGHT}_flight_status"
+FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"
 """Topics and services of a vehicle, below its name."""
 
 BUFFER = "buffer"
@@ -87,7 +87,7 @@ def parameters(
                 "descent_reference": SAFE_DESCENT,
                 "state": STATE,
                 "control": LQR_CONTROL,
-                "flight_state": FLIGHT_STATE,
+                "flight_status": FLIGHT_STATUS,
             },
         },
         "takeoff_server": {

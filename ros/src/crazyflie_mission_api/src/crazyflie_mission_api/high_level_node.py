@@ -18,7 +18,6 @@ from crazyflie_mission_api.service_relay import relay
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import (
     FlightStatus,
-    PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
 from crazyflie_utils import Node, NodeHandle, ServiceError
@@ -62,9 +61,7 @@ class HighLevelNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        message_type = (
-            PositionVelocityYawStateStamped if parameters.has_yaw else PositionVelocityStateStamped
-        )
+        message_type = parameters.reference_type
         self._reference = handle.publisher(parameters.reference_topic, message_type)
         for name, service_type, callback in (
             ("takeoff", srv.Takeoff, self._on_takeoff),
@@ -80,13 +77,13 @@ class HighLevelNode(Node):
             ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
         ):
             handle.advertise_service(f"~{name}", service_type, callback)
-        handle.subscribe(parameters.flight_status_topic, FlightStatus, self._on_flight_status)
         handle.subscribe(
-            parameters.state_topic,
-            PositionVelocityYawStateStamped,
-            self._on_state,
-            finite="state",
+            parameters.flight_status_topic, FlightStatus, lambda m: self._set_flight_state(m.state)
         )
+        if parameters.flight_state_topic is not None:
+            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
+        state_type = PositionVelocityYawStateStamped
+        handle.subscribe(parameters.state_topic, state_type, self._on_state, finite="state")
         handle.subscribe(parameters.reference_topic, message_type, self._on_reference)
         handle.subscribe(parameters.start_topic, String, self._on_start_all)
         handle.subscribe("~cmd_full_state", FullState, self._on_setpoint)
@@ -116,12 +113,17 @@ class HighLevelNode(Node):
         self._measured = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
         self._measured_at = self._handle.time()
 
-    def _on_flight_status(self, message):
-        took_off = self._flight_state == FlightStatus.TAKING_OFF
-        state = self._flight_state = message.state
+    def _on_flight_state(self, message):
+        state = getattr(FlightStatus, message.data.upper(), FlightStatus.UNKNOWN)
+        self._set_flight_state(state)
+
+    def _set_flight_state(self, state):
+        before, self._flight_state = self._flight_state, state
+        if state == before:
+            return
         if state != FlightStatus.TAKING_OFF:
             self._hover = None
-            if took_off and state != FlightStatus.FLYING:
+            if before == FlightStatus.TAKING_OFF and state != FlightStatus.FLYING:
                 # A command during an aborted takeoff must not take effect after the next one.
                 self._next = None
         if state == FlightStatus.FLYING:
@@ -213,13 +215,8 @@ class HighLevelNode(Node):
         return srv.UploadTrajectoryResponse()
 
     def _on_start(self, request):
-        self._execute(
-            Follower.start,
-            request.trajectoryId,
-            request.timescale,
-            request.reversed,
-            request.relative,
-        )
+        flown = (request.trajectoryId, request.timescale, request.reversed, request.relative)
+        self._execute(Follower.start, *flown)
         return srv.StartTrajectoryResponse()
 
     def _on_start_all(self, message):

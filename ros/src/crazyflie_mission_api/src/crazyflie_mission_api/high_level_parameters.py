@@ -1,5 +1,6 @@
 """Parameters of the node that offers the driver's high-level services."""
 
+from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYawStateStamped
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC
 
@@ -19,14 +20,11 @@ class HighLevelParameters(Parameters):
         name="reference/yaw",
     )
     state_topic: str = parameter(TOPIC, "where the vehicle is", "state", "topics/state")
-    flight_state_topic: str = parameter(
-        TOPIC, "the takeoff server's flight state", "in_flight_state", "topics/flight_state"
+    flight_status_topic: str = parameter(
+        TOPIC, "of the takeoff server", "in_flight_flight_status", "topics/flight_status"
     )
-    own_flight_status_topic: str | None = parameter(
-        TOPIC,
-        "the same, typed; by default the name of flight_state with `_flight_status` for `_state`",
-        None,
-        "topics/flight_status",
+    flight_state_topic: str | None = parameter(
+        TOPIC, "text of a takeoff server without flight status", None, "topics/flight_state"
     )
     takeoff: str = parameter(SERVICE, "the takeoff server's", "takeoff", "srv/takeoff")
     land: str = parameter(SERVICE, "the takeoff server's", "land", "srv/land")
@@ -37,7 +35,6 @@ class HighLevelParameters(Parameters):
     time_step: float = parameter(TIME_STEP, "from one reference to the next", 0.02)
 
     @property
-    def flight_status_topic(self) -> str:
-        """The takeoff server's flight state, typed."""
-        prefix = self.flight_state_topic.removesuffix("_state")
-        return self.own_flight_status_topic or f"{prefix}_flight_status"
+    def reference_type(self) -> type[PositionVelocityStateStamped]:
+        """Message type of references."""
+        return PositionVelocityYawStateStamped if self.has_yaw else PositionVelocityStateStamped

@@ -32,7 +32,7 @@ MEMORY = 31
 """Pieces that the memory of a vehicle holds."""
 
 MAX_POSITION_AGE = 0.5
-"""A position older than this is not known, s; as `high_level_node.STATE_LIMIT`."""
+"""A position older than this is not known, s; as `high_level_node.MAX_STATE_AGE`."""
 
 _LANDED_HEIGHT = 0.1
 """Above the start, m: a vehicle below has landed."""
@@ -100,9 +100,8 @@ class RosVehicle(MissionVehicle):
         self._seen_at = -math.inf
         self._ground = 0.0
         self._landing_end = 0.0
-        self._status = ""
+        self._flight_status = FlightStatus()
         self._driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
-        self._flight_state = FlightStatus.UNKNOWN
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
@@ -153,14 +152,15 @@ class RosVehicle(MissionVehicle):
             is_cut_off = status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
             is_bad = is_cut_off or status.is_emergency or status.supervisor & _FAULTS
             return status.text if is_bad else self._stream.fault()
-        if self._flight_state in _ENDED:
-            return f"it does not fly any more: {self._status or WORDS[self._flight_state]}"
+        status = self._flight_status
+        if status.state in _ENDED:
+            return f"it does not fly any more: {status.reason or WORDS[status.state]}"
         return ""
 
     @override
     def has_landed(self) -> bool:
         if not self._uses_driver:
-            return self._flight_state == FlightStatus.ON_GROUND
+            return self._flight_status.state == FlightStatus.ON_GROUND
         place = self.position()
         if place is None:
             status = self._driver_status
@@ -184,14 +184,11 @@ class RosVehicle(MissionVehicle):
         s = message.state
         self._pose, self._seen_at = ((s.x, s.y, s.z), s.yaw), self._handle.time()
 
-    def _on_status(self, message):
-        self._status = message.data
+    def _on_flight_status(self, message):
+        self._flight_status = message
 
     def _on_driver_status(self, message):
         self._driver_status = message
-
-    def _on_flight_status(self, message):
-        self._flight_state, self._status = message.state, message.reason
 
     # Commands.
 

@@ -27,12 +27,13 @@ def sampled(pieces: Pieces) -> tuple[Array, Array]:
     times: list[Array] = [
         np.linspace(0.0, piece.duration, SAMPLES, dtype=np.float64) for piece in pieces
     ]
-    values = [
-        np.stack([np.stack(evaluate(axis, time)) for axis in piece.axes], axis=1)
-        for piece, time in zip(pieces, times, strict=True)
-    ]
+
+    def values(piece, time):
+        return np.stack([np.stack(evaluate(axis, time)) for axis in piece.axes], axis=1)
+
+    columns = [values(piece, time) for piece, time in zip(pieces, times, strict=True)]
     times = [begin + time for begin, time in zip(begins, times, strict=False)]
-    return np.concatenate(times), np.concatenate(values, axis=-1)
+    return np.concatenate(times), np.concatenate(columns, axis=-1)
 
 
 def demands(values: Array) -> dict[str, Array]:

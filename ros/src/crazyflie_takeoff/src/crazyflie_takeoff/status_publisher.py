@@ -98,8 +98,8 @@ class StatusPublisher:
         """Publish the status, typed and in words, if it has changed."""
         status = self._flight_status()
         content = (status.state, status.reason, status.takeoff_refusal)
-        # A server that takes the place of another one does not take back what is known.
-        if content != self._published and status.state != FlightStatus.UNKNOWN:
+        # Not before the state's own topics, and nothing while it is not known.
+        if content != self._published and status.state == CODES[self.state] != FlightStatus.UNKNOWN:
             self._published = content
             self._status.publish(status)
         if (text := _text(status)) != self._published_text:

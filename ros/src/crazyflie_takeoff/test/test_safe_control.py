@@ -24,17 +24,6 @@ def test_learns_the_thrust_of_hover_also_from_a_climb():
     assert hover.value == 1.25 * G
 
 
-def test_takes_no_drag_for_weight():
-    hover = HoverThrust()
-    z_dot = 0.0
-    for k in range(1000):
-        target = 1.0 if 600 <= k < 800 else 0.0
-        thrust = min(max(G + 5.0 * (target - z_dot), 4.0), 16.0)
-        hover.update(0.01, level(thrust), z_dot)
-        z_dot += 0.01 * (thrust - G - 0.2 * z_dot)
-        assert hover.value == pytest.approx(G, abs=0.06)
-
-
 def test_learns_the_vertical_part_of_a_tilted_thrust():
     tilted = HoverThrust()
     for _ in range(2000):

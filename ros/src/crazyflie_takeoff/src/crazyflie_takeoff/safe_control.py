@@ -26,9 +26,6 @@ HOVER_RANGE = 0.25
 AVERAGING = 2.0
 """Time constant of the mean of the commanded thrust, s."""
 
-MAX_LEARNING_SPEED = 0.3
-"""In a climb or a descent that is faster the drag would be taken for weight, m/s."""
-
 SINK_RATE = 0.3
 """How fast the target speed goes down in a descent, m/s^2: without a state the thrust is as much
 below hover. From 1 m a vehicle meets the ground at 0.7 m/s, from 2 m at 1.0 m/s."""
@@ -120,8 +117,6 @@ class HoverThrust:
         speed : float or None
             Measured z_dot, m/s.
         """
-        if speed is not None and abs(speed) > MAX_LEARNING_SPEED:
-            return
         share = step / (AVERAGING + step)
         vertical = control.thrust * math.cos(control.roll) * math.cos(control.pitch)
         self._thrust += share * (vertical - self._thrust)

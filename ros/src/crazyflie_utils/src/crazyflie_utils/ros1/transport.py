@@ -19,6 +19,7 @@ from crazyflie_utils.parameters.writer import ParameterWriter
 from crazyflie_utils.ros1 import patches
 from crazyflie_utils.ros1.calls import ServiceCaller, wait_for_answer
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
+from crazyflie_utils.ros1.screen_log import shield_screen_log
 from crazyflie_utils.transport import (
     ExternalPublisher,
     ExternalSubscriber,
@@ -77,6 +78,7 @@ class RosTransport(Transport):
         self.refused: Counter[Hashable] = Counter()
         self._complaints = Throttle()
         self._limits_rate = limits_rate
+        shield_screen_log()
         patches.harden_tcp_server(self._refuse)
         allow_many_topics()
         self._remappings = dict(rospy.names.get_resolved_mappings())

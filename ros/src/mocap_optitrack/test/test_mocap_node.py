@@ -227,8 +227,9 @@ def test_a_silence_of_the_stream_costs_nothing_but_itself():
 def test_a_machine_whose_clock_is_set_back_is_warned_of():
     process, node = launch()
     show(process, node, body(1))
-    before = process.clock.stamp
-    process.clock.stamp = lambda moment=None: before(moment) - genpy.Duration(3.0)
+    handle = node._handle
+    before = handle.stamp
+    handle.stamp = lambda moment=None: before(moment) - genpy.Duration(3.0)
     show(process, node, body(1))
     (text,) = process.logged("warn")
     assert text == "/mocap_node: this machine's clock was set back by 2.990 s: stamps step back too"

@@ -10,7 +10,7 @@ class Odometer:
     ----------
     max_step : float
         Two positions further apart than this (m) are a jump of the motion
-        capture, which nobody has flown.
+        capture, which has not been flown.
     distance : float
         m.
     """

@@ -34,8 +34,8 @@ class YawLag(Dynamics):
         return [*rates, (commanded - yaw_dot) / self._time_constant]
 
     @override
-    def on_ground(self, x: Vector) -> Vector:
-        return [*self._near_hover.on_ground(x[:7]), x[7]]
+    def apply_ground_contact(self, x: Vector) -> Vector:
+        return [*self._near_hover.apply_ground_contact(x[:7]), x[7]]
 
     @override
     def pose(self, x: Vector, u: Vector) -> tuple[Triple, Quaternion]:

@@ -94,6 +94,15 @@ def test_what_came_while_it_was_frozen_comes_when_it_goes_on(graph, listener):
     assert listener.heard[1:] == [(10.35, 1.0), (10.35, 2.0), (10.35, 3.0)]
 
 
+def test_many_messages_of_one_topic_push_out_none_of_another(graph, listener):
+    graph.freeze("/listener")
+    graph.publish("/greeting", String("you missed me"))
+    graph.advance(20.0)
+    graph.thaw("/listener")
+    missed = [data for _, data in listener.heard[1:]]
+    assert missed == ["you missed me", *range(101, 201)]
+
+
 def test_frozen_timers_skip_what_they_missed(graph, listener):
     graph.freeze("/talker")
     graph.advance(5.0)

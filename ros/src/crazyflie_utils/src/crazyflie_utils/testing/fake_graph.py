@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 from typing import Any
@@ -84,7 +83,7 @@ class FakeGraph:
         process.is_frozen = False
         process.clock.set(self.time)
         while process.waiting:
-            deliver, message = process.waiting.popleft()
+            deliver, message = process.waiting.pop(0)
             deliver(message)
 
     def is_alive(self, name: str) -> bool:
@@ -192,11 +191,14 @@ class _GraphProcess(FakeProcess):
         super().__init__(transport=_GraphTransport(name, graph, parameters), start=graph.time)
         self.name = name
         self.is_frozen = False
-        self.waiting: deque[tuple[Deliver, Any]] = deque(maxlen=_MAX_WAITING)
+        self.waiting: list[tuple[Deliver, Any]] = []
 
     def receive(self, deliver: Deliver, message: Any) -> None:
         """Deliver a message, or keep it until the process goes on."""
         if self.is_frozen:
+            same = [k for k, (other, _) in enumerate(self.waiting) if other is deliver]
+            if len(same) == _MAX_WAITING:
+                del self.waiting[same[0]]
             self.waiting.append((deliver, message))
             return
         # Whose turn it is to wake up at this moment is chance.

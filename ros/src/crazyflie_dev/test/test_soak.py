@@ -171,8 +171,8 @@ def test_complaints(watch):
     watch.graph.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
     watch.is_blind = True
     is_at(watch, 0.5)
-    is_at(watch, 0.5, after=BLIND_LIMIT + 1.0)
-    is_at(watch, 0.5, after=BLIND_LIMIT + 1.0)
+    is_at(watch, 0.5, after=BLIND_LIMIT + 3.5)
+    is_at(watch, 0.5, after=BLIND_LIMIT + 3.5)
     is_at(watch, 0.1)
     is_at(watch, 0.05)
     is_at(watch, 0.0)

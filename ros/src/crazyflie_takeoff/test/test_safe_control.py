@@ -40,3 +40,15 @@ def test_a_state_that_is_the_last_one_is_not_taken_again():
     # A new one counts.
     slow = motion._replace(velocity=(0.0, 0.0, 0.0))
     assert safe.advance(0.01, slow, False).thrust > G - 1.0
+
+
+def test_without_a_state_a_hover_thrust_that_is_too_high_hardly_lifts():
+    z, z_dot = 1.5, 0.05
+    safe = SafeControl(1.015 * G, Motion((0.0, 0.0, z), (0.0, 0.0, z_dot)))
+    highest = z
+    for k in range(800):
+        z_dot += 0.01 * (safe.advance(0.01, None, k >= 160).thrust - G)
+        z += 0.01 * z_dot
+        highest = max(highest, z)
+    assert highest < 1.65
+    assert z < 0.0

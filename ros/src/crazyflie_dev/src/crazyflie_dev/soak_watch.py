@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from crazyflie_model.units import GRAVITY
 from crazyflie_msgs.msg import FlightStatus
+from crazyflie_takeoff.safe_control import SINK_SPEED
 from crazyflie_utils.testing import FakeGraph
 
 MOST_THRUST = 16.0
@@ -28,8 +29,8 @@ STARVED_OVERSHOOT = 2.5
 less what was still to be climbed."""
 
 BLIND_LIMIT = 8.0
-"""How long a vehicle may be in the air without a good pose, s: 0.1 s until it is level,
-0.5 s in which the pose may come back, 5 s of descent, and what it falls then."""
+"""How long a vehicle may be in the air without a good pose, s: 1.6 s in which the pose may come
+back, 5 s of descent, and what it falls then; and the way down at `SINK_SPEED` beside."""
 
 MOST_SPEED = 3.0
 """Of a vehicle, m/s: references are 1.4 m away at most, and approached at less than half of it."""
@@ -181,7 +182,7 @@ class Watch:
     def _watch_blindness(self, time, height):
         if not (self.is_blind and height > _AIRBORNE):
             self._blind_since = time
-        elif time - self._blind_since > BLIND_LIMIT:
+        elif time - self._blind_since > BLIND_LIMIT + self._reference / SINK_SPEED:
             self.say(f"in the air without a pose: for {time - self._blind_since:.1f} s")
 
     def _on_control(self, message):

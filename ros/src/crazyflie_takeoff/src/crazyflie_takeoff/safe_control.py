@@ -27,8 +27,9 @@ AVERAGING = 2.0
 """Time constant of the mean of the commanded thrust, s."""
 
 SINK_RATE = 0.3
-"""How fast the target speed goes down in a descent, m/s^2: without a state the thrust is as much
-below hover. From 1 m a vehicle meets the ground at 0.7 m/s, from 2 m at 1.0 m/s."""
+"""How fast the target speed goes down in a descent, and from the beginning while no state comes,
+m/s^2: the thrust is then as much below hover, which may have been learned 2 % too high. From 1 m a
+vehicle without a state meets the ground at 0.7 m/s, from 2 m at 1.0 m/s."""
 
 SINK_SPEED = 0.4
 """The target speed goes down to this while the speed is measured, m/s."""
@@ -178,7 +179,7 @@ class SafeControl:
         """
         self._reckon(step)
         offset = self._offset(measured)
-        if sinks:
+        if sinks or measured is None:
             lowest = -math.inf if measured is None else -SINK_SPEED
             self._target = max(self._target - SINK_RATE * min(step, LONGEST_STEP), lowest)
         else:

@@ -98,6 +98,7 @@ class VehicleServer(Server):
         lag = now - self._begin - self.vehicle.time
         if lag > _GREATEST_LAG:
             self._begin += lag
+            self._next_observation += lag
             self._warn(f"the machine is too slow: the vehicle has lost {lag:.2f} s")
         for datagram in self.vehicle.advance_to(now - self._begin):
             if self._client is not None:

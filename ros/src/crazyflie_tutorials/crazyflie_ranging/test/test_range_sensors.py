@@ -68,7 +68,7 @@ def sensors(write, directions, **changes):
 def test_the_deck():
     deck = range_sensors.load(CONFIG / "multiranger.yaml")
     assert [each.direction for each in deck] == ["front", "back", "left", "right", "up"]
-    assert [each.variable for each in deck] == [f"range.{each.name}" for each in deck]
+    assert [each.log_variable for each in deck] == [f"range.{each.name}" for each in deck]
 
 
 @pytest.mark.parametrize(

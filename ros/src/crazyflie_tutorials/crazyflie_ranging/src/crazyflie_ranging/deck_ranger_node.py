@@ -20,7 +20,7 @@ class DeckRangerParameters(Parameters):
     sensors: tuple[RangeSensor, ...] = parameter(SensorFile(), "the sensors, a YAML file")
     variables: tuple[str, ...] = parameter(
         ListOf(TEXT),
-        "of the log block in their order, as the driver is told",
+        "of the log block in their order, as in the driver's parameter",
         name="genericLogTopic_ranges_Variables",
     )
     log_topic: str = parameter(TOPIC, "of the log block", "crazyflie/ranges", "topics/log")

@@ -157,7 +157,7 @@ class SpawnerNode(Node):
             vehicle.spawning.set_exception(
                 ServiceError(f"{name} was not there after {limit:g} s, and is taken down")
             )
-            # Nobody waits for this removal, but the vehicle has not ended by itself.
+            # No caller waits for this removal, but the vehicle has not ended by itself.
             vehicle.removing.append(Future())
             vehicle.process.end()
 

@@ -205,7 +205,7 @@ def test_after_an_error_in_a_step_the_vehicle_restarts(bench, monkeypatch, caplo
     bench.unlock()
     bench.stream(attitude(thrust=50000), 1.0)
     assert bench.height > 0.2
-    monkeypatch.setattr(bench.vehicle.board, "step", raise_error)
+    monkeypatch.setattr(bench.firmware, "step", raise_error)
     bench.run(0.9)
     # Without its microcontroller it falls.
     assert bench.vehicle.board is None

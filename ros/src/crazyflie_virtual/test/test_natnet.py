@@ -13,7 +13,7 @@ from natnet.version import Version
 from scipy.spatial.transform import Rotation
 
 from crazyflie_virtual.mocap import natnet
-from crazyflie_virtual.mocap.natnet import BodyPose, Encoder, Stamps
+from crazyflie_virtual.mocap.natnet import BodyPose, Encoder
 from crazyflie_virtual.mocap.scene import MocapSwitches, Scene
 from crazyflie_virtual.observer import Observation
 
@@ -56,7 +56,7 @@ def test_model(version):
 
 
 def test_frame(version):
-    message = Encoder(version).frame(77, BODIES, Stamps(1.5, 1.6, 1.7))
+    message = Encoder(version).frame(77, BODIES, 1.5, 1.6, 1.7)
     frame, rest = read(DataFrame, message, natnet.FRAME, version)
     # The end mark, which the library leaves; of version 4.1 it does not know the precision
     # time stamp, 8 bytes before the flags.
@@ -82,7 +82,7 @@ def test_frame(version):
     ],
 )
 def test_the_end_of_a_frame(version, form, stamps):
-    message = Encoder(version).frame(77, [], Stamps(1.5, 1.6, 1.7))
+    message = Encoder(version).frame(77, [], 1.5, 1.6, 1.7)
     end = struct.unpack(form, message[-struct.calcsize(form) :])
     assert end == (0, 0, 1.5, *stamps, 0, 0)
     # Before it are the number, and counts, from 4.1 on with sizes; all are zero.

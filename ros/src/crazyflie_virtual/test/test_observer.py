@@ -49,3 +49,20 @@ def test_a_vehicle_tells_its_observer():
             server.stop()
     assert (first.body_id, first.position) == (5, (0.0, 2.0, 0.0))
     assert first.time < second.time <= time.monotonic()
+
+
+def test_after_a_stall_no_two_observations_have_the_same_time():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as observer:
+        observer.bind(("127.0.0.1", 0))
+        observer.setblocking(False)
+        port = observer.getsockname()[1]
+        server = VehicleServer(VehicleSettings(port=0, observer_port=port))
+        begin = server.observe().time
+        try:
+            for moment in (0.2999, 0.3001):
+                server._process(begin + moment)
+        finally:
+            server.stop()
+        assert decode(observer.recv(1024)).time == pytest.approx(begin + 0.2999)
+        with pytest.raises(BlockingIOError):
+            observer.recv(1024)

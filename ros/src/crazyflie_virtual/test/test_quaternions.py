@@ -5,7 +5,7 @@ from cflib.utils.encoding import compress_quaternion as reference
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from crazyflie_virtual.firmware.compressed import compress_quaternion, decompress_quaternion
+from crazyflie_virtual.quaternions import compress_quaternion, decompress_quaternion
 
 COMPONENTS = st.tuples(*[st.floats(-1.0, 1.0)] * 4)
 

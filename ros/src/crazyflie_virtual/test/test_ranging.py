@@ -36,19 +36,19 @@ def test_the_ground_is_beside_a_vehicle_that_is_tilted():
     half = math.radians(60.0) / 2.0
     # Nose down.
     tilted = RangingSensors(At(1.0, (0.0, math.sin(half), 0.0, math.cos(half))), True, True)
-    assert tilted.front == round(1000.0 / math.sin(math.radians(60.0)))
-    assert tilted.zrange == 2000
-    assert (tilted.back, tilted.up, tilted.left, tilted.right) == (NOTHING,) * 4
+    assert tilted.distance("front") == round(1000.0 / math.sin(math.radians(60.0)))
+    assert tilted.distance("zrange") == 2000
+    assert {tilted.distance(side) for side in ("back", "up", "left", "right")} == {NOTHING}
 
 
 def test_reach():
-    assert RangingSensors(At(3.99), True, True).zrange == 3990
-    assert RangingSensors(At(4.01), True, True).zrange == NOTHING
+    assert RangingSensors(At(3.99), True, True).distance("zrange") == 3990
+    assert RangingSensors(At(4.01), True, True).distance("zrange") == NOTHING
 
 
 def test_without_decks():
     without = RangingSensors(Physics(), False, False)
-    assert [getattr(without, side) for side in (*SIDES, "zrange")] == [0] * 6
+    assert [without.distance(side) for side in (*SIDES, "zrange")] == [0] * 6
 
 
 WORLD = """\
@@ -65,9 +65,9 @@ def test_what_is_in_a_world(tmp_path):
     bench.take_off(1.0)
     ranging = bench.firmware.ranging
     x, _, height = bench.physics.position
-    assert ranging.front == pytest.approx(1000.0 * (1.0 - x), abs=20)
-    assert ranging.zrange == pytest.approx(1000.0 * height, abs=20)
-    assert (ranging.back, ranging.left, ranging.right, ranging.up) == (NOTHING,) * 4
+    assert ranging.distance("front") == pytest.approx(1000.0 * (1.0 - x), abs=20)
+    assert ranging.distance("zrange") == pytest.approx(1000.0 * height, abs=20)
+    assert {ranging.distance(side) for side in ("back", "left", "right", "up")} == {NOTHING}
 
 
 def test_a_bad_world_is_named(tmp_path):

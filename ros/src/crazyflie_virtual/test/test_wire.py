@@ -19,7 +19,7 @@ from crazyflie_virtual.tables.number_types import (
     U16,
     U32,
 )
-from crazyflie_virtual.tables.toc import Entry, Table
+from crazyflie_virtual.tables.toc import Table
 
 
 def test_header_is_port_reserved_bits_channel():
@@ -73,7 +73,7 @@ def test_values_are_limited_to_their_type(number_type, value, packed):
 
 
 def entries(*names):
-    return [Entry("group", name, 7) for name in names]
+    return [("group", name, 7) for name in names]
 
 
 def test_table_answers():

@@ -1,6 +1,7 @@
 """Where rays meet shapes."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,9 +46,9 @@ def distance(shape, origin, direction):
         (BALL, (-2, 0.1, 1), (0, 0, 1), 0.0),
         (wall("wall", (1, -1), (1, 1), 2.0, 0.2), (0, 0, 1), (1, 0, 0), 0.9),
         (wall("wall", (1, -1), (1, 1), 2.0, 0.2), (0, 0, 2.1), (1, 0, 0), math.inf),
-        (Floor((2.0, 2.0)).solid(), (0.5, 0, 1.5), (0, 0, -1), 1.5),
-        (Floor((2.0, 2.0)).solid(), (1.5, 0, 1.5), (0, 0, -1), math.inf),
-        (Floor((2.0, 2.0)).solid(), (0, 0, 1.5), (1, 0, 0), math.inf),
+        (Floor(size=(2.0, 2.0)).solid(), (0.5, 0, 1.5), (0, 0, -1), 1.5),
+        (Floor(size=(2.0, 2.0)).solid(), (1.5, 0, 1.5), (0, 0, -1), math.inf),
+        (Floor(size=(2.0, 2.0)).solid(), (0, 0, 1.5), (1, 0, 0), math.inf),
     ],
 )
 def test_distances(shape, origin, direction, expected):
@@ -84,7 +85,7 @@ def is_inside(shape, point):
 
 
 def test_the_first_is_met():
-    world = World("world", Floor((8.0, 8.0)), (BOX, CYLINDER, BALL))
+    world = World("world", Floor(size=(8.0, 8.0)), (BOX, CYLINDER, BALL))
     directions = np.array([[[1, 0, 0], [0, 1, 0], [-1, 0, 0]], [[0, 0, -1], [0, 0, 1], [0, -1, 0]]])
     distances, indices = world.cast((0.0, 0.0, 1.0), directions)
     assert indices.tolist() == [[0, 1, 2], [3, -1, -1]]
@@ -102,28 +103,27 @@ def test_each_ray_has_an_origin_of_its_own():
 
 
 def test_circle():
-    circle = Circle((1.0, 2.0, 0.5), radius=0.5, period=8.0, phase=math.pi / 2.0)
+    circle = Circle(centre=(1.0, 2.0, 0.5), radius=0.5, period=8.0, phase=math.pi / 2.0)
     assert circle.position(0.0) == pytest.approx((1.0, 2.5, 0.5))
     assert circle.position(-3.0) == pytest.approx((1.0, 2.5, 0.5))
     assert circle.position(2.0) == pytest.approx((0.5, 2.0, 0.5))
-    clockwise = Circle((1.0, 2.0, 0.5), 0.5, 8.0, math.pi / 2.0, clockwise=True)
+    clockwise = replace(circle, clockwise=True)
     assert clockwise.position(2.0) == pytest.approx((1.5, 2.0, 0.5))
 
 
 def test_waypoints():
-    points = ((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (0.0, 0.0, 1.0))
-    path = Waypoints((0.0, 2.0, 6.0), points)
+    points = ((0.0, 0.0, 0.0, 1.0), (2.0, 1.0, 0.0, 1.0), (6.0, 0.0, 0.0, 1.0))
+    path = Waypoints(points=points)
     places = [path.position(time)[0] for time in (-1.0, 0.0, 1.0, 2.0, 4.0, 6.0, 7.0)]
     assert places == pytest.approx([0.0, 0.0, 0.5, 1.0, 0.5, 0.0, 0.5])
-    once = Waypoints((0.0, 2.0), points[:2], repeat=False)
+    once = Waypoints(points=points[:2], repeat=False)
     assert once.position(99.0) == (1.0, 0.0, 1.0)
 
 
 def test_what_moves_is_elsewhere_later():
-    moving = Ball(
-        name="moving", centre=(1.0, 0.0, 1.0), radius=0.1, path=Circle((0.0, 0.0, 1.0), 1.0, 4.0)
-    )
-    world = World("world", Floor((4.0, 4.0)), (BOX, moving))
+    path = Circle(centre=(0.0, 0.0, 1.0), radius=1.0, period=4.0)
+    moving = Ball(name="moving", centre=(1.0, 0.0, 1.0), radius=0.1, path=path)
+    world = World("world", Floor(size=(4.0, 4.0)), (BOX, moving))
     assert world.moving == (moving,)
     later = world.at(1.0)
     assert later["moving"].centre == pytest.approx((0.0, 1.0, 1.0))

@@ -49,7 +49,7 @@ def write(tmp_path):
 def test_what_is_in_it(write):
     world = world_file.load(write(GOOD))
     assert world.frame == "world"
-    assert world.floor == Floor((4.0, 3.0))
+    assert world.floor == Floor(size=(4.0, 3.0))
     assert world["crate"] == Box(
         name="crate", centre=(1.0, 0.0, 0.5), extent=(0.2, 0.3, 1.0), yaw=0.5
     )

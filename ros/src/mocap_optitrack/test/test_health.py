@@ -3,7 +3,7 @@
 import pytest
 
 from mocap_optitrack.frames import Body
-from mocap_optitrack.health import ERROR, OK, WARN, Health
+from mocap_optitrack.health import ERROR, OK, WARN, Event, Health
 from mocap_optitrack.parameters import RigidBodyDictionary
 
 BODIES = RigidBodyDictionary()({"1": {"pose": "one"}, "cf7": {"pose": "seven"}}).bodies
@@ -96,12 +96,12 @@ def test_a_connection_that_is_silent(health):
 
 
 def test_while_the_clock_is_learned(health):
-    health.learning()
+    health.count(Event.LEARNING)
     assert health.report(1.0)[0][1:3] == (WARN, "learning the server's clock")
 
 
 def test_stale_frames_only(health):
-    health.stale()
+    health.count(Event.STALE)
     stream_status = health.report(1.0)[0]
     assert stream_status.level == ERROR
     assert "all frames are stale" in stream_status.message
@@ -110,11 +110,11 @@ def test_stale_frames_only(health):
 
 def test_a_clock_that_jumps_once_is_no_fault_but_again_and_again_is(health):
     stream(health, 0.0, 1.0, ONE)
-    health.clock_set()
+    health.count(Event.CLOCK_SET)
     assert health.report(1.0)[0].level == OK
     stream(health, 1.0, 2.0, ONE)
-    health.clock_set()
-    health.clock_set()
+    health.count(Event.CLOCK_SET)
+    health.count(Event.CLOCK_SET)
     level, message = health.report(2.0)[0][1:3]
     assert level == ERROR
     assert "two servers" in message
@@ -124,7 +124,7 @@ def test_a_clock_that_jumps_once_is_no_fault_but_again_and_again_is(health):
 def test_frames_of_two_servers(health, foreign, level):
     stream(health, 0.0, 1.0, ONE)
     for _ in range(foreign):
-        health.foreign()
+        health.count(Event.FOREIGN)
     assert health.report(1.0)[0].level == level
 
 

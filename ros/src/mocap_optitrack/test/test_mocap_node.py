@@ -2,6 +2,7 @@
 
 import math
 from pathlib import Path
+from unittest.mock import Mock
 
 import genpy
 import pytest
@@ -34,22 +35,12 @@ BODIES = {
 }
 
 
-class NoReceiver:
-    """In the place of the thread that frames come from."""
-
-    def start(self):
-        """Do nothing: the test calls the node."""
-
-    def stop(self):
-        """Do nothing."""
-
-
 class SilentNode(MocapNode):
     """A node that is not connected to anything, but says how it would be."""
 
     def make_receiver(self, handle):
         self.source = self._make_source(handle)
-        return NoReceiver()
+        return Mock()
 
 
 def flat(parameters, prefix=""):
@@ -69,10 +60,9 @@ def launch(**changes):
     return process, node
 
 
-def refusal(**changes):
+def refusal(parameters):
     """Return what is logged when the node refuses to start."""
     process = FakeProcess()
-    parameters = {"rigid_bodies": BODIES, **changes}
     assert not process.launch(SilentNode(), "/mocap_node", flat(parameters))
     return process.logged("error")[0]
 
@@ -181,10 +171,10 @@ def test_a_body_that_is_never_seen_is_warned_of_once_in_a_while():
     assert "3 (cf3)" in text
 
 
-def test_trouble_is_warned_of_and_reported():
+def test_a_failure_is_warned_of_and_reported():
     process, node = launch()
     for _ in range(3):
-        node.on_trouble("no server answers")
+        node.on_failure("no server answers")
     process.advance(1.0)
     assert process.logged("warn") == ["/mocap_node: no server answers (trying again)"]
     (message,) = process.published("/diagnostics")
@@ -194,9 +184,11 @@ def test_trouble_is_warned_of_and_reported():
     assert "/mocap_node: connected to a server" in process.logged("info")
 
 
-def timed(process, exposure):
-    """Return a frame of a server whose clock is 100 s behind, just sent."""
-    return Frame(exposure, exposure + 0.005, process.clock.time(), (body(1),))
+def show_timed(process, node, wait=0.01):
+    """Let a frame come from a server whose clock is 100 s behind, just sent."""
+    process.advance(wait)
+    now = process.clock.time()
+    node.on_frame(Frame(now - 100.005, now - 100.0, now, (body(1),)))
 
 
 def test_a_silence_of_the_stream_costs_nothing_but_itself():
@@ -204,22 +196,18 @@ def test_a_silence_of_the_stream_costs_nothing_but_itself():
     topic = "/mocap_node/Robot_1/pose"
     node.on_connected("a server")
     for _ in range(100):
-        process.advance(0.01)
-        node.on_frame(timed(process, process.clock.time() - 100.005))
+        show_timed(process, node)
     before = len(process.published(topic))
-    process.advance(1.2)
     node.on_silence("no frames for 1 s; is it live?")
-    node.on_frame(timed(process, process.clock.time() - 100.005))
+    show_timed(process, node, wait=1.2)
     assert len(process.published(topic)) == before + 1
     # Nor does a new connection to the same server; one to another does.
-    node.on_trouble("no frames for 10 s")
+    node.on_failure("no frames for 10 s")
     node.on_connected("a server")
-    process.advance(0.01)
-    node.on_frame(timed(process, process.clock.time() - 100.005))
+    show_timed(process, node)
     assert len(process.published(topic)) == before + 2
     node.on_connected("another server")
-    process.advance(0.01)
-    node.on_frame(timed(process, process.clock.time() - 100.005))
+    show_timed(process, node)
     assert len(process.published(topic)) == before + 2
     assert "/mocap_node: no frames for 1 s; is it live?" in process.logged("warn")
 
@@ -236,13 +224,10 @@ def test_a_machine_whose_clock_is_set_back_is_warned_of():
     assert len(process.published("/mocap_node/Robot_1/pose")) == 2
 
 
-def test_natnet_is_the_default():
+def test_the_configuration_of_natnet():
     _, node = launch()
     assert isinstance(node.source, NatNetSource)
     assert node._parameters.natnet == NatNetParameters()
-
-
-def test_the_configuration_of_natnet():
     config = {
         "server_address": "motive",
         "local_address": "192.168.1.20",
@@ -263,9 +248,7 @@ def test_other_systems(backend):
 
 
 def test_the_shipped_configuration():
-    process, node = FakeProcess(), SilentNode()
-    parameters = yaml.safe_load(SHIPPED.read_text())
-    assert process.launch(node, "/mocap_node", flat(parameters))
+    process, node = launch(**yaml.safe_load(SHIPPED.read_text()))
     assert process.logged("warn") == []
     assert node._parameters.natnet == NatNetParameters(multicast_address="224.0.0.1")
     assert isinstance(node.source, NatNetSource)
@@ -306,12 +289,10 @@ def test_what_means_nothing_is_warned_of():
     ],
 )
 def test_bad_parameters_are_named(changes, name, reason):
-    text = refusal(**changes)
+    text = refusal({"rigid_bodies": BODIES, **changes})
     assert f"{name} is" in text
     assert reason in text
 
 
 def test_the_bodies_are_required():
-    process = FakeProcess()
-    assert not process.launch(SilentNode(), "/mocap_node", {})
-    assert "parameter /mocap_node/rigid_bodies is not set" in process.logged("error")[0]
+    assert "parameter /mocap_node/rigid_bodies is not set" in refusal({})

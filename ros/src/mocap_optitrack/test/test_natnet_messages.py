@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_virtual.mocap.natnet import VERSIONS, BodyPose, Encoder, Stamps
+from crazyflie_virtual.mocap.natnet import VERSIONS, BodyPose, Encoder
 from mocap_optitrack import natnet_messages as natnet
 from mocap_optitrack.frames import Body
 
@@ -56,7 +56,7 @@ def test_names(version):
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_frames(version):
-    message = Encoder(version).frame(5, POSES, Stamps(100.0, 100.002, 100.005))
+    message = Encoder(version).frame(5, POSES, 100.0, 100.002, 100.005)
     frame = natnet.read_frame(payload(message, natnet.FRAME), version, FREQUENCY, NAMES, 7.5)
     assert frame.arrival == 7.5
     assert frame.bodies == tuple(Body(*pose) for pose in POSES)
@@ -66,7 +66,7 @@ def test_frames(version):
 
 
 def test_a_server_with_ptp_is_read_like_one_without():
-    message = payload(Encoder("4.1").frame(5, POSES, Stamps(100.0, 100.002, 100.005)), natnet.FRAME)
+    message = payload(Encoder("4.1").frame(5, POSES, 100.0, 100.002, 100.005), natnet.FRAME)
     # The precision time stamp is before flags and end mark.
     precise = message[:-14] + struct.pack("<II", 1_700_000_000, 0x80000000) + message[-6:]
     read = [natnet.read_frame(each, "4.1", FREQUENCY, NAMES, 7.5) for each in (message, precise)]
@@ -149,7 +149,7 @@ def test_what_is_no_message(datagram):
 
 @given(st.integers(0, 120), st.sampled_from(VERSIONS))
 def test_a_message_that_was_cut_off_is_refused(length, version):
-    whole = payload(Encoder(version).frame(5, POSES, Stamps(1.0, 1.0, 1.0)), natnet.FRAME)
+    whole = payload(Encoder(version).frame(5, POSES, 1.0, 1.0, 1.0), natnet.FRAME)
     assert length < len(whole) - 8
     with pytest.raises(natnet.DecodeError, match=f"NatNet {version} of {length} bytes"):
         natnet.read_frame(whole[:length], version, FREQUENCY, {}, 0.0)
@@ -209,7 +209,7 @@ def valid(number, version):
     encoder = Encoder("3.1" if version == "3.0" else version)
     if number == natnet.MODEL:
         return encoder.model(POSES)
-    return encoder.frame(5, POSES, Stamps(100.0, 100.002, 100.005))
+    return encoder.frame(5, POSES, 100.0, 100.002, 100.005)
 
 
 NUMBERS = st.sampled_from([natnet.SERVER_INFO, natnet.MODEL, natnet.FRAME])
@@ -259,7 +259,7 @@ def test_the_largest_datagrams_take_little_time_and_memory(number, version, fill
 
 @pytest.mark.parametrize("stamp", [math.nan, math.inf])
 def test_a_frame_without_a_time_is_refused(stamp):
-    message = Encoder("2.9").frame(5, POSES, Stamps(stamp, 0.0, 0.0))
+    message = Encoder("2.9").frame(5, POSES, stamp, 0.0, 0.0)
     with pytest.raises(natnet.DecodeError, match="has no time"):
         natnet.read_frame(payload(message, natnet.FRAME), "2.9", FREQUENCY, {}, 0.0)
 

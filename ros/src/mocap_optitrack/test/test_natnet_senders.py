@@ -26,7 +26,7 @@ def forger(encoder):
     messages = [
         encoder.server_info("forged", 1511, None),
         encoder.model([elsewhere]),
-        encoder.frame(1, [elsewhere], natnet.Stamps(now, now, now)),
+        encoder.frame(1, [elsewhere], now, now, now),
     ]
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.bind(("127.0.0.2", 0))

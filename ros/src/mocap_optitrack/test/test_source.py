@@ -56,7 +56,7 @@ class Run:
             lambda text: self.said.put(("connected", text)),
             lambda frame: self.said.put(("frame", frame)),
             lambda text: self.said.put(("silence", text)),
-            lambda text: self.said.put(("trouble", text)),
+            lambda text: self.said.put(("failure", text)),
         )
 
     def __enter__(self):
@@ -79,7 +79,7 @@ def _short_waits(monkeypatch):
     monkeypatch.setattr(module, "_RETRY", 0.001)
     monkeypatch.setattr(module, "_POLL", 0.001)
     monkeypatch.setattr(module, "_SILENCE", 0.05)
-    monkeypatch.setattr(module, "_GIVE_UP", 0.5)
+    monkeypatch.setattr(module, "_RECONNECT_AFTER", 0.5)
 
 
 def frame(number):
@@ -97,14 +97,14 @@ def test_frames_are_handed_over_in_order():
 def test_a_connection_that_cannot_be_opened_is_tried_again():
     with Run([SourceError("no answer")], [SourceError("no answer")], ["a server"]) as run:
         said = [run.next() for _ in range(3)]
-    assert said == [("trouble", "no answer"), ("trouble", "no answer"), ("connected", "a server")]
+    assert said == [("failure", "no answer"), ("failure", "no answer"), ("connected", "a server")]
     assert all(source.is_closed for source in run.sources)
 
 
 def test_a_connection_that_ends_is_made_anew():
     with Run(["a server", frame(1), SourceError("gone")], ["a server", frame(2)]) as run:
         said = [run.next() for _ in range(5)]
-    assert said[2:] == [("trouble", "gone"), ("connected", "a server"), ("frame", frame(2))]
+    assert said[2:] == [("failure", "gone"), ("connected", "a server"), ("frame", frame(2))]
 
 
 def test_a_connection_that_is_silent_for_a_while_is_kept():
@@ -120,7 +120,7 @@ def test_a_connection_without_frames_is_given_up():
     with Run(["a server", frame(1)], ["a server", frame(2)]) as run:
         said = [run.next() for _ in range(6)]
     assert said[2] == ("silence", "no frames for 0.05 s; is it plugged in?")
-    assert said[3] == ("trouble", "no frames for 0.5 s; is it plugged in?")
+    assert said[3] == ("failure", "no frames for 0.5 s; is it plugged in?")
     assert said[5] == ("frame", frame(2))
 
 

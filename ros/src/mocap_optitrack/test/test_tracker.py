@@ -38,16 +38,16 @@ def keys(poses):
 
 
 def test_bodies_are_found_by_number_and_by_name():
-    seen = tracker().take(frame(body(1, "x"), body(2, "cf7"), body(8, "My Drone"), body(9, "y")))
+    seen = tracker().process(frame(body(1, "x"), body(2, "cf7"), body(8, "My Drone"), body(9, "y")))
     assert keys(seen) == ["1", "cf7", "3"]
 
 
 def test_a_name_of_its_own_counts_more_than_a_number():
-    assert keys(tracker().take(frame(body(3, "another one")))) == []
+    assert keys(tracker().process(frame(body(3, "another one")))) == []
 
 
 def test_systems_without_numbers_may_call_a_body_one():
-    assert keys(tracker().take(frame(body(None, "1"), body(None, "cf7")))) == ["1", "cf7"]
+    assert keys(tracker().process(frame(body(None, "1"), body(None, "cf7")))) == ["1", "cf7"]
 
 
 @pytest.mark.parametrize(
@@ -62,42 +62,42 @@ def test_systems_without_numbers_may_call_a_body_one():
     ],
 )
 def test_invalid_bodies_are_dropped(invalid):
-    seen = tracker().take(frame(body(1, **invalid), body(2, "cf7")))
+    seen = tracker().process(frame(body(1, **invalid), body(2, "cf7")))
     assert keys(seen) == ["cf7"]
 
 
 def test_poses_have_z_up_and_norm_1():
-    (seen,) = tracker(up_axis="y").take(frame(body(quaternion=(0.0, 0.6, 0.0, 0.8001))))
+    (seen,) = tracker(up_axis="y").process(frame(body(quaternion=(0.0, 0.6, 0.0, 0.8001))))
     assert seen.position == (1.0, -3.0, 2.0)
     assert seen.quaternion == pytest.approx((0.0, 0.0, 0.6, 0.8), abs=1e-4)
     assert math.hypot(*seen.quaternion) == pytest.approx(1.0, abs=1e-15)
 
 
 def test_frames_without_a_time_have_that_of_their_arrival():
-    (seen,) = tracker().take(frame(body(), time=12.5))
+    (seen,) = tracker().process(frame(body(), time=12.5))
     assert seen.time == 12.5
 
 
 def test_frames_that_have_waited_are_older():
     tracked = tracker(stale_after=0.2)
-    assert tracked.take(Frame(None, None, 12.5, (body(),), waited=0.25)) == []
-    (seen,) = tracked.take(Frame(None, None, 12.5, (body(),), waited=0.125))
+    assert tracked.process(Frame(None, None, 12.5, (body(),), waited=0.25)) == []
+    (seen,) = tracked.process(Frame(None, None, 12.5, (body(),), waited=0.125))
     assert seen.time == 12.375
 
 
 def test_a_frame_that_is_not_new_is_dropped():
     one = tracker()
-    assert one.take(frame(body()))
-    assert not one.take(frame(body()))
-    assert one.take(frame(body(), time=10.1))
+    assert one.process(frame(body()))
+    assert not one.process(frame(body()))
+    assert one.process(frame(body(), time=10.1))
 
 
 def test_simulated_time_that_begins_again():
     one = tracker()
     time = settled(one)
-    assert one.take(timed(time))
-    assert one.take(frame(body(), time=3.0))
-    assert not one.take(frame(body(), time=3.0))
+    assert one.process(timed(time))
+    assert one.process(frame(body(), time=3.0))
+    assert not one.process(frame(body(), time=3.0))
 
 
 def timed(server_time, latency=0.03, network=0.001):
@@ -109,33 +109,33 @@ def timed(server_time, latency=0.03, network=0.001):
 def settled(one):
     """Let a tracker learn the server's clock; return the server's time afterwards."""
     for k in range(1, 100):
-        one.take(timed(0.01 * k))
+        one.process(timed(0.01 * k))
     return 1.0
 
 
 def test_nothing_is_published_before_the_servers_clock_is_known():
     one = tracker()
-    assert not one.take(timed(0.01))
-    assert not one.take(timed(0.02))
-    assert one.take(timed(settled(one)))
+    assert not one.process(timed(0.01))
+    assert not one.process(timed(0.02))
+    assert one.process(timed(settled(one)))
 
 
 def test_poses_have_the_time_of_their_exposure():
     one = tracker()
     time = settled(one)
-    (seen,) = one.take(timed(time))
+    (seen,) = one.process(timed(time))
     assert seen.time == pytest.approx(500.0 + time, abs=0.0011)
     # One that has been held up on the way has it too.
-    (seen,) = one.take(timed(time + 0.01, network=0.1))
+    (seen,) = one.process(timed(time + 0.01, network=0.1))
     assert seen.time == pytest.approx(500.0 + time + 0.01, abs=0.0011)
 
 
 def test_a_frame_that_is_too_old_is_dropped():
     one = tracker(stale_after=0.2)
     time = settled(one)
-    assert not one.take(timed(time, network=0.18))
-    assert one.take(timed(time + 0.01, network=0.16))
-    assert not one.take(timed(time + 0.02, latency=0.25))
+    assert not one.process(timed(time, network=0.18))
+    assert one.process(timed(time + 0.01, network=0.16))
+    assert not one.process(timed(time + 0.02, latency=0.25))
 
 
 def counts(health):
@@ -149,7 +149,7 @@ def test_after_a_silence_the_first_frame_is_published():
     time = settled(one)
     for silence in (1.2, 5.0, 600.0):
         time += silence
-        (seen,) = one.take(timed(time))
+        (seen,) = one.process(timed(time))
         assert seen.time == pytest.approx(500.0 + time, abs=0.0011)
 
 
@@ -159,9 +159,9 @@ def test_frames_that_come_again_or_too_late_are_dropped_and_counted():
     time = settled(one)
     published = 0
     for k in range(100):
-        published += len(one.take(timed(time + 0.01 * k)))
-        assert not one.take(timed(time + 0.01 * k, network=0.002))
-        assert not one.take(timed(time + 0.01 * (k - 3), network=0.032))
+        published += len(one.process(timed(time + 0.01 * k)))
+        assert not one.process(timed(time + 0.01 * k, network=0.002))
+        assert not one.process(timed(time + 0.01 * (k - 3), network=0.032))
     assert published == 100
     assert counts(health) == ("200", "0")
 
@@ -172,8 +172,8 @@ def test_one_frame_with_a_wild_time_is_dropped_and_counted(shift):
     one = tracker(health=health)
     time = settled(one)
     wild = timed(time)
-    assert not one.take(wild._replace(exposure=wild.exposure + shift, sent=wild.sent + shift))
-    assert one.take(timed(time + 0.01))
+    assert not one.process(wild._replace(exposure=wild.exposure + shift, sent=wild.sent + shift))
+    assert one.process(timed(time + 0.01))
     assert counts(health) == ("0", "1")
 
 
@@ -181,8 +181,8 @@ def test_an_exposure_in_the_future_is_dropped_and_counted():
     health = Health(BODIES, 0.2, 0.0)
     one = tracker(health=health)
     time = settled(one)
-    assert not one.take(timed(time)._replace(exposure=time + 8.0))
-    assert one.take(timed(time + 0.01))
+    assert not one.process(timed(time)._replace(exposure=time + 8.0))
+    assert one.process(timed(time + 0.01))
     assert counts(health) == ("0", "1")
 
 
@@ -193,7 +193,7 @@ def test_no_stamp_is_ever_in_the_future_or_steps_back():
     for k in range(5000):
         taken = timed(0.01 * k + generator.choice([0.0] * 9 + [-0.5, -0.01, 0.02, 8.0]))
         arrival = 500.0 + 0.01 * k + 0.031 + generator.expovariate(500.0)
-        for seen in one.take(taken._replace(arrival=arrival)):
+        for seen in one.process(taken._replace(arrival=arrival)):
             stamps.append(seen.time)
             assert seen.time < arrival + 0.005
     assert all(a < b for a, b in pairwise(stamps))
@@ -207,7 +207,7 @@ def test_a_server_whose_clock_is_set_back_is_followed():
     published = 0
     for k in range(100):
         late = timed(time + 0.01 * k - 300.0)
-        published += len(one.take(late._replace(arrival=late.arrival + 300.0)))
+        published += len(one.process(late._replace(arrival=late.arrival + 300.0)))
     # Half a second, and ten frames.
     assert published == pytest.approx(40, abs=3)
 
@@ -216,4 +216,4 @@ def test_another_server_is_learned_anew():
     one = tracker()
     time = settled(one)
     one.restart()
-    assert not one.take(timed(time))
+    assert not one.process(timed(time))

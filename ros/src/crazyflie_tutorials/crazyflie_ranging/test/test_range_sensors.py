@@ -39,7 +39,7 @@ GOOD = "sensors:\n" + ENTRY + ENTRY.replace("front", "back")
 
 WORLD = World(
     "world",
-    Floor((10.0, 10.0)),
+    Floor(size=(10.0, 10.0)),
     (
         Box(name="wall", centre=(2.1, 0.0, 1.0), extent=(0.2, 4.0, 2.0)),
         Ball(name="ball", centre=(0.0, 1.2, 1.0), radius=0.2),
@@ -68,7 +68,7 @@ def sensors(write, directions, **changes):
 def test_the_deck():
     deck = range_sensors.load(CONFIG / "multiranger.yaml")
     assert [each.direction for each in deck] == ["front", "back", "left", "right", "up"]
-    assert [each.variable for each in deck] == [f"range.{each.name}" for each in deck]
+    assert [each.log_variable for each in deck] == [f"range.{each.name}" for each in deck]
 
 
 @pytest.mark.parametrize(

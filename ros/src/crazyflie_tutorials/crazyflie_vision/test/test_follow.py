@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from crazyflie_vision.follow import Follower
+from crazyflie_vision.follow import Follower, GainParameters, SpeedParameters
 from crazyflie_vision.target import Target
 
 F = 208.0
@@ -14,12 +14,8 @@ CENTRE = (159.5, 119.5)
 FOLLOWER = Follower(
     distance=1.0,
     radius=0.12,
-    forward=1.0,
-    up=1.0,
-    turn=1.5,
-    max_forward=0.5,
-    max_up=0.3,
-    max_turn=1.0,
+    gains=GainParameters(forward=1.0, up=1.0, turn=1.5),
+    limits=SpeedParameters(forward=0.5, up=0.3, turn=1.0),
 )
 AT_REST = Target(*CENTRE, F * 0.12)
 

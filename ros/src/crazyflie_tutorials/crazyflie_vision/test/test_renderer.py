@@ -16,7 +16,7 @@ from crazyflie_world.shapes import Ball, Box, Cylinder, wall
 from crazyflie_world.world import Floor, World
 
 CAMERA = Pinhole.with_fov(320, 240, 75.0)
-FLOOR = Floor((8.0, 8.0))
+FLOOR = Floor(size=(8.0, 8.0))
 RED = (1.0, 0.0, 0.0)
 
 
@@ -52,7 +52,7 @@ def test_a_ball_is_where_it_is_projected(ahead, left, up, roll, pitch, yaw):
     vehicle = Rotation.from_euler("xyz", [roll, pitch, yaw]).as_matrix()
     centre = pose.position + vehicle @ np.array([ahead, left * ahead, up * ahead])
     ball = Ball(name="ball", centre=tuple(centre), radius=0.1, colour=RED)
-    mask = is_red(render([ball], pose, Floor((0.1, 0.1))))
+    mask = is_red(render([ball], pose, Floor(size=(0.1, 0.1))))
     x, y, depth = project(centre, pose)
     rows, columns = np.nonzero(mask)
     # The outline is an ellipse a little off the projected centre: by r^2 / d^2 of the angle.
@@ -78,7 +78,7 @@ def test_what_is_nearer_covers():
 
 @pytest.mark.parametrize("roll", [-0.3, 0.0, 0.3])
 def test_the_horizon_is_level_in_the_world(roll):
-    image = render([], looking(roll=roll), Floor((4000.0, 4000.0), colour=(0.2, 0.2, 0.2)))
+    image = render([], looking(roll=roll), Floor(size=(4000.0, 4000.0), colour=(0.2, 0.2, 0.2)))
     is_sky = (image == np.array(SKY, dtype=np.uint8)).all(axis=2)
     for column in (20, 160, 300):
         # A roll to the right lifts the horizon's right end... as seen by who rolls: its left.
@@ -87,7 +87,7 @@ def test_the_horizon_is_level_in_the_world(roll):
 
 
 def test_checkers_lie_in_the_world():
-    floor = Floor((4.0, 4.0), "checkers")
+    floor = Floor(size=(4.0, 4.0), texture="checkers")
     image = render([], looking(pitch=math.radians(30.0)), floor)[..., 0].astype(int)
     pose = looking(pitch=math.radians(30.0))
 
@@ -161,7 +161,8 @@ def test_any_pose_gives_an_image(position, roll, pitch, yaw):
         wall("wall", (-3.0, 2.0), (3.0, 2.0), 2.5, 0.1),
     )
     with np.errstate(all="raise", under="ignore"):
-        image = render(objects, looking(roll, pitch, yaw, position), Floor((5.0, 5.0), "speckles"))
+        floor = Floor(size=(5.0, 5.0), texture="speckles")
+        image = render(objects, looking(roll, pitch, yaw, position), floor)
     assert image.shape == (240, 320, 3)
     assert image.dtype == np.uint8
 

@@ -14,7 +14,7 @@ from crazyflie_vision.noise import PixelNoise
 from crazyflie_vision.target import Target, draw
 
 ORANGE = (13, 102, 242)
-ORANGES = ColourBounds(0, 20, 140, 255, 70, 255)
+ORANGES = ColourBounds()
 FACE = cv2.imread(str(CONFIG / "face.jpg"))
 DETECTOR = FaceDetector()
 
@@ -71,7 +71,7 @@ def test_the_larger_of_two():
 
 def test_a_range_of_hues_through_red():
     crimson = (60, 0, 230)
-    through_red = ColourBounds(165, 10, 140, 255, 70, 255)
+    through_red = ColourBounds(hue_lower=165, hue_upper=10)
     for colour in (crimson, ORANGE[:1] + (20, 240)):
         assert find(disc(160, 120, 20, colour), through_red, 30.0) is not None
     assert find(disc(160, 120, 20, (0, 200, 0)), through_red, 30.0) is None

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import Point, PointStamped, Quaternion, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import CameraInfo, Image
 from test_camera import CONFIG
@@ -137,9 +139,6 @@ def test_bounds_of_the_colour_may_change(camera):
 
 def reconfigure(process, node, **values):
     """Set live parameters, as rqt_reconfigure does."""
-    from dynamic_reconfigure.encoding import encode_config
-    from dynamic_reconfigure.srv import ReconfigureRequest
-
     process.call(f"{node}/set_parameters", ReconfigureRequest(encode_config(values)))
 
 
@@ -149,9 +148,8 @@ INFO = CameraInfo(K=[200.0, 0.0, 159.5, 0.0, 200.0, 119.5, 0.0, 0.0, 1.0])
 @pytest.fixture
 def follow():
     fake = FakeProcess()
-    node = FollowNode()
-    assert fake.launch(node, "/follow", {"radius": 0.1})
-    fake.node = node
+    fake.node = FollowNode()
+    assert fake.launch(fake.node, "/follow", {"radius": 0.1})
     return fake
 
 

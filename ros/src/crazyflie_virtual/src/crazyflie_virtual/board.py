@@ -1,22 +1,18 @@
 """The microcontroller: firmware and ports, from power-up on."""
 
 from collections.abc import Callable
-from typing import Any
+from functools import partial
 
-from crazyflie_virtual.body.physics import MotorCommands, Physics
+from crazyflie_virtual.body.physics import Physics
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.firmware import SUPERVISOR_PROTOCOL, Firmware
 from crazyflie_virtual.firmware.localization import DECK
 from crazyflie_virtual.link.crtp import Packet, Port
-from crazyflie_virtual.ports.high_level import HighLevelPort
-from crazyflie_virtual.ports.link import LinkPort
+from crazyflie_virtual.ports import high_level, link, platform, setpoints, supervisor
 from crazyflie_virtual.ports.localization import LocalizationPort
 from crazyflie_virtual.ports.log import LogPort
 from crazyflie_virtual.ports.memory import MemoryPort
 from crazyflie_virtual.ports.parameters import ParameterPort
-from crazyflie_virtual.ports.platform import PlatformPort
-from crazyflie_virtual.ports.setpoints import AttitudeSetpointPort, GenericSetpointPort
-from crazyflie_virtual.ports.supervisor import SupervisorPort
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.decks import decks
 from crazyflie_virtual.tables.memories import LighthouseMemory, eeprom, memories
@@ -25,12 +21,7 @@ _ADDRESS_PREFIX = 0xE7E7E7E700
 
 
 class Storage:
-    """Memories and stored parameters, which persist over a restart.
-
-    Parameters
-    ----------
-    settings : VehicleSettings
-    """
+    """Memories and stored parameters, which persist over a restart."""
 
     def __init__(self, settings: VehicleSettings):
         self.eeprom = eeprom(_ADDRESS_PREFIX | settings.address)
@@ -43,17 +34,7 @@ class Storage:
 
 
 class Board:
-    """A running firmware behind its ports.
-
-    Parameters
-    ----------
-    physics : Physics
-    faults : FaultSwitches
-    settings : VehicleSettings
-    storage : Storage
-    failure : str
-        See `Firmware`.
-    """
+    """A running firmware behind its ports; for ``failure`` see `Firmware`."""
 
     def __init__(
         self,
@@ -64,50 +45,44 @@ class Board:
         failure: str = "",
     ):
         firmware = self.firmware = Firmware(physics, faults, settings, failure)
-        supervisor = SupervisorPort(firmware)
         self._log = LogPort(firmware)
         lighthouse = LighthouseMemory(storage.lighthouse)
-        ports: list[Any] = [
-            LinkPort(firmware.warn),
-            PlatformPort(settings.protocol, supervisor, firmware.warn),
-            self._log,
-            ParameterPort(firmware, storage.parameters),
-            MemoryPort(
-                memories(
-                    storage.eeprom,
-                    firmware.planner.memory,
-                    firmware.memory_tester,
-                    lighthouse,
-                    storage.one_wire,
-                ),
-                firmware.warn,
+        memory = MemoryPort(
+            memories(
+                storage.eeprom,
+                firmware.planner.memory,
+                firmware.memory_tester,
+                lighthouse,
+                storage.one_wire,
             ),
-            AttitudeSetpointPort(firmware),
-            GenericSetpointPort(firmware),
-            HighLevelPort(firmware),
-            LocalizationPort(firmware, settings.address, lighthouse),
-        ]
-        if settings.protocol >= SUPERVISOR_PROTOCOL:
-            ports.append(supervisor)
-        self._handlers: dict[int, Callable[[Packet], list[Packet]]] = {
-            port.port: port.handle for port in ports
+            firmware.warn,
+        )
+        self._handlers: dict[int, Callable[[int, bytes], bytes | None]] = {
+            Port.LINK: partial(link.handle, firmware),
+            Port.PLATFORM: partial(platform.handle, firmware),
+            Port.LOG: self._log.handle,
+            Port.PARAMETERS: ParameterPort(firmware, storage.parameters).handle,
+            Port.MEMORY: memory.handle,
+            Port.SETPOINT: partial(setpoints.handle_attitude, firmware),
+            Port.GENERIC_SETPOINT: partial(setpoints.handle_generic, firmware),
+            Port.HIGH_LEVEL: partial(high_level.handle, firmware),
+            Port.LOCALIZATION: LocalizationPort(firmware, settings.address, lighthouse).handle,
         }
+        if settings.protocol >= SUPERVISOR_PROTOCOL:
+            self._handlers[Port.SUPERVISOR] = partial(supervisor.handle, firmware)
 
-    def receive(self, packet: Packet) -> list[Packet]:
-        """Return the answers to a packet."""
-        self.firmware.link_statistics.count_received(self.firmware.time)
-        handle = self._handlers.get(packet.port)
-        answers = handle(packet) if handle else self._no_port(packet)
-        self.firmware.link_statistics.count_sent(len(answers))
-        return answers
-
-    def step(self, voltage: float) -> MotorCommands:
-        """Take a step and return the motor commands; see `Firmware.step`."""
-        return self.firmware.step(voltage)
-
-    def _no_port(self, packet):
-        self.firmware.warn("port", f"CRTP: nothing listens on port {packet.port}")
-        return []
+    def receive(self, packet: Packet) -> Packet | None:
+        """Return the answer to a packet, from the same port and channel; None for no answer."""
+        statistics = self.firmware.link_statistics
+        statistics.count_received(self.firmware.time)
+        if packet.port not in self._handlers:
+            self.firmware.warn("port", f"CRTP: nothing listens on port {packet.port}")
+            return None
+        answer = self._handlers[packet.port](packet.channel, packet.data)
+        if answer is None:
+            return None
+        statistics.count_sent(1)
+        return packet._replace(data=answer)
 
     def unsolicited(self) -> list[Packet]:
         """Return the packets that answer no request: log data and console."""

@@ -3,10 +3,10 @@
 import signal
 import sys
 from collections.abc import Callable
-from typing import Any
 
 from crazyflie_utils.parameters.command_line import parse_arguments
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters
+from crazyflie_virtual.server import Server
 
 _DESCRIPTION = (
     "A Crazyflie in software that speaks CRTP over UDP: connect with any cflib program to "
@@ -21,10 +21,7 @@ _MOCAP_DESCRIPTION = (
 
 def virtual_crazyflie() -> None:
     """Run a virtual vehicle until interrupted."""
-    if _is_ros_node():
-        from crazyflie_virtual.vehicle_node import VirtualCrazyflieNode
-
-        _run_node(VirtualCrazyflieNode, "virtual_crazyflie")
+    if _ran_as_node("crazyflie_virtual.vehicle_node:VirtualCrazyflieNode", "virtual_crazyflie"):
         return
     from crazyflie_virtual.link.server import VehicleServer
     from crazyflie_virtual.settings import VehicleSettings
@@ -34,10 +31,7 @@ def virtual_crazyflie() -> None:
 
 def virtual_mocap() -> None:
     """Run a virtual motion capture system until interrupted."""
-    if _is_ros_node():
-        from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
-
-        _run_node(VirtualMocapNode, "virtual_mocap")
+    if _ran_as_node("crazyflie_virtual.mocap.mocap_node:VirtualMocapNode", "virtual_mocap"):
         return
     from crazyflie_virtual.mocap.server import MocapServer
     from crazyflie_virtual.mocap.settings import MocapSettings
@@ -45,22 +39,21 @@ def virtual_mocap() -> None:
     _run("virtual_mocap", _MOCAP_DESCRIPTION, MocapSettings, MocapServer)
 
 
-def _is_ros_node():
+def _ran_as_node(node_type: str, name: str) -> bool:
     # roslaunch gives every node its name this way; parameters for rosrun look alike.
-    return any(":=" in argument for argument in sys.argv[1:])
-
-
-def _run_node(node_type: type, name: str) -> None:
+    if not any(":=" in argument for argument in sys.argv[1:]):
+        return False
     from crazyflie_utils import run
 
     run(node_type, name)
+    return True
 
 
 def _run(
     program: str,
     description: str,
     settings_type: type[Parameters],
-    server_type: Callable[..., Any],
+    server_type: Callable[..., Server],
 ) -> None:
     settings = parse_arguments(settings_type, sys.argv[1:], program, description)
     try:

@@ -1,36 +1,16 @@
 """A server of this package as a ROS node: settings from parameters, switches while it runs."""
 
-from typing import ClassVar, Protocol
+from typing import ClassVar
 
 from typing_extensions import override
 
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.node import Node
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters
+from crazyflie_virtual.server import Server
 
 _POLL_PERIOD = 0.5
 """How often the switches are read, s."""
-
-
-class Server(Protocol):
-    """What `ServerNode` runs.
-
-    Attributes
-    ----------
-    description : str
-        Where clients find it.
-    switches : object
-        Its attributes are the live fields of the settings.
-    """
-
-    description: str
-    switches: object
-
-    def start(self) -> None:
-        """Run in a thread of its own until `stop`."""
-
-    def stop(self) -> None:
-        """End, and close the sockets."""
 
 
 class ServerNode(Node):

@@ -5,7 +5,7 @@ import math
 
 from crazyflie_virtual.board import Board, Storage
 from crazyflie_virtual.body.battery import LOW_CHARGE, Battery
-from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
+from crazyflie_virtual.body.physics import OFF, STEP, Physics
 from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
 from crazyflie_virtual.link import crtp
 from crazyflie_virtual.link.crtp import Packet, Port
@@ -24,17 +24,11 @@ _BATTERY_STEPS = 10
 _RESTART_TIME = 1.0
 """Time of a restart after a failed assertion, s: assumed."""
 
-_STOPPED: MotorCommands = (0.0, 0.0, 0.0, 0.0)
-
 _LOGGER = logging.getLogger(__name__)
 
 
 class VirtualVehicle:
     """Body, battery, radio chip and microcontroller.
-
-    Parameters
-    ----------
-    settings : VehicleSettings
 
     Raises
     ------
@@ -88,7 +82,8 @@ class VirtualVehicle:
         if self.board is None:
             return []
         try:
-            return [answer.encode() for answer in self.board.receive(packet)]
+            answer = self.board.receive(packet)
+            return [] if answer is None else [answer.encode()]
         except FirmwareAssertionError as assertion:
             self._restart(str(assertion))
             return []
@@ -113,12 +108,12 @@ class VirtualVehicle:
 
     def _step(self):
         self._steps += 1
-        commands, datagrams = _STOPPED, []
+        commands, datagrams = OFF, []
         if self.time >= self._restart_time:
             self._start(self._failure)
         if self.board is not None:
             try:
-                commands = self.board.step(self.battery.voltage)
+                commands = self.board.firmware.step(self.battery.voltage)
                 datagrams = [packet.encode() for packet in self.board.unsolicited()]
             except Exception as error:
                 failure = f"{type(error).__name__} in a step: {error}"
@@ -127,11 +122,10 @@ class VirtualVehicle:
                 self._restart(failure)
         if math.isnan(sum(commands)):
             # The processor converts NaN to zero.
-            commands = _STOPPED
+            commands = OFF
         failed = self.faults.motor_failure
         if failed:
-            m1, m2, m3, m4 = (0.0 if i + 1 == failed else c for i, c in enumerate(commands))
-            commands = (m1, m2, m3, m4)
+            commands = commands._replace(**{f"m{failed}": 0.0})
         self.physics.step(commands, self.battery.voltage)
         if self._steps % _BATTERY_STEPS == 0:
             self._drain()

@@ -11,7 +11,7 @@ from crazyflie_virtual.server_node import ServerNode
 from crazyflie_virtual.settings import VehicleSettings
 
 _LOOK_PERIOD = 0.05
-"""How often it is looked where things are that move in the vehicle's world, s."""
+"""Period at which the moving objects of the vehicle's world are looked up, s."""
 
 
 class VirtualCrazyflieNode(ServerNode):
@@ -37,7 +37,7 @@ class VirtualCrazyflieNode(ServerNode):
             try:
                 place = self._lookup(world.frame, each.name).transform.translation
             except TransformError:
-                # Nobody moves it at present: it stays where it is.
+                # No node moves it at present: it stays where it is.
                 continue
             centres[each.name] = (place.x, place.y, place.z)
         physics.world = world.placed(centres)

@@ -12,10 +12,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from crazyflie_utils.parameters.types import ListOf, Number
 from crazyflie_world.paths import Path, Position
 
 Colour = tuple[float, float, float]
 """Red, green, blue, each from 0 to 1."""
+
+COLOUR = ListOf(Number(minimum=0.0, maximum=1.0), 3)
+"""Type of a parameter that is a `Colour`."""
 
 Vectors = NDArray[np.float64]
 """Shape (..., 3)."""

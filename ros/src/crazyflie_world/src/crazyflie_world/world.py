@@ -7,37 +7,29 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.types import ListOf, Number, Text
 from crazyflie_world.paths import Position
-from crazyflie_world.shapes import Box, Colour, Shape, cast
+from crazyflie_world.shapes import COLOUR, Box, Colour, Shape, cast
 
 FLOOR = "floor"
 """Name of the floor among the solids."""
 
 
-@dataclass(frozen=True)
-class Floor:
-    """The floor: the plane z = 0, with its middle in the origin.
+TEXTURES = ("plain", "checkers", "speckles")
+"""Of floors."""
 
-    Attributes
-    ----------
-    size : tuple of float
-        Along x and y, m.
-    texture : str
-        What a camera sees of it; one of `TEXTURES`.
-    colour : tuple of float
-    """
 
-    size: tuple[float, float]
-    texture: str = "plain"
-    colour: Colour = (0.6, 0.6, 0.6)
+class Floor(Parameters):
+    """The floor: the plane z = 0, with its middle in the origin; as in a world file."""
+
+    size: tuple[float, float] = parameter(ListOf(Number("m", above=0.0), 2), "along x and y")
+    texture: str = parameter(Text(TEXTURES), "what a camera sees of it", "plain")
+    colour: Colour = parameter(COLOUR, "red, green, blue", (0.6, 0.6, 0.6))
 
     def solid(self) -> Box:
         """Return it as a box without thickness."""
         return Box(name=FLOOR, centre=(0.0, 0.0, 0.0), extent=(*self.size, 0.0), colour=self.colour)
-
-
-TEXTURES = ("plain", "checkers", "speckles")
-"""Of floors."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ import os
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -15,27 +14,22 @@ from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import (
-    BOOLEAN,
-    FINITE,
     FRAME,
     METRES,
     POSITION,
     TEXT,
-    TIME_STEP,
     ListOf,
     Number,
     ParameterType,
-    Text,
 )
 from crazyflie_utils.parameters.yaml_file import Entry
 from crazyflie_world.paths import Circle, Path, Waypoints
-from crazyflie_world.shapes import WALL_COLOUR, Ball, Box, Cylinder, Shape, wall
-from crazyflie_world.world import FLOOR, TEXTURES, Floor, World
+from crazyflie_world.shapes import COLOUR, WALL_COLOUR, Ball, Box, Cylinder, Shape, wall
+from crazyflie_world.world import FLOOR, Floor, World
 
 _LENGTH = Number("m", above=0.0)
 _ANGLE = Number("rad")
 _PLACE = ListOf(METRES, 2)
-_COLOUR = ListOf(Number(minimum=0.0, maximum=1.0), 3)
 
 
 class _Name(ParameterType):
@@ -52,55 +46,11 @@ class _Name(ParameterType):
         return "a name of letters, digits and underscores that begins with a letter"
 
 
-class CircleParameters(Parameters):
-    """A path in a circle."""
-
-    centre: tuple[float, float, float] = parameter(POSITION, "of the circle")
-    radius: float = parameter(_LENGTH, "of the circle")
-    period: float = parameter(TIME_STEP, "of one round")
-    phase: float = parameter(_ANGLE, "where it begins, from the x axis", 0.0)
-    clockwise: bool = parameter(BOOLEAN, "direction, as seen from above", False)
-
-    def path(self) -> Circle:
-        """Return what is declared."""
-        return Circle(self.centre, self.radius, self.period, self.phase, self.clockwise)
-
-
-class WaypointsParameters(Parameters):
-    """A path from point to point."""
-
-    points: tuple[tuple[float, ...], ...] = parameter(
-        ListOf(ListOf(FINITE, 4)), "[time, x, y, z], s and m"
-    )
-    repeat: bool = parameter(BOOLEAN, "begin again after the last", True)
-
-    @override
-    def complaints(self) -> Iterator[str]:
-        times = [point[0] for point in self.points]
-        if len(times) < 2:
-            yield f"points are {len(times)}; expected two or more"
-        elif times[0] != 0.0 or any(a >= b for a, b in pairwise(times)):
-            yield f"the times of points are {times}; expected each larger than the last, from 0 (s)"
-        elif self.repeat and self.points[0][1:] != self.points[-1][1:]:
-            yield (
-                f"the last of points is {list(self.points[-1][1:])}; expected the first, "
-                f"{list(self.points[0][1:])} (m), where the path begins again"
-            )
-
-    def path(self) -> Waypoints:
-        """Return what is declared."""
-        return Waypoints(
-            tuple(point[0] for point in self.points),
-            tuple((x, y, z) for _, x, y, z in self.points),
-            self.repeat,
-        )
-
-
 class _ObjectParameters(Parameters):
     """What all objects but walls have."""
 
     name: str = parameter(_Name(), "no other object has it")
-    colour: tuple[float, float, float] = parameter(_COLOUR, "red, green, blue", (0.5, 0.5, 0.5))
+    colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", (0.5, 0.5, 0.5))
     centre: tuple[float, float, float] | None = parameter(
         POSITION, "of an object that does not move", None
     )
@@ -153,7 +103,7 @@ class WallParameters(Parameters):
     """A wall that stands on the floor."""
 
     name: str = parameter(_Name(), "no other object has it")
-    colour: tuple[float, float, float] = parameter(_COLOUR, "red, green, blue", WALL_COLOUR)
+    colour: tuple[float, float, float] = parameter(COLOUR, "red, green, blue", WALL_COLOUR)
     start: tuple[float, float] = parameter(_PLACE, "where it begins, x and y", name="from")
     end: tuple[float, float] = parameter(_PLACE, "where it ends, x and y", name="to")
     height: float = parameter(_LENGTH, "above the floor", 2.5)
@@ -169,19 +119,11 @@ class WallParameters(Parameters):
         return wall(self.name, self.start, self.end, self.height, self.thickness, self.colour)
 
 
-class FloorParameters(Parameters):
-    """The floor."""
-
-    size: tuple[float, float] = parameter(ListOf(_LENGTH, 2), "along x and y")
-    texture: str = parameter(Text(TEXTURES), "what a camera sees of it", "plain")
-    colour: tuple[float, float, float] = parameter(_COLOUR, "red, green, blue", (0.6, 0.6, 0.6))
-
-
 class WorldParameters(Parameters):
     """What is in a world file besides objects."""
 
     frame: str = parameter(FRAME, "tf frame of all positions", "world")
-    floor: FloorParameters = group(FloorParameters, "floor")
+    floor: Floor = group(Floor, "floor")
 
 
 OBJECTS: dict[str, type[_ObjectParameters]] = {
@@ -193,10 +135,7 @@ OBJECTS: dict[str, type[_ObjectParameters]] = {
 
 WALL = "wall"
 
-PATHS: dict[str, type[CircleParameters] | type[WaypointsParameters]] = {
-    "circle": CircleParameters,
-    "waypoints": WaypointsParameters,
-}
+PATHS: dict[str, type[Path]] = {"circle": Circle, "waypoints": Waypoints}
 """Paths, by their type."""
 
 
@@ -242,8 +181,7 @@ def load(path: str | FilePath) -> World:
             complaints += error.complaints
     if complaints:
         raise ParameterError(*complaints)
-    floor = settings.floor
-    return World(settings.frame, Floor(floor.size, floor.texture, floor.colour), tuple(objects))
+    return World(settings.frame, settings.floor, tuple(objects))
 
 
 def _object(entry: Entry) -> Shape:
@@ -271,7 +209,7 @@ def _with_picture(shape: Shape, entry: Entry) -> Shape:
 
 
 def _path(entry: Entry) -> Path:
-    return entry.read(PATHS[_type(entry, tuple(PATHS))], besides=("type",)).path()
+    return entry.read(PATHS[_type(entry, tuple(PATHS))], besides=("type",))
 
 
 def _type(entry: Entry, choices: tuple[str, ...]) -> str:

@@ -21,8 +21,8 @@ class ArrivalTimes:
     that one that is read less than half a period after the last one was there already, and is
     one period later than the last one. One that had to be waited for came when it was read.
 
-    Of the first frame after a stall nobody knows whether the stream or the reader has paused,
-    until the next one comes: it has no time.
+    After a stall it is unknown, until the second frame comes, whether the stream or the reader has
+    paused: the first one has no time.
     """
 
     def __init__(self) -> None:
@@ -32,17 +32,9 @@ class ArrivalTimes:
         self._time = 0.0
 
     def update(self, moment: float) -> float | None:
-        """Return when a frame arrived that is read now.
+        """Return when a frame arrived that is read at ``moment`` (s of a monotonic clock).
 
-        Parameters
-        ----------
-        moment : float
-            Now, s of a monotonic clock.
-
-        Returns
-        -------
-        float or None
-            s of the same clock, at most ``moment``; None when it cannot be told.
+        The result is at most ``moment``; None when it is unknown.
         """
         last_read, self._last_read = self._last_read, moment
         if last_read is None:

@@ -25,7 +25,7 @@ _RESTART = 1.0
 """A message that was sent this long before the newest one, s, has not been overtaken:
 networks do not hold messages back for so long."""
 
-_PATIENCE = 10
+_CONTRADICTION_LIMIT = 10
 """Messages in a row that contradict what is known, until the clock is taken to be set."""
 
 
@@ -62,7 +62,7 @@ class ClockOffset:
     _contradictions: int
 
     def __init__(self) -> None:
-        self._forget()
+        self._reset()
 
     @property
     def is_settled(self) -> bool:
@@ -70,7 +70,7 @@ class ClockOffset:
         return self._offset is not None
 
     def update(self, sent: float, arrival: float) -> FrameOrder:
-        """Take note of a message and return what it is.
+        """Process a message and return what it is.
 
         Parameters
         ----------
@@ -84,13 +84,13 @@ class ClockOffset:
         if order is not FrameOrder.NEW:
             # The newest message again, however often, is no sign of another clock.
             self._contradictions += sent != self._newest
-            if self._contradictions < _PATIENCE:
+            if self._contradictions < _CONTRADICTION_LIMIT:
                 return order
             order = FrameOrder.RESTART
         elif self._has_lagged():
             order = FrameOrder.RESTART
         if order is FrameOrder.RESTART:
-            self._forget()
+            self._reset()
         self._contradictions = 0
         self._newest = sent
         self._collect(arrival, difference)
@@ -115,7 +115,7 @@ class ClockOffset:
             raise ValueError("the offset of the server's clock has not settled yet")
         return moment + self._offset
 
-    def _forget(self):
+    def _reset(self):
         # Of each bucket: when it began, and its smallest difference.
         self._window: deque[tuple[float, float]] = deque(maxlen=_BUCKETS)
         self._offset = None

@@ -1,7 +1,9 @@
 """How well motion capture works, for the diagnostics."""
 
 import math
+from collections import Counter
 from collections.abc import Sequence
+from enum import Enum
 from typing import NamedTuple
 
 from mocap_optitrack.frames import Body
@@ -18,6 +20,16 @@ _MOST_OTHERS = 10
 """Bodies that are not configured and are remembered, so that a message can name them."""
 
 _TWO_SERVERS = "the server's clock keeps jumping: do two servers send to the same address?"
+
+
+class Event(Enum):
+    """What is counted beside good frames."""
+
+    LEARNING = "a frame came before the server's clock was known"
+    CLOCK_SET = "the server's clock has jumped"
+    STALE = "a frame was too old"
+    REPEATED = "a frame had come already, or was overtaken on its way"
+    FOREIGN = "the time of a frame does not fit the server's clock"
 
 
 class Status(NamedTuple):
@@ -65,35 +77,19 @@ class Health:
         self._labels = {body.key: body.label for body in bodies}
         self.stale_after = stale_after
         self._server: str | None = None
-        self._trouble = "not connected so far"
+        self._failure = "not connected so far"
         self._silence = "no frames"
         self._last_frame: float | None = None
         self._stream_begin: float | None = None
         self._others: dict[tuple[int | None, str | None], Body] = {}
         self._begin_period(now)
 
-    def learning(self) -> None:
-        """Take note of a frame that came before the server's clock was known."""
-        self._learning += 1
-
-    def clock_set(self) -> None:
-        """Take note that the server's clock has jumped."""
-        self._jumps += 1
-
-    def stale(self) -> None:
-        """Take note of a frame that was too old."""
-        self._stale += 1
-
-    def repeated(self) -> None:
-        """Take note of a frame that had come already, or was overtaken on its way."""
-        self._repeated += 1
-
-    def foreign(self) -> None:
-        """Take note of a frame whose time does not fit the server's clock."""
-        self._foreign += 1
+    def count(self, event: Event) -> None:
+        """Count an event."""
+        self._events[event] += 1
 
     def frame(self, now: float, latency: float) -> None:
-        """Take note of a good frame and its latency from exposure to arrival (s)."""
+        """Count a good frame and its latency from exposure to arrival (s)."""
         if self._last_frame is not None:
             self._longest_gap = max(self._longest_gap, now - self._last_frame)
         if self._stream_begin is None:
@@ -103,7 +99,7 @@ class Health:
         self._latencies.append(latency)
 
     def body(self, body: RigidBody, now: float, is_tracked: bool) -> None:
-        """Take note that a wanted body was in a good frame, tracked or not."""
+        """Count a configured body in a good frame."""
         count = self._bodies[body.key]
         count.frames += 1
         if is_tracked:
@@ -111,22 +107,22 @@ class Health:
             count.last = now
 
     def other(self, body: Body) -> None:
-        """Take note of a `Body` in a good frame that is not configured."""
+        """Record a `Body` in a good frame that is not configured."""
         if len(self._others) < _MOST_OTHERS:
             self._others[body.body_id, body.name] = body
 
     def connected(self, server: str) -> None:
-        """Take note of a new connection."""
+        """Record a new connection."""
         self._server = server
 
     def silent(self, text: str) -> None:
-        """Take note that a connection has no frames; the next one ends that."""
+        """Record why a connection has no frames; the next frame ends that."""
         self._silence = text
 
-    def disconnected(self, trouble: str) -> None:
-        """Take note that there is no connection: what was seen before does not count."""
+    def disconnected(self, failure: str) -> None:
+        """Record why there is no connection: what was seen before does not count."""
         self._server = None
-        self._trouble = trouble
+        self._failure = failure
         self._stream_begin = None
         self._last_frame = None
         self._others.clear()
@@ -134,17 +130,9 @@ class Health:
             count.begin_period()
 
     def report(self, now: float) -> list[Status]:
-        """Return the state since the last report; counting begins anew.
+        """Return the state of the stream, then of every body, since the last report.
 
-        Parameters
-        ----------
-        now : float
-            s.
-
-        Returns
-        -------
-        list of Status
-            Of the stream, then of every body.
+        Counting begins anew at ``now`` (s).
         """
         statuses = [self._stream_status(now)]
         statuses += [self._body_status(key, now) for key in self._bodies]
@@ -155,11 +143,7 @@ class Health:
         self._begin = now
         self._latencies: list[float] = []
         self._longest_gap = 0.0
-        self._learning = 0
-        self._jumps = 0
-        self._stale = 0
-        self._repeated = 0
-        self._foreign = 0
+        self._events: Counter[Event] = Counter()
         for count in self._bodies.values():
             count.begin_period()
 
@@ -174,9 +158,9 @@ class Health:
             "server": self._server or "none",
             "rate (Hz)": f"{rate:.1f}",
             "longest gap (ms)": _milliseconds(gap),
-            "stale frames": str(self._stale),
-            "repeated frames": str(self._repeated),
-            "frames of another clock": str(self._foreign),
+            "stale frames": str(self._events[Event.STALE]),
+            "repeated frames": str(self._events[Event.REPEATED]),
+            "frames of another clock": str(self._events[Event.FOREIGN]),
         }
         if frames:
             mean = math.fsum(self._latencies) / frames
@@ -187,16 +171,17 @@ class Health:
 
     def _stream_assessment(self, values, gap):
         if self._server is None:
-            return ERROR, self._trouble
-        if self._jumps > 1 or self._foreign > len(self._latencies):
+            return ERROR, self._failure
+        foreign = self._events[Event.FOREIGN]
+        if self._events[Event.CLOCK_SET] > 1 or foreign > len(self._latencies):
             return ERROR, _TWO_SERVERS
         if not self._latencies:
-            if self._learning:
+            if self._events[Event.LEARNING]:
                 return WARN, "learning the server's clock"
-            if self._stale:
+            if self._events[Event.STALE]:
                 return ERROR, "all frames are stale: is the server paused or playing a recording?"
             return ERROR, self._silence
-        if self._foreign > 1:
+        if foreign > 1:
             return WARN, _TWO_SERVERS
         if gap > self.stale_after:
             return WARN, f"gaps of up to {values['longest gap (ms)']} ms"

@@ -21,7 +21,7 @@ SYSTEMS = ("vicon", "qualisys", "vrpn")
 """What the package can do beside NatNet."""
 
 _MARGIN = 2.0
-"""How much longer than the worker's own limit an answer is waited for, s."""
+"""Added to the worker's own limit of connecting, s."""
 
 _CHUNK = 65536
 
@@ -29,7 +29,7 @@ _CHUNK = 65536
 class LibrarySource(Source):
     """A system that the motioncapture package knows.
 
-    The package tells neither when a frame was taken nor which bodies are tracked.
+    The package says neither when a frame was taken nor which bodies are tracked.
     So frames have the time of their arrival at the package, which `ArrivalTimes` estimates
     for those that have waited there, and a body counts as tracked when its
     pose is not, to the last bit, the one it had in the frame before: measurements of
@@ -62,9 +62,8 @@ class LibrarySource(Source):
             # The package does not take names.
             address = socket.gethostbyname(name) + colon + port
         except OSError as error:
-            raise SourceError(
-                f"motioncapture_config/hostname {self._host!r} is unknown: {error}"
-            ) from None
+            text = f"motioncapture_config/hostname {self._host!r} is unknown: {error}"
+            raise SourceError(text) from None
         command = [sys.executable, "-m", library_worker.__name__, self._system, address]
         self._worker = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, bufsize=0

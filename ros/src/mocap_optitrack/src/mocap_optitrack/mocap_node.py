@@ -1,5 +1,7 @@
 """ROS interface of a motion capture system."""
 
+from functools import partial
+
 import genpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import (
@@ -8,6 +10,7 @@ from geometry_msgs.msg import (
     Pose2D,
     PoseStamped,
     Quaternion,
+    Transform,
     TransformStamped,
     Vector3,
 )
@@ -75,13 +78,13 @@ class MocapNode(Node):
         self._tracker.stale_after = parameters.stale_after
 
     def make_receiver(self, handle: NodeHandle) -> Receiver:
-        """Return the thread that calls this node's ``on_...`` in their turn."""
+        """Return the thread whose frames and events the executor passes to ``on_...``."""
         return Receiver(
             lambda: self._make_source(handle),
-            on_connected=lambda text: handle.submit(self.on_connected, text),
-            on_frame=lambda frame: handle.submit(self.on_frame, frame),
-            on_silence=lambda text: handle.submit(self.on_silence, text),
-            on_trouble=lambda text: handle.submit(self.on_trouble, text),
+            on_connected=partial(handle.submit, self.on_connected),
+            on_frame=partial(handle.submit, self.on_frame),
+            on_silence=partial(handle.submit, self.on_silence),
+            on_failure=partial(handle.submit, self.on_failure),
         )
 
     @override
@@ -89,7 +92,7 @@ class MocapNode(Node):
         self._receiver.stop()
 
     def on_connected(self, server: str) -> None:
-        """Take note of a new connection."""
+        """Log a new connection; another server has another clock."""
         self._handle.info(f"connected to {server}")
         self._health.connected(server)
         if server != self._server:
@@ -101,14 +104,14 @@ class MocapNode(Node):
         self._handle.warn(text, throttle=_REPEAT, key="silence")
         self._health.silent(text)
 
-    def on_trouble(self, text: str) -> None:
+    def on_failure(self, text: str) -> None:
         """Warn that there is no connection."""
         self._handle.warn(f"{text} (trying again)", throttle=_REPEAT)
         self._health.disconnected(text)
 
     def on_frame(self, frame: Frame) -> None:
         """Publish a frame."""
-        poses = self._tracker.take(frame)
+        poses = self._tracker.process(frame)
         if not poses:
             return
         stamp = self._handle.stamp(poses[0].time)
@@ -146,24 +149,21 @@ class MocapNode(Node):
     def _report(self):
         statuses = self._health.report(self._handle.time())
         name = self._handle.name.lstrip("/")
-        message = DiagnosticArray(header=Header(stamp=self._handle.stamp()))
-        for status in statuses:
-            values = [KeyValue(key, value) for key, value in status.values.items()]
-            message.status.append(
-                DiagnosticStatus(
-                    level=status.level,
-                    name=f"{name}: {status.component}",
-                    message=status.message,
-                    hardware_id=self._parameters.backend,
-                    values=values,
-                )
+        reports = [
+            DiagnosticStatus(
+                level=status.level,
+                name=f"{name}: {status.component}",
+                message=status.message,
+                hardware_id=self._parameters.backend,
+                values=[KeyValue(key, value) for key, value in status.values.items()],
             )
-        self._diagnostics.publish(message)
+            for status in statuses
+        ]
+        self._diagnostics.publish(DiagnosticArray(Header(stamp=self._handle.stamp()), reports))
         stream, *bodies = statuses
-        # Without a stream no body is seen; that has been warned of.
-        faulty = bodies if stream.level < ERROR else []
-        for status in faulty:
-            if status.level == ERROR:
+        for status in bodies:
+            # Without a stream no body is seen; that has been warned of.
+            if status.level == ERROR and stream.level < ERROR:
                 text = f"{status.component}: {status.message}"
                 self._handle.warn(text, throttle=_REPEAT, key=status.component)
 
@@ -173,13 +173,10 @@ def _private(topic):
     return topic if topic.startswith(("/", "~")) else "~" + topic
 
 
-def _pose(header, body_pose):
-    pose = Pose(Point(*body_pose.position), Quaternion(*body_pose.quaternion))
-    return PoseStamped(header, pose)
+def _pose(header, pose):
+    return PoseStamped(header, Pose(Point(*pose.position), Quaternion(*pose.quaternion)))
 
 
 def _transform(header, pose):
-    transform = TransformStamped(header=header, child_frame_id=pose.body.parameters.child_frame_id)
-    transform.transform.translation = Vector3(*pose.position)
-    transform.transform.rotation = Quaternion(*pose.quaternion)
-    return transform
+    transform = Transform(Vector3(*pose.position), Quaternion(*pose.quaternion))
+    return TransformStamped(header, pose.body.parameters.child_frame_id, transform)

@@ -1,4 +1,4 @@
-"""OptiTrack's Motive, and whatever else speaks NatNet."""
+"""NatNet servers, such as OptiTrack's Motive."""
 
 import contextlib
 import math
@@ -25,11 +25,10 @@ _NAMES_AGAIN = 2.0
 """From one request for the names of bodies to the next, s."""
 
 _SILENCE = 0.5
-"""Without a frame for this long the server is asked again, s: one that was started anew
-knows its clients no more."""
+"""Without a frame for this long the server is asked again, s: after a restart it has no clients."""
 
 _KEEP_ALIVE = 1.0
-"""From one sign of life to the next, without which a server stops sending, s."""
+"""From one keep-alive to the next, without which a server stops sending, s."""
 
 _FOREIGN_AGAIN = 5.0
 """From one warning about datagrams of other senders than the server to the next, s."""
@@ -64,13 +63,13 @@ class NatNetSource(Source):
         self._sockets: list[socket.socket] = []
         self._server: tuple[str, int] | None = None
         self._sender: str | None = None
-        self._foreign_told_at: float | None = None
+        self._foreign_warned_at: float | None = None
         self._group: tuple[str, int] | None = None
         self._names: dict[int, str] = {}
         self._wants_names = True
         self._asked_names_at: float | None = None
         self._kept_alive_at: float | None = None
-        self._heard_at = -math.inf
+        self._frame_at = -math.inf
 
     @override
     def open(self) -> str:
@@ -85,7 +84,7 @@ class NatNetSource(Source):
             if self._group is not None:
                 address, port = self._group
                 join_group(self._udp_socket(), address, port, self._interface())
-            self._heard_at = time.monotonic()
+            self._frame_at = time.monotonic()
         except OSError as error:
             raise SourceError(f"cannot open a NatNet connection: {error}") from None
         return self._description()
@@ -156,7 +155,6 @@ class NatNetSource(Source):
         return _ALL_INTERFACES
 
     def _ask_for_server(self, targets):
-        port = self._parameters.command_port
         if self._parameters.local_address is not None:
             interface = socket.inet_aton(self._parameters.local_address)
             self._commands.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, interface)
@@ -164,14 +162,14 @@ class NatNetSource(Source):
         ask_at = 0.0
         while (now := time.monotonic()) < end:
             if now >= ask_at:
-                self._ask(targets, port)
+                self._send_connect(targets)
                 ask_at = now + _ASK_AGAIN
             ready, _, _ = select.select([self._commands], [], [], min(end, ask_at) - now)
             if not ready:
                 continue
             datagram, sender = self._commands.recvfrom(_LARGEST)
             if self._sender not in (None, sender[0]):
-                self._tell_of_foreign(sender[0])
+                self._warn_of_sender(sender[0])
                 continue
             # What is no answer is skipped; if nothing else comes, the caller says so.
             with contextlib.suppress(natnet.DecodeError):
@@ -194,7 +192,8 @@ class NatNetSource(Source):
             "optitrack_config/server_address right, and does a firewall let UDP pass?"
         )
 
-    def _ask(self, targets, port):
+    def _send_connect(self, targets):
+        port = self._parameters.command_port
         failures = []
         for target in targets:
             try:
@@ -222,8 +221,8 @@ class NatNetSource(Source):
         if self._wants_names and _is_due(self._asked_names_at, _NAMES_AGAIN, now):
             self._asked_names_at = now
             self._send(natnet.REQUEST_MODEL)
-        if _is_due(self._heard_at, _SILENCE, now):
-            self._heard_at = now
+        if _is_due(self._frame_at, _SILENCE, now):
+            self._frame_at = now
             self._send(natnet.CONNECT, "Ping")
 
     def _send(self, number, text=""):
@@ -233,12 +232,15 @@ class NatNetSource(Source):
 
     def _take(self, datagram, sender, arrival):
         if self._sender not in (None, sender[0]):
-            self._tell_of_foreign(sender[0])
+            self._warn_of_sender(sender[0])
             return None
         try:
             number, payload = natnet.split(datagram)
             if number == natnet.SERVER_INFO and sender == self._server:
-                self._check(natnet.read_server_info(payload))
+                info = natnet.read_server_info(payload)
+                if info != self._info:
+                    text = f"{self._where()} is not what it was: {info.name} {info.version}"
+                    raise SourceError(text)
             frame = self._decode(number, payload, arrival)
         except natnet.DecodeError as error:
             self._warn(f"ignoring a datagram from {sender[0]}: {error}")
@@ -247,31 +249,25 @@ class NatNetSource(Source):
             self._sender = sender[0]
         return frame
 
-    def _tell_of_foreign(self, address):
+    def _warn_of_sender(self, address):
         now = time.monotonic()
-        if _is_due(self._foreign_told_at, _FOREIGN_AGAIN, now):
-            self._foreign_told_at = now
+        if _is_due(self._foreign_warned_at, _FOREIGN_AGAIN, now):
+            self._foreign_warned_at = now
             self._warn(
                 f"ignoring a datagram from {address}: the NatNet server is at {self._sender}; if "
                 f"{address} is the server, name it in optitrack_config/server_address"
             )
 
-    def _check(self, info):
-        if info != self._info:
-            raise SourceError(f"{self._where()} is not what it was: {info.name} {info.version}")
-
     def _decode(self, number, payload, arrival):
-        version = self._info.version
+        info = self._info
         if number == natnet.MODEL and self._sender is not None:
-            self._names = natnet.read_names(payload, version)
+            self._names = natnet.read_names(payload, info.version)
             self._wants_names = False
         if number != natnet.FRAME:
             return None
-        self._heard_at = time.monotonic()
-        frequency = self._info.clock_frequency
-        frame = natnet.read_frame(payload, version, frequency, self._names, arrival)
-        if any(body.name is None for body in frame.bodies):
-            self._wants_names = True
+        self._frame_at = time.monotonic()
+        frame = natnet.read_frame(payload, info.version, info.clock_frequency, self._names, arrival)
+        self._wants_names |= any(body.name is None for body in frame.bodies)
         return frame
 
     def _where(self):

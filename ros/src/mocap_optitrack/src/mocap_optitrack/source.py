@@ -9,9 +9,9 @@ from collections.abc import Callable
 from mocap_optitrack.frames import Frame
 
 _SILENCE = 1.0
-"""A connection without a frame for this long is told of, s."""
+"""A connection without a frame for this long is reported, s."""
 
-_GIVE_UP = 10.0
+_RECONNECT_AFTER = 10.0
 """A connection without a frame for this long is made anew, s: the server may have moved,
 or a network interface may have forgotten its multicast groups."""
 
@@ -62,21 +62,17 @@ class Source(ABC):
 
 
 class Receiver:
-    """A thread that hands over frames and connects again and again when it must.
+    """A thread that hands over frames and reconnects when necessary.
 
     Parameters
     ----------
     make_source : callable
         Returns a new `Source`.
-    on_connected : callable
-        Called with what `Source.open` returned.
+    on_connected, on_silence, on_failure : callable
+        Called with a text: what `Source.open` returned; why an open connection may have had
+        no frame for a while; why a connection has failed or ended, before the next attempt.
     on_frame : callable
         Called with every `Frame`.
-    on_silence : callable
-        Called with a text when an open connection has had no frame for a while.
-    on_trouble : callable
-        Called with a text whenever a connection fails or ends; there will be
-        another attempt.
     """
 
     def __init__(
@@ -85,13 +81,13 @@ class Receiver:
         on_connected: Callable[[str], None],
         on_frame: Callable[[Frame], None],
         on_silence: Callable[[str], None],
-        on_trouble: Callable[[str], None],
+        on_failure: Callable[[str], None],
     ):
         self._make_source = make_source
         self._on_connected = on_connected
         self._on_frame = on_frame
         self._on_silence = on_silence
-        self._on_trouble = on_trouble
+        self._on_failure = on_failure
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="motion capture", daemon=True)
 
@@ -113,26 +109,26 @@ class Receiver:
                 self._on_connected(source.open())
                 self._receive(source)
             except SourceError as error:
-                self._on_trouble(str(error))
+                self._on_failure(str(error))
             except Exception:
                 # The thread must go on, whatever a system or a library raises.
-                self._on_trouble(f"motion capture failed\n{traceback.format_exc()}")
+                self._on_failure(f"motion capture failed\n{traceback.format_exc()}")
             finally:
                 source.close()
             self._stopping.wait(_RETRY)
 
     def _receive(self, source):
         last = time.monotonic()
-        is_told = False
+        is_reported = False
         while not self._stopping.is_set():
             frame = source.read(_POLL)
             silence = time.monotonic() - last
             if frame is not None:
                 last = time.monotonic()
-                is_told = False
+                is_reported = False
                 self._on_frame(frame)
-            elif silence > _GIVE_UP:
-                raise SourceError(f"no frames for {_GIVE_UP:g} s; {source.silence_hint}")
-            elif silence > _SILENCE and not is_told:
-                is_told = True
+            elif silence > _RECONNECT_AFTER:
+                raise SourceError(f"no frames for {_RECONNECT_AFTER:g} s; {source.silence_hint}")
+            elif silence > _SILENCE and not is_reported:
+                is_reported = True
                 self._on_silence(f"no frames for {_SILENCE:g} s; {source.silence_hint}")

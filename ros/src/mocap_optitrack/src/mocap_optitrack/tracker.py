@@ -7,12 +7,18 @@ from typing import NamedTuple
 from mocap_optitrack.axes import normalized, to_z_up
 from mocap_optitrack.clock_offset import ClockOffset, FrameOrder
 from mocap_optitrack.frames import Frame, Quaternion, Vector3
-from mocap_optitrack.health import Health
+from mocap_optitrack.health import Event, Health
 from mocap_optitrack.parameters import RigidBody
 
 _LEAD = 0.005
 """By how much a stamp may be ahead of its arrival, s: the offset of the server's clock is
 known to a millisecond or two."""
+
+_EVENTS = {
+    FrameOrder.OLD: Event.REPEATED,
+    FrameOrder.FOREIGN: Event.FOREIGN,
+    FrameOrder.RESTART: Event.CLOCK_SET,
+}
 
 _RESET = 1.0
 """By how much local time steps back when a simulation is reset, at least, s."""
@@ -39,7 +45,7 @@ class BodyPose(NamedTuple):
 
 
 class Tracker:
-    """Finds the wanted bodies in frames and drops what is invalid or stale.
+    """Finds the configured bodies in frames and drops what is invalid or stale.
 
     A frame counts once: one that is not newer than the last one is dropped. So is one
     that is older than ``stale_after`` on arrival, or from the future, or from another
@@ -74,17 +80,13 @@ class Tracker:
         self._clock = ClockOffset()
 
     def restart(self) -> None:
-        """Take note that the server is another one, and so is its clock."""
+        """Learn the clock of another server."""
         self._clock = ClockOffset()
 
-    def take(self, frame: Frame) -> list[BodyPose]:
-        """Return what is to be published of a frame.
+    def process(self, frame: Frame) -> list[BodyPose]:
+        """Return the poses of a frame, all of one time that is later than the last frame's.
 
-        Returns
-        -------
-        list of BodyPose
-            All of the same time, which is later than that of the frame before. Empty
-            during the first half second of a server, in which its clock is learned.
+        There are none during the first half second of a server, in which its clock is learned.
         """
         if frame.arrival < self._arrival - _RESET:
             # Simulated time begins again.
@@ -95,47 +97,45 @@ class Tracker:
         if time is None:
             return []
         age = frame.arrival - time
-        if time <= self._newest:
-            self._health.repeated()
-            return []
-        if age < -_LEAD:
-            self._health.foreign()
-            return []
-        if age > self.stale_after:
-            self._health.stale()
+        fault = self._fault(time, age)
+        if fault is not None:
+            self._health.count(fault)
             return []
         self._newest = time
         self._health.frame(frame.arrival, age)
         poses = []
         for body in frame.bodies:
-            wanted = self._wanted(body)
-            if wanted is None:
+            configured = self._configured(body)
+            if configured is None:
                 self._health.other(body)
                 continue
             pose = _pose(body, self._up_axis)
-            self._health.body(wanted, frame.arrival, pose is not None)
+            self._health.body(configured, frame.arrival, pose is not None)
             if pose is not None:
-                poses.append(BodyPose(wanted, time, *pose))
+                poses.append(BodyPose(configured, time, *pose))
         return poses
+
+    def _fault(self, time, age):
+        if time <= self._newest:
+            return Event.REPEATED
+        if age < -_LEAD:
+            return Event.FOREIGN
+        return Event.STALE if age > self.stale_after else None
 
     def _time_of(self, frame):
         if frame.exposure is None:
             return frame.arrival - frame.waited
         order = self._clock.update(frame.sent, frame.arrival)
-        if order is FrameOrder.OLD:
-            self._health.repeated()
+        if order in _EVENTS:
+            self._health.count(_EVENTS[order])
+        if order in (FrameOrder.OLD, FrameOrder.FOREIGN):
             return None
-        if order is FrameOrder.FOREIGN:
-            self._health.foreign()
-            return None
-        if order is FrameOrder.RESTART:
-            self._health.clock_set()
         if not self._clock.is_settled:
-            self._health.learning()
+            self._health.count(Event.LEARNING)
             return None
         return self._clock.to_local(frame.exposure)
 
-    def _wanted(self, body):
+    def _configured(self, body):
         # Systems without numbers may well call a body "1".
         number = body.name if body.body_id is None else str(body.body_id)
         return self._by_number.get(number) or self._by_name.get(body.name)

@@ -20,7 +20,7 @@ class DeckRangerParameters(Parameters):
     sensors: tuple[RangeSensor, ...] = parameter(SensorFile(), "the sensors, a YAML file")
     variables: tuple[str, ...] = parameter(
         ListOf(TEXT),
-        "of the log block in their order, as the driver is told",
+        "of the log block in their order, as in the driver's parameter",
         name="genericLogTopic_ranges_Variables",
     )
     log_topic: str = parameter(TOPIC, "of the log block", "crazyflie/ranges", "topics/log")
@@ -32,9 +32,9 @@ class DeckRangerParameters(Parameters):
     @override
     def complaints(self) -> Iterator[str]:
         for sensor in self.sensors:
-            if sensor.variable not in self.variables:
+            if sensor.log_variable not in self.variables:
                 yield (
-                    f"the sensor {sensor.name} reads {sensor.variable}; expected one of "
+                    f"the sensor {sensor.name} reads {sensor.log_variable}; expected one of "
                     f"genericLogTopic_ranges_Variables, {', '.join(self.variables)}"
                 )
 
@@ -46,7 +46,7 @@ class DeckRangerNode(Node):
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(DeckRangerParameters)
         places = {name: place for place, name in enumerate(self._parameters.variables)}
-        self._places = [places[sensor.variable] for sensor in self._parameters.sensors]
+        self._places = [places[sensor.log_variable] for sensor in self._parameters.sensors]
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -75,7 +75,7 @@ class DeckRangerNode(Node):
             if message.values[place] > 0.0:
                 readings[number] = sensor.reading(_MILLIMETRE * message.values[place])
             else:
-                text = f"{sensor.variable} on {topic} is 0: is there a deck?"
+                text = f"{sensor.log_variable} on {topic} is 0: is there a deck?"
                 self._handle.warn(text, throttle=5.0)
         if readings:
             self._publisher.publish(readings, message.header.stamp)

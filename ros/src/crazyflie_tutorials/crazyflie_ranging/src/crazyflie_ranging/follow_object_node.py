@@ -5,39 +5,19 @@ from collections.abc import Iterator
 from geometry_msgs.msg import Twist, Vector3
 from typing_extensions import override
 
-from crazyflie_ranging.follower import FollowDistances, Follower
+from crazyflie_ranging.follower import Follower
 from crazyflie_ranging.latest_ranges import LatestRanges
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
-
-_DISTANCE = Number("m", above=0.0)
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 
 
-class FollowObjectParameters(Parameters):
+class FollowObjectParameters(Follower):
     """Parameters of `FollowObjectNode`."""
 
     front_topic: str = parameter(TOPIC, "the sensor in front", "range/front", "topics/front")
     left_topic: str = parameter(TOPIC, "the one at the left", "range/left", "topics/left")
     right_topic: str = parameter(TOPIC, "the one at the right", "range/right", "topics/right")
     cmd_vel_topic: str = parameter(TOPIC, "where velocities go", "cmd_vel", "topics/cmd_vel")
-    scale_linear: float = parameter(
-        Number("m/s", minimum=0.0), "speed ahead and back", 0.3, live=True
-    )
-    scale_angular: float = parameter(
-        Number("rad/s", minimum=0.0),
-        "yaw rate to what is at one side and not in front; 0: no turning",
-        0.0,
-        live=True,
-    )
-    back_off: float = parameter(
-        _DISTANCE, "backs off from what is nearer", 0.3, "distances/back_off", live=True
-    )
-    follow: float = parameter(
-        _DISTANCE, "follows what is farther away", 0.6, "distances/follow", live=True
-    )
-    lost: float = parameter(
-        _DISTANCE, "but not what is beyond this", 2.0, "distances/lost", live=True
-    )
     silence: float = parameter(
         TIME_STEP, "so long after the last reading of the sensor in front it stands still", 0.15
     )
@@ -45,21 +25,9 @@ class FollowObjectParameters(Parameters):
 
     @override
     def complaints(self) -> Iterator[str]:
-        if not self.back_off <= self.follow <= self.lost:
-            yield (
-                f"distances/back_off, follow and lost are {self.back_off:g}, {self.follow:g} and "
-                f"{self.lost:g}; expected each >= the one before (m)"
-            )
+        yield from super().complaints()
         if self.time_step >= self.silence:
             yield f"time_step is {self.time_step:g}; expected < silence, {self.silence:g} (s)"
-
-    def follower(self) -> Follower:
-        """Return the algorithm with these parameters."""
-        return Follower(
-            FollowDistances(self.back_off, self.follow, self.lost),
-            self.scale_linear,
-            self.scale_angular,
-        )
 
 
 class FollowObjectNode(Node):
@@ -68,7 +36,6 @@ class FollowObjectNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(FollowObjectParameters, self._reconfigure)
-        self._follower = self._parameters.follower()
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -91,7 +58,6 @@ class FollowObjectNode(Node):
 
     def _reconfigure(self, parameters):
         self._parameters = parameters
-        self._follower = parameters.follower()
 
     def _on_timer(self):
         # A velocity holds until the next one.
@@ -104,5 +70,5 @@ class FollowObjectNode(Node):
             self._handle.warn(f"standing still: nothing comes on {topic}", throttle=5.0)
             self._publisher.publish(Twist())
             return
-        speed, yaw_dot = self._follower.velocity(front, left, right)
+        speed, yaw_dot = self._parameters.velocity(front, left, right)
         self._publisher.publish(Twist(linear=Vector3(x=speed), angular=Vector3(z=yaw_dot)))

@@ -2,9 +2,11 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from crazyflie_references.velocity_reference import Velocity
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.types import DURATION, Number
 
 AXES: dict[str, tuple[str, int]] = {
     "front": ("x", 1),
@@ -17,23 +19,16 @@ AXES: dict[str, tuple[str, int]] = {
 """Direction -> component of a velocity, and its sign there."""
 
 
-@dataclass(frozen=True)
-class ObstacleStop:
-    """Limits velocities to what comes to rest at a distance from every obstacle.
+class ObstacleStop(Parameters):
+    """Limits velocities to what comes to rest at a distance from every obstacle."""
 
-    Attributes
-    ----------
-    distance : float
-        Nearer to an obstacle, nothing leads towards it, m.
-    deceleration : float
-        With which the vehicle brakes, m/s^2.
-    reaction : float
-        How long it flies on before, s.
-    """
-
-    distance: float
-    deceleration: float
-    reaction: float
+    distance: float = parameter(
+        Number("m", above=0.0), "nearer to an obstacle, nothing leads towards it", 0.5, live=True
+    )
+    deceleration: float = parameter(
+        Number("m/s^2", above=0.0), "with which the vehicle brakes before that", 0.5, live=True
+    )
+    reaction: float = parameter(DURATION, "that it flies on until it brakes", 0.3, live=True)
 
     def speed(self, clearance: float) -> float:
         """Return the largest speed (m/s) towards an obstacle that is ``clearance`` (m) away.

@@ -1,4 +1,4 @@
-"""ROS interface of the obstacle stop: a filter of cmd_vel, before whoever obeys it."""
+"""ROS interface of the obstacle stop: a filter of cmd_vel."""
 
 from collections.abc import Iterator
 
@@ -8,12 +8,12 @@ from typing_extensions import override
 from crazyflie_ranging.latest_ranges import LatestRanges
 from crazyflie_ranging.obstacle_stop import AXES, ObstacleStop
 from crazyflie_references.velocity_reference import Velocity
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.types import DURATION, TIME_STEP, TOPIC, ListOf, Number, Text
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, ListOf, Text
 from crazyflie_utils.vectors import is_finite
 
 
-class ObstacleStopParameters(Parameters):
+class ObstacleStopParameters(ObstacleStop):
     """Parameters of `ObstacleStopNode`."""
 
     in_topic: str = parameter(
@@ -30,13 +30,6 @@ class ObstacleStopParameters(Parameters):
         "that are guarded; a silent sensor stops all motion there",
         ("front", "back", "left", "right", "up"),
     )
-    distance: float = parameter(
-        Number("m", above=0.0), "nearer to an obstacle, nothing leads towards it", 0.5, live=True
-    )
-    deceleration: float = parameter(
-        Number("m/s^2", above=0.0), "with which the vehicle brakes before that", 0.5, live=True
-    )
-    reaction: float = parameter(DURATION, "that it flies on until it brakes", 0.3, live=True)
     silence: float = parameter(TIME_STEP, "so long after its last reading a sensor is silent", 0.15)
     command_silence: float = parameter(
         TIME_STEP, "so long after the last velocity, zero is published once", 0.5
@@ -48,10 +41,6 @@ class ObstacleStopParameters(Parameters):
         if self.time_step >= self.silence:
             yield f"time_step is {self.time_step:g}; expected < silence, {self.silence:g} (s)"
 
-    def obstacle_stop(self) -> ObstacleStop:
-        """Return the algorithm with these parameters."""
-        return ObstacleStop(self.distance, self.deceleration, self.reaction)
-
 
 class ObstacleStopNode(Node):
     """Pass velocities on as far as they lead to no obstacle."""
@@ -62,7 +51,7 @@ class ObstacleStopNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._reconfigure(handle.load(ObstacleStopParameters, self._reconfigure))
+        self._parameters = handle.load(ObstacleStopParameters, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -82,7 +71,6 @@ class ObstacleStopNode(Node):
 
     def _reconfigure(self, parameters):
         self._parameters = parameters
-        self._obstacle_stop = parameters.obstacle_stop()
 
     def _on_cmd_vel(self, message):
         linear, angular = message.linear, message.angular
@@ -112,5 +100,5 @@ class ObstacleStopNode(Node):
             topic = self._handle.resolve(self._parameters.ranges_topic)
             text = f"no motion to {', '.join(silent)}: nothing comes below {topic}"
             self._handle.warn(text, throttle=5.0)
-        v = self._obstacle_stop.limit(command, clearances)
+        v = self._parameters.limit(command, clearances)
         self._publisher.publish(Twist(linear=Vector3(v.x, v.y, v.z), angular=Vector3(z=v.yaw_dot)))

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,66 +35,8 @@ DIRECTIONS: dict[str, Triple] = {
 """Where sensors look: roll, pitch, yaw that turn the body's x axis there, rad."""
 
 
-@dataclass(frozen=True)
-class RangeSensor:
-    """A sensor that measures the distance to what is nearest in a cone.
-
-    Attributes
-    ----------
-    type : str
-        `LASER` or `ULTRASONIC`.
-    name : str
-        Its topic.
-    frame_id : str
-        Its tf frame, whose x axis is the axis of the cone.
-    direction : str
-        One of `DIRECTIONS`.
-    position : tuple of float
-        Where it is on the vehicle, in the body's frame (forward, left, up), m.
-    min_range, max_range : float
-        Between which it measures, m.
-    spread_angle : float
-        Of the cone, from edge to edge, rad.
-    desired_frequency : float
-        Hz.
-    noise : float
-        Standard deviation of a simulated measurement, m.
-    rays : int
-        With how many a simulated one looks.
-    variable : str
-        Log variable of the firmware, which has it in mm.
-    """
-
-    type: str
-    name: str
-    frame_id: str
-    direction: str
-    position: Triple
-    min_range: float
-    max_range: float
-    spread_angle: float
-    desired_frequency: float
-    noise: float
-    rays: int
-    variable: str
-
-    @property
-    def attitude(self) -> Quaternion:
-        """Of its frame in the body's."""
-        return quaternion_from_rpy(*DIRECTIONS[self.direction])
-
-    def reading(self, distance: float) -> float:
-        """Return what it says about a distance (m): infinity beyond its range.
-
-        What is nearer than its range is negative infinity, as in REP 117.
-        """
-        if distance > self.max_range:
-            return math.inf
-        return distance if distance >= self.min_range else -math.inf
-
-
-class RangeSensorParameters(Parameters):
-    """An entry of a sensor file."""
+class RangeSensor(Parameters):
+    """A sensor that measures the distance to what is nearest in a cone, as in a sensor file."""
 
     type: str = parameter(Text((LASER, ULTRASONIC)), "how it measures")
     name: str = parameter(TOPIC, "its topic")
@@ -121,22 +62,24 @@ class RangeSensorParameters(Parameters):
         if self.min_range >= self.max_range:
             yield (f"min_range is {self.min_range:g}; expected < max_range, {self.max_range:g} (m)")
 
-    def sensor(self) -> RangeSensor:
-        """Return what is declared."""
-        return RangeSensor(
-            self.type,
-            self.name,
-            self.frame_id,
-            self.direction,
-            self.position,
-            self.min_range,
-            self.max_range,
-            self.spread_angle,
-            self.desired_frequency,
-            self.noise,
-            self.rays,
-            self.variable or f"range.{self.name}",
-        )
+    @property
+    def log_variable(self) -> str:
+        """Log variable of the firmware, which has the distance in mm."""
+        return self.variable or f"range.{self.name}"
+
+    @property
+    def attitude(self) -> Quaternion:
+        """Of its frame in the body's."""
+        return quaternion_from_rpy(*DIRECTIONS[self.direction])
+
+    def reading(self, distance: float) -> float:
+        """Return what the sensor reports at a distance (m): infinity beyond its range.
+
+        What is nearer than its range is negative infinity, as in REP 117.
+        """
+        if distance > self.max_range:
+            return math.inf
+        return distance if distance >= self.min_range else -math.inf
 
 
 class SensorFile(ParameterType):
@@ -172,7 +115,7 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
             complaints += entry.error("is not known; expected sensors").complaints
     for entry in file["sensors"].elements():
         try:
-            sensors.append(entry.read(RangeSensorParameters).sensor())
+            sensors.append(entry.read(RangeSensor))
             for key, taken in lines.items():
                 value = entry[key]
                 if value.value in taken:

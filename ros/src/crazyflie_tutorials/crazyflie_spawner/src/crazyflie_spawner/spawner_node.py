@@ -20,7 +20,7 @@ from crazyflie_utils.parameters.types import FRAME, SERVICE, TEXT, TIME_STEP, Nu
 from crazyflie_utils.refusal import RefusalError
 
 PERIOD = 0.2
-"""Between two looks at the vehicles, s of the machine's clock."""
+"""Between two checks of the vehicles, s of the machine's clock."""
 
 
 class SpawnerParameters(Parameters):
@@ -48,19 +48,19 @@ class Vehicle:
     ----------
     process : VehicleProcess
     ticks_left : int
-        How many looks it still has to be there.
+        Timer periods left until it has to be ready.
     spawning : Future
-        The answer to who has asked for it.
-    is_there : bool
-        Whether its takeoff has been offered.
+        Reply of the spawn service.
+    is_ready : bool
+        Whether its takeoff service is offered.
     removing : list of Future
-        The answers to those who do not want it any more.
+        Replies of the remove service.
     """
 
     process: VehicleProcess
     ticks_left: int
     spawning: "Future[SpawnVehicleResponse]"
-    is_there: bool = False
+    is_ready: bool = False
     removing: "list[Future[RemoveVehicleResponse]]" = field(default_factory=list)
 
 
@@ -93,7 +93,7 @@ class SpawnerNode(Node):
 
     @override
     def shutdown(self) -> None:
-        """Have all vehicles end."""
+        """End all vehicles."""
         for vehicle in self._vehicles.values():
             vehicle.process.end()
 
@@ -142,14 +142,14 @@ class SpawnerNode(Node):
             status = vehicle.process.status
             if status is not None:
                 self._forget(name, status)
-            elif not vehicle.is_there and not vehicle.removing:
+            elif not vehicle.is_ready and not vehicle.removing:
                 services = self._handle.service_nodes() if services is None else services
-                self._look_for(name, vehicle, services)
+                self._check_ready(name, vehicle, services)
 
-    def _look_for(self, name, vehicle, services):
+    def _check_ready(self, name, vehicle, services):
         vehicle.ticks_left -= 1
         if self._takeoff(name) in services:
-            vehicle.is_there = True
+            vehicle.is_ready = True
             vehicle.spawning.set_result(SpawnVehicleResponse(name))
             self._handle.info(f"{name} is there")
         elif vehicle.ticks_left <= 0:
@@ -157,7 +157,7 @@ class SpawnerNode(Node):
             vehicle.spawning.set_exception(
                 ServiceError(f"{name} was not there after {limit:g} s, and is taken down")
             )
-            # Whoever takes it down has no interest in an answer.
+            # No caller waits for this removal, but the vehicle has not ended by itself.
             vehicle.removing.append(Future())
             vehicle.process.end()
 

@@ -1,32 +1,38 @@
 """Axes of a joystick, or of keys in its place, to velocities."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from crazyflie_references.velocity_reference import Velocity
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import Integer, Number
+
+AXIS_NUMBER = Integer(0, 63)
+"""Of an axis or a button of sensor_msgs/Joy."""
 
 
-@dataclass(frozen=True)
-class Axes:
-    """Numbers of the axes, from 0, and the velocities of a full deflection.
+class AxisParameters(Parameters):
+    """Numbers of axes, from 0, as crazyflie_demo's keyboard and gamepads have them."""
 
-    Attributes
-    ----------
-    forward, left, up, turn : int
-        Which axis it is.
-    horizontal, vertical : float
-        m/s.
-    yaw_dot : float
-        rad/s.
-    """
+    forward: int = parameter(AXIS_NUMBER, "flies ahead", 4)
+    left: int = parameter(AXIS_NUMBER, "flies to the left", 3)
+    up: int = parameter(AXIS_NUMBER, "rises", 1)
+    turn: int = parameter(AXIS_NUMBER, "turns to the left", 0)
 
-    forward: int
-    left: int
-    up: int
-    turn: int
-    horizontal: float
-    vertical: float
-    yaw_dot: float
+
+class JoyVelocity(Parameters):
+    """Velocities of a joystick's full deflections."""
+
+    axes: AxisParameters = group(AxisParameters, "axes")
+    horizontal: float = parameter(
+        Number("m/s", above=0.0), "speed of a full deflection", 0.5, "speed/horizontal", live=True
+    )
+    vertical: float = parameter(
+        Number("m/s", above=0.0), "speed of a full deflection", 0.3, "speed/vertical", live=True
+    )
+    yaw_dot: float = parameter(
+        Number("rad/s", above=0.0), "yaw rate of a full deflection", 1.0, "speed/yaw_dot", live=True
+    )
 
     def velocity(self, deflections: Sequence[float]) -> Velocity:
         """Return the velocity for deflections from -1 to 1; an axis that is missing is at 0."""
@@ -36,8 +42,8 @@ class Axes:
             return min(max(value, -1.0), 1.0)
 
         return Velocity(
-            self.horizontal * deflection(self.forward),
-            self.horizontal * deflection(self.left),
-            self.vertical * deflection(self.up),
-            self.yaw_dot * deflection(self.turn),
+            self.horizontal * deflection(self.axes.forward),
+            self.horizontal * deflection(self.axes.left),
+            self.vertical * deflection(self.axes.up),
+            self.yaw_dot * deflection(self.axes.turn),
         )

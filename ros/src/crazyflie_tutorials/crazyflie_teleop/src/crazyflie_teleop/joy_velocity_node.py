@@ -7,27 +7,15 @@ from sensor_msgs.msg import Joy
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
-from crazyflie_teleop.joy_velocity import Axes
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import SERVICE, TOPIC, Integer, Number
+from crazyflie_teleop.joy_velocity import AXIS_NUMBER, JoyVelocity
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameters.types import SERVICE, TOPIC
 
 FLIGHT_LIMIT = 120.0
 """The longest that takeoff or landing may take, s of the machine's clock."""
 
-_NUMBER = Integer(0, 63)
 
-
-class AxisParameters(Parameters):
-    """Numbers of axes, from 0, as crazyflie_demo's keyboard and gamepads have them."""
-
-    forward: int = parameter(_NUMBER, "flies ahead", 4)
-    left: int = parameter(_NUMBER, "flies to the left", 3)
-    up: int = parameter(_NUMBER, "rises", 1)
-    turn: int = parameter(_NUMBER, "turns to the left", 0)
-
-
-class JoyVelocityParameters(Parameters):
+class JoyVelocityParameters(JoyVelocity):
     """Parameters of `JoyVelocityNode`."""
 
     joy_topic: str = parameter(TOPIC, "a joystick, or a keyboard", "joy", "topics/joy")
@@ -40,19 +28,9 @@ class JoyVelocityParameters(Parameters):
         None,
         "srv/emergency",
     )
-    axes: AxisParameters = group(AxisParameters, "axes")
-    takeoff_button: int = parameter(_NUMBER, "calls takeoff", 2, "buttons/takeoff")
-    land_button: int = parameter(_NUMBER, "calls land", 0, "buttons/land")
-    emergency_button: int = parameter(_NUMBER, "calls emergency", 1, "buttons/emergency")
-    horizontal: float = parameter(
-        Number("m/s", above=0.0), "speed of a full deflection", 0.5, "speed/horizontal", live=True
-    )
-    vertical: float = parameter(
-        Number("m/s", above=0.0), "speed of a full deflection", 0.3, "speed/vertical", live=True
-    )
-    yaw_dot: float = parameter(
-        Number("rad/s", above=0.0), "yaw rate of a full deflection", 1.0, "speed/yaw_dot", live=True
-    )
+    takeoff_button: int = parameter(AXIS_NUMBER, "calls takeoff", 2, "buttons/takeoff")
+    land_button: int = parameter(AXIS_NUMBER, "calls land", 0, "buttons/land")
+    emergency_button: int = parameter(AXIS_NUMBER, "calls emergency", 1, "buttons/emergency")
 
 
 class JoyVelocityNode(Node):
@@ -63,7 +41,7 @@ class JoyVelocityNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._reconfigure(handle.load(JoyVelocityParameters, self._reconfigure))
+        self._parameters = handle.load(JoyVelocityParameters, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -76,22 +54,13 @@ class JoyVelocityNode(Node):
         self._publisher.publish(Twist())
 
     def _reconfigure(self, parameters):
-        self._parameters = p = parameters
-        self._axes = Axes(
-            p.axes.forward,
-            p.axes.left,
-            p.axes.up,
-            p.axes.turn,
-            p.horizontal,
-            p.vertical,
-            p.yaw_dot,
-        )
+        self._parameters = parameters
 
     def _on_joy(self, message):
         if not all(map(math.isfinite, message.axes)):
             self._handle.warn("ignoring a joystick's axes that are not finite", throttle=1.0)
             return
-        v = self._axes.velocity(message.axes)
+        v = self._parameters.velocity(message.axes)
         self._publisher.publish(Twist(linear=Vector3(v.x, v.y, v.z), angular=Vector3(z=v.yaw_dot)))
         pressed = {number for number, is_down in enumerate(message.buttons) if is_down}
         new, self._pressed = pressed - self._pressed, pressed

@@ -1,4 +1,4 @@
-"""Takes off by itself, so that one launch file is enough for a flight."""
+"""Calls takeoff once, so that one launch file is enough for a flight."""
 
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
@@ -7,7 +7,7 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import SERVICE
 
 PERIOD = 0.5
-"""Between two looks whether the service is there, s of the machine's clock."""
+"""Between two checks whether the service is offered, s of the machine's clock."""
 
 FLIGHT_LIMIT = 120.0
 """The longest that a takeoff may take, s of the machine's clock."""

@@ -1,30 +1,35 @@
 """A thing of one colour, found by that and by the moments of its image."""
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.types import Integer
 from crazyflie_vision.target import Target
 
+_HUE = Integer(0, 179)
+_BYTE = Integer(0, 255)
 
-@dataclass(frozen=True)
-class ColourBounds:
+
+class ColourBounds(Parameters):
     """A range of colours as OpenCV has them: hue 0 to 179 (half degrees), the others 0 to 255.
 
     A lower hue that is larger than the upper one means a range that goes through red, where hue
-    begins again.
+    begins again. The default is orange.
     """
 
-    hue_lower: int
-    hue_upper: int
-    saturation_lower: int
-    saturation_upper: int
-    value_lower: int
-    value_upper: int
+    hue_lower: int = parameter(
+        _HUE, "half degrees; larger than hue_upper for a range through red", 0, live=True
+    )
+    hue_upper: int = parameter(_HUE, "half degrees: 0 red, 60 green, 120 blue", 20, live=True)
+    saturation_lower: int = parameter(_BYTE, "0 grey, 255 a pure colour", 140, live=True)
+    saturation_upper: int = parameter(_BYTE, "likewise", 255, live=True)
+    value_lower: int = parameter(_BYTE, "0 black, 255 bright", 70, live=True)
+    value_upper: int = parameter(_BYTE, "likewise", 255, live=True)
 
     def mask(self, image: NDArray[Any]) -> NDArray[Any]:
         """Return 255 where an image (blue, green, red) has such a colour, elsewhere 0."""

@@ -26,10 +26,7 @@ class FilterNode(ImageNode):
     """Base class: a filter has ``parameters_type``, and `apply`."""
 
     parameters_type: ClassVar[type[FilterParameters]] = FilterParameters
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(self.parameters_type, self._reconfigure)
+    _parameters: FilterParameters
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -44,6 +41,3 @@ class FilterNode(ImageNode):
     def on_image(self, image: filters.Image, header: Header) -> None:
         if self._publisher.has_subscribers():
             self._publisher.publish(to_message(self.apply(image), header))
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters

@@ -1,38 +1,43 @@
 """Following what a camera sees: it stays in the middle of the image, and at a distance."""
 
 import math
-from dataclasses import dataclass
 
 from crazyflie_references.velocity_reference import Velocity
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.declaration import group
+from crazyflie_utils.parameters.types import Number
 from crazyflie_vision.target import Target
 
+_LENGTH = Number("m", above=0.0)
+_GAIN = Number("1/s", minimum=0.0)
+_SPEED = Number("m/s", minimum=0.0)
 
-@dataclass(frozen=True)
-class Follower:
-    """A proportional controller from a target in an image to a velocity.
 
-    Attributes
-    ----------
-    distance : float
-        To be kept between camera and target, m.
-    radius : float
-        Of the target in the world, m.
-    forward, up, turn : float
-        Gains: velocity over distance and over height, rate over angle, 1/s.
-    max_forward, max_up : float
-        m/s.
-    max_turn : float
-        rad/s.
-    """
+class GainParameters(Parameters):
+    """How fast errors are to vanish."""
 
-    distance: float
-    radius: float
-    forward: float
-    up: float
-    turn: float
-    max_forward: float
-    max_up: float
-    max_turn: float
+    forward: float = parameter(
+        _GAIN, "velocity ahead over what is missing in distance", 1.5, live=True
+    )
+    up: float = parameter(_GAIN, "velocity upwards over what is missing in height", 1.5, live=True)
+    turn: float = parameter(_GAIN, "yaw rate over the angle to the target", 2.5, live=True)
+
+
+class SpeedParameters(Parameters):
+    """What is not exceeded."""
+
+    forward: float = parameter(_SPEED, "ahead, and back", 0.5, live=True)
+    up: float = parameter(_SPEED, "upwards, and down", 0.3, live=True)
+    turn: float = parameter(Number("rad/s", minimum=0.0), "to either side", 1.0, live=True)
+
+
+class Follower(Parameters):
+    """A proportional controller from a target in an image to a velocity."""
+
+    distance: float = parameter(_LENGTH, "to be kept to the target", 1.0, live=True)
+    radius: float = parameter(_LENGTH, "of the target; half the width of a face", 0.12, live=True)
+    gains: GainParameters = group(GainParameters, "gains")
+    limits: SpeedParameters = group(SpeedParameters, "limits")
 
     def velocity(
         self, target: Target, focal_length: float, centre: tuple[float, float]
@@ -56,13 +61,14 @@ class Follower:
         Velocity
             In the heading frame of a vehicle whose camera looks ahead.
         """
+        gains, limits = self.gains, self.limits
         depth = focal_length * self.radius / target.radius
         right = (target.x - centre[0]) / focal_length
         down = (target.y - centre[1]) / focal_length
         return Velocity(
-            x=_limited(self.forward * (depth - self.distance), self.max_forward),
-            z=_limited(-self.up * depth * down, self.max_up),
-            yaw_dot=_limited(-self.turn * math.atan(right), self.max_turn),
+            x=_limited(gains.forward * (depth - self.distance), limits.forward),
+            z=_limited(-gains.up * depth * down, limits.up),
+            yaw_dot=_limited(-gains.turn * math.atan(right), limits.turn),
         )
 
 

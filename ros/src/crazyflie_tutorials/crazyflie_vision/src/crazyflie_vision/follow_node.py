@@ -7,42 +7,15 @@ from sensor_msgs.msg import CameraInfo
 from typing_extensions import override
 
 from crazyflie_references.velocity_reference import Velocity
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
-from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_vision.follow import Follower
 from crazyflie_vision.target import Target
 
-_LENGTH = Number("m", above=0.0)
-_GAIN = Number("1/s", minimum=0.0)
-_SPEED = Number("m/s", minimum=0.0)
 
-
-class GainParameters(Parameters):
-    """How fast errors are to vanish."""
-
-    forward: float = parameter(
-        _GAIN, "velocity ahead over what is missing in distance", 1.5, live=True
-    )
-    up: float = parameter(_GAIN, "velocity upwards over what is missing in height", 1.5, live=True)
-    turn: float = parameter(_GAIN, "yaw rate over the angle to the target", 2.5, live=True)
-
-
-class SpeedParameters(Parameters):
-    """What is not exceeded."""
-
-    forward: float = parameter(_SPEED, "ahead, and back", 0.5, live=True)
-    up: float = parameter(_SPEED, "upwards, and down", 0.3, live=True)
-    turn: float = parameter(Number("rad/s", minimum=0.0), "to either side", 1.0, live=True)
-
-
-class FollowParameters(Parameters):
+class FollowParameters(Follower):
     """Parameters of `FollowNode`."""
 
-    distance: float = parameter(_LENGTH, "to be kept to the target", 1.0, live=True)
-    radius: float = parameter(_LENGTH, "of the target; half the width of a face", 0.12, live=True)
-    gains: GainParameters = group(GainParameters, "gains")
-    limits: SpeedParameters = group(SpeedParameters, "limits")
     silence: float = parameter(
         TIME_STEP, "after so long without a target the vehicle stops", 0.12, live=True
     )
@@ -56,19 +29,6 @@ class FollowParameters(Parameters):
     cmd_vel_topic: str = parameter(
         TOPIC, "velocities in the heading frame", "cmd_vel", name="topics/cmd_vel"
     )
-
-    def follower(self) -> Follower:
-        """Return the controller."""
-        return Follower(
-            self.distance,
-            self.radius,
-            self.gains.forward,
-            self.gains.up,
-            self.gains.turn,
-            self.limits.forward,
-            self.limits.up,
-            self.limits.turn,
-        )
 
 
 class FollowNode(Node):
@@ -87,7 +47,7 @@ class FollowNode(Node):
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._reconfigure(handle.load(FollowParameters, self._reconfigure))
+        self._parameters = handle.load(FollowParameters, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -105,7 +65,6 @@ class FollowNode(Node):
 
     def _reconfigure(self, parameters):
         self._parameters = parameters
-        self._follower = parameters.follower()
 
     def _on_info(self, message):
         focal_length, _, cx, _, _, cy, *_ = message.K
@@ -129,7 +88,7 @@ class FollowNode(Node):
             self._handle.warn(f"there is a target, but nothing on {topic}", throttle=5.0)
             return
         target = Target(point.x, point.y, point.z)
-        self._velocity = self._follower.velocity(target, self._focal_length, self._centre)
+        self._velocity = self._parameters.velocity(target, self._focal_length, self._centre)
         self._seen_at = self._handle.time()
 
     def _on_timer(self):

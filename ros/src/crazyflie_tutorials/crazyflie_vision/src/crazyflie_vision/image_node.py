@@ -1,20 +1,30 @@
-"""What all nodes have in common that look at images."""
+"""The ROS interface that filters and trackers share: images in."""
 
-from typing import Any
+from typing import Any, ClassVar
 
 from numpy.typing import NDArray
 from sensor_msgs.msg import Image
 from std_msgs.msg import Header
+from typing_extensions import override
 
-from crazyflie_utils import Node, NodeHandle
+from crazyflie_utils import Node, NodeHandle, Parameters
 from crazyflie_vision.images import to_array
 
 
 class ImageNode(Node):
-    """Base class of nodes that do something with every image of a topic."""
+    """Base class of nodes that process every image of a topic: has ``parameters_type``."""
+
+    parameters_type: ClassVar[type[Parameters]]
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(self.parameters_type, self._reconfigure)
+
+    def _reconfigure(self, parameters: Any) -> None:
+        self._parameters = parameters
 
     def watch(self, handle: NodeHandle, topic: str) -> None:
-        """Have `on_image` called for every image; those that cannot be read are named."""
+        """Call `on_image` for every image; log those that cannot be read."""
 
         def convert(message: Image) -> None:
             try:
@@ -27,7 +37,7 @@ class ImageNode(Node):
         handle.subscribe(topic, Image, convert)
 
     def on_image(self, image: NDArray[Any], header: Header) -> None:
-        """Do what the node is for.
+        """Process an image.
 
         Parameters
         ----------

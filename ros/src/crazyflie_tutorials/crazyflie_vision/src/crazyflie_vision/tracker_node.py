@@ -1,6 +1,6 @@
 """Image in, target out: the ROS interface that all trackers share."""
 
-from typing import Any, ClassVar
+from typing import Any
 
 from geometry_msgs.msg import Point, PointStamped
 from numpy.typing import NDArray
@@ -35,12 +35,8 @@ class TrackerNode(ImageNode):
     A target is published with the stamp of its image; where nothing is found, nothing is.
     """
 
-    parameters_type: ClassVar[type[TrackerParameters]] = TrackerParameters
+    _parameters: TrackerParameters
     needed_in_flight = True
-
-    @override
-    def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(self.parameters_type, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -60,6 +56,3 @@ class TrackerNode(ImageNode):
             self._target.publish(PointStamped(header, point))
         if self._debug.has_subscribers():
             self._debug.publish(to_message(draw(image, target), header))
-
-    def _reconfigure(self, parameters):
-        self._parameters = parameters

@@ -15,11 +15,11 @@ _IDLE_CURRENT = 0.12
 """Of the electronics, A."""
 
 _CHARGES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-_VOLTAGES = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10, 4.20)
+OPEN_CIRCUIT_VOLTAGES = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10, 4.20)
 """Open-circuit voltage, V, over state of charge; the firmware's table, which is of the stock
 battery, and 4.2 V when full."""
 
-FULL_VOLTAGE = _VOLTAGES[-1]
+FULL_VOLTAGE = OPEN_CIRCUIT_VOLTAGES[-1]
 
 LOW_CHARGE = 0.055
 """State of charge at which the voltage in flight is low (3.2 V) but not yet critical (3.0 V)."""
@@ -66,4 +66,5 @@ def open_circuit_voltage(charge: float) -> float:
     """Return the voltage without load, V, at a state of charge from 0 to 1."""
     i = min(max(bisect.bisect_right(_CHARGES, charge) - 1, 0), len(_CHARGES) - 2)
     part = (charge - _CHARGES[i]) / (_CHARGES[i + 1] - _CHARGES[i])
-    return _VOLTAGES[i] + part * (_VOLTAGES[i + 1] - _VOLTAGES[i])
+    low, high = OPEN_CIRCUIT_VOLTAGES[i : i + 2]
+    return low + part * (high - low)

@@ -1,6 +1,7 @@
 """The body of the vehicle: the airframe, what is felt in it, and coming down on the back."""
 
 import math
+from typing import NamedTuple
 
 from crazyflie_model.angles import Quaternion, Triple, rotate_back
 from crazyflie_model.inner_loops import PERIOD
@@ -13,8 +14,17 @@ from crazyflie_world.world import World
 STEP = PERIOD
 """Step of the integration, s: that of the firmware's attitude controller."""
 
-MotorCommands = tuple[float, float, float, float]
-"""PWM of the four motors."""
+
+class MotorCommands(NamedTuple):
+    """PWM of the four motors."""
+
+    m1: float
+    m2: float
+    m3: float
+    m4: float
+
+
+OFF = MotorCommands(0.0, 0.0, 0.0, 0.0)
 
 _OVERTURNING = 0.5
 """Cosine of the tilt on the ground beyond which a vehicle lies on its back."""
@@ -37,8 +47,6 @@ class Physics:
     ----------
     specific_force : tuple, 3 components
         What an accelerometer feels, m/s^2, body frame.
-    impact_speed : float
-        Downward speed of the last contact with the ground, m/s.
     world : World or None
         What is around it; None for the ground alone, which is also all that it comes to rest on.
     is_overturned : bool
@@ -58,7 +66,6 @@ class Physics:
         x[13:17] = [0.0] * 4
         self._x = x
         self.specific_force: Triple = (0.0, 0.0, GRAVITY)
-        self.impact_speed = 0.0
         self.world: World | None = None
         self.is_overturned = False
 
@@ -97,26 +104,16 @@ class Physics:
         self.specific_force = (0.0, 0.0, GRAVITY)
 
     def step(self, commands: MotorCommands, voltage: float) -> None:
-        """Take the body on by `STEP`.
-
-        Parameters
-        ----------
-        commands : tuple, 4 components
-            Motor commands, PWM.
-        voltage : float
-            Of the battery, V: it limits the speed of the motors.
-        """
+        """Advance by `STEP`; the battery's voltage (V) limits the speed of the motors."""
         top = CRAZYFLIE.max_rotor_speed * voltage / FULL_VOLTAGE
         before = self._x
         if self.is_overturned:
-            commands = (0.0, 0.0, 0.0, 0.0)
+            commands = OFF
         speeds = [min(top, CRAZYFLIE.rotor_speed(command)) for command in commands]
         after = self._airframe.step(0.0, before, speeds, STILL_AIR, STEP)
         if after[2] <= 0.0:
             after = tip(self._airframe, before, after, STEP)
         self._x = after
-        if before[2] > 0.0 and after[2] <= 0.0:
-            self.impact_speed = max(0.0, -before[5])
         if after[2] <= 0.0 and not self.is_overturned:
             up = 1.0 - 2.0 * (before[6] ** 2 + before[7] ** 2)
             self.is_overturned = up < _OVERTURNING

@@ -11,8 +11,15 @@ NOTHING = 32767
 _REACH = 4.0
 """m."""
 
-_FRONT, _LEFT, _UP = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-_BACK, _RIGHT, _DOWN = (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0)
+_DIRECTIONS: dict[str, Triple] = {
+    "front": (1.0, 0.0, 0.0),
+    "back": (-1.0, 0.0, 0.0),
+    "left": (0.0, 1.0, 0.0),
+    "right": (0.0, -1.0, 0.0),
+    "up": (0.0, 0.0, 1.0),
+    "zrange": (0.0, 0.0, -1.0),
+}
+"""Log variable -> where its sensor looks, body frame."""
 
 
 class RangingSensors:
@@ -32,41 +39,11 @@ class RangingSensors:
         self.has_multiranger = has_multiranger
         self.has_flow_deck = has_flow_deck
 
-    @property
-    def front(self) -> int:
-        """Along the body's x."""
-        return self._side(_FRONT)
-
-    @property
-    def back(self) -> int:
-        """Against the body's x."""
-        return self._side(_BACK)
-
-    @property
-    def left(self) -> int:
-        """Along the body's y."""
-        return self._side(_LEFT)
-
-    @property
-    def right(self) -> int:
-        """Against the body's y."""
-        return self._side(_RIGHT)
-
-    @property
-    def up(self) -> int:
-        """Along the body's z."""
-        return self._side(_UP)
-
-    @property
-    def zrange(self) -> int:
-        """Against the body's z."""
-        return self._measure(_DOWN) if self.has_flow_deck else 0
-
-    def _side(self, direction: Triple) -> int:
-        return self._measure(direction) if self.has_multiranger else 0
-
-    def _measure(self, axis: Triple) -> int:
-        direction = rotate(self._physics.quaternion, axis)
+    def distance(self, side: str) -> int:
+        """Return what the sensor of a log variable (of the group ``range``) reports, mm."""
+        if not (self.has_flow_deck if side == "zrange" else self.has_multiranger):
+            return 0
+        direction = rotate(self._physics.quaternion, _DIRECTIONS[side])
         distance = self._distance(direction)
         return round(1000.0 * distance) if distance < _REACH else NOTHING
 

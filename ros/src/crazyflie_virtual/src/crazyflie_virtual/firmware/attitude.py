@@ -49,9 +49,8 @@ class AttitudeController:
 
     def reset(self) -> None:
         """Forget integrals and last measurements."""
-        for pid in (self.roll, self.pitch, self.yaw):
-            pid.reset()
-        for pid in (self.roll_rate, self.pitch_rate, self.yaw_rate):
+        rates = (self.roll_rate, self.pitch_rate, self.yaw_rate)
+        for pid in (self.roll, self.pitch, self.yaw, *rates):
             pid.reset()
 
     def desired_rates(self, estimate: Estimate, roll: float, pitch: float, yaw: float) -> Triple:
@@ -78,12 +77,13 @@ class AttitudeController:
         tuple of float
             PWM.
         """
-        about_roll = self.roll_rate.update(rates[0], gyro[0])
-        about_pitch = self.pitch_rate.update(rates[1], gyro[1])
-        about_yaw = self.yaw_rate.update(rates[2], gyro[2])
-        # The firmware converts them to integers of 16 bits.
-        return (_or_zero(about_roll), _or_zero(about_pitch), _or_zero(about_yaw))
+        return (
+            _or_zero(self.roll_rate.update(rates[0], gyro[0])),
+            _or_zero(self.pitch_rate.update(rates[1], gyro[1])),
+            _or_zero(self.yaw_rate.update(rates[2], gyro[2])),
+        )
 
 
 def _or_zero(output):
+    # As the firmware's conversion of NaN to an integer of 16 bits.
     return output if output == output else 0.0

@@ -14,10 +14,6 @@ class Commander:
     `relax_priority`: neither age nor a new client ends that. Afterwards the high-level
     commander holds the motors off until its next command.
 
-    Parameters
-    ----------
-    planner : Planner
-
     Attributes
     ----------
     setpoint : Setpoint

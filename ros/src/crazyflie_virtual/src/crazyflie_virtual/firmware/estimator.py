@@ -19,6 +19,7 @@ from crazyflie_model.angles import rotate, zyx_from_quaternion
 from crazyflie_model.units import GRAVITY
 from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.states import Estimate
+from crazyflie_virtual.quaternions import normalized, turned
 
 _ACCELERATION_NOISE = 3.7e-4
 """Process noise, m^2/s^3: 0.6 m/s^2, held for 1 ms each."""
@@ -96,20 +97,9 @@ class Estimator:
         mean = [total / self._samples for total in self._sums]
         self._clear_samples()
         e = self._estimate
-        x, y, z, w = e.qx, e.qy, e.qz, e.qw
         half = 0.5 * dt * math.pi / 180.0
-        a, b, c = (half * rate for rate in mean[:3])
-        x, y, z, w = (
-            x + w * a + y * c - z * b,
-            y + w * b + z * a - x * c,
-            z + w * c + x * b - y * a,
-            w - x * a - y * b - z * c,
-        )
-        scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
-        e.qx, e.qy, e.qz, e.qw = x, y, z, w = x * scale, y * scale, z * scale, w * scale
-
-        force_x, force_y, force_z = mean[3:]
-        e.ax, e.ay, up = rotate((x, y, z, w), (force_x, force_y, force_z))
+        e.qx, e.qy, e.qz, e.qw = turned(e.quaternion, *(half * rate for rate in mean[:3]))
+        e.ax, e.ay, up = rotate(e.quaternion, mean[3:])
         e.az = up - 1.0
         dvx, dvy, dvz = GRAVITY * dt * e.ax, GRAVITY * dt * e.ay, GRAVITY * dt * e.az
         e.x += dt * (e.vx + 0.5 * dvx)
@@ -175,14 +165,12 @@ class Estimator:
         # Towards another quaternion of the same sign; for small angles the
         # straight line is the great circle.
         e = self._estimate
-        x, y, z, w = (
+        e.qx, e.qy, e.qz, e.qw = normalized(
             e.qx + gain * (x - e.qx),
             e.qy + gain * (y - e.qy),
             e.qz + gain * (z - e.qz),
             e.qw + gain * (w - e.qw),
         )
-        scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
-        e.qx, e.qy, e.qz, e.qw = x * scale, y * scale, z * scale, w * scale
         self._update_angles()
 
     def _update_angles(self):

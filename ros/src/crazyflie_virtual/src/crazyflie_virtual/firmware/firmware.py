@@ -1,7 +1,7 @@
 """The firmware: its parts and the order in which they run."""
 
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_virtual.body.physics import STEP, MotorCommands, Physics
+from crazyflie_virtual.body.physics import OFF, STEP, MotorCommands, Physics
 from crazyflie_virtual.body.ranging import RangingSensors
 from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.faults import FaultSwitches
@@ -12,7 +12,7 @@ from crazyflie_virtual.firmware.localization import DECK, Localization
 from crazyflie_virtual.firmware.planner import ACTIVE, Planner, TrajectoryState
 from crazyflie_virtual.firmware.power import PowerMonitor
 from crazyflie_virtual.firmware.setpoints import AttitudeDecoder
-from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, OFF, Stabilizer
+from crazyflie_virtual.firmware.stabilizer import IDLE_THRUST, Stabilizer
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
 from crazyflie_virtual.firmware.supervisor import Supervisor
 from crazyflie_virtual.firmware.supervisor_states import State
@@ -52,7 +52,7 @@ class Firmware:
     time : float
         Since the start, s.
     setpoint : Setpoint
-        The controllers' present setpoint.
+        Input of the controllers.
     info : SupervisorState
         State of supervisor and high-level commander at the supervisor's last
         update, as clients see it.
@@ -69,7 +69,7 @@ class Firmware:
     ):
         self._physics = physics
         self.faults = faults
-        self._protocol = settings.protocol
+        self.protocol = settings.protocol
         self._steps = 0
         self.time = 0.0
         self.console = Console(lambda: self.time)
@@ -110,13 +110,7 @@ class Firmware:
         return round(1000.0 * self.time)
 
     def step(self, voltage: float) -> MotorCommands:
-        """Advance by `STEP`; return the motor commands, PWM.
-
-        Parameters
-        ----------
-        voltage : float
-            Of the battery, V.
-        """
+        """Advance by `STEP` at a voltage of the battery (V); return the motor commands."""
         physics, sensors, estimate = self._physics, self.sensors, self.estimate
         self._steps += 1
         self.time = self._steps * STEP
@@ -172,7 +166,7 @@ class Firmware:
             self._warned_state = None
         planner_state = self.planner.state
         self.info = self.supervisor.flags
-        if self._protocol >= SUPERVISOR_PROTOCOL:
+        if self.protocol >= SUPERVISOR_PROTOCOL:
             self.info |= SupervisorState.of(
                 high_level_active=planner_state in ACTIVE,
                 trajectory_finished=self.planner.is_finished(self.time),

@@ -3,13 +3,14 @@
 import errno
 import math
 from enum import Enum
+from typing import Any
 
 from crazyflie_model.angles import Triple
 from crazyflie_model.planner import smooth_piece, spiral_piece, straight_piece
 from crazyflie_model.polynomials import PIECE_SIZE, Goal, PolynomialPiece, at_rest
 from crazyflie_model.trajectory import Trajectory
 from crazyflie_virtual.firmware.compressed_trajectory import read_compressed
-from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Modes, Setpoint
+from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, Estimate, Modes, Setpoint
 
 MEMORY_SIZE = 4096
 """Bytes of the trajectory memory."""
@@ -98,12 +99,14 @@ class Planner:
             self.state = TrajectoryState.DISABLED
             return None
         self._last = goal
+        motion: tuple[Any, ...] = (*goal.position, *goal.velocity, *goal.acceleration)
         return Setpoint(
+            **dict(zip(MOTION, motion, strict=True)),
             mode=_TRACKING,
             yaw=math.degrees(goal.yaw),
             yaw_rate=math.degrees(goal.yaw_rate),
             time=time,
-        ).with_motion(goal.position, goal.velocity, goal.acceleration)
+        )
 
     def tell_state(self, estimate: Estimate) -> None:
         """Start the next plan at the estimated state instead of the last setpoint."""

@@ -1,12 +1,14 @@
 """Power management: states by the battery's voltage. 10 Hz."""
 
+from crazyflie_virtual.body.battery import OPEN_CIRCUIT_VOLTAGES
+
 ON_BATTERY, LOW = 0, 3
 """States; 1 and 2, charging and charged, do not occur."""
 
 _LOW_AFTER = 5.0
 """Time of low voltage until the state `LOW`, s."""
 
-_LEVELS = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10)
+_LEVELS = OPEN_CIRCUIT_VOLTAGES[:-1]
 """Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C]."""
 
 

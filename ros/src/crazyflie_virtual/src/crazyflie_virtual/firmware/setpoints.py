@@ -9,8 +9,8 @@ from typing import NamedTuple
 from crazyflie_model.limits import MAX_SETPOINT_PWM
 from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
 from crazyflie_virtual.firmware.commander import PRIORITY_DISABLE
-from crazyflie_virtual.firmware.compressed import decompress_quaternion
-from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Modes, Setpoint
+from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, VELOCITY, Modes, Setpoint
+from crazyflie_virtual.quaternions import decompress_quaternion
 
 _LEAST_THRUST = 1000
 """Of an attitude setpoint, PWM: less is none."""
@@ -174,14 +174,14 @@ def _stop(data):
 def _full_state(data):
     *motion, word, p, q, r = _FULL_STATE.unpack(data)
     # mm and milliradians on the wire.
-    x, y, z, vx, vy, vz, ax, ay, az = (part / 1000.0 for part in motion)
     return Setpoint(
+        **{name: part / 1000.0 for name, part in zip(MOTION, motion, strict=True)},
         mode=Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, quaternion=ABSOLUTE),
         quaternion=decompress_quaternion(word),
         roll_rate=math.degrees(p / 1000.0),
         pitch_rate=math.degrees(q / 1000.0),
         yaw_rate=math.degrees(r / 1000.0),
-    ).with_motion((x, y, z), (vx, vy, vz), (ax, ay, az))
+    )
 
 
 def _manual(data):

@@ -5,7 +5,7 @@ import math
 from crazyflie_model.angles import zyx_from_quaternion
 from crazyflie_model.inner_loops import PERIOD
 from crazyflie_model.mixer import limit, mix
-from crazyflie_virtual.body.physics import MotorCommands
+from crazyflie_virtual.body.physics import OFF, MotorCommands
 from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
 from crazyflie_virtual.firmware.position import PositionController
@@ -17,8 +17,6 @@ from crazyflie_virtual.firmware.states import (
     Modes,
     Setpoint,
 )
-
-OFF: MotorCommands = (0.0, 0.0, 0.0, 0.0)
 
 IDLE_THRUST = 7000
 """Of vehicles that the client arms, with brushless motors, PWM."""
@@ -42,8 +40,8 @@ class MotorOverride:
     def commands(self) -> MotorCommands | None:
         """Return the commands that hold, or None."""
         if self.enable == 1:
-            return float(self.m1), float(self.m2), float(self.m3), float(self.m4)
-        return (float(self.m1),) * 4 if self.enable else None
+            return MotorCommands(*map(float, (self.m1, self.m2, self.m3, self.m4)))
+        return MotorCommands(*(float(self.m1),) * 4) if self.enable else None
 
 
 class Stabilizer:
@@ -65,8 +63,8 @@ class Stabilizer:
         Desired body rates, deg/s.
     thrust, command_roll, command_pitch, command_yaw : float
         Inputs of the mixer, PWM.
-    requested, commands : tuple, 4 components
-        Motor commands before and after their limits, PWM.
+    requested, commands : MotorCommands
+        Before and after their limits.
     idle_thrust : int
         Least command of an armed motor, PWM.
     """
@@ -91,13 +89,12 @@ class Stabilizer:
         with_position: bool,
         may_run: bool,
     ) -> MotorCommands:
-        """Return the motor commands, PWM.
+        """Return the motor commands.
 
         Parameters
         ----------
-        setpoint : Setpoint
-        estimate : Estimate
-        sensors : Sensors
+        setpoint, estimate, sensors
+            Inputs of the controllers.
         with_position : bool
             Whether the position controller runs in this step.
         may_run : bool
@@ -115,18 +112,13 @@ class Stabilizer:
         else:
             self._control_attitude(setpoint, estimate, sensors)
             # The mixer's pitch is positive nose down.
-            m1, m2, m3, m4 = mix(
-                self.thrust, self.command_roll, -self.command_pitch, self.command_yaw
-            )
-            self.requested = (m1, m2, m3, m4)
+            inputs = (self.thrust, self.command_roll, -self.command_pitch, self.command_yaw)
+            self.requested = MotorCommands(*mix(*inputs))
         override = self.override.commands()
         if override is not None:
             self.requested = override
-        if may_run:
-            m1, m2, m3, m4 = limit(self.requested, float(self.idle_thrust))
-            self.commands = (m1, m2, m3, m4)
-        else:
-            self.commands = OFF
+        idle = float(self.idle_thrust)
+        self.commands = MotorCommands(*limit(self.requested, idle)) if may_run else OFF
         return self.commands
 
     def _reset(self, estimate):

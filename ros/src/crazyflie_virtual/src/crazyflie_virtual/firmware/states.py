@@ -10,11 +10,15 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import NamedTuple
 
-from crazyflie_model.angles import Quaternion, Triple
-from crazyflie_virtual.firmware.compressed import compress_quaternion
+from crazyflie_model.angles import Quaternion
+from crazyflie_virtual.quaternions import compress_quaternion
 
 DISABLED, ABSOLUTE, VELOCITY = 0, 1, 2
 """Modes of a setpoint's axis: not controlled, to this value, at this rate."""
+
+
+MOTION = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
+"""Position, velocity and acceleration of setpoint and estimate."""
 
 
 class Modes(NamedTuple):
@@ -85,13 +89,6 @@ class Setpoint(_Motion):
     quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)
     thrust: float = 0.0
     time: float = 0.0
-
-    def with_motion(self, position: Triple, velocity: Triple, acceleration: Triple) -> "Setpoint":
-        """Return the setpoint with a position (m), a velocity (m/s) and an acceleration (m/s^2)."""
-        x, y, z = position
-        vx, vy, vz = velocity
-        ax, ay, az = acceleration
-        return replace(self, x=x, y=y, z=z, vx=vx, vy=vy, vz=vz, ax=ax, ay=ay, az=az)
 
     @property
     def is_finite(self) -> bool:

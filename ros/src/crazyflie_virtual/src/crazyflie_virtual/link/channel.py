@@ -3,14 +3,15 @@
 import math
 from collections import deque
 from random import Random
-from typing import Generic, TypeVar
 
 from crazyflie_virtual.faults import FaultSwitches
+from crazyflie_virtual.server import Address
 
-T = TypeVar("T")
+Item = tuple[bytes, Address]
+"""Datagram, and its sender or receiver."""
 
 
-class Channel(Generic[T]):
+class Channel:
     """Datagrams on their way.
 
     Parameters
@@ -23,9 +24,9 @@ class Channel(Generic[T]):
     def __init__(self, faults: FaultSwitches, random: Random):
         self._faults = faults
         self._random = random
-        self._on_the_way: deque[tuple[float, T]] = deque()
+        self._on_the_way: deque[tuple[float, Item]] = deque()
 
-    def push(self, time: float, item: T) -> None:
+    def push(self, time: float, item: Item) -> None:
         """Send something at ``time`` (s)."""
         faults = self._faults
         if faults.silence > 0.0 or self._random.random() < faults.loss:
@@ -36,7 +37,7 @@ class Channel(Generic[T]):
             due = max(due, self._on_the_way[-1][0])
         self._on_the_way.append((due, item))
 
-    def pop(self, time: float) -> list[T]:
+    def pop(self, time: float) -> list[Item]:
         """Return what has arrived at ``time`` (s), oldest first."""
         arrived = []
         while self._on_the_way and self._on_the_way[0][0] <= time:

@@ -2,14 +2,14 @@
 
 import random
 import select
-import threading
 import time
 from collections.abc import Callable
 
-from crazyflie_virtual.faults import FaultSwitches
+from typing_extensions import override
+
 from crazyflie_virtual.link.channel import Channel
-from crazyflie_virtual.link.sockets import Address, open_socket, received, send
 from crazyflie_virtual.observer import Observation
+from crazyflie_virtual.server import Address, Server, open_socket, received, send
 from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 
@@ -23,7 +23,7 @@ _NULL = b"\xff"
 """What a scanner sends: it is no client."""
 
 
-class VehicleServer:
+class VehicleServer(Server):
     """A vehicle behind a socket.
 
     Parameters
@@ -46,55 +46,36 @@ class VehicleServer:
 
     def __init__(self, settings: VehicleSettings, warn: Callable[[str], None] = lambda text: None):
         self._socket = open_socket(settings.host, settings.port)
+        super().__init__(self._socket)
         self.address = self._socket.getsockname()
         self._warn = warn
         self.vehicle = VirtualVehicle(settings)
+        self.switches = self.vehicle.faults
         source = random.Random(settings.seed)
-        self._up = Channel[tuple[bytes, Address]](self.vehicle.faults, source)
-        self._down = Channel[tuple[bytes, Address]](self.vehicle.faults, source)
+        self._up = Channel(self.vehicle.faults, source)
+        self._down = Channel(self.vehicle.faults, source)
         self._client: Address | None = None
-        self._begin = self._last_turn = time.monotonic()
+        self._begin = self._last_time = time.monotonic()
         self._observer = (settings.observer_host, settings.observer_port)
         self._observation_period = 1.0 / settings.observer_rate
         self._next_observation = self._begin
         number = _number(self.address[1])
         self._body_id = settings.body_id or number
         self._body_name = settings.body_name or f"cf{number}"
-        self._is_stopping = False
-        self._thread: threading.Thread | None = None
 
     @property
+    @override
     def description(self) -> str:
-        """Where clients find the vehicle."""
         host, port = self.address
         return f"virtual Crazyflie at udp://{host}:{port}"
 
-    @property
-    def switches(self) -> FaultSwitches:
-        """The vehicle's fault switches."""
-        return self.vehicle.faults
-
-    def start(self) -> None:
-        """Run in a thread of its own until `stop`."""
-        self._thread = threading.Thread(target=self.run, name="virtual_crazyflie", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End, and close the port."""
-        self._is_stopping = True
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(timeout=2.0)
-        self._socket.close()
-
-    def run(self) -> None:
-        """Serve until `stop`."""
-        while not self._is_stopping:
-            now = time.monotonic()
-            self._turn(now)
-            arrival = min(self._up.next_arrival(), self._down.next_arrival())
-            wake = min(now - (now - self._begin) % _TICK + _TICK, arrival)
-            wait = max(0.0, wake - time.monotonic())
-            select.select([self._socket], [], [], wait)
+    @override
+    def serve(self) -> None:
+        now = time.monotonic()
+        self._process(now)
+        arrival = min(self._up.next_arrival(), self._down.next_arrival())
+        wake = min(now - (now - self._begin) % _TICK + _TICK, arrival)
+        select.select([self._socket], [], [], max(0.0, wake - time.monotonic()))
 
     def observe(self) -> Observation:
         """Return the truth about the vehicle, as of now."""
@@ -109,14 +90,15 @@ class VehicleServer:
             physics.rates,
         )
 
-    def _turn(self, now):
-        self.vehicle.faults.pass_time(now - self._last_turn)
-        self._last_turn = now
+    def _process(self, now):
+        self.vehicle.faults.pass_time(now - self._last_time)
+        self._last_time = now
         for item in received(self._socket):
             self._up.push(now, item)
         lag = now - self._begin - self.vehicle.time
         if lag > _GREATEST_LAG:
             self._begin += lag
+            self._next_observation += lag
             self._warn(f"the machine is too slow: the vehicle has lost {lag:.2f} s")
         for datagram in self.vehicle.advance_to(now - self._begin):
             if self._client is not None:

@@ -49,20 +49,6 @@ class BodyPose(NamedTuple):
     is_tracked: bool
 
 
-class Stamps(NamedTuple):
-    """When a frame came to be, s of the server's clock.
-
-    Attributes
-    ----------
-    exposure, received, sent : float
-        Middle of the cameras' exposure, arrival of their data, dispatch of the frame.
-    """
-
-    exposure: float
-    received: float
-    sent: float
-
-
 def parse(datagram: bytes) -> tuple[int, bytes] | None:
     """Return number and payload of a message; None when it is none."""
     if len(datagram) < _HEADER.size:
@@ -116,7 +102,14 @@ class Encoder:
             payload += description
         return _message(MODEL, payload)
 
-    def frame(self, number: int, bodies: Sequence[BodyPose], stamps: Stamps) -> bytes:
+    def frame(
+        self,
+        number: int,
+        bodies: Sequence[BodyPose],
+        exposure: float,
+        received: float,
+        sent: float,
+    ) -> bytes:
         """Return a frame.
 
         Parameters
@@ -124,24 +117,26 @@ class Encoder:
         number : int
             Of the frame.
         bodies : sequence of BodyPose
-        stamps : Stamps
+        exposure, received, sent : float
+            Middle of the cameras' exposure, arrival of their data, dispatch of the frame; s
+            of the server's clock.
         """
         rigid_bodies = b"".join(self._rigid_body(body) for body in bodies)
-        sections = [(0, b""), (0, b""), (len(bodies), rigid_bodies), (0, b"")]
-        if self._parts >= (4, 1):
-            # Assets.
-            sections.append((0, b""))
-        # Labelled markers, force plates, devices.
-        sections += [(0, b"")] * (3 if self._parts >= (2, 11) else 2)
+        # Behind the rigid bodies skeletons, assets from 4.1 on, labelled markers, force plates,
+        # and devices from 2.11 on.
+        empty = (0, b"")
+        behind = 3 + (self._parts >= (2, 11)) + (self._parts >= (4, 1))
+        sections = [empty, empty, (len(bodies), rigid_bodies), *[empty] * behind]
         payload = struct.pack("<i", number)
         for count, content in sections:
             payload += struct.pack("<i", count)
             if self._parts >= (4, 1):
                 payload += struct.pack("<i", len(content))
             payload += content
-        payload += struct.pack("<IId", 0, 0, stamps.exposure)
+        payload += struct.pack("<IId", 0, 0, exposure)
         if self._parts >= (3, 0):
-            payload += struct.pack("<3Q", *(round(s * CLOCK_FREQUENCY) for s in stamps))
+            stamps = (round(s * CLOCK_FREQUENCY) for s in (exposure, received, sent))
+            payload += struct.pack("<3Q", *stamps)
         if self._parts >= (4, 1):
             # Precision time stamp, in seconds and their fraction: zeros without PTP.
             payload += struct.pack("<II", 0, 0)

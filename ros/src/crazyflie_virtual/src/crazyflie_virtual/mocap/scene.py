@@ -1,21 +1,23 @@
 """What the cameras see of the virtual vehicles."""
 
-import math
 import random
+from dataclasses import dataclass
 
 from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_virtual.mocap.natnet import BodyPose
 from crazyflie_virtual.observer import Observation
+from crazyflie_virtual.quaternions import turned
 
 _STALE = 0.5
 """How long after the last observation a body counts as gone, s."""
 
 
+@dataclass
 class MocapSwitches:
     """What can be made to go wrong, at any time.
 
-    Parameters
+    Attributes
     ----------
     dropout : float
         Probability with which a body is not tracked in a frame.
@@ -25,10 +27,9 @@ class MocapSwitches:
         Whether frames are held back.
     """
 
-    def __init__(self, dropout: float = 0.0, invalid: str = "", silent: bool = False):
-        self.dropout = dropout
-        self.invalid = invalid
-        self.silent = silent
+    dropout: float = 0.0
+    invalid: str = ""
+    silent: bool = False
 
     def hides(self, body_id: int) -> bool:
         """Return whether a body is one of those that are not tracked."""
@@ -72,10 +73,7 @@ class Scene:
     def bodies(self, time: float) -> list[BodyPose]:
         """Return every body as it is seen at ``time`` (s), in the order of their numbers.
 
-        Returns
-        -------
-        list of BodyPose
-            A body that is not tracked has the pose it was seen at last.
+        A body that is not tracked has the pose it was seen at last.
         """
         return [self._see(self._observations[i], time) for i in sorted(self._observations)]
 
@@ -103,13 +101,5 @@ def _extrapolate(observation, time):
     position = tuple(
         p + v * dt for p, v in zip(observation.position, observation.velocity, strict=True)
     )
-    x, y, z, w = observation.quaternion
-    a, b, c = (0.5 * dt * rate for rate in observation.rates)
-    turned = (
-        x + w * a + y * c - z * b,
-        y + w * b + z * a - x * c,
-        z + w * c + x * b - y * a,
-        w - x * a - y * b - z * c,
-    )
-    norm = math.hypot(*turned)
-    return position, tuple(part / norm for part in turned)
+    half_angles = (0.5 * dt * rate for rate in observation.rates)
+    return position, turned(observation.quaternion, *half_angles)

@@ -2,17 +2,18 @@
 
 import select
 import socket
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
 
-from crazyflie_virtual.link.sockets import Address, open_socket, received, send
+from typing_extensions import override
+
 from crazyflie_virtual.mocap import natnet
-from crazyflie_virtual.mocap.natnet import BodyPose, Encoder, Stamps
+from crazyflie_virtual.mocap.natnet import BodyPose, Encoder
 from crazyflie_virtual.mocap.scene import Scene
 from crazyflie_virtual.mocap.settings import MocapSettings
 from crazyflie_virtual.observer import decode
+from crazyflie_virtual.server import Address, Server, open_socket, received, send
 
 _CLIENT_LIMIT = 5.0
 """How long after its last message a client is sent frames, s."""
@@ -21,7 +22,7 @@ _LONGEST_WAIT = 0.1
 """s."""
 
 
-class MocapServer:
+class MocapServer(Server):
     """Streams what a `Scene` shows.
 
     Parameters
@@ -48,9 +49,8 @@ class MocapServer:
         self._settings = settings
         _check_address("multicast_address", settings.multicast_address)
         self.switches = settings.switches()
-        self._scene = Scene(
-            self.switches, settings.position_noise, settings.attitude_noise, settings.seed
-        )
+        noise = (settings.position_noise, settings.attitude_noise)
+        self._scene = Scene(self.switches, *noise, settings.seed)
         self._encoder = Encoder(settings.version)
         self._commands = open_socket(settings.host, settings.command_port)
         try:
@@ -58,6 +58,7 @@ class MocapServer:
         except OSError:
             self._commands.close()
             raise
+        super().__init__(self._commands, self._observations)
         self.address = self._commands.getsockname()
         self.observer_port = self._observations.getsockname()[1]
         if settings.multicast:
@@ -68,44 +69,28 @@ class MocapServer:
         self._begin = time.monotonic()
         self._frames = 0
         self._pending: deque[tuple[float, float, int, list[BodyPose]]] = deque()
-        self._is_stopping = False
-        self._thread: threading.Thread | None = None
 
     @property
+    @override
     def description(self) -> str:
-        """Where clients find the server."""
         s = self._settings
         host, port = self.address
         way = f"multicast to {s.multicast_address}:{s.data_port}" if s.multicast else "unicast"
         return f"virtual motion capture: NatNet {s.version} at {host}:{port}, {way}"
 
-    def start(self) -> None:
-        """Run in a thread of its own until `stop`."""
-        self._thread = threading.Thread(target=self.run, name="virtual_mocap", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """End, and close the ports."""
-        self._is_stopping = True
-        if self._thread is not None and self._thread is not threading.current_thread():
-            self._thread.join(timeout=2.0)
-        self._commands.close()
-        self._observations.close()
-
-    def run(self) -> None:
-        """Serve until `stop`."""
-        while not self._is_stopping:
-            wake = self._begin + (self._frames + 1) * self._period
-            if self._pending:
-                wake = min(wake, self._pending[0][0])
-            wait = min(max(0.0, wake - time.monotonic()), _LONGEST_WAIT)
-            ready, _, _ = select.select([self._commands, self._observations], [], [], wait)
-            if self._observations in ready:
-                self._receive_observations()
-            if self._commands in ready:
-                self._receive_commands(time.monotonic())
-            self._expose(time.monotonic())
-            self._dispatch(time.monotonic())
+    @override
+    def serve(self) -> None:
+        wake = self._begin + (self._frames + 1) * self._period
+        if self._pending:
+            wake = min(wake, self._pending[0][0])
+        wait = min(max(0.0, wake - time.monotonic()), _LONGEST_WAIT)
+        ready, _, _ = select.select([self._commands, self._observations], [], [], wait)
+        if self._observations in ready:
+            self._receive_observations()
+        if self._commands in ready:
+            self._receive_commands(time.monotonic())
+        self._expose(time.monotonic())
+        self._dispatch(time.monotonic())
 
     def _receive_observations(self):
         for datagram, _ in received(self._observations):
@@ -152,7 +137,7 @@ class MocapServer:
     def _dispatch(self, now):
         while self._pending and self._pending[0][0] <= now:
             _, exposure, frame, bodies = self._pending.popleft()
-            message = self._encoder.frame(frame, bodies, Stamps(exposure, exposure, now))
+            message = self._encoder.frame(frame, bodies, exposure, exposure, now)
             for receiver in self._receivers(now):
                 send(self._commands, message, receiver)
 

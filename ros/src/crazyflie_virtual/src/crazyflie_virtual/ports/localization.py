@@ -3,9 +3,8 @@
 import math
 import struct
 
-from crazyflie_virtual.firmware.compressed import decompress_quaternion
 from crazyflie_virtual.firmware.firmware import Firmware
-from crazyflie_virtual.link.crtp import Packet, Port
+from crazyflie_virtual.quaternions import decompress_quaternion
 from crazyflie_virtual.tables.memories import LighthouseMemory
 
 _POSITION, _GENERIC, _PACKED_POSITIONS = 0, 1, 2
@@ -28,31 +27,28 @@ class LocalizationPort:
     lighthouse : LighthouseMemory
     """
 
-    port = Port.LOCALIZATION
-
     def __init__(self, firmware: Firmware, address: int, lighthouse: LighthouseMemory):
         self._firmware = firmware
         self._address = address
         self._lighthouse = lighthouse
 
-    def handle(self, packet: Packet) -> list[Packet]:
-        """Take a measurement; only to storing lighthouse data there is an answer."""
-        data = packet.data
-        if packet.channel == _POSITION and len(data) == 12:
+    def handle(self, channel: int, data: bytes) -> bytes | None:
+        """Process a measurement; only to storing lighthouse data there is an answer."""
+        if channel == _POSITION and len(data) == 12:
             self._take_position(struct.unpack("<fff", data))
-        elif packet.channel == _PACKED_POSITIONS:
+        elif channel == _PACKED_POSITIONS:
             for values in _each(_PACKED_POSITION, data):
                 if values[0] == self._address:
                     self._take_position([part / 1000.0 for part in values[1:]])
-        elif packet.channel == _GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
+        elif channel == _GENERIC and len(data) == 5 and data[0] == _STORE_LIGHTHOUSE:
             done = self._lighthouse.store(*struct.unpack_from("<HH", data, 1))
-            return [Packet(self.port, _GENERIC, bytes([_STORE_LIGHTHOUSE, done]))]
-        elif packet.channel == _GENERIC and data:
+            return bytes([_STORE_LIGHTHOUSE, done])
+        elif channel == _GENERIC and data:
             self._generic(data[0], data[1:])
         else:
-            text = f"LOC: nothing done with {len(data)} bytes on channel {packet.channel}"
+            text = f"LOC: nothing done with {len(data)} bytes on channel {channel}"
             self._firmware.warn("location", text)
-        return []
+        return None
 
     def _generic(self, command, data):
         supervisor = self._firmware.supervisor

@@ -8,7 +8,7 @@ from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.tables.log_table import log_variables
 from crazyflie_virtual.tables.number_types import LOG_CODES, LOG_TYPES, NumberType
-from crazyflie_virtual.tables.toc import Entry, Table
+from crazyflie_virtual.tables.toc import Table
 
 MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
 """Blocks at one time, variables in all of them, bytes of values in one."""
@@ -33,36 +33,26 @@ class _Block:
 
 
 class LogPort:
-    """Sends the values of variables that the client asks for, periodically.
-
-    Parameters
-    ----------
-    firmware : Firmware
-        Where the values are.
-    """
-
-    port = Port.LOG
+    """Sends the values of variables that the client asks for, periodically."""
 
     def __init__(self, firmware: Firmware):
         self._firmware = firmware
         self._variables = log_variables()
-        entries = [Entry(v.group, v.name, LOG_CODES[v.number_type]) for v in self._variables]
+        entries = [(v.group, v.name, LOG_CODES[v.number_type]) for v in self._variables]
         self.table = Table(entries, bytes([MAX_BLOCKS, MAX_VARIABLES]))
         self._blocks: dict[int, _Block] = {}
         self._due: int | None = None
         self._once: list[_Block] = []
 
-    def handle(self, packet: Packet) -> list[Packet]:
-        """Return the answers to a packet."""
-        if packet.channel == _TABLE:
-            answer = self.table.answer(packet.data)
-            return [] if answer is None else [Packet(Port.LOG, _TABLE, answer)]
-        if packet.channel == _CONTROL and packet.data:
-            command, rest = packet.data[0], packet.data[1:]
+    def handle(self, channel: int, data: bytes) -> bytes | None:
+        """Return the data of the answer; None for no answer."""
+        if channel == _TABLE:
+            return self.table.answer(data)
+        if channel == _CONTROL and data:
+            command, rest = data[0], data[1:]
             block_id = rest[0] if rest else 0
-            error = self._control(command, block_id, rest[1:])
-            return [Packet(Port.LOG, _CONTROL, bytes([command, block_id, error]))]
-        return []
+            return bytes([command, block_id, self._control(command, block_id, rest[1:])])
+        return None
 
     def collect(self) -> list[Packet]:
         """Return the packets with values that are due."""

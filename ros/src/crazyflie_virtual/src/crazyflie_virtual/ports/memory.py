@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 from crazyflie_virtual.firmware.assertion import FirmwareAssertionError
 from crazyflie_virtual.firmware.console import Warn
-from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.tables.memories import Memory
 
 _INFO, _READ, _WRITE = 0, 1, 2
@@ -27,18 +26,14 @@ class MemoryPort:
         See `Console.warn`.
     """
 
-    port = Port.MEMORY
-
     def __init__(self, memories: Iterable[Memory], warn: Warn):
         self._memories = tuple(memories)
         self._warn = warn
 
-    def handle(self, packet: Packet) -> list[Packet]:
-        """Return the answers to a packet."""
+    def handle(self, channel: int, data: bytes) -> bytes | None:
+        """Return the data of the answer; None for no answer."""
         handlers = {_INFO: self._info, _READ: self._read, _WRITE: self._write}
-        handler = handlers.get(packet.channel, self._unknown)
-        answer = handler(packet.data)
-        return [] if answer is None else [Packet(Port.MEMORY, packet.channel, answer)]
+        return handlers.get(channel, self._unknown)(data)
 
     def _info(self, data):
         if data[:1] == bytes([_COUNT]):
@@ -75,7 +70,6 @@ class MemoryPort:
         content = data[5:]
         done = number < len(self._memories) and self._memories[number].write(address, content)
         if not done:
-            self._warn(
-                "memory", f"MEM: {number} has no {len(content)} bytes at {address:#x} to write"
-            )
+            text = f"MEM: {number} has no {len(content)} bytes at {address:#x} to write"
+            self._warn("memory", text)
         return data[:5] + bytes([0 if done else errno.EIO])

@@ -5,10 +5,10 @@ import struct
 from operator import attrgetter
 
 from crazyflie_virtual.firmware.firmware import Firmware
-from crazyflie_virtual.link.crtp import MAX_DATA, Packet, Port
+from crazyflie_virtual.link.crtp import MAX_DATA
 from crazyflie_virtual.tables.number_types import PARAMETER_CODES, PARAMETER_TYPES
 from crazyflie_virtual.tables.parameter_table import NO_LIMITS, ParameterSpec, parameter_specs
-from crazyflie_virtual.tables.toc import Entry, Table
+from crazyflie_virtual.tables.toc import Table
 
 _TABLE, _READ, _WRITE, _MISC = 0, 1, 2, 3
 
@@ -24,15 +24,11 @@ _PERSISTENT = 1
 _EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40
 """Flags beside the type's code."""
 
+_NO_ENTRY = bytes([errno.ENOENT])
+
 
 class Parameter:
-    """A parameter of a firmware that runs.
-
-    Parameters
-    ----------
-    spec : ParameterSpec
-    firmware : Firmware
-    """
+    """A parameter of a firmware that runs."""
 
     def __init__(self, spec: ParameterSpec, firmware: Firmware):
         self.spec = spec
@@ -90,8 +86,6 @@ class ParameterPort:
         Full name -> value; outlives a restart of the vehicle. Applied at once.
     """
 
-    port = Port.PARAMETERS
-
     def __init__(self, firmware: Firmware, stored: dict[str, float]):
         self._parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
         self._stored = stored
@@ -99,22 +93,17 @@ class ParameterPort:
         for parameter in self._parameters:
             if parameter.full_name in stored:
                 parameter.set(stored[parameter.full_name])
-        self.table = Table([Entry(p.spec.group, p.spec.name, p.code) for p in self._parameters])
+        self.table = Table([(p.spec.group, p.spec.name, p.code) for p in self._parameters])
 
-    def handle(self, packet: Packet) -> list[Packet]:
-        """Return the answers to a packet."""
-        data = packet.data
-        if packet.channel == _TABLE:
-            answer = self.table.answer(data)
-        elif packet.channel == _MISC:
-            answer = self._misc(data)
-        elif len(data) < 2:
-            answer = None
-        elif packet.channel == _READ:
-            answer = self._read(data)
-        else:
-            answer = self._write(data)
-        return [] if answer is None else [Packet(Port.PARAMETERS, packet.channel, answer)]
+    def handle(self, channel: int, data: bytes) -> bytes | None:
+        """Return the data of the answer; None for no answer."""
+        if channel == _TABLE:
+            return self.table.answer(data)
+        if channel == _MISC:
+            return self._misc(data)
+        if len(data) < 2:
+            return None
+        return self._read(data) if channel == _READ else self._write(data)
 
     def _find(self, data, at=0):
         (index,) = struct.unpack_from("<H", data, at)
@@ -123,14 +112,14 @@ class ParameterPort:
     def _read(self, data):
         parameter = self._find(data)
         if parameter is None:
-            return data[:2] + bytes([errno.ENOENT])
+            return data[:2] + _NO_ENTRY
         return data[:2] + b"\0" + parameter.spec.number_type.pack(parameter.value)
 
     def _write(self, data):
         parameter = self._find(data)
         if parameter is None:
             self._warn("parameter", f"PARAM: there is none with the number {data[:2].hex()}")
-            return data[:2] + bytes([errno.ENOENT])
+            return data[:2] + _NO_ENTRY
         if parameter.spec.read_only:
             self._warn(parameter.full_name, f"PARAM: {parameter.full_name} is read-only")
             return None
@@ -155,12 +144,12 @@ class ParameterPort:
             return None
         if data[0] == _SET_BY_NAME:
             return self._set_by_name(data)
-        handler = _MISC_HANDLERS.get(data[0])
-        if handler is None or len(data) < 3:
+        if data[0] not in _MISC_HANDLERS or len(data) < 3:
             self._warn("parameter command", f"PARAM: unknown command {data.hex()}")
             return None
         parameter = self._find(data, 1)
-        return data[:3] + handler(self, parameter)
+        answer = None if parameter is None else _MISC_HANDLERS[data[0]](self, parameter)
+        return data[:3] + (_NO_ENTRY if answer is None else answer)
 
     def _set_by_name(self, data):
         parts = data[1:].split(b"\0", 2)
@@ -181,45 +170,39 @@ class ParameterPort:
         names = data[: 1 + len(parts[0]) + 1 + len(parts[1]) + 1]
         return (names + bytes([error]))[:MAX_DATA]
 
-    def _extended_type(self, parameter):
-        is_extended = parameter is not None and parameter.spec.persistent
-        return bytes([_PERSISTENT if is_extended else errno.ENOENT])
+    # Answers to the other commands; None where the parameter does not have what is asked for.
 
-    def _extended_type_2(self, parameter):
-        known = parameter is not None and parameter.spec.persistent
-        return (b"\0" if known else b"") + self._extended_type(parameter)
+    def _extended_type(self, parameter):
+        return bytes([_PERSISTENT]) if parameter.spec.persistent else None
 
     def _default(self, parameter):
-        if parameter is None or parameter.spec.read_only:
-            return bytes([errno.ENOENT])
-        return parameter.spec.number_type.pack(parameter.default)
-
-    def _default_2(self, parameter):
-        value = self._default(parameter)
-        known = parameter is not None and not parameter.spec.read_only
-        return (b"\0" if known else b"") + value
+        spec = parameter.spec
+        return None if spec.read_only else spec.number_type.pack(parameter.default)
 
     def _store(self, parameter):
-        if parameter is None or not parameter.spec.persistent:
-            return bytes([errno.ENOENT])
+        if not parameter.spec.persistent:
+            return None
         self._stored[parameter.full_name] = parameter.value
         return b"\0"
 
     def _clear(self, parameter):
-        if parameter is None or not parameter.spec.persistent:
-            return bytes([errno.ENOENT])
-        if self._stored.pop(parameter.full_name, None) is None:
-            return bytes([errno.ENOENT])
-        return b"\0"
+        return None if self._stored.pop(parameter.full_name, None) is None else b"\0"
 
     def _state(self, parameter):
-        if parameter is None:
-            return bytes([errno.ENOENT])
         number_type = parameter.spec.number_type
         default = number_type.pack(parameter.default)
         if parameter.full_name not in self._stored:
             return b"\0" + default
         return b"\1" + default + number_type.pack(self._stored[parameter.full_name])
+
+
+def _with_status(handler):
+    # The later commands put a 0 before an answer that is no error.
+    def handle(port, parameter):
+        answer = handler(port, parameter)
+        return None if answer is None else b"\0" + answer
+
+    return handle
 
 
 _MISC_HANDLERS = {
@@ -228,6 +211,6 @@ _MISC_HANDLERS = {
     _STATE: ParameterPort._state,
     _CLEAR: ParameterPort._clear,
     _DEFAULT: ParameterPort._default,
-    _EXTENDED_TYPE_2: ParameterPort._extended_type_2,
-    _DEFAULT_2: ParameterPort._default_2,
+    _EXTENDED_TYPE_2: _with_status(ParameterPort._extended_type),
+    _DEFAULT_2: _with_status(ParameterPort._default),
 }

@@ -1,17 +1,17 @@
 """The log variables: names and types of the firmware's, and where their values are."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from operator import attrgetter
+from typing import NamedTuple
 
 from crazyflie_virtual.firmware.firmware import Firmware
+from crazyflie_virtual.firmware.states import MOTION
 from crazyflie_virtual.tables.number_types import FLOAT, I8, I16, I32, U8, U16, U32, NumberType
+from crazyflie_virtual.tables.toc import pid_paths
 
 Read = Callable[[Firmware], float]
 """Returns a value."""
-
-Rows = list[tuple[str, NumberType, Read]]
-"""Name, type and value of some variables of a group."""
 
 
 class LogVariable(NamedTuple):
@@ -36,66 +36,33 @@ def log_variables() -> list[LogVariable]:
     return [LogVariable(group, *row) for group, rows in _GROUPS.items() for row in rows]
 
 
-def _constant(value: float) -> Read:
-    # Where the virtual vehicle has nothing to measure.
-    return lambda firmware: value
+def _rows(
+    number_type: NumberType, scale: float | None = None, /, **sources: str | float
+) -> list[tuple[str, NumberType, Read]]:
+    # Name -> path from the firmware, or a number where the virtual vehicle has nothing to measure.
+    def reader(source: str | float) -> Read:
+        if not isinstance(source, str):
+            return lambda firmware: source
+        read: Read = attrgetter(source)
+        return read if scale is None else lambda firmware: scale * read(firmware)
+
+    return [(name, number_type, reader(source)) for name, source in sources.items()]
 
 
-def _attributes(
-    number_type: NumberType,
-    names: Mapping[str, str] | Iterable[str],
-    owner: Callable[[Firmware], Any],
-    scale: float | None = None,
-) -> Rows:
-    # Attributes of a part of the firmware, under their own names or as name -> attribute.
-    def read(attribute: str) -> Read:
-        if scale is None:
-            return lambda firmware: getattr(owner(firmware), attribute)
-        return lambda firmware: scale * getattr(owner(firmware), attribute)
-
-    pairs = names.items() if isinstance(names, Mapping) else ((name, name) for name in names)
-    return [(name, number_type, read(attribute)) for name, attribute in pairs]
+def _of(owner: str, *names: str) -> dict[str, str]:
+    # Attributes under their own names.
+    return {name: f"{owner}.{name}" for name in names}
 
 
-def _pids(suffixes: Iterable[str], **pids: Callable[[Firmware], Any]) -> Rows:
-    # Outputs of PID controllers under the firmware's names, such as roll_outP.
-    attributes = dict(zip(suffixes, ("out_p", "out_i", "out_d", "out_ff"), strict=True))
-    return [
-        row
-        for axis, pid in pids.items()
-        for row in _attributes(FLOAT, {axis + s: a for s, a in attributes.items()}, pid)
-    ]
+def _pids(owner, suffixes, **pids):
+    outputs = dict(zip(suffixes, ("out_p", "out_i", "out_d", "out_ff"), strict=True))
+    return _rows(FLOAT, **dict(pid_paths(owner, pids, outputs)))
 
 
-def _estimate(firmware: Firmware) -> Any:
-    return firmware.estimate
+def _range(side: str) -> Read:
+    return lambda firmware: firmware.ranging.distance(side)
 
 
-def _setpoint(firmware: Firmware) -> Any:
-    return firmware.setpoint
-
-
-def _sensors(firmware: Firmware) -> Any:
-    return firmware.sensors
-
-
-def _stabilizer(firmware: Firmware) -> Any:
-    return firmware.stabilizer
-
-
-def _localization(firmware: Firmware) -> Any:
-    return firmware.localization
-
-
-def _motor(i: int) -> Read:
-    return lambda firmware: firmware.stabilizer.commands[i]
-
-
-def _motor_request(i: int) -> Read:
-    return lambda firmware: firmware.stabilizer.requested[i]
-
-
-_MOTION = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
 _ANGLES = ("roll", "pitch", "yaw")
 _QUATERNION = ("qx", "qy", "qz", "qw")
 
@@ -104,148 +71,139 @@ _POSITION_OUTPUTS = ("p", "i", "d", "ff")
 
 _RADIAN = math.pi / 180.0
 _MILLIRADIAN = 1000.0 * _RADIAN
+_STANDARD_GRAVITY = 9810.0
+"""mm/s^2."""
 
-_GROUPS: dict[str, Rows] = {
-    "stateEstimate": _attributes(FLOAT, (*_MOTION, *_ANGLES, *_QUATERNION), _estimate),
+_GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
+    "stateEstimate": _rows(FLOAT, **_of("estimate", *MOTION, *_ANGLES, *_QUATERNION)),
     "stateEstimateZ": [
-        *_attributes(I16, _MOTION[:6], _estimate, 1000.0),
-        *_attributes(I16, _MOTION[6:8], _estimate, 9810.0),
+        *_rows(I16, 1000.0, **_of("estimate", *MOTION[:6])),
+        *_rows(I16, _STANDARD_GRAVITY, **_of("estimate", "ax", "ay")),
         # With gravity, unlike stateEstimate.az.
-        ("az", I16, lambda f: 9810.0 * (f.estimate.az + 1.0)),
-        ("quat", U32, lambda f: f.estimate.compressed_quaternion),
-        ("rateRoll", I16, lambda f: _MILLIRADIAN * f.sensors.gyro_x),
-        ("ratePitch", I16, lambda f: -_MILLIRADIAN * f.sensors.gyro_y),
-        ("rateYaw", I16, lambda f: _MILLIRADIAN * f.sensors.gyro_z),
+        ("az", I16, lambda f: _STANDARD_GRAVITY * (f.estimate.az + 1.0)),
+        *_rows(U32, quat="estimate.compressed_quaternion"),
+        *_rows(I16, _MILLIRADIAN, rateRoll="sensors.gyro_x"),
+        *_rows(I16, -_MILLIRADIAN, ratePitch="sensors.gyro_y"),
+        *_rows(I16, _MILLIRADIAN, rateYaw="sensors.gyro_z"),
     ],
     "stabilizer": [
-        *_attributes(FLOAT, _ANGLES, _estimate),
-        ("thrust", FLOAT, lambda f: f.stabilizer.thrust),
-        ("rtStab", FLOAT, _constant(500.0)),
-        ("intToOut", U32, _constant(0)),
+        *_rows(FLOAT, **_of("estimate", *_ANGLES), thrust="stabilizer.thrust", rtStab=500.0),
+        *_rows(U32, intToOut=0),
     ],
-    "ctrltarget": [
-        *_attributes(FLOAT, (*_MOTION, "roll", "pitch"), _setpoint),
-        ("yaw", FLOAT, lambda f: f.setpoint.yaw_rate),
-    ],
-    "ctrltargetZ": _attributes(I16, _MOTION, _setpoint, 1000.0),
-    "acc": _attributes(FLOAT, {"x": "acc_x", "y": "acc_y", "z": "acc_z"}, _sensors),
-    "gyro": _attributes(FLOAT, {"x": "gyro_x", "y": "gyro_y", "z": "gyro_z"}, _sensors),
-    "mag": _attributes(FLOAT, {"x": "mag_x", "y": "mag_y", "z": "mag_z"}, _sensors),
-    "range": _attributes(
-        U16, ("front", "back", "up", "left", "right", "zrange"), lambda f: f.ranging
+    "ctrltarget": _rows(
+        FLOAT, **_of("setpoint", *MOTION, "roll", "pitch"), yaw="setpoint.yaw_rate"
     ),
-    "baro": [
-        ("asl", FLOAT, lambda f: f.sensors.asl),
-        ("temp", FLOAT, lambda f: f.sensors.temperature),
-        ("pressure", FLOAT, lambda f: f.sensors.pressure),
+    "ctrltargetZ": _rows(I16, 1000.0, **_of("setpoint", *MOTION)),
+    "acc": _rows(FLOAT, x="sensors.acc_x", y="sensors.acc_y", z="sensors.acc_z"),
+    "gyro": _rows(FLOAT, x="sensors.gyro_x", y="sensors.gyro_y", z="sensors.gyro_z"),
+    "mag": _rows(FLOAT, x="sensors.mag_x", y="sensors.mag_y", z="sensors.mag_z"),
+    "range": [
+        (side, U16, _range(side)) for side in ("front", "back", "up", "left", "right", "zrange")
     ],
+    "baro": _rows(
+        FLOAT, asl="sensors.asl", temp="sensors.temperature", pressure="sensors.pressure"
+    ),
     "pm": [
-        ("vbat", FLOAT, lambda f: f.power.voltage),
-        ("vbatMV", U16, lambda f: f.power.millivolts),
-        ("extVbat", FLOAT, _constant(0.0)),
-        ("extVbatMV", U16, _constant(0)),
-        ("extCurr", FLOAT, _constant(0.0)),
-        ("chargeCurrent", FLOAT, _constant(0.0)),
-        ("state", I8, lambda f: f.power.state),
-        ("batteryLevel", U8, lambda f: f.power.level),
+        *_rows(FLOAT, vbat="power.voltage"),
+        *_rows(U16, vbatMV="power.millivolts"),
+        *_rows(FLOAT, extVbat=0.0),
+        *_rows(U16, extVbatMV=0),
+        *_rows(FLOAT, extCurr=0.0, chargeCurrent=0.0),
+        *_rows(I8, state="power.state"),
+        *_rows(U8, batteryLevel="power.level"),
     ],
     "radio": [
-        ("rssi", U8, _constant(40)),
-        ("isConnected", U8, lambda f: f.link_statistics.is_connected),
-        ("numRxBc", U16, _constant(0)),
-        ("numRxUc", U16, lambda f: f.link_statistics.received),
+        *_rows(U8, rssi=40, isConnected="link_statistics.is_connected"),
+        *_rows(U16, numRxBc=0, numRxUc="link_statistics.received"),
     ],
     "motor": [
-        *((f"m{i + 1}", U16, _motor(i)) for i in range(4)),
-        *((f"m{i + 1}req", I32, _motor_request(i)) for i in range(4)),
+        *_rows(U16, **{f"m{i}": f"stabilizer.commands.m{i}" for i in range(1, 5)}),
+        *_rows(I32, **{f"m{i}req": f"stabilizer.requested.m{i}" for i in range(1, 5)}),
     ],
-    "supervisor": [("info", U16, lambda f: f.info)],
+    "supervisor": _rows(U16, info="info"),
     "sys": [
-        ("canfly", U8, lambda f: f.supervisor.can_fly),
-        ("isFlying", U8, lambda f: f.supervisor.is_flying),
-        ("isTumbled", U8, lambda f: f.supervisor.is_tumbled),
-        ("armed", I8, lambda f: f.supervisor.is_armed),
+        *_rows(
+            U8,
+            canfly="supervisor.can_fly",
+            isFlying="supervisor.is_flying",
+            isTumbled="supervisor.is_tumbled",
+        ),
+        *_rows(I8, armed="supervisor.is_armed"),
     ],
     "health": [
-        *((f"motorVar{a}M{i}", FLOAT, _constant(0.0)) for i in range(1, 5) for a in "XY"),
-        ("motorPass", U8, _constant(0)),
-        ("batterySag", FLOAT, _constant(0.0)),
-        ("batteryPass", U8, _constant(0)),
-        ("motorTestCount", U16, _constant(0)),
+        *_rows(FLOAT, **{f"motorVar{axis}M{i}": 0.0 for i in range(1, 5) for axis in "XY"}),
+        *_rows(U8, motorPass=0),
+        *_rows(FLOAT, batterySag=0.0),
+        *_rows(U8, batteryPass=0),
+        *_rows(U16, motorTestCount=0),
     ],
-    "ring": [("fadeTime", FLOAT, _constant(0.5))],
-    "kalman": [
-        *_attributes(FLOAT, {"stateX": "x", "stateY": "y", "stateZ": "z"}, _estimate),
-        *_attributes(FLOAT, {"statePX": "vx", "statePY": "vy", "statePZ": "vz"}, _estimate),
-        *((f"stateD{i}", FLOAT, _constant(0.0)) for i in range(3)),
-        *((f"var{a}", FLOAT, lambda f: f.estimator.variance_position) for a in "XYZ"),
-        *((f"varP{a}", FLOAT, lambda f: f.estimator.variance_velocity) for a in "XYZ"),
-        *((f"varD{i}", FLOAT, lambda f: f.estimator.variance_attitude) for i in range(3)),
-        *_attributes(FLOAT, {"q0": "qw", "q1": "qx", "q2": "qy", "q3": "qz"}, _estimate),
-        ("rtUpdate", FLOAT, _constant(100.0)),
-        ("rtPred", FLOAT, _constant(500.0)),
-        ("rtFinal", FLOAT, _constant(500.0)),
-    ],
-    "locSrv": _attributes(FLOAT, ("x", "y", "z", *_QUATERNION), _localization),
-    "locSrvZ": [("tick", U16, lambda f: f.localization.milliseconds)],
-    "ext_pos": _attributes(FLOAT, {"X": "x", "Y": "y", "Z": "z"}, _localization),
+    "ring": _rows(FLOAT, fadeTime=0.5),
+    "kalman": _rows(
+        FLOAT,
+        **{"stateX": "estimate.x", "stateY": "estimate.y", "stateZ": "estimate.z"},
+        **{"statePX": "estimate.vx", "statePY": "estimate.vy", "statePZ": "estimate.vz"},
+        **{f"stateD{i}": 0.0 for i in range(3)},
+        **{f"var{axis}": "estimator.variance_position" for axis in "XYZ"},
+        **{f"varP{axis}": "estimator.variance_velocity" for axis in "XYZ"},
+        **{f"varD{i}": "estimator.variance_attitude" for i in range(3)},
+        **{"q0": "estimate.qw", "q1": "estimate.qx", "q2": "estimate.qy", "q3": "estimate.qz"},
+        **{"rtUpdate": 100.0, "rtPred": 500.0, "rtFinal": 500.0},
+    ),
+    "locSrv": _rows(FLOAT, **_of("localization", "x", "y", "z", *_QUATERNION)),
+    "locSrvZ": _rows(U16, tick="localization.milliseconds"),
+    "ext_pos": _rows(FLOAT, X="localization.x", Y="localization.y", Z="localization.z"),
     "controller": [
-        ("cmd_thrust", FLOAT, lambda f: f.stabilizer.thrust),
-        ("cmd_roll", FLOAT, lambda f: f.stabilizer.command_roll),
-        ("cmd_pitch", FLOAT, lambda f: f.stabilizer.command_pitch),
-        ("cmd_yaw", FLOAT, lambda f: -f.stabilizer.command_yaw),
-        ("r_roll", FLOAT, lambda f: _RADIAN * f.sensors.gyro_x),
-        ("r_pitch", FLOAT, lambda f: -_RADIAN * f.sensors.gyro_y),
-        ("r_yaw", FLOAT, lambda f: _RADIAN * f.sensors.gyro_z),
-        ("accelz", FLOAT, lambda f: f.sensors.acc_z),
-        ("actuatorThrust", FLOAT, lambda f: f.stabilizer.thrust),
-        *_attributes(FLOAT, _ANGLES, _stabilizer),
-        ("rollRate", FLOAT, lambda f: f.stabilizer.roll_rate),
-        ("pitchRate", FLOAT, lambda f: f.stabilizer.pitch_rate),
-        ("yawRate", FLOAT, lambda f: f.stabilizer.yaw_rate),
-        ("ctr_yaw", I16, lambda f: -f.stabilizer.command_yaw),
+        *_rows(
+            FLOAT,
+            cmd_thrust="stabilizer.thrust",
+            cmd_roll="stabilizer.command_roll",
+            cmd_pitch="stabilizer.command_pitch",
+        ),
+        *_rows(FLOAT, -1.0, cmd_yaw="stabilizer.command_yaw"),
+        *_rows(FLOAT, _RADIAN, r_roll="sensors.gyro_x"),
+        *_rows(FLOAT, -_RADIAN, r_pitch="sensors.gyro_y"),
+        *_rows(FLOAT, _RADIAN, r_yaw="sensors.gyro_z"),
+        *_rows(
+            FLOAT,
+            accelz="sensors.acc_z",
+            actuatorThrust="stabilizer.thrust",
+            **_of("stabilizer", *_ANGLES),
+            rollRate="stabilizer.roll_rate",
+            pitchRate="stabilizer.pitch_rate",
+            yawRate="stabilizer.yaw_rate",
+        ),
+        *_rows(I16, -1.0, ctr_yaw="stabilizer.command_yaw"),
     ],
     "pid_attitude": _pids(
-        _ATTITUDE_OUTPUTS,
-        roll=lambda f: f.stabilizer.attitude.roll,
-        pitch=lambda f: f.stabilizer.attitude.pitch,
-        yaw=lambda f: f.stabilizer.attitude.yaw,
+        "stabilizer.attitude", _ATTITUDE_OUTPUTS, roll="roll", pitch="pitch", yaw="yaw"
     ),
     "pid_rate": _pids(
+        "stabilizer.attitude",
         _ATTITUDE_OUTPUTS,
-        roll=lambda f: f.stabilizer.attitude.roll_rate,
-        pitch=lambda f: f.stabilizer.attitude.pitch_rate,
-        yaw=lambda f: f.stabilizer.attitude.yaw_rate,
+        roll="roll_rate",
+        pitch="pitch_rate",
+        yaw="yaw_rate",
     ),
     "posCtl": [
-        ("targetVX", FLOAT, lambda f: f.stabilizer.position.vx.desired),
-        ("targetVY", FLOAT, lambda f: f.stabilizer.position.vy.desired),
-        ("targetVZ", FLOAT, lambda f: f.stabilizer.position.vz.desired),
-        ("targetX", FLOAT, lambda f: f.stabilizer.position.x.desired),
-        ("targetY", FLOAT, lambda f: f.stabilizer.position.y.desired),
-        ("targetZ", FLOAT, lambda f: f.stabilizer.position.z.desired),
-        ("bodyVX", FLOAT, lambda f: f.stabilizer.position.body_vx),
-        ("bodyVY", FLOAT, lambda f: f.stabilizer.position.body_vy),
-        ("bodyX", FLOAT, lambda f: f.stabilizer.position.body_x),
-        ("bodyY", FLOAT, lambda f: f.stabilizer.position.body_y),
+        *_rows(
+            FLOAT,
+            **{
+                f"target{pid.upper()}": f"stabilizer.position.{pid}.desired"
+                for pid in ("vx", "vy", "vz", "x", "y", "z")
+            },
+            bodyVX="stabilizer.position.body_vx",
+            bodyVY="stabilizer.position.body_vy",
+            bodyX="stabilizer.position.body_x",
+            bodyY="stabilizer.position.body_y",
+        ),
         *_pids(
+            "stabilizer.position",
             _POSITION_OUTPUTS,
-            X=lambda f: f.stabilizer.position.x,
-            Y=lambda f: f.stabilizer.position.y,
-            Z=lambda f: f.stabilizer.position.z,
-            VX=lambda f: f.stabilizer.position.vx,
-            VY=lambda f: f.stabilizer.position.vy,
-            VZ=lambda f: f.stabilizer.position.vz,
+            **{pid.upper(): pid for pid in ("x", "y", "z", "vx", "vy", "vz")},
         ),
     ],
-    "lighthouse": [
-        (name, U16, _constant(0))
-        for name in ("bsReceive", "bsActive", "bsAvailable", "bsGeoVal", "bsCalVal")
-    ],
-    "memTst": [("errCntW", U32, lambda f: f.memory_tester.errors)],
-    "crtp": [
-        ("rxRate", U16, lambda f: f.link_statistics.received_rate),
-        ("txRate", U16, lambda f: f.link_statistics.sent_rate),
-    ],
+    "lighthouse": _rows(U16, bsReceive=0, bsActive=0, bsAvailable=0, bsGeoVal=0, bsCalVal=0),
+    "memTst": _rows(U32, errCntW="memory_tester.errors"),
+    "crtp": _rows(U16, rxRate="link_statistics.received_rate", txRate="link_statistics.sent_rate"),
 }
 """Group -> (name, type, value)."""

@@ -1,8 +1,9 @@
 """The memories of the vehicle that a client can read and write."""
 
 import struct
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable
+
+from typing_extensions import override
 
 EEPROM, ONE_WIRE, LED_RING, TRAJECTORY, LIGHTHOUSE = 0x00, 0x01, 0x10, 0x12, 0x14
 TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19
@@ -23,59 +24,48 @@ LED_TIMINGS_SIZE = 40
 """Ten steps of 4 bytes."""
 
 
-@dataclass(frozen=True)
 class Memory:
     """One memory.
 
-    Attributes
+    Parameters
     ----------
-    type : int
-    size : int
-        Bytes.
-    read : callable
-        ``read(address, count)`` returns bytes; None where there is no such address.
-    write : callable
-        ``write(address, data)`` returns whether there is such an address.
+    memory_type : int
+    buffer : bytes or bytearray
+        The content; bytes cannot be written.
     serial : bytes
         8 bytes.
+    size : int, optional
+        What clients see, bytes; that of the buffer by default.
     """
 
-    type: int
-    size: int
-    read: Callable[[int, int], bytes | None]
-    write: Callable[[int, bytes], bool]
-    serial: bytes = NO_SERIAL
+    def __init__(
+        self,
+        memory_type: int,
+        buffer: bytes | bytearray,
+        serial: bytes = NO_SERIAL,
+        size: int | None = None,
+    ):
+        self.type = memory_type
+        self.serial = serial
+        self.size = len(buffer) if size is None else size
+        self._buffer = buffer
 
-    @classmethod
-    def over(cls, memory_type: int, buffer: bytearray, serial: bytes = NO_SERIAL) -> "Memory":
-        """Return the memory of a type that is a buffer."""
+    def read(self, address: int, count: int) -> bytes | None:
+        """Return ``count`` bytes; None where there is no such address."""
+        end = address + count
+        return bytes(self._buffer[address:end]) if end <= len(self._buffer) else None
 
-        def write(address, data):
-            return write_into(buffer, address, data)
-
-        def read(address, count):
-            return read_from(buffer, address, count)
-
-        return cls(memory_type, len(buffer), read, write, serial)
-
-
-def read_from(buffer: bytes | bytearray, address: int, count: int) -> bytes | None:
-    """Return ``count`` bytes of a buffer; None where it has none."""
-    end = address + count
-    return bytes(buffer[address:end]) if end <= len(buffer) else None
-
-
-def write_into(buffer: bytearray, address: int, data: bytes) -> bool:
-    """Write into a buffer; return whether it goes so far."""
-    end = address + len(data)
-    if end > len(buffer):
-        return False
-    buffer[address:end] = data
-    return True
+    def write(self, address: int, data: bytes) -> bool:
+        """Write; return whether there is such an address."""
+        end = address + len(data)
+        if isinstance(self._buffer, bytes) or end > len(self._buffer):
+            return False
+        self._buffer[address:end] = data
+        return True
 
 
-class MemoryTester:
-    """A memory that holds its addresses: reading gives them, writing is compared with them.
+class MemoryTester(Memory):
+    """A memory that holds its addresses; what is written is compared with them.
 
     Attributes
     ----------
@@ -84,6 +74,7 @@ class MemoryTester:
     """
 
     def __init__(self) -> None:
+        super().__init__(TESTER, bytes(address & 0xFF for address in range(_TESTER_SIZE)))
         self.errors = 0
 
     @property
@@ -96,24 +87,16 @@ class MemoryTester:
         if value:
             self.errors = 0
 
-    def memory(self) -> Memory:
-        """Return the memory."""
-        return Memory(TESTER, _TESTER_SIZE, self._read, self._write)
-
-    def _read(self, address, count):
-        if address + count > _TESTER_SIZE:
-            return None
-        return bytes(a & 0xFF for a in range(address, address + count))
-
-    def _write(self, address, data):
-        expected = self._read(address, len(data))
+    @override
+    def write(self, address: int, data: bytes) -> bool:
+        expected = self.read(address, len(data))
         if expected is None:
             return False
         self.errors += sum(a != b for a, b in zip(data, expected, strict=True))
         return True
 
 
-class LighthouseMemory:
+class LighthouseMemory(Memory):
     """Geometry and calibration of base stations; kept, but nothing is located with them.
 
     Parameters
@@ -131,45 +114,44 @@ class LighthouseMemory:
     _CALIBRATION_SIZE = 61
 
     def __init__(self, stored: dict[int, bytes]):
+        size = self._CALIBRATION_PAGE * self._PAGE_SIZE + self.STATIONS * self._CALIBRATION_SIZE
+        super().__init__(LIGHTHOUSE, b"", size=size)
         self._stored = stored
         sizes = ((0, self._GEOMETRY_SIZE), (self._CALIBRATION_PAGE, self._CALIBRATION_SIZE))
         self._pages = {
-            first + i: bytearray(stored.get(first + i, bytes(size)))
+            first + i: Memory(LIGHTHOUSE, bytearray(stored.get(first + i, bytes(size))))
             for first, size in sizes
             for i in range(self.STATIONS)
         }
 
-    def memory(self) -> Memory:
-        """Return the memory."""
-        size = self._CALIBRATION_PAGE * self._PAGE_SIZE + self.STATIONS * self._CALIBRATION_SIZE
-        return Memory(LIGHTHOUSE, size, self._read, self._write)
-
     def store(self, geometries: int, calibrations: int) -> bool:
         """Keep what is marked in two bit masks over a restart; return whether all was there."""
         masks = ((0, geometries), (self._CALIBRATION_PAGE, calibrations))
-        pages = [first + i for first, mask in masks for i in range(16) if mask >> i & 1]
-        for page in pages:
-            if page in self._pages:
-                self._stored[page] = bytes(self._pages[page])
-        return all(page in self._pages for page in pages)
+        marked = [first + i for first, mask in masks for i in range(16) if mask >> i & 1]
+        pages = {number: self._pages[number] for number in marked if number in self._pages}
+        for number, page in pages.items():
+            self._stored[number] = page.read(0, page.size) or b""
+        return len(pages) == len(marked)
 
-    def _read(self, address, count):
+    @override
+    def read(self, address: int, count: int) -> bytes | None:
         page, start = divmod(address, self._PAGE_SIZE)
-        return read_from(self._pages.get(page, b""), start, count)
+        return self._pages.get(page, _NO_PAGE).read(start, count)
 
-    def _write(self, address, data):
+    @override
+    def write(self, address: int, data: bytes) -> bool:
         page, start = divmod(address, self._PAGE_SIZE)
-        return page in self._pages and write_into(self._pages[page], start, data)
+        return self._pages.get(page, _NO_PAGE).write(start, data)
 
 
-def deck_memory() -> Memory:
-    """Return the memory that describes the decks' own firmware: none of them has any."""
+_NO_PAGE = Memory(LIGHTHOUSE, b"")
+
+
+def _deck_memory():
+    # Describes the decks' own firmware: none of them has any.
     places, version, info_size = 4, 3, 0x20
     info = bytes([version]) + bytes(2 * places * info_size)
-    size = 0x10000000 * (places + 1)
-    return Memory(
-        DECKS, size, lambda address, count: read_from(info, address, count), lambda *_: False
-    )
+    return Memory(DECKS, info, size=0x10000000 * (places + 1))
 
 
 def memories(
@@ -190,14 +172,14 @@ def memories(
         Serial number and content of the decks' memories.
     """
     return [
-        Memory.over(EEPROM, eeprom, EEPROM_SERIAL),
-        Memory.over(TRAJECTORY, trajectories),
-        tester.memory(),
-        Memory.over(LED_RING, bytearray(LED_RING_SIZE)),
-        Memory.over(LED_TIMINGS, bytearray(LED_TIMINGS_SIZE)),
-        lighthouse.memory(),
-        deck_memory(),
-        *(Memory.over(ONE_WIRE, content, serial) for serial, content in one_wire),
+        Memory(EEPROM, eeprom, EEPROM_SERIAL),
+        Memory(TRAJECTORY, trajectories),
+        tester,
+        Memory(LED_RING, bytearray(LED_RING_SIZE)),
+        Memory(LED_TIMINGS, bytearray(LED_TIMINGS_SIZE)),
+        lighthouse,
+        _deck_memory(),
+        *(Memory(ONE_WIRE, content, serial) for serial, content in one_wire),
     ]
 
 

@@ -2,30 +2,9 @@
 
 import struct
 import zlib
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Mapping, Sequence
 
 _ITEM, _INFO = 2, 3
-
-
-class Entry(NamedTuple):
-    """One line of a table.
-
-    Attributes
-    ----------
-    group, name : str
-        Together at most 24 characters: an item is one packet.
-    code : int
-        Type and flags, a byte.
-    """
-
-    group: str
-    name: str
-    code: int
-
-    def encode(self) -> bytes:
-        """Return type and names as they are on the wire."""
-        return bytes([self.code]) + self.group.encode() + b"\0" + self.name.encode() + b"\0"
 
 
 class Table:
@@ -33,16 +12,19 @@ class Table:
 
     Parameters
     ----------
-    entries : sequence of Entry
-        In the order of their numbers.
+    entries : sequence of tuple
+        (group, name, code) in the order of their numbers. Group and name have together at
+        most 24 characters: an item is one packet. The code is type and flags, a byte.
     limits : bytes
         What follows number of entries and checksum in the table's description.
     """
 
-    def __init__(self, entries: Sequence[Entry], limits: bytes = b""):
-        self._items = [entry.encode() for entry in entries]
+    def __init__(self, entries: Sequence[tuple[str, str, int]], limits: bytes = b""):
+        self._items = [
+            bytes([code]) + f"{group}\0{name}\0".encode() for group, name, code in entries
+        ]
         self._limits = limits
-        self._index = {(e.group, e.name): i for i, e in enumerate(entries)}
+        self._index = {(group, name): i for i, (group, name, _) in enumerate(entries)}
         self.crc = zlib.crc32(b"".join(self._items))
         """Changes with the table: clients keep tables by it."""
 
@@ -60,7 +42,24 @@ class Table:
             return struct.pack("<BHI", _INFO, len(self._items), self.crc) + self._limits
         if request[:1] == bytes([_ITEM]) and len(request) >= 3:
             (index,) = struct.unpack_from("<H", request, 1)
-            if index < len(self._items):
-                return request[:3] + self._items[index]
-            return request[:1]
+            return request[:3] + self._items[index] if index < len(self._items) else request[:1]
         return None
+
+
+def pid_paths(
+    owner: str, pids: Mapping[str, str], attributes: Mapping[str, str]
+) -> Iterable[tuple[str, str]]:
+    """Yield (name, path from the `Firmware`) of attributes of PID controllers.
+
+    Parameters
+    ----------
+    owner : str
+        Path to the object that has the controllers.
+    pids : dict
+        Prefix of names -> the owner's attribute.
+    attributes : dict
+        Suffix of names -> the controller's attribute.
+    """
+    for prefix, pid in pids.items():
+        for suffix, attribute in attributes.items():
+            yield prefix + suffix, f"{owner}.{pid}.{attribute}"

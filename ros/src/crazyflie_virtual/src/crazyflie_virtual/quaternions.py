@@ -1,4 +1,4 @@
-"""Quaternions in 32 bits, as they are on the wire."""
+"""Quaternions (x, y, z, w): turned by a small angle, and in 32 bits as they are on the wire."""
 
 import math
 
@@ -7,6 +7,23 @@ from crazyflie_model.angles import Quaternion
 _BITS = 9
 _MASK = (1 << _BITS) - 1
 _ROOT_HALF = math.sqrt(0.5)
+
+
+def turned(quaternion: Quaternion, a: float, b: float, c: float) -> Quaternion:
+    """Return a unit quaternion turned about the body axes, by twice ``(a, b, c)`` (small, rad)."""
+    x, y, z, w = quaternion
+    return normalized(
+        x + w * a + y * c - z * b,
+        y + w * b + z * a - x * c,
+        z + w * c + x * b - y * a,
+        w - x * a - y * b - z * c,
+    )
+
+
+def normalized(x: float, y: float, z: float, w: float) -> Quaternion:
+    """Return the unit quaternion in a direction."""
+    scale = 1.0 / math.sqrt(x * x + y * y + z * z + w * w)
+    return x * scale, y * scale, z * scale, w * scale
 
 
 def compress_quaternion(quaternion: Quaternion) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_batch import simulation
-from crazyflie_batch.code_version import OtherCodeError, code_version
+from crazyflie_batch.code_version import OtherFlightsError, code_version
 from crazyflie_batch.estimators import Estimator, FiniteDifferences, Kalman
 from crazyflie_batch.settings import Settings
 
@@ -25,10 +25,6 @@ CHUNK_TIMEOUT = 600.0
 
 OUTCOMES = ("largest_error", "rms_error", "largest_tilt", "largest_speed", "has_crashed")
 """Columns of results; see `crazyflie_batch.Flights`."""
-
-
-class OtherSettingsError(Exception):
-    """The folder has flights of other settings."""
 
 
 class Results:
@@ -44,8 +40,8 @@ class Results:
 
     Raises
     ------
-    OtherSettingsError
-    OtherCodeError
+    OtherFlightsError
+        They are of other settings, or of another version of the code.
     OSError
     """
 
@@ -107,22 +103,14 @@ def _check(folder, present, noted):
         return
     advice = "expected another --out, or --restart"
     if {**noted, "code": present["code"]} == present:
-        raise OtherCodeError(f"{folder} has flights of another version of the code; {advice}")
-    raise OtherSettingsError(f"{folder} has flights of other settings; {advice}")
+        raise OtherFlightsError(f"{folder} has flights of another version of the code; {advice}")
+    raise OtherFlightsError(f"{folder} has flights of other settings; {advice}")
 
 
 def run(
     settings: Settings, results: Results, executor: Executor, report: Callable[[int], object]
 ) -> None:
-    """Simulate the missing chunks.
-
-    Parameters
-    ----------
-    settings : Settings
-    results : Results
-    executor : Executor
-    report : callable
-        ``report(count)`` is called with the number of flights of every finished chunk.
+    """Simulate the missing chunks; call ``report(count)`` with the flights of each when it ends.
 
     Raises
     ------
@@ -167,20 +155,17 @@ def fly_chunk(
 
     Raises
     ------
-    OtherCodeError
+    OtherFlightsError
         This process has another `code_version`.
     """
     if code != code_version():
-        raise OtherCodeError("a worker has another version of the code")
+        raise OtherFlightsError("a worker has another version of the code")
     flights = simulate(settings, first, values)
     return np.column_stack([getattr(flights, name) for name in OUTCOMES]).astype(float)
 
 
 def simulate(
-    settings: Settings,
-    first: int,
-    values: dict[str, NDArray[np.float64]],
-    record: bool = False,
+    settings: Settings, first: int, values: dict[str, NDArray[np.float64]]
 ) -> simulation.Flights:
     """Return the flights of a chunk; see `fly_chunk`."""
     run, n = settings.run, len(next(iter(values.values())))
@@ -201,7 +186,6 @@ def simulate(
         ),
         seed=run.seed,
         first=first,
-        record=record,
         threads=1,
     )
 

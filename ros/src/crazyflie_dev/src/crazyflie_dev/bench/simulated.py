@@ -1,4 +1,4 @@
-"""How fast simulated time passes in one process, as fast as it goes."""
+"""How fast simulated time passes in one process, without pacing."""
 
 import functools
 import subprocess

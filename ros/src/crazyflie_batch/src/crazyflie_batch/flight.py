@@ -55,12 +55,10 @@ class Plan:
     Attributes
     ----------
     make_model : callable
-        ``make_model(**parameters)`` returns the `Dynamics` of one vehicle.
-    model_parameters : tuple of str
-        Names of its parameters.
+        ``make_model(**parameters)`` returns the `Dynamics` of one vehicle, by the names in
+        ``model_parameters``.
     max_tilt : float
         A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
-    estimator : type of Estimator
     steps : int
         Of the model in a tick, a multiple of `SAMPLE_STEPS`.
     """

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from crazyflie_batch import simulation
 from crazyflie_batch.code_version import OtherFlightsError, code_version
-from crazyflie_batch.estimators import Estimator, FiniteDifferences, Kalman
+from crazyflie_batch.estimators import FiniteDifferences, Kalman
 from crazyflie_batch.settings import Settings
 
 CHUNK_SIZE = 256
@@ -32,11 +32,7 @@ class Results:
 
     It also has the settings and the `code_version` of the flights.
 
-    Parameters
-    ----------
-    folder : Path
-        Created if missing.
-    settings : Settings
+    The folder is created if missing.
 
     Raises
     ------
@@ -143,15 +139,8 @@ def fly_chunk(
 ) -> NDArray[np.float64]:
     """Return the outcomes of a chunk, shape (flights, len(OUTCOMES)).
 
-    Parameters
-    ----------
-    settings : Settings
-    first : int
-        Number of the first flight.
-    values : dict
-        Swept parameters of these flights; see `Settings.values`.
-    code : str
-        The `code_version` of the other flights.
+    ``values`` are the swept parameters of the flights from number ``first`` on, see
+    `Settings.values`; ``code`` is the `code_version` of the other flights.
 
     Raises
     ------
@@ -171,10 +160,11 @@ def simulate(
     run, n = settings.run, len(next(iter(values.values())))
     swept: dict[str, Any] = dict(values)
     vehicle = dataclasses.replace(settings.vehicle, **swept)
+    is_kalman = run.estimator == "kalman"
     return simulation.simulate(
         _model(settings, vehicle, n),
         _controller(settings, vehicle, n),
-        _estimator(settings),
+        Kalman(run.filter_noise, run.filter_walk) if is_kalman else FiniteDifferences(),
         (run.start_x, run.start_y, run.start_z),
         n,
         goal=(run.goal_x, run.goal_y, run.goal_z, 0.0, 0.0, 0.0, run.goal_yaw),
@@ -191,10 +181,8 @@ def simulate(
 
 
 def _model(settings, vehicle, n):
-    if settings.run.model == "near_hover":
-        return simulation.near_hover()
-    if settings.run.model == "coupled_7d":
-        return simulation.coupled_7d()
+    if settings.run.model != "quadrotor":
+        return getattr(simulation, settings.run.model)()
     wind = [np.broadcast_to(part, n) for part in (vehicle.wind_x, vehicle.wind_y, vehicle.wind_z)]
     return simulation.quadrotor(vehicle.mass_error, vehicle.thrust_error, np.stack(wind, axis=-1))
 
@@ -210,9 +198,3 @@ def _controller(settings, vehicle, n):
         integrator_k=integrator * (run.integrator_k_x, run.integrator_k_y, run.integrator_k_z),
         integrator_limit=(run.integrator_x, run.integrator_y, run.integrator_z),
     )
-
-
-def _estimator(settings: Settings) -> Estimator:
-    if settings.run.estimator == "kalman":
-        return Kalman(settings.run.filter_noise, settings.run.filter_walk)
-    return FiniteDifferences()

@@ -1,12 +1,11 @@
-"""Numbers that stand for those of a running program: formulas become machine code.
+"""Symbolic numbers, with which formulas become machine code.
 
 The formulas of `crazyflie_model` take floats, arrays or whatever else calculates like these
 (see `crazyflie_model.elementwise`). Given a `Symbol`, a formula leaves the instructions that
 would calculate its result, in an LLVM function that is being built; nothing is calculated yet.
-A symbol stands for one number of each of several vehicles, its lanes, which the processor
-calculates at once.
+A symbol stands for one number of each of several vehicles, its lanes.
 
-A formula must not ask for a value: what depends on one is said with ``where`` and ``clip``.
+A formula must not branch on a value; it chooses with ``where`` and ``clip``.
 """
 
 from collections.abc import Callable, Sequence
@@ -43,15 +42,9 @@ _MUST_NOT_BRANCH = "a formula of a batch must not branch; it chooses with where(
 
 
 class Emitter:
-    """Writes instructions for vectors of numbers into an LLVM function.
+    """Writes instructions for vectors of ``lanes`` numbers into an LLVM function.
 
-    Parameters
-    ----------
-    builder : llvmlite.ir.IRBuilder
-    lanes : int
-        Numbers to a vector.
-    vector_functions : bool
-        Whether the C library has its functions for such vectors.
+    ``vector_functions`` says whether the C library has its functions for such vectors.
     """
 
     def __init__(self, builder: ir.IRBuilder, lanes: int, vector_functions: bool):

@@ -17,7 +17,6 @@ from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose
 
-
 POSE_PERIOD = 0.01
 """Of the simulator, s; a soak from the command line has twice as many poses."""
 

@@ -108,7 +108,7 @@ class FlightRecord:
         return max(0.0, float(self.state.column("z").max()) - height)
 
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
-        """Return mean and maximum distance (m) from a point in the last ``duration`` s before /land.
+        """Return mean and maximum distance (m) from a point for ``duration`` s until /land.
 
         Raises
         ------

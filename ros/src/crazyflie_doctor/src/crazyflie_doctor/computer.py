@@ -81,15 +81,15 @@ def debian_packages() -> dict[str, str]:
 
 def python_packages(entries: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Return name -> version of the packages that are asked for, and of the installed ones."""
-    wanted, installed = {}, {}
+    required, installed = {}, {}
     for requirement in map(Requirement, entries):
         if requirement.marker is None or requirement.marker.evaluate():
             exact = [s.version for s in requirement.specifier if s.operator == "=="]
-            wanted[requirement.name] = exact[0] if exact else ""
-            # What is missing is what is wanted and not installed.
+            required[requirement.name] = exact[0] if exact else ""
+            # What is missing is what is required and not installed.
             with contextlib.suppress(importlib.metadata.PackageNotFoundError):
                 installed[requirement.name] = importlib.metadata.version(requirement.name)
-    return wanted, installed
+    return required, installed
 
 
 def network() -> Network:

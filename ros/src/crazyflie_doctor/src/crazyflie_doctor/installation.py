@@ -50,13 +50,13 @@ def check_python(first: Python, of_ros: str) -> Iterator[Finding]:
 
 
 def check_packages(
-    wanted: Mapping[str, str], installed: Mapping[str, str], remedy: str
+    required: Mapping[str, str], installed: Mapping[str, str], remedy: str
 ) -> Iterator[Finding]:
-    """Check packages, name -> version; a wanted version that is empty stands for any."""
-    missing = [name for name in wanted if name not in installed]
+    """Check packages, name -> version; an empty required version stands for any."""
+    missing = [name for name in required if name not in installed]
     if missing:
         yield error(f"missing: {listed(missing, 20)}", remedy)
-    for name, version in wanted.items():
+    for name, version in required.items():
         if version and installed.get(name, version) != version:
             yield warn(f"{name} is {installed[name]}, tested is {version}", remedy)
 
@@ -167,9 +167,11 @@ class Radio:
 
 def check_radio(radio: Radio, uris: Sequence[str]) -> Iterator[Finding]:
     """Check the permission to use a Crazyradio, where there is one or a vehicle needs one."""
-    wanted = [uri for uri in uris if uri.startswith("radio://")]
-    if wanted and not radio.dongles:
-        yield error(f"no Crazyradio is plugged in for {listed(wanted)}", "plug it in; see `lsusb`")
+    radio_uris = [uri for uri in uris if uri.startswith("radio://")]
+    if radio_uris and not radio.dongles:
+        yield error(
+            f"no Crazyradio is plugged in for {listed(radio_uris)}", "plug it in; see `lsusb`"
+        )
     refused = [path for path, may in radio.dongles.items() if not may]
     if refused:
         steps = [] if radio.has_rules else [_RULES, "sudo udevadm trigger"]
@@ -179,5 +181,5 @@ def check_radio(radio: Radio, uris: Sequence[str]) -> Iterator[Finding]:
             f"no permission to use the Crazyradio {listed(refused)}",
             " && ".join(steps) or "unplug it and plug it in again",
         )
-    elif (wanted or radio.dongles) and not radio.has_rules:
+    elif (radio_uris or radio.dongles) and not radio.has_rules:
         yield warn("there is no udev rule for the Crazyradio: only root may use it", _RULES)

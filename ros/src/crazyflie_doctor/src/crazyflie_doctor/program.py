@@ -95,9 +95,9 @@ def _of_the_computer() -> Iterator[Check]:
     yield Check("logs", f"{path}, {free / 1e9:.0f} GB free", found)
 
 
-def _packages(origin: str, wanted: Mapping[str, str], installed: Mapping[str, str]) -> Check:
-    fine = f"all {len(wanted)} are installed" if wanted else "no list here (an install space)"
-    found = installation.check_packages(wanted, installed, "./run install")
+def _packages(origin: str, required: Mapping[str, str], installed: Mapping[str, str]) -> Check:
+    fine = f"all {len(required)} are installed" if required else "no list here (an install space)"
+    found = installation.check_packages(required, installed, "./run install")
     return Check(f"{origin} packages", fine, found)
 
 

@@ -239,7 +239,7 @@ def _check_stream(child, transforms):
 
 
 def check_gains(graph: Graph, recording: Recording) -> Iterator[Finding]:
-    """Compare the delay from pose to control with what the gains in use can bear.
+    """Compare the delay from pose to control with what the gains in use tolerate.
 
     The loop's delay is what was measured from the pose's stamp, and half a period for
     which each control is held.

@@ -89,7 +89,7 @@ def listen(seconds: float, connections: list[Connection]) -> list[tuple[str, int
 
 
 if __name__ == "__main__":
-    wanted = iter(sys.argv[2:])
-    connections = [Connection(*each) for each in zip(wanted, wanted, wanted, strict=True)]
+    topics = iter(sys.argv[2:])
+    connections = [Connection(*each) for each in zip(topics, topics, topics, strict=True)]
     found = listen(float(sys.argv[1]), connections)
     json.dump(found, sys.stdout)

@@ -6,17 +6,19 @@ from unittest import mock
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_batch import simulation
+from crazyflie_batch import FiniteDifferences, Kalman, simulation
 from crazyflie_batch.batch import Batch
 from crazyflie_lqr import control_law
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_simulator.motion_capture import MotionCapture
 from crazyflie_simulator.vehicle import SimulatedVehicle
+from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
 from crazyflie_state_estimator.motion import MotionEstimator
 from crazyflie_state_estimator.rate_filter import FiniteDifference
 
 _YAW = 6
+_FILTERS: dict[Any, Any] = {FiniteDifferences: FiniteDifference, Kalman: ConstantAccelerationFilter}
 
 
 def prepare(*args: Any, **kwargs: Any) -> Batch:
@@ -38,7 +40,7 @@ def fly_one(batch: Batch, index: int) -> tuple[NDArray[np.float64], NDArray[np.f
     plan, period = batch.plan, batch.plan.period
     own = {name: values[:, index].tolist() for name, values in batch.parameters.items()}
     vehicle = SimulatedVehicle(plan.model(own), batch.x[:3, index].tolist(), 0.0, plan.max_tilt)
-    filter_ = plan.estimator.scalar(own["estimator"])
+    filter_ = _FILTERS[plan.estimator](*own["estimator"])
     estimator = MotionEstimator(filter_, FiniteDifference())
     controller = IntegralStateFeedback(
         np.reshape(own["K"], (control_law.U_DIM, control_law.X_DIM)),

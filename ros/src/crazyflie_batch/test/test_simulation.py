@@ -72,7 +72,7 @@ def test_a_state_that_overflows_counts_as_a_crash():
         ({"n": 0}, "n is 0; expected at least one"),
         ({"n": -3}, "n is -3"),
         ({"period": 0.003}, "period is 0.003; expected a whole number of 0.002 s"),
-        ({"duration": 0.0}, "duration is 0.0"),
+        ({"duration": 0.0}, "duration is 0; expected at least one period, 0.01 s"),
         ({"x0": (0.0, 0.0)}, r"x0 has the shape \(2,\); expected \(3,\) or \(2, 3\)"),
         ({"goal": np.zeros((3, 7))}, r"goal has the shape \(3, 7\)"),
         ({"controller": Controller(np.zeros((4, 6)))}, r"K has the shape \(4, 6\)"),

@@ -77,7 +77,10 @@ def _loop(now):
         ("clock", "/use_sim_time is true, but nothing comes on /clock"),
         ("tf tree", "crazyflie/base_link has the parents crazyflie, world"),
         ("tf tree", "tf has a loop: egg -> hen -> egg"),
-        ("frames", "nobody publishes the frame crazyfly that /state_estimator needs (did you mean"),
+        (
+            "frames",
+            "no node publishes the frame crazyfly that /state_estimator needs (did",
+        ),
         ("drivers", "radio://0/80/2M/E7E7E7E7E7 is added by /cf1/add, /cf2/add"),
         ("Crazyradio", "no Crazyradio is plugged in for radio://0/80/2M/E7E7E7E7E7"),
     ],

@@ -89,7 +89,7 @@ def test_topics_without_a_publisher():
     nobody = but(publishers={"/control/lqr": {"/lqr"}})
     assert found(graph.check_publishers(nobody)) == [
         ("error", "/ref has no publisher, /lqr waits for it"),
-        ("error", "nobody publishes /tf"),
+        ("error", "no node publishes /tf"),
     ]
 
 

@@ -12,8 +12,8 @@ from crazyflie_doctor.installation import Network, Python, Radio
 
 
 def test_a_line_for_each_finding_or_one_that_says_what_is_fine():
-    assert list(lines(Check("logs", "much space", list))) == [("ok", "ok     logs: much space")]
-    both = lines(Check("logs", "", lambda: [warn("little space", "free some"), error("a", "b")]))
+    assert list(lines(Check("logs", "much space", []))) == [("ok", "ok     logs: much space")]
+    both = lines(Check("logs", "", [warn("little space", "free some"), error("a", "b")]))
     assert list(both) == [
         ("warn", "warn   logs: little space; free some"),
         ("error", "error  logs: a; b"),
@@ -78,7 +78,7 @@ HERE, LAB = "http://localhost:11311", "http://lab:11311"
         ({"ROS_MASTER_URI": LAB, "ROS_IP": "10.0.0.8"}, "error", "no address of this computer"),
         ({"ROS_MASTER_URI": LAB, "ROS_HOSTNAME": "nobody"}, "error", "is unknown here"),
         ({"ROS_MASTER_URI": LAB, "hostname": "old"}, "error", "hostname 'old' is 10.9.9.9"),
-        ({"ROS_MASTER_URI": HERE}, "warn", "whoever is in the network"),
+        ({"ROS_MASTER_URI": HERE}, "warn", "any computer in the network"),
         (
             {"ROS_MASTER_URI": HERE, "ROS_IP": "10.0.0.7", "ROS_HOSTNAME": "me"},
             "warn",

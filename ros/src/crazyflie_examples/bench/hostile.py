@@ -1,5 +1,5 @@
 #!/usr/bin/env python
-"""How the hover stack bears hostile peers: rate of the control, and memory of the nodes.
+"""Measures the hover stack under attack by other nodes: rate of the control, memory of the nodes.
 
 Start `roslaunch crazyflie_examples sw_hover.launch rviz:=false` in one shell and this in
 another; it prints a line for each attack, with the undisturbed rate just before it. Nothing
@@ -7,7 +7,6 @@ is asserted: the figures depend on the machine, and on what else it does.
 """
 
 import os
-import re
 import signal
 import subprocess
 import sys
@@ -16,6 +15,7 @@ import time
 import rospy
 from tf2_msgs.msg import TFMessage
 
+from crazyflie_dev.bench import graph
 from crazyflie_msgs.msg import (
     ControlStamped,
     PositionVelocityStateStamped,
@@ -54,8 +54,13 @@ def main() -> None:
         time.sleep(_DURATION)
         return len(controls) / (time.monotonic() - start)
 
+    processes = [graph.process_of(f"/{name}") for name in _NODES]
+
+    def memory():
+        return [graph.memory([process]) for process in processes]
+
     print(
-        f"{'attack':<18}{'before':>8}{'control, Hz':>13}{'sent, Hz':>14}   memory, MB, of", *_NODES
+        f"{'attack':<18}{'before':>8}{'control, Hz':>13}{'sent, Hz':>14}   memory, MiB, of", *_NODES
     )
     for kind, command in _ATTACKS.items():
         before = rate()
@@ -89,7 +94,7 @@ def end(attacker: subprocess.Popen[bytes]) -> str:
 
 
 def freeze() -> None:
-    """Subscribe to what matters, and stop without hanging up."""
+    """Subscribe to the topics of the flight, and stop without closing the connections."""
     sys.stdin.readline()
     rospy.init_node("frozen_listener")
     for topic, kind in (
@@ -101,24 +106,6 @@ def freeze() -> None:
     time.sleep(0.5)
     os.kill(os.getpid(), signal.SIGSTOP)
     os._exit(0)
-
-
-def memory() -> list[float]:
-    """Return the resident memory of the nodes, MB."""
-    found = []
-    for name in _NODES:
-        for process in filter(str.isdigit, os.listdir("/proc")):
-            try:
-                with open(f"/proc/{process}/cmdline", encoding="utf-8") as file:
-                    command = file.read()
-                if f"__name:={name}" in command and "python" in command:
-                    with open(f"/proc/{process}/status", encoding="utf-8") as file:
-                        size = re.search(r"VmRSS:\s+(\d+)", file.read())
-                    found.append(int(size[1]) / 1024.0)
-                    break
-            except OSError:
-                continue
-    return found
 
 
 if __name__ == "__main__":

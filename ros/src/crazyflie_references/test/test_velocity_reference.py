@@ -6,9 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crazyflie_references.velocity_reference import ReferenceLimits, Velocity, VelocityReference
+from crazyflie_references.velocity_reference import LimitParameters, Velocity, VelocityReference
 
-LIMITS = ReferenceLimits(0.7, 0.4, 1.5, acceleration=1.0, min_height=0.3, max_height=2.0)
+LIMITS = LimitParameters(
+    horizontal=0.7, vertical=0.4, yaw_dot=1.5, acceleration=1.0, min_height=0.3, max_height=2.0
+)
 DT = 0.02
 SPEED = st.floats(-5.0, 5.0)
 

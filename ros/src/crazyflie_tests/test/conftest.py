@@ -6,6 +6,11 @@ from pages import Page
 from reader import Reader
 
 
+def pytest_collection_modifyitems(items):
+    """Put the pages last: tests behind them would build the workspace without their changes."""
+    items.sort(key=lambda item: item.path.name == "test_commands.py")
+
+
 @pytest.fixture(scope="session")
 def home(tmp_path_factory):
     """Return a home of one's own."""

@@ -1,4 +1,4 @@
-"""Somebody who does what a page of the manual says."""
+"""Follows a page of the manual: types its commands, applies its changes, compares outputs."""
 
 import re
 import subprocess
@@ -54,12 +54,16 @@ class Reader:
         self._printed = ""
 
     def follow(self, page: Page) -> None:
-        """Do all that the page says, and end what goes on then."""
+        """Do all that the page says, and end what goes on then.
+
+        Its changes are applied before its first command, so that one build has all of them.
+        """
+        for block in page.blocks:
+            if block.comment == "apply":
+                self._apply(block.text)
         for part in page.parts:
             if isinstance(part, Block) and part.comment.startswith("run"):
                 self._type(part.commands, part.comment.partition("until ")[2])
-            elif isinstance(part, Block) and part.comment == "apply":
-                self._apply(part.text)
             elif isinstance(part, Block) and part.comment == "prints":
                 assert is_printed(part.text, self._printed), f"{part.text}\n\n{self._printed}"
             elif part == "end":

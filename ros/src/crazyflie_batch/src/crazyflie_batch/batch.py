@@ -19,13 +19,10 @@ class Batch:
 
     Attributes
     ----------
-    plan : Plan
     parameters : mapping
         By the names of `Plan.parameter_dims`, arrays of shape (dim, n).
     x : ndarray, shape (x_dim, n)
         States of the model at the beginning.
-    ticks : int
-    seed : int
     first : int
         Number of the first vehicle.
     """
@@ -85,9 +82,10 @@ def fly(batch: Batch, record: bool, threads: int) -> Flights:
     """Return the flights; ``record`` keeps the states of all ticks."""
     plan, lanes = batch.plan, program(batch.plan).lanes
     start = plan.initial_memory(list(batch.x))
-    memory = _grouped([part for name in plan.memory_dims() for part in start[name]], batch.n, lanes)
+    groups = _groups(batch.n, lanes)
+    memory = _grouped([part for row in start.values() for part in row], groups, batch.n)
     values = [batch.parameters[name] for name in plan.parameter_dims()]
-    parameters = _grouped(np.concatenate(values), batch.n, lanes)
+    parameters = _grouped(np.concatenate(values), groups, batch.n)
     rows = batch.ticks if record else 0
     records = np.empty((len(memory), rows, *memory.shape[1:]))
     slots = int(batch.parameters["delay"].max()) + 1
@@ -96,7 +94,7 @@ def fly(batch: Batch, record: bool, threads: int) -> Flights:
     is_random = batch.parameters["noise"].any() or batch.parameters["dropout"].any()
 
     def fly_group(group):
-        noise = _noise_samples(batch, group, lanes) if is_random else no_noise
+        noise = _noise_samples(batch, groups[group]) if is_random else no_noise
         rows = records[group] if record else np.empty((1, *memory.shape[1:]))
         program(plan).fly(memory[group], parameters[group], noise, rows, slots)
 
@@ -106,20 +104,20 @@ def fly(batch: Batch, record: bool, threads: int) -> Flights:
     return _flights(batch, memory, records)
 
 
-def _noise_samples(batch, group, lanes):
-    numbers = np.minimum(group * lanes + np.arange(lanes), batch.n - 1)
-    samples = [batch.noise_samples(number) for number in numbers.tolist()]
+def _groups(n, lanes):
+    """Return the vehicles of each group; the last one is filled up with the last vehicle."""
+    return np.minimum(np.arange(math.ceil(n / lanes) * lanes), n - 1).reshape(-1, lanes)
+
+
+def _noise_samples(batch, vehicles):
+    samples = [batch.noise_samples(vehicle) for vehicle in vehicles.tolist()]
     return np.ascontiguousarray(np.stack(samples, axis=-1))
 
 
-def _grouped(rows, n, lanes):
-    """Return rows of shape (n,), or numbers, as one array of shape (groups, rows, lanes).
-
-    The last group is filled up with the last vehicle.
-    """
-    index = np.minimum(np.arange(math.ceil(n / lanes) * lanes), n - 1)
-    full = np.array([np.broadcast_to(row, (n,))[index] for row in rows])
-    return np.ascontiguousarray(full.reshape(len(full), -1, lanes).swapaxes(0, 1))
+def _grouped(rows, groups, n):
+    """Return rows of shape (n,), or numbers, as one array of shape (groups, rows, lanes)."""
+    full = np.array([np.broadcast_to(row, (n,))[groups] for row in rows])
+    return np.ascontiguousarray(full.swapaxes(0, 1))
 
 
 def _flights(batch, memory, records):

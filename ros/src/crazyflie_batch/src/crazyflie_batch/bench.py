@@ -47,15 +47,5 @@ def steps_per_second(n: int, measurement: Measurement | None = None) -> tuple[fl
     return steps / min(times[1:]), steps / min(processor_times[1:])
 
 
-def steps_of_one() -> float:
-    """Return the steps of a single vehicle in a second of the clock."""
-    return steps_per_second(ONE)[0]
-
-
-def steps_of_many() -> float:
-    """Return the steps of `MANY` vehicles in a second of the clock, on all processors."""
-    return steps_per_second(MANY)[0]
-
-
 def _gains():
     return load_matrix(str(Path(RosPack().get_path("crazyflie_lqr"), "config", "K_soft.txt")), 4, 7)

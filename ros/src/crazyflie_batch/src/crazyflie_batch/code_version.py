@@ -18,8 +18,8 @@ FLOWN_PACKAGES = (
 """Their modules decide about a flight; the others only read settings."""
 
 
-class OtherCodeError(Exception):
-    """Flights are those of another version of the code."""
+class OtherFlightsError(Exception):
+    """Flights of other settings, or of another version of the code."""
 
 
 @lru_cache(maxsize=1)

@@ -6,7 +6,7 @@ What a filter remembers is a list of components, as states are; nothing is chang
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,34 +15,18 @@ from typing_extensions import override
 from crazyflie_batch.per_vehicle import check_above
 from crazyflie_model.elementwise import Vector, where
 from crazyflie_state_estimator import kalman
-from crazyflie_state_estimator.rate_filter import FiniteDifference, RateFilter
 
 
+@dataclass(frozen=True)
 class Estimator(ABC):
     """A filter that finds position and velocity from positions.
 
-    An object holds the parameters, by which vehicles may differ; the class, how it calculates.
-
-    Attributes
-    ----------
-    memory_dim : int
-        How many numbers it remembers.
-    parameter_dim : int
-        How many `parameters` there are.
+    The fields of an object are parameters, by which vehicles may differ: each a float, or an array
+    of shape (n,). The class calculates.
     """
 
-    memory_dim: int
-    parameter_dim: int
-
-    @property
-    @abstractmethod
-    def parameters(self) -> dict[str, ArrayLike]:
-        """By name, each a float, or an array of shape (n,)."""
-
-    @classmethod
-    @abstractmethod
-    def scalar(cls, parameters: Sequence[float]) -> RateFilter:
-        """Return the filter that a node has, for one vehicle's `parameters`."""
+    memory_dim: ClassVar[int]
+    """Number of components of the memory."""
 
     @classmethod
     @abstractmethod
@@ -67,21 +51,11 @@ class Estimator(ABC):
         """
 
 
+@dataclass(frozen=True)
 class FiniteDifferences(Estimator):
     """See `crazyflie_state_estimator.rate_filter.FiniteDifference`."""
 
     memory_dim = 3
-    parameter_dim = 0
-
-    @property
-    @override
-    def parameters(self) -> dict[str, ArrayLike]:
-        return {}
-
-    @classmethod
-    @override
-    def scalar(cls, parameters: Sequence[float]) -> RateFilter:
-        return FiniteDifference()
 
     @classmethod
     @override
@@ -119,21 +93,10 @@ class Kalman(Estimator):
     noise: ArrayLike = kalman.POSITION_NOISE
     acceleration_walk: ArrayLike = kalman.ACCELERATION_WALK
     memory_dim = 15
-    parameter_dim = 2
 
     def __post_init__(self) -> None:
         check_above("noise", self.noise, 0.0)
         check_above("acceleration_walk", self.acceleration_walk, 0.0)
-
-    @property
-    @override
-    def parameters(self) -> dict[str, ArrayLike]:
-        return {"noise": self.noise, "acceleration_walk": self.acceleration_walk}
-
-    @classmethod
-    @override
-    def scalar(cls, parameters: Sequence[float]) -> RateFilter:
-        return kalman.ConstantAccelerationFilter(*parameters)
 
     @classmethod
     @override

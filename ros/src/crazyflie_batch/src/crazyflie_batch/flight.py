@@ -10,7 +10,7 @@ Memory and parameters of a vehicle are dictionaries of names to lists of compone
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import islice
 from typing import Any
 
@@ -55,12 +55,10 @@ class Plan:
     Attributes
     ----------
     make_model : callable
-        ``make_model(**parameters)`` returns the `Dynamics` of one vehicle.
-    model_parameters : tuple of str
-        Names of its parameters.
+        ``make_model(**parameters)`` returns the `Dynamics` of one vehicle, by the names in
+        ``model_parameters``.
     max_tilt : float
         A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
-    estimator : type of Estimator
     steps : int
         Of the model in a tick, a multiple of `SAMPLE_STEPS`.
     """
@@ -78,24 +76,15 @@ class Plan:
 
     def memory_dims(self) -> dict[str, int]:
         """Return what a flight remembers, and how many numbers that are."""
-        return {
-            "x": self.make_model(**dict.fromkeys(self.model_parameters, 0.0)).x_dim,
-            "u": control_law.U_DIM,
-            "age": 1,
-            "is_commanded": 1,
-            "has_crashed": 1,
-            "estimator": self.estimator.memory_dim,
-            "stamp": 1,
-            "integral": 3,
-            "control_stamp": 1,
-            "metrics": len(METRICS),
-        }
+        x_dim = self.make_model(**dict.fromkeys(self.model_parameters, 0.0)).x_dim
+        start = self.initial_memory([0.0] * x_dim)
+        return {name: len(part) for name, part in start.items()}
 
     def parameter_dims(self) -> dict[str, int]:
         """Return what differs between vehicles, and how many numbers that are."""
         return {
             "model": len(self.model_parameters),
-            "estimator": self.estimator.parameter_dim,
+            "estimator": len(fields(self.estimator)),
             "K": control_law.X_DIM * control_law.U_DIM,
             "u_ref": control_law.U_DIM,
             "integrator_k": 3,

@@ -18,7 +18,7 @@ _BYTES = 8
 
 
 class MachineCode:
-    """Flies groups of `lanes` vehicles at once by vector instructions; see `program.Program`."""
+    """Flies groups of `lanes` vehicles by vector instructions, as `program.ArrayProgram` does."""
 
     def __init__(self, plan: Plan):
         self.lanes, self._machine, vector_functions = _machine()
@@ -35,7 +35,7 @@ class MachineCode:
     def fly(
         self, memory: Any, parameters: Any, noise_samples: Any, record: Any, slots: int
     ) -> None:
-        """See `program.Program.fly`."""
+        """See `program.ArrayProgram.fly`."""
         transit = np.zeros((slots, flight.POSE_DIM, self.lanes))
         arrays = (memory, parameters, transit, noise_samples, record)
         self._fly(

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crazyflie_batch import simulation
-from crazyflie_batch.code_version import OtherCodeError, code_version
-from crazyflie_batch.estimators import Estimator, FiniteDifferences, Kalman
+from crazyflie_batch.code_version import OtherFlightsError, code_version
+from crazyflie_batch.estimators import FiniteDifferences, Kalman
 from crazyflie_batch.settings import Settings
 
 CHUNK_SIZE = 256
@@ -27,25 +27,17 @@ OUTCOMES = ("largest_error", "rms_error", "largest_tilt", "largest_speed", "has_
 """Columns of results; see `crazyflie_batch.Flights`."""
 
 
-class OtherSettingsError(Exception):
-    """The folder has flights of other settings."""
-
-
 class Results:
     """A folder with the outcomes of flights, from which an interrupted run continues.
 
     It also has the settings and the `code_version` of the flights.
 
-    Parameters
-    ----------
-    folder : Path
-        Created if missing.
-    settings : Settings
+    The folder is created if missing.
 
     Raises
     ------
-    OtherSettingsError
-    OtherCodeError
+    OtherFlightsError
+        They are of other settings, or of another version of the code.
     OSError
     """
 
@@ -107,22 +99,14 @@ def _check(folder, present, noted):
         return
     advice = "expected another --out, or --restart"
     if {**noted, "code": present["code"]} == present:
-        raise OtherCodeError(f"{folder} has flights of another version of the code; {advice}")
-    raise OtherSettingsError(f"{folder} has flights of other settings; {advice}")
+        raise OtherFlightsError(f"{folder} has flights of another version of the code; {advice}")
+    raise OtherFlightsError(f"{folder} has flights of other settings; {advice}")
 
 
 def run(
     settings: Settings, results: Results, executor: Executor, report: Callable[[int], object]
 ) -> None:
-    """Simulate the missing chunks.
-
-    Parameters
-    ----------
-    settings : Settings
-    results : Results
-    executor : Executor
-    report : callable
-        ``report(count)`` is called with the number of flights of every finished chunk.
+    """Simulate the missing chunks; call ``report(count)`` with the flights of each when it ends.
 
     Raises
     ------
@@ -155,41 +139,32 @@ def fly_chunk(
 ) -> NDArray[np.float64]:
     """Return the outcomes of a chunk, shape (flights, len(OUTCOMES)).
 
-    Parameters
-    ----------
-    settings : Settings
-    first : int
-        Number of the first flight.
-    values : dict
-        Swept parameters of these flights; see `Settings.values`.
-    code : str
-        The `code_version` of the other flights.
+    ``values`` are the swept parameters of the flights from number ``first`` on, see
+    `Settings.values`; ``code`` is the `code_version` of the other flights.
 
     Raises
     ------
-    OtherCodeError
+    OtherFlightsError
         This process has another `code_version`.
     """
     if code != code_version():
-        raise OtherCodeError("a worker has another version of the code")
+        raise OtherFlightsError("a worker has another version of the code")
     flights = simulate(settings, first, values)
     return np.column_stack([getattr(flights, name) for name in OUTCOMES]).astype(float)
 
 
 def simulate(
-    settings: Settings,
-    first: int,
-    values: dict[str, NDArray[np.float64]],
-    record: bool = False,
+    settings: Settings, first: int, values: dict[str, NDArray[np.float64]]
 ) -> simulation.Flights:
     """Return the flights of a chunk; see `fly_chunk`."""
     run, n = settings.run, len(next(iter(values.values())))
     swept: dict[str, Any] = dict(values)
     vehicle = dataclasses.replace(settings.vehicle, **swept)
+    is_kalman = run.estimator == "kalman"
     return simulation.simulate(
         _model(settings, vehicle, n),
         _controller(settings, vehicle, n),
-        _estimator(settings),
+        Kalman(run.filter_noise, run.filter_walk) if is_kalman else FiniteDifferences(),
         (run.start_x, run.start_y, run.start_z),
         n,
         goal=(run.goal_x, run.goal_y, run.goal_z, 0.0, 0.0, 0.0, run.goal_yaw),
@@ -201,16 +176,13 @@ def simulate(
         ),
         seed=run.seed,
         first=first,
-        record=record,
         threads=1,
     )
 
 
 def _model(settings, vehicle, n):
-    if settings.run.model == "near_hover":
-        return simulation.near_hover()
-    if settings.run.model == "coupled_7d":
-        return simulation.coupled_7d()
+    if settings.run.model != "quadrotor":
+        return getattr(simulation, settings.run.model)()
     wind = [np.broadcast_to(part, n) for part in (vehicle.wind_x, vehicle.wind_y, vehicle.wind_z)]
     return simulation.quadrotor(vehicle.mass_error, vehicle.thrust_error, np.stack(wind, axis=-1))
 
@@ -226,9 +198,3 @@ def _controller(settings, vehicle, n):
         integrator_k=integrator * (run.integrator_k_x, run.integrator_k_y, run.integrator_k_z),
         integrator_limit=(run.integrator_x, run.integrator_y, run.integrator_z),
     )
-
-
-def _estimator(settings: Settings) -> Estimator:
-    if settings.run.estimator == "kalman":
-        return Kalman(settings.run.filter_noise, settings.run.filter_walk)
-    return FiniteDifferences()

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from crazyflie_batch.code_version import OtherCodeError
-from crazyflie_batch.monte_carlo import OtherSettingsError, Results, run
+from crazyflie_batch.code_version import OtherFlightsError
+from crazyflie_batch.monte_carlo import Results, run
 from crazyflie_batch.report import findings, table, write_csv
 from crazyflie_batch.settings import read_settings
 from crazyflie_utils import ParameterError
@@ -31,13 +31,7 @@ class SchedulerError(Exception):
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; return its exit status: 0, 1 for what cannot be flown, 2 for usage.
-
-    Parameters
-    ----------
-    arguments : list of str, optional
-        Of the command line, by default the process's.
-    """
+    """Run the command; return its exit status: 0, 1 for what cannot be flown, 2 for usage."""
     options = _parser().parse_args(arguments)
     try:
         settings = read_settings(options.settings)
@@ -45,7 +39,12 @@ def main(arguments: list[str] | None = None) -> int:
         if options.restart:
             shutil.rmtree(folder / "chunks", ignore_errors=True)
             (folder / "settings.json").unlink(missing_ok=True)
-        results = _results(folder, settings)
+        try:
+            results = Results(folder, settings)
+        except OSError as error:
+            raise OSError(
+                f"--out is {folder}: {error.strerror}; expected a folder that can be written"
+            ) from None
         with _executor(options.scheduler) as executor:
             _fly(settings, results, executor)
         found = findings(settings, results.outcomes())
@@ -56,7 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
         from crazyflie_batch.figure import save_figure
 
         save_figure(found, folder / "figure.png")
-    except (ParameterError, OtherSettingsError, OtherCodeError, SchedulerError, OSError) as error:
+    except (ParameterError, OtherFlightsError, SchedulerError, OSError) as error:
         print(f"monte_carlo: {error}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
@@ -65,15 +64,6 @@ def main(arguments: list[str] | None = None) -> int:
     print(text)
     print(f"\nwrote report.txt, flights.csv and figure.png in {folder}")
     return 0
-
-
-def _results(folder, settings):
-    try:
-        return Results(folder, settings)
-    except OSError as error:
-        raise OSError(
-            f"--out is {folder}: {error.strerror}; expected a folder that can be written"
-        ) from None
 
 
 def _parser():

@@ -3,7 +3,6 @@
 import logging
 import threading
 from functools import lru_cache
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,16 +24,14 @@ Array = NDArray[np.float64]
 _log = logging.getLogger(__name__)
 
 
-class Program(Protocol):
-    """Flies groups of vehicles that have a plan in common, in several threads at a time.
+class ArrayProgram:
+    """Flies groups of vehicles that have a plan in common by numpy's arrays; thread-safe."""
 
-    Attributes
-    ----------
-    lanes : int
-        Vehicles in a group, the last axis of all arrays.
-    """
+    lanes = 256
+    """Vehicles in a group, the last axis of all arrays."""
 
-    lanes: int
+    def __init__(self, plan: Plan):
+        self._plan = plan
 
     def fly(
         self, memory: Array, parameters: Array, noise_samples: Array, record: Array, slots: int
@@ -53,20 +50,6 @@ class Program(Protocol):
         slots : int
             The longest delay, in ticks, and 1.
         """
-
-
-class ArrayProgram:
-    """Computes the formulas with numpy's arrays: slower than machine code."""
-
-    lanes = 256
-
-    def __init__(self, plan: Plan):
-        self._plan = plan
-
-    def fly(
-        self, memory: Array, parameters: Array, noise_samples: Array, record: Array, slots: int
-    ) -> None:
-        """See `Program.fly`."""
         plan, dims = self._plan, self._plan.memory_dims()
         values = flight.components(parameters, plan.parameter_dims())
         state = flight.components(memory.copy(), dims)
@@ -94,7 +77,7 @@ def _store(rows, state, dims):
 _compiling = threading.Lock()
 
 
-def program(plan: Plan) -> Program:
+def program(plan: Plan) -> "ArrayProgram | MachineCode":
     """Return the program of a plan, made once in a process for all threads.
 
     Raises

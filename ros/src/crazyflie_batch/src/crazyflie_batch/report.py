@@ -25,7 +25,6 @@ class Findings:
 
     Attributes
     ----------
-    settings : Settings
     values : dict
         Swept parameters; see `Settings.values`.
     outcomes : dict

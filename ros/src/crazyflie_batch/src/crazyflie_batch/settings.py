@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from rospkg import ResourceNotFound, RosPack
 from scipy.special import ndtri
 
+from crazyflie_batch.simulation import time_errors
 from crazyflie_lqr.gain_file import GainFileError, load_matrix
-from crazyflie_model import inner_loops
 from crazyflie_model.limits import CRASH_TILT
 from crazyflie_state_estimator import kalman
 from crazyflie_utils import ParameterError, Parameters, parameter
@@ -114,24 +114,7 @@ class RunParameters(Parameters):
 
     def complaints(self) -> list[str]:
         """See `Parameters.complaints`."""
-        found = []
-        ticks = round(self.duration / self.period)
-        last = (ticks - 1) * self.period
-        if ticks < 1:
-            found.append(
-                f"duration is {self.duration:g}; expected at least one period, {self.period:g} s"
-            )
-        elif self.settle_time > last + 1e-6 * self.period:
-            found.append(
-                f"settle_time is {self.settle_time:g}; expected at most {last:g}, one period "
-                f"less than the duration, {self.duration:g}"
-            )
-        samples = self.period / inner_loops.PERIOD
-        if abs(samples - round(samples)) > 1e-6:
-            found.append(
-                f"period is {self.period:g}; expected a whole number of {inner_loops.PERIOD:g} s"
-            )
-        return found
+        return time_errors(self.duration, self.period, self.settle_time)
 
 
 UNIFORM, NORMAL, VALUES = "uniform", "normal", "values"
@@ -153,7 +136,9 @@ class Sweep:
     kind : str
         `UNIFORM`, `NORMAL` or `VALUES`.
     numbers : tuple of float
-        See the file.
+        Lowest and highest; mean and standard deviation; or the values.
+    low, high : float
+        Range of the parameter, to which a normal distribution is cut off.
     """
 
     name: str
@@ -176,17 +161,7 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Settings:
-    """A Monte-Carlo run.
-
-    Attributes
-    ----------
-    name : str
-    run : RunParameters
-    vehicle : FlightParameters
-    sweeps : tuple of Sweep
-    K : tuple of tuple of float
-        Gains, 4 rows of 7.
-    """
+    """A Monte-Carlo run; ``name`` is that of the file, and ``K`` has 4 rows of 7 gains."""
 
     name: str
     run: RunParameters

@@ -6,11 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from crazyflie_batch.batch import Batch, Flights, fly
 from crazyflie_batch.estimators import Estimator, FiniteDifferences
-from crazyflie_batch.flight import SAMPLE_STEPS, Plan
+from crazyflie_batch.flight import Plan
 from crazyflie_batch.per_vehicle import check_above, check_range, columns, stacked_columns
 from crazyflie_lqr import control_law
 from crazyflie_model import inner_loops
@@ -23,7 +23,7 @@ HOVER = (0.0, 0.0, 0.0, GRAVITY)
 """Control at the reference."""
 
 _ROUNDING = 1e-6
-"""Of a whole number of periods."""
+"""Of a whole number of periods, as a fraction of one."""
 
 
 @dataclass(frozen=True)
@@ -211,27 +211,17 @@ def simulate(
     estimator, measurement = estimator or FiniteDifferences(), measurement or Measurement()
     if n <= 0:
         raise ValueError(f"n is {n}; expected at least one vehicle")
-    steps = round(period / STEP) if math.isfinite(period) else 0
-    if steps <= 0 or steps % SAMPLE_STEPS or abs(steps * STEP - period) > 1e-9:
-        raise ValueError(f"period is {period}; expected a whole number of {inner_loops.PERIOD} s")
-    ticks = round(duration / period) if math.isfinite(duration) else 0
-    if ticks < 1:
-        raise ValueError(f"duration is {duration}; expected at least one period, {period} s")
-    last = (ticks - 1) * period
-    if not 0.0 <= settle_time <= last + _ROUNDING * period:
-        raise ValueError(
-            f"settle_time is {settle_time:g}; expected 0 to {last:g}, when the last tick is"
-        )
+    if errors := time_errors(duration, period, settle_time):
+        raise ValueError("; ".join(errors))
+    steps, ticks = round(period / STEP), round(duration / period)
     plan = Plan(model.make, tuple(model.parameters), model.max_tilt, type(estimator), steps)
-    noise = {
-        "position_noise": measurement.position_noise,
-        "attitude_noise": measurement.attitude_noise,
-    }
+    noise = {name: getattr(measurement, name) for name in ("position_noise", "attitude_noise")}
     # A longer delay makes no difference: the pose arrives after the end.
-    delay = np.minimum(delay_ticks(measurement.latency, plan.period), ticks)
+    latency = np.asarray(measurement.latency, dtype=float)
+    delay = np.ceil((latency - 1e-9) / plan.period).clip(0.0, ticks)
     parameters = {
         "model": stacked_columns(model.parameters, n),
-        "estimator": stacked_columns(estimator.parameters, n),
+        "estimator": stacked_columns(vars(estimator), n),
         "K": columns("K", controller.K, (control_law.U_DIM, control_law.X_DIM), n),
         "u_ref": columns("u_ref", controller.u_ref, (control_law.U_DIM,), n),
         "integrator_k": columns("integrator_k", controller.integrator_k, (3,), n),
@@ -247,9 +237,18 @@ def simulate(
     return fly(batch, record, threads or len(os.sched_getaffinity(0)))
 
 
-def delay_ticks(latency: ArrayLike, period: float) -> NDArray[np.float64]:
-    """Return after how many ticks a pose arrives that is ``latency`` (s) on its way."""
-    return np.ceil((np.asarray(latency, dtype=float) - 1e-9) / period).clip(0.0)
+def time_errors(duration: float, period: float, settle_time: float) -> list[str]:
+    """Return what is wrong with these arguments of `simulate`, in s."""
+    samples = period / inner_loops.PERIOD
+    if not 0.5 < samples < math.inf or abs(samples - round(samples)) > _ROUNDING:
+        return [f"period is {period:g}; expected a whole number of {inner_loops.PERIOD:g} s"]
+    ticks = round(duration / period) if math.isfinite(duration) else 0
+    if ticks < 1:
+        return [f"duration is {duration:g}; expected at least one period, {period:g} s"]
+    last = (ticks - 1) * period
+    if not 0.0 <= settle_time <= last + _ROUNDING * period:
+        return [f"settle_time is {settle_time:g}; expected 0 to {last:g}, when the last tick is"]
+    return []
 
 
 def _initial_states(model, positions):

@@ -1,16 +1,15 @@
-"""Numbers that stand for those of a running program: formulas become machine code.
+"""Symbolic numbers, with which formulas become machine code.
 
 The formulas of `crazyflie_model` take floats, arrays or whatever else calculates like these
 (see `crazyflie_model.elementwise`). Given a `Symbol`, a formula leaves the instructions that
 would calculate its result, in an LLVM function that is being built; nothing is calculated yet.
-A symbol stands for one number of each of several vehicles, its lanes, which the processor
-calculates at once.
+A symbol stands for one number of each of several vehicles, its lanes.
 
-A formula must not ask for a value: what depends on one is said with ``where`` and ``clip``.
+A formula must not branch on a value; it chooses with ``where`` and ``clip``.
 """
 
-import operator
 from collections.abc import Callable, Sequence
+from functools import partialmethod
 from typing import Any
 
 import numpy as np
@@ -35,12 +34,7 @@ _FUNCTIONS = {
 _INTRINSICS = {np.sqrt: "llvm.sqrt", np.floor: "llvm.floor", np.absolute: "llvm.fabs"}
 """Of LLVM: one instruction of most processors."""
 
-_OPERATORS: dict[Any, Callable[[Any, Any], Any]] = {
-    np.add: operator.add,
-    np.subtract: operator.sub,
-    np.multiply: operator.mul,
-    np.divide: operator.truediv,
-}
+_OPERATORS = {np.add: "fadd", np.subtract: "fsub", np.multiply: "fmul", np.divide: "fdiv"}
 """Arrive as functions where numpy's own numbers are on the left."""
 
 
@@ -48,15 +42,9 @@ _MUST_NOT_BRANCH = "a formula of a batch must not branch; it chooses with where(
 
 
 class Emitter:
-    """Writes instructions for vectors of numbers into an LLVM function.
+    """Writes instructions for vectors of ``lanes`` numbers into an LLVM function.
 
-    Parameters
-    ----------
-    builder : llvmlite.ir.IRBuilder
-    lanes : int
-        Numbers to a vector.
-    vector_functions : bool
-        Whether the C library has its functions for such vectors.
+    ``vector_functions`` says whether the C library has its functions for such vectors.
     """
 
     def __init__(self, builder: ir.IRBuilder, lanes: int, vector_functions: bool):
@@ -75,12 +63,16 @@ class Emitter:
         """Return the symbol of a vector."""
         return Symbol(self, value)
 
+    def arithmetic(self, instruction: str, left: Any, right: Any) -> "Symbol":
+        """Return the result of an LLVM instruction of two symbols or floats."""
+        emit = getattr(self.builder, instruction)
+        return self.symbol(emit(self.value(left), self.value(right)))
+
     def call(self, function: Any, arguments: Sequence[Any]) -> "Symbol":
         """Return a function, one of numpy's, of symbols or floats."""
-        values = [self.value(argument) for argument in arguments]
         if function in _OPERATORS:
-            left, right = map(self.value, arguments)
-            return _OPERATORS[function](self.symbol(left), self.symbol(right))
+            return self.arithmetic(_OPERATORS[function], *arguments)
+        values = [self.value(argument) for argument in arguments]
         if function in _INTRINSICS:
             name = f"{_INTRINSICS[function]}.v{self.lanes}f64"
             return self.symbol(self.builder.call(self._declare(name, self.type, 1), values))
@@ -146,6 +138,18 @@ class Condition:
         return self._emitter.symbol(self._emitter.builder.select(self.value, *values))
 
 
+def _arithmetic(instruction: str) -> tuple[Callable[..., "Symbol"], Callable[..., "Symbol"]]:
+    """Return the methods of an operator with the symbol on its left, and on its right."""
+
+    def with_symbol_left(self: "Symbol", other: Any) -> "Symbol":
+        return self._emitter.arithmetic(instruction, self, other)
+
+    def with_symbol_right(self: "Symbol", other: Any) -> "Symbol":
+        return self._emitter.arithmetic(instruction, other, self)
+
+    return with_symbol_left, with_symbol_right
+
+
 class Symbol:
     """A number that the program will know; see the module."""
 
@@ -153,36 +157,13 @@ class Symbol:
         self.value = value
         self._emitter = emitter
 
-    def _binary(self, instruction: str, left: Any, right: Any) -> "Symbol":
-        emit = getattr(self._emitter.builder, instruction)
-        return Symbol(self._emitter, emit(self._emitter.value(left), self._emitter.value(right)))
-
-    def __add__(self, other: Any) -> "Symbol":
-        return self._binary("fadd", self, other)
-
-    def __radd__(self, other: Any) -> "Symbol":
-        return self._binary("fadd", other, self)
-
-    def __sub__(self, other: Any) -> "Symbol":
-        return self._binary("fsub", self, other)
-
-    def __rsub__(self, other: Any) -> "Symbol":
-        return self._binary("fsub", other, self)
-
-    def __mul__(self, other: Any) -> "Symbol":
-        return self._binary("fmul", self, other)
-
-    def __rmul__(self, other: Any) -> "Symbol":
-        return self._binary("fmul", other, self)
-
-    def __truediv__(self, other: Any) -> "Symbol":
-        return self._binary("fdiv", self, other)
-
-    def __rtruediv__(self, other: Any) -> "Symbol":
-        return self._binary("fdiv", other, self)
+    __add__, __radd__ = _arithmetic("fadd")
+    __sub__, __rsub__ = _arithmetic("fsub")
+    __mul__, __rmul__ = _arithmetic("fmul")
+    __truediv__, __rtruediv__ = _arithmetic("fdiv")
 
     def __neg__(self) -> "Symbol":
-        return self._binary("fsub", -0.0, self)
+        return self._emitter.arithmetic("fsub", -0.0, self)
 
     def __pow__(self, exponent: Any) -> "Symbol":
         try:
@@ -204,21 +185,11 @@ class Symbol:
         values = self.value, self._emitter.value(other)
         return Condition(self._emitter, self._emitter.builder.fcmp_ordered(sign, *values))
 
-    def __lt__(self, other: Any) -> Condition:
-        return self._compare("<", other)
-
-    def __le__(self, other: Any) -> Condition:
-        return self._compare("<=", other)
-
-    def __gt__(self, other: Any) -> Condition:
-        return self._compare(">", other)
-
-    def __ge__(self, other: Any) -> Condition:
-        return self._compare(">=", other)
-
-    def __eq__(self, other: object) -> Condition:  # type: ignore[override]
-        return self._compare("==", other)
-
+    __lt__ = partialmethod(_compare, "<")
+    __le__ = partialmethod(_compare, "<=")
+    __gt__ = partialmethod(_compare, ">")
+    __ge__ = partialmethod(_compare, ">=")
+    __eq__ = partialmethod(_compare, "==")
     __hash__ = None  # type: ignore[assignment]
 
     def __array_ufunc__(self, function: Any, method: str, *args: Any, **kwargs: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Draws the packages by floor, from their imports and manifests, and prints circles.
+"""Draws the packages by floor from their imports and manifests; prints circles.
 
 ``python3 -m crazyflie_dev.import_graph`` writes the floors into docs/architecture.md and the
 picture docs/images/packages.svg.
@@ -13,7 +13,7 @@ import graphlib
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import rospkg
@@ -35,41 +35,33 @@ def top_of_repository() -> Path:
 
 def package_graph(sources: Path) -> dict[str, set[str]]:
     """Return the packages below a folder with those of the same folder that they need."""
-    found = {package.name: (sources / path, package) for path, package in _packages(sources)}
-    owners = _owners(found)
-    graph = {}
-    for name, (folder, package) in found.items():
-        named = {each.name for each in package.exec_depends} & found.keys()
-        graph[name] = (named | _imported_packages(folder, owners)) - {name}
-    return graph
+    found = _declared_and_imported(sources)
+    return {
+        name: declared & found.keys() | imported for name, (declared, imported) in found.items()
+    }
 
 
 def undeclared_imports(sources: Path) -> dict[str, set[str]]:
     """Return the packages that import from others without naming them in package.xml."""
-    found = {package.name: (sources / path, package) for path, package in _packages(sources)}
-    owners = _owners(found)
-    missing = {
-        name: _imported_packages(folder, owners)
-        - {name}
-        - {each.name for each in package.exec_depends}
-        for name, (folder, package) in found.items()
+    found = _declared_and_imported(sources).items()
+    return {
+        name: imported - declared for name, (declared, imported) in found if imported - declared
     }
-    return {name: names for name, names in missing.items() if names}
 
 
 def module_graph(sources: Path) -> dict[str, set[str]]:
-    """Return the modules of all packages with those of other modules that they import."""
+    """Return the modules of all packages with the others that they import anywhere."""
     files = {
         ".".join(path.relative_to(folder).with_suffix("").parts).removesuffix(".__init__"): path
         for package_path, _ in _packages(sources)
         for folder in [sources / package_path / "src"]
         for path in folder.rglob("*.py")
     }
-    graph = {}
-    for module, path in files.items():
-        imported = {name if name in files else source for source, name in _imports(path)}
-        graph[module] = imported & files.keys() - {module}
-    return graph
+    return {
+        module: {name if name in files else source for source, name in _imports(path)}
+        & files.keys() - {module}
+        for module, path in files.items()
+    }
 
 
 def circles(graph: Graph) -> list[list[str]]:
@@ -140,12 +132,6 @@ def edges(graph: Graph) -> list[tuple[str, str]]:
     return sorted((name, needed) for name in graph for needed in graph[name])
 
 
-def drawn_edges(picture: str) -> list[tuple[str, str]]:
-    """Return the pairs (name, needed name) that an SVG picture by graphviz shows, sorted."""
-    titles = re.findall(r"<title>(\w+)(?:-|&#45;)(?:>|&gt;)(\w+)</title>", picture)
-    return sorted(titles)
-
-
 def with_floors(page: str, levels: list[list[str]]) -> str:
     """Return the text of a page with the floors in the block below its comment."""
     return _BLOCK.sub(lambda match: match[1] + text_of(levels) + match[2], page)
@@ -162,36 +148,29 @@ def _packages(sources):
     return [(path, package) for path, package in packages if not package.is_metapackage()]
 
 
-def _owners(found):
-    # Of top-level modules; a package of messages is a module of its name.
-    modules = {
-        path.name.removesuffix(".py"): name
-        for name, (folder, _) in found.items()
-        for path in (folder / "src").glob("*")
+def _declared_and_imported(sources: Path) -> dict[str, tuple[set[str], set[str]]]:
+    """Return package -> other packages in its package.xml, and those it imports from."""
+    found = {package.name: (sources / path, package) for path, package in _packages(sources)}
+    # A package of messages is a module of its name.
+    owners = {name: name for name in found} | {
+        path.stem: name for name, (folder, _) in found.items() for path in folder.glob("src/*")
     }
-    return {name: name for name in found} | modules
-
-
-def _imported_packages(folder: Path, owners: Mapping[str, str]) -> set[str]:
-    files = [*folder.glob("src/**/*.py"), *(f for f in folder.glob("exec/*") if f.is_file())]
-    modules = {source.partition(".")[0] for file in files for source, _ in _imports(file)}
-    return {owners[name] for name in modules if name in owners}
+    needed = {}
+    for name, (folder, package) in found.items():
+        files = [*folder.glob("src/**/*.py"), *(f for f in folder.glob("exec/*") if f.is_file())]
+        modules = {source.partition(".")[0] for file in files for source, _ in _imports(file)}
+        imported = {owners[module] for module in modules if module in owners}
+        needed[name] = ({each.name for each in package.exec_depends}, imported - {name})
+    return needed
 
 
 def _imports(file: Path) -> Iterator[tuple[str, str]]:
     """Yield the modules that a file imports from, each with the full name of what it imports."""
-    for node in _executed(ast.parse(file.read_text()).body):
+    for node in ast.walk(ast.parse(file.read_text())):
         if isinstance(node, ast.Import):
             yield from ((each.name, each.name) for each in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module:
             yield from ((node.module, f"{node.module}.{each.name}") for each in node.names)
-
-
-def _executed(statements: Iterable[ast.stmt]) -> Iterator[ast.AST]:
-    """Yield the nodes of all statements but those for type checkers."""
-    for statement in statements:
-        if not (isinstance(statement, ast.If) and "TYPE_CHECKING" in ast.dump(statement.test)):
-            yield from ast.walk(statement)
 
 
 def main() -> int:

@@ -36,14 +36,9 @@ _LOG_LINES = 40
 
 
 def pixels_of(picture: NDArray[np.uint8], colour: ArrayLike) -> int:
-    """Count the pixels of a colour, in light or in shadow.
+    """Return the number of pixels of a colour, in light or in shadow.
 
-    Parameters
-    ----------
-    picture : ndarray, shape (height, width, 3)
-        uint8.
-    colour : array_like, shape (3,)
-        Red, green, blue; any scale.
+    The picture has the shape (height, width, 3); the colour is red, green, blue of any scale.
     """
     pixels = picture.reshape(-1, 3).astype(float)
     brightness = np.linalg.norm(pixels, axis=1)
@@ -52,19 +47,9 @@ def pixels_of(picture: NDArray[np.uint8], colour: ArrayLike) -> int:
 
 
 def crop_to_scene(screen: NDArray[np.uint8], background: ArrayLike) -> NDArray[np.uint8]:
-    """Cut RViz's panels away: return the part of a screen that has the background colour.
+    """Return a screen without RViz's panels: the part that has the background colour, 0 to 255.
 
-    Parameters
-    ----------
-    screen : ndarray, shape (height, width, 3)
-        uint8.
-    background : array_like, shape (3,)
-        Colour behind the scene, 0 to 255.
-
-    Returns
-    -------
-    ndarray, shape (h, w, 3)
-        Empty when the colour is nowhere.
+    Arrays have the shape (height, width, 3); the result is empty when the colour is nowhere.
     """
     is_background = (screen == np.asarray(background)).all(axis=2)
     rows = np.flatnonzero(is_background.any(axis=1))
@@ -89,14 +74,9 @@ def material_of(model: Path, name: str) -> list[float]:
 
 
 class Scene:
-    """RViz's picture of the flight, and what should be on it.
+    """RViz's picture of the flight on a display, and what should be on it.
 
-    Parameters
-    ----------
-    display : str
-        Name of the display that RViz draws on.
-    description : Path
-        Folder of crazyflie_description, which has the colours.
+    ``description`` is the folder of crazyflie_description, which has the colours.
     """
 
     def __init__(self, display: str, description: Path):
@@ -134,16 +114,7 @@ class Scene:
 
 
 def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
-    """Fly to the hover, and write what RViz shows of it.
-
-    Parameters
-    ----------
-    output : Path
-        PNG file.
-    log : Path
-        Receives what roslaunch and the nodes print.
-    launch_arguments : list of str
-        Further arguments of sw_hover.launch.
+    """Fly to the hover; write what RViz shows into a PNG file, the output of roslaunch into a log.
 
     Raises
     ------

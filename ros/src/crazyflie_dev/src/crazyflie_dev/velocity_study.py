@@ -8,10 +8,12 @@ measures the filters, prints a table and draws a figure.
 import argparse
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.dynamics import coupled_acceleration
@@ -25,7 +27,7 @@ from crazyflie_state_estimator.kalman import (
     ConstantAccelerationFilter,
 )
 from crazyflie_state_estimator.motion import MotionEstimator
-from crazyflie_state_estimator.rate_filter import FiniteDifference
+from crazyflie_state_estimator.rate_filter import FiniteDifference, RateFilter
 
 PERIOD = 0.01
 """Time between two poses, s."""
@@ -33,6 +35,7 @@ PERIOD = 0.01
 NOISE = 0.001
 """Standard deviation of the poses' coordinates, m."""
 
+_SETTLED = slice(round(1.0 / PERIOD), None)
 _STEP = 0.001
 _YAW_RATE = 0.3
 _LEG = 3.0
@@ -97,23 +100,13 @@ class SampledFlight:
 def fly(vehicle: ModelError, duration: float, seed: int = 0) -> SampledFlight:
     """Return a flight: hover, then steps between waypoints, 1 to 2.2 m apart, while turning.
 
-    The controller knows the true state, so that the same flight serves every
-    filter and the noise is independent of it.
-
-    Parameters
-    ----------
-    vehicle : ModelError
-    duration : float
-        s.
-    seed : int
-        Of wind and noise.
+    ``duration`` is in s; ``seed`` is that of wind and noise. The controller has the true state, so
+    all filters see the same flight.
     """
     rng = np.random.default_rng(seed)
     samples, steps = round(duration / PERIOD), round(PERIOD / _STEP)
     gusts = _correlated_noise(rng, samples * steps, vehicle.gusts)
-    follow = 1.0
-    if vehicle.response_time > 0.0:
-        follow = 1.0 - np.exp(-_STEP / vehicle.response_time)
+    follow = 1.0 - np.exp(-_STEP / vehicle.response_time) if vehicle.response_time else 1.0
     position, yaw = _WAYPOINTS[0].copy(), 0.0
     velocity: NDArray[np.float64] = np.zeros(3)
     acting: NDArray[np.float64] = np.array([0.0, 0.0, 0.0, GRAVITY])
@@ -145,46 +138,27 @@ def _control(time, position, velocity, yaw):
 
 
 def _correlated_noise(rng, steps, deviation):
-    noise = np.zeros((steps, 3))
-    for i in range(1, steps):
-        noise[i] = noise[i - 1] * (1.0 - _STEP) + deviation * np.sqrt(2.0 * _STEP) * rng.normal(
-            size=3
-        )
-    return noise
+    """Return noise that is correlated over 1 s, shape (steps, 3); the first row is 0."""
+    drive = deviation * np.sqrt(2.0 * _STEP) * rng.normal(size=(steps - 1, 3))
+    return np.vstack([np.zeros(3), lfilter([1.0], [1.0, _STEP - 1.0], drive, axis=0)])
 
 
-def finite_difference() -> MotionEstimator:
-    """Return the estimator that is the default of the nodes."""
-    return MotionEstimator(FiniteDifference(), FiniteDifference())
-
-
-def kalman() -> MotionEstimator:
-    """Return the estimator with a Kalman filter, with the nodes' defaults."""
-    return _kalman(ACCELERATION_WALK)
-
-
-def kalman_with_control() -> MotionEstimator:
-    """Return the estimator for poses and controls, with the nodes' defaults."""
-    return _kalman(ACCELERATION_WALK_WITH_CONTROL)
-
-
-def _kalman(walk):
-    return MotionEstimator(ConstantAccelerationFilter(POSITION_NOISE, walk), FiniteDifference())
-
-
-FILTERS = {
-    "finite difference": (finite_difference, False),
-    "Kalman": (kalman, False),
-    "Kalman with control": (kalman_with_control, True),
+FILTERS: dict[str, tuple[Callable[[], RateFilter], bool]] = {
+    "finite difference": (FiniteDifference, False),
+    "Kalman": (partial(ConstantAccelerationFilter, POSITION_NOISE, ACCELERATION_WALK), False),
+    "Kalman with control": (
+        partial(ConstantAccelerationFilter, POSITION_NOISE, ACCELERATION_WALK_WITH_CONTROL),
+        True,
+    ),
 }
-"""Name -> (estimator, whether it is given the control)."""
+"""Name -> filter with the nodes' defaults, and whether it is given the control."""
 
 
 def estimate(
-    flight: SampledFlight, make_estimator: Callable[[], MotionEstimator], uses_control: bool
+    flight: SampledFlight, make_filter: Callable[[], RateFilter], uses_control: bool
 ) -> NDArray[np.float64]:
-    """Return the velocities (n, 3), m/s, that an estimator finds; 0 at the first sample."""
-    estimator, control = make_estimator(), ControlInput()
+    """Return the velocities (n, 3), m/s, that a filter finds; 0 at the first sample."""
+    estimator, control = MotionEstimator(make_filter(), FiniteDifference()), ControlInput()
     velocity = np.zeros_like(flight.measured)
     for k, (time, position, yaw) in enumerate(
         zip(flight.time, flight.measured, flight.yaw, strict=True)
@@ -200,7 +174,7 @@ def estimate(
 
 def rms_error(flight: SampledFlight, velocity: NDArray[np.float64]) -> float:
     """Return the root mean square of the velocity error, m/s, over all but the first second."""
-    return float(np.sqrt(np.mean((velocity - flight.velocity)[_settled()] ** 2)))
+    return float(np.sqrt(np.mean((velocity - flight.velocity)[_SETTLED] ** 2)))
 
 
 def lag(flight: SampledFlight, velocity: NDArray[np.float64]) -> float:
@@ -209,12 +183,8 @@ def lag(flight: SampledFlight, velocity: NDArray[np.float64]) -> float:
     misfits = []
     for shift in shifts:
         delayed = [np.interp(flight.time - shift, flight.time, axis) for axis in flight.velocity.T]
-        misfits.append(np.mean((velocity - np.transpose(delayed))[_settled()] ** 2))
+        misfits.append(np.mean((velocity - np.transpose(delayed))[_SETTLED] ** 2))
     return float(shifts[np.argmin(misfits)])
-
-
-def _settled():
-    return slice(round(1.0 / PERIOD), None)
 
 
 def draw(
@@ -226,15 +196,7 @@ def draw(
 ) -> None:
     """Draw x_dot of a flight, and its errors, between two times (s) into a file.
 
-    Parameters
-    ----------
-    flight : SampledFlight
-    velocities : dict of str to ndarray, shape (n, 3)
-        What the filters found, by name.
-    path : str
-        The ending says in which format, such as .png.
-    start, end : float
-        s.
+    ``velocities`` are those that the filters found, by name, shape (n, 3).
     """
     figure = Figure(figsize=(9.0, 7.0), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(4, 3))

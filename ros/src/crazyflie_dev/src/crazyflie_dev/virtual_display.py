@@ -35,12 +35,7 @@ def screenshot(display: str) -> NDArray[np.uint8]:
 
 @contextlib.contextmanager
 def virtual_display(width: int, height: int) -> Iterator[str]:
-    """Run Xvfb on a display that is free, for the time of a with block; yield its name.
-
-    Parameters
-    ----------
-    width, height : int
-        Pixels.
+    """Run Xvfb with a size in pixels on a display that is free; yield the display's name.
 
     Raises
     ------

@@ -9,9 +9,8 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TypeVar
 
 import rospkg
 from packaging.requirements import Requirement
@@ -26,9 +25,9 @@ _PROGRAM_LIMIT = 20.0
 
 _MODULES = ("rospy", "tf2_ros", "numpy", "scipy", "cflib", "control", "natnet")
 
-_RADIO_ID = ("1915", "7777")
+_PRINT_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
-T = TypeVar("T")
+_RADIO_ID = ("1915", "7777")
 
 
 def first_python() -> Python:
@@ -36,7 +35,7 @@ def first_python() -> Python:
     path = shutil.which("python3")
     if path is None:
         return Python("", "", {})
-    version = _run(path, "-c", "import sys; print('%d.%d' % sys.version_info[:2])")
+    version = _run(path, "-c", _PRINT_VERSION)
     code = (
         "import importlib, sys\n"
         "for name in sys.argv[1:]:\n"
@@ -49,7 +48,7 @@ def first_python() -> Python:
 
 def python_of_ros() -> str:
     """Return the version of the Python that Debian's ROS is for; this one's where ROS is not."""
-    version = _run("/usr/bin/python3", "-c", "import sys; print('%d.%d' % sys.version_info[:2])")
+    version = _run("/usr/bin/python3", "-c", _PRINT_VERSION)
     return version.strip() or "{}.{}".format(*sys.version_info)
 
 
@@ -82,15 +81,15 @@ def debian_packages() -> dict[str, str]:
 
 def python_packages(entries: Iterable[str]) -> tuple[dict[str, str], dict[str, str]]:
     """Return name -> version of the packages that are asked for, and of the installed ones."""
-    wanted, installed = {}, {}
+    required, installed = {}, {}
     for requirement in map(Requirement, entries):
         if requirement.marker is None or requirement.marker.evaluate():
             exact = [s.version for s in requirement.specifier if s.operator == "=="]
-            wanted[requirement.name] = exact[0] if exact else ""
-            # What is missing is what is wanted and not installed.
+            required[requirement.name] = exact[0] if exact else ""
+            # What is missing is what is required and not installed.
             with contextlib.suppress(importlib.metadata.PackageNotFoundError):
                 installed[requirement.name] = importlib.metadata.version(requirement.name)
-    return wanted, installed
+    return required, installed
 
 
 def network() -> Network:
@@ -99,22 +98,18 @@ def network() -> Network:
 
 
 def _resolve(name):
-    # The resolver knows no time limit: it is asked in a thread that may be left behind.
-    return _within(_RESOLVER_LIMIT, lambda: socket.gethostbyname(name), "")
+    """Return the address of a host; empty if there is none within the limit."""
+    addresses = []
 
-
-def _within(limit: float, work: Callable[[], T], otherwise: T) -> T:
-    results: list[T] = []
-
-    def attempt():
-        # After a failure ``otherwise`` is returned.
+    def resolve():
         with contextlib.suppress(OSError, UnicodeError):
-            results.append(work())
+            addresses.append(socket.gethostbyname(name))
 
-    thread = threading.Thread(target=attempt, daemon=True)
+    # The resolver has no time limit of its own: its thread may be left behind.
+    thread = threading.Thread(target=resolve, daemon=True)
     thread.start()
-    thread.join(limit)
-    return results[0] if results else otherwise
+    thread.join(_RESOLVER_LIMIT)
+    return addresses[0] if addresses else ""
 
 
 def _is_own(address):

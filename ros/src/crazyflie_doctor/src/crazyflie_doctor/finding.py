@@ -1,6 +1,6 @@
 """What a check has found."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 OK, WARN, ERROR = "ok", "warn", "error"
@@ -32,13 +32,13 @@ class Check:
     name : str
     fine : str
         What is so when nothing is found.
-    find : callable
-        ``find()`` returns the findings.
+    findings : iterable of Finding
+        Of a generator, which makes the check when it is iterated.
     """
 
     name: str
     fine: str
-    find: Callable[[], Iterable[Finding]]
+    findings: Iterable[Finding]
 
 
 def warn(text: str, remedy: str) -> Finding:
@@ -53,7 +53,7 @@ def error(text: str, remedy: str) -> Finding:
 
 def lines(check: Check) -> Iterator[tuple[str, str]]:
     """Make a check; yield level and line of each finding, or of its being fine."""
-    findings = list(check.find())
+    findings = list(check.findings)
     if not findings:
         yield OK, f"ok     {check.name}: {check.fine}"
     for finding in findings:

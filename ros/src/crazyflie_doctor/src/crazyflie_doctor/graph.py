@@ -91,12 +91,8 @@ def check_nodes(graph: Graph) -> Iterator[Finding]:
 def check_types(graph: Graph, ours: Callable[[str, str], str | None]) -> Iterator[Finding]:
     """Compare the types of all publishers and services with those of this workspace.
 
-    Parameters
-    ----------
-    graph : Graph
-    ours : callable
-        ``ours(kind, type name)`` returns the MD5 sum that the type has here, None if it is
-        unknown here; the kind is "msg" or "srv".
+    ``ours(kind, type name)`` returns the MD5 sum of the type here, None if it is unknown here; the
+    kind is "msg" or "srv".
     """
     for (node, topic), offered in sorted(graph.topic_types.items()):
         yield from _compare(f"{node} publishes {topic}", offered, ours("msg", offered[0]))
@@ -151,7 +147,7 @@ def check_publishers(graph: Graph) -> Iterator[Finding]:
                 f"launch what publishes it, or mend {listed(parameters)}",
             )
     if graph.subscribers.get("/tf") and not graph.publishers.get("/tf"):
-        yield error("nobody publishes /tf", "start the simulator or mocap_optitrack")
+        yield error("no node publishes /tf", "start the simulator or mocap_optitrack")
     yield from _doubled(graph)
 
 
@@ -195,11 +191,7 @@ def _takeoff_servers(graph, reference):
 def check_drivers(graph: Graph, reported: Mapping[str, set[str]]) -> Iterator[Finding]:
     """Find vehicles that several drivers, or several launches, are to fly.
 
-    Parameters
-    ----------
-    graph : Graph
-    reported : dict
-        Address of a vehicle -> nodes whose diagnostics speak of it.
+    ``reported`` is address of a vehicle -> nodes whose diagnostics have it.
     """
     for uri, nodes in sorted(reported.items()):
         if len(nodes) > 1:

@@ -11,6 +11,9 @@ LEAST_FREE = 100e6
 
 FEW_FREE = 1e9
 
+_LOOPBACK = "127."
+"""Begin of addresses that no other computer can reach."""
+
 _RULES = "sudo cp $(rospack find crazyflie_link)/udev/99-crazyflie.rules /etc/udev/rules.d/"
 _SOURCE = "source devel/setup.bash (or install/setup.bash) of the workspace in this shell"
 
@@ -34,14 +37,7 @@ class Python:
 
 
 def check_python(first: Python, of_ros: str) -> Iterator[Finding]:
-    """Check the first python3 on the PATH.
-
-    Parameters
-    ----------
-    first : Python
-    of_ros : str
-        Version of the Python for which ROS is installed.
-    """
+    """Check the first python3 on the PATH; ``of_ros`` is the version for which ROS is installed."""
     if first.version != of_ros:
         yield error(
             f"{first.path or 'no python3'} on the PATH is Python {first.version or '?'}, "
@@ -54,22 +50,13 @@ def check_python(first: Python, of_ros: str) -> Iterator[Finding]:
 
 
 def check_packages(
-    wanted: Mapping[str, str], installed: Mapping[str, str], remedy: str
+    required: Mapping[str, str], installed: Mapping[str, str], remedy: str
 ) -> Iterator[Finding]:
-    """Check package lists.
-
-    Parameters
-    ----------
-    wanted : dict
-        Name -> version; empty for any.
-    installed : dict
-        Name -> version.
-    remedy : str
-    """
-    missing = [name for name in wanted if name not in installed]
+    """Check packages, name -> version; an empty required version stands for any."""
+    missing = [name for name in required if name not in installed]
     if missing:
         yield error(f"missing: {listed(missing, 20)}", remedy)
-    for name, version in wanted.items():
+    for name, version in required.items():
         if version and installed.get(name, version) != version:
             yield warn(f"{name} is {installed[name]}, tested is {version}", remedy)
 
@@ -94,11 +81,6 @@ class Network:
     hostname: str
     resolve: Callable[[str], str]
     is_own: Callable[[str], bool]
-
-
-def is_loopback(address: str) -> bool:
-    """Tell whether an address is one that no other computer can reach."""
-    return address.startswith("127.")
 
 
 def check_network(network: Network) -> Iterator[Finding]:
@@ -141,7 +123,7 @@ def _check_own_name(network, master, master_address):
             f"{variable} {name!r} is {address}, no address of this computer",
             "export ROS_IP with one that `hostname -I` prints, or 127.0.0.1",
         )
-    elif is_loopback(address) and master_address and not network.is_own(master_address):
+    elif address.startswith(_LOOPBACK) and master_address and not network.is_own(master_address):
         yield error(
             f"the master is on {master}, but nodes started here can only be reached from here "
             f"({variable} {name})",
@@ -149,7 +131,7 @@ def _check_own_name(network, master, master_address):
         )
     if not given and master_address and network.is_own(master_address):
         yield warn(
-            "neither ROS_IP nor ROS_HOSTNAME is set: whoever is in the network can command nodes",
+            "neither ROS_IP nor ROS_HOSTNAME is set: any computer in the network can command nodes",
             f"{_SOURCE}, or export ROS_IP=127.0.0.1",
         )
 
@@ -184,17 +166,12 @@ class Radio:
 
 
 def check_radio(radio: Radio, uris: Sequence[str]) -> Iterator[Finding]:
-    """Check the permission to use a Crazyradio, where there is one or a URI asks for one.
-
-    Parameters
-    ----------
-    radio : Radio
-    uris : sequence of str
-        Of the vehicles in the graph.
-    """
-    wanted = [uri for uri in uris if uri.startswith("radio://")]
-    if wanted and not radio.dongles:
-        yield error(f"no Crazyradio is plugged in for {listed(wanted)}", "plug it in; see `lsusb`")
+    """Check the permission to use a Crazyradio, where there is one or a vehicle needs one."""
+    radio_uris = [uri for uri in uris if uri.startswith("radio://")]
+    if radio_uris and not radio.dongles:
+        yield error(
+            f"no Crazyradio is plugged in for {listed(radio_uris)}", "plug it in; see `lsusb`"
+        )
     refused = [path for path, may in radio.dongles.items() if not may]
     if refused:
         steps = [] if radio.has_rules else [_RULES, "sudo udevadm trigger"]
@@ -204,5 +181,5 @@ def check_radio(radio: Radio, uris: Sequence[str]) -> Iterator[Finding]:
             f"no permission to use the Crazyradio {listed(refused)}",
             " && ".join(steps) or "unplug it and plug it in again",
         )
-    elif (wanted or radio.dongles) and not radio.has_rules:
+    elif (radio_uris or radio.dongles) and not radio.has_rules:
         yield warn("there is no udev rule for the Crazyradio: only root may use it", _RULES)

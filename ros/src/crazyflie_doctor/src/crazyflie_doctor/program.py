@@ -3,8 +3,7 @@
 import os
 import sys
 import threading
-from collections.abc import Iterator
-from functools import partial
+from collections.abc import Iterator, Mapping
 
 import rosgraph
 
@@ -59,76 +58,56 @@ def _give_up(limit):
 def _checks(duration: float) -> Iterator[Check]:
     yield from _of_the_computer()
     if not running_graph.is_master_online():
-        yield Check("master", "", partial(_no_master, rosgraph.get_master_uri()))
+        missing = warn(
+            f"no ROS master at {rosgraph.get_master_uri()}, the graph was not checked",
+            "start one with roslaunch or roscore, or mend ROS_MASTER_URI",
+        )
+        yield Check("master", "", [missing])
         yield _radio([])
         return
     running = running_graph.graph()
     if not set(running.publishers.get("/rosout", ())) - {"/rosout"}:
-        yield Check("master", "", lambda: [warn("no node runs", "roslaunch what is to be checked")])
-    yield Check("nodes", "all answer", lambda: graph.check_nodes(running))
-    yield Check("types", "all are ours", lambda: graph.check_types(running, running_graph.own_md5))
-    yield Check("connections", "complete", partial(_connections, running))
-    yield Check("publishers", "one of each", lambda: graph.check_publishers(running))
+        yield Check("master", "", [warn("no node runs", "roslaunch what is to be checked")])
+    yield Check("nodes", "all answer", graph.check_nodes(running))
+    yield Check("types", "all are ours", graph.check_types(running, running_graph.own_md5))
+    yield Check("connections", "complete", _connections(running))
+    yield Check("publishers", "one of each", graph.check_publishers(running))
     recording = record(running, duration)
-    for name, fine, find in (
-        ("clock", "one for all", timing.check_clock),
-        ("tf tree", "is a tree", timing.check_tf_tree),
-        ("frames", "all are published", timing.check_frames),
-        ("tf rate", "poses come often and fresh", timing.check_tf_rate),
-        ("gains", "fit the delay", timing.check_gains),
-    ):
-        # Each check is made before the next is yielded.
-        yield Check(name, fine, partial(find, running, recording))
-    yield Check(
-        "drivers", "one for a vehicle", lambda: graph.check_drivers(running, recording.reported)
-    )
+    yield Check("clock", "one for all", timing.check_clock(running, recording))
+    yield Check("tf tree", "is a tree", timing.check_tf_tree(running, recording))
+    yield Check("frames", "all are published", timing.check_frames(running, recording))
+    yield Check("tf rate", "poses come often and fresh", timing.check_tf_rate(running, recording))
+    yield Check("gains", "fit the delay", timing.check_gains(running, recording))
+    yield Check("drivers", "one for a vehicle", graph.check_drivers(running, recording.reported))
     yield _radio([*running.uris, *recording.reported])
 
 
 def _of_the_computer() -> Iterator[Check]:
-    first, of_ros = computer.first_python(), computer.python_of_ros()
-    yield Check(
-        "Python",
-        f"{first.path}, {first.version}",
-        lambda: installation.check_python(first, of_ros),
-    )
+    first = computer.first_python()
+    found = installation.check_python(first, computer.python_of_ros())
+    yield Check("Python", f"{first.path}, {first.version}", found)
     debian = dict.fromkeys(computer.package_list("debian.txt"), "")
-    yield Check(
-        "Debian packages",
-        f"all {len(debian)} are installed" if debian else "no list here (an install space)",
-        lambda: installation.check_packages(debian, computer.debian_packages(), "./run install"),
-    )
-    wanted, installed = computer.python_packages(computer.package_list("requirements.txt"))
-    yield Check(
-        "PyPI packages",
-        f"all {len(wanted)} are installed" if wanted else "no list here (an install space)",
-        lambda: installation.check_packages(wanted, installed, "./run install"),
-    )
-    yield Check("network", "can be reached", lambda: installation.check_network(computer.network()))
+    yield _packages("Debian", debian, computer.debian_packages())
+    yield _packages("PyPI", *computer.python_packages(computer.package_list("requirements.txt")))
+    yield Check("network", "can be reached", installation.check_network(computer.network()))
     path, is_writable, free = computer.log_directory()
-    yield Check(
-        "logs",
-        f"{path}, {free / 1e9:.0f} GB free",
-        lambda: installation.check_log_directory(path, is_writable, free),
-    )
+    found = installation.check_log_directory(path, is_writable, free)
+    yield Check("logs", f"{path}, {free / 1e9:.0f} GB free", found)
 
 
-def _no_master(uri: str) -> list[Finding]:
-    return [
-        warn(
-            f"no ROS master at {uri}, the graph was not checked",
-            "start one with roslaunch or roscore, or mend ROS_MASTER_URI",
-        )
-    ]
+def _packages(origin: str, required: Mapping[str, str], installed: Mapping[str, str]) -> Check:
+    fine = f"all {len(required)} are installed" if required else "no list here (an install space)"
+    found = installation.check_packages(required, installed, "./run install")
+    return Check(f"{origin} packages", fine, found)
 
 
 def _radio(uris: list[str]) -> Check:
     found = computer.radio()
     fine = f"{len(found.dongles)} that may be used" if found.dongles else "none, and none needed"
-    return Check("Crazyradio", fine, lambda: installation.check_radio(found, uris))
+    return Check("Crazyradio", fine, installation.check_radio(found, uris))
 
 
-def _connections(running: graph.Graph) -> list[Finding]:
-    findings = list(graph.check_connections(running))
-    # A subscriber may just have been connecting.
-    return list(graph.check_connections(running_graph.graph())) if findings else findings
+def _connections(running: graph.Graph) -> Iterator[Finding]:
+    # A subscriber may just have been connecting: what is missing has to be missing twice.
+    if list(graph.check_connections(running)):
+        yield from graph.check_connections(running_graph.graph())

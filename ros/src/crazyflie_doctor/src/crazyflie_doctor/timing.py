@@ -82,7 +82,7 @@ class Recording:
 
 
 def check_clock(graph: Graph, recording: Recording) -> Iterator[Finding]:
-    """Check that all nodes live by one clock, and that it goes."""
+    """Check that all nodes use one clock, and that it advances."""
     sources = graph.publishers.get("/clock", set())
     if graph.parameters.get("/use_sim_time", False):
         if not recording.clocks:
@@ -125,16 +125,13 @@ def check_tf_tree(_: Graph, recording: Recording) -> Iterator[Finding]:
                 "end one of them, or rename its frame: tf takes whichever came last",
             )
         elif len(sources[child]) > 1:
-            kind = "static transform" if _is_static(recording, child) else "transform"
+            is_static = any(t.is_static for t in recording.transforms if t.child == child)
+            kind = "static transform" if is_static else "transform"
             yield error(
                 f"the {kind} of {child} comes from {listed(sources[child])}", "end all but one"
             )
     for loop in _loops(parents):
         yield error(f"tf has a loop: {' -> '.join(loop)}", "turn one of these transforms round")
-
-
-def _is_static(recording, child):
-    return any(t.is_static for t in recording.transforms if t.child == child)
 
 
 def _loops(parents):
@@ -152,7 +149,7 @@ def _loops(parents):
 
 
 def check_frames(graph: Graph, recording: Recording) -> Iterator[Finding]:
-    """Find frames, and pairs of frames, that nodes need but nobody publishes."""
+    """Find frames, and pairs of frames, that nodes need and no node publishes."""
     known = {frame for t in recording.transforms for frame in (t.parent, t.child)}
     for node, (fixed, robot) in sorted(frames_of(graph).items()):
         missing = sorted({fixed, robot} - known)
@@ -160,7 +157,7 @@ def check_frames(graph: Graph, recording: Recording) -> Iterator[Finding]:
             near = difflib.get_close_matches(frame, known, 1, 0.5)
             hint = f"did you mean {near[0]}?" if near else f"there are {listed(known) or 'none'}"
             yield error(
-                f"nobody publishes the frame {frame} that {node} needs ({hint})",
+                f"no node publishes the frame {frame} that {node} needs ({hint})",
                 "mend its parameter or the child_frame_id of the rigid body; does motion capture "
                 "see it?",
             )
@@ -242,7 +239,7 @@ def _check_stream(child, transforms):
 
 
 def check_gains(graph: Graph, recording: Recording) -> Iterator[Finding]:
-    """Compare the delay from pose to control with what the gains in use can bear.
+    """Compare the delay from pose to control with what the gains in use tolerate.
 
     The loop's delay is what was measured from the pose's stamp, and half a period for
     which each control is held.

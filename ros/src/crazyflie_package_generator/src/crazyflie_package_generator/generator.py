@@ -27,21 +27,13 @@ class GeneratorError(Exception):
 
 
 def check_name(what: str, name: str) -> None:
-    """Check a name by the rules for packages.
-
-    REP 144: lower case letters, digits and underscores, at least two characters, the first
-    one a letter, no two underscores in a row. It also becomes the name of a Python module.
-
-    Parameters
-    ----------
-    what : str
-        Of which it is the name, for the message.
-    name : str
+    """Check the name of a package or node (``what``), which also becomes that of a Python module.
 
     Raises
     ------
     GeneratorError
-        It does not keep to them.
+        It does not follow REP 144: lower case letters, digits and underscores, at least two
+        characters, the first one a letter, no two underscores in a row.
     """
     if not _NAME.fullmatch(name) or keyword.iskeyword(name):
         raise GeneratorError(
@@ -62,14 +54,10 @@ class Package:
 
     Attributes
     ----------
-    name : str
-        Of the package.
-    node : str
-        Of its node, without ``_node``.
+    name, node : str
+        Of the package, and of its node without ``_node``.
     messages : bool
         Whether it has a message of its own.
-    maintainer, email : str
-        For package.xml.
     """
 
     name: str
@@ -79,13 +67,7 @@ class Package:
     email: str = "nobody@example.com"
 
     def check(self) -> None:
-        """Check the names.
-
-        Raises
-        ------
-        GeneratorError
-            One cannot be used.
-        """
+        """Raise GeneratorError if a name, the maintainer or the email cannot be used."""
         check_name("package", self.name)
         check_name("node", self.node)
         if self.node.endswith("_node"):

@@ -1,9 +1,14 @@
 """A reference that goes where a velocity in its own heading frame leads it."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from typing_extensions import override
+
 from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.types import Number
 
 
 @dataclass(frozen=True)
@@ -26,48 +31,43 @@ class Pose:
     yaw: float
 
 
-@dataclass(frozen=True)
-class ReferenceLimits:
-    """What a reference keeps to.
+_SPEED = Number("m/s", above=0.0)
 
-    Attributes
-    ----------
-    horizontal, vertical : float
-        Speeds, m/s.
-    yaw_dot : float
-        rad/s.
-    acceleration : float
-        m/s^2, horizontal and vertical.
-    min_height, max_height : float
-        m.
-    """
 
-    horizontal: float
-    vertical: float
-    yaw_dot: float
-    acceleration: float
-    min_height: float
-    max_height: float
+class LimitParameters(Parameters):
+    """What a reference keeps to."""
+
+    horizontal: float = parameter(_SPEED, "largest speed, x and y together", 0.7, live=True)
+    vertical: float = parameter(_SPEED, "largest speed, z", 0.4, live=True)
+    yaw_dot: float = parameter(Number("rad/s", above=0.0), "largest yaw rate", 1.5, live=True)
+    acceleration: float = parameter(
+        Number("m/s^2", above=0.0), "largest acceleration, also when stopping", 1.0, live=True
+    )
+    min_height: float = parameter(Number("m"), "the reference sinks no lower", 0.3, live=True)
+    max_height: float = parameter(Number("m"), "and rises no higher", 2.0, live=True)
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        if self.min_height > self.max_height:
+            yield (
+                f"limits/min_height is {self.min_height:g}; "
+                f"expected <= limits/max_height, {self.max_height:g} (m)"
+            )
 
 
 class VelocityReference:
     """Integrates velocities, within limits.
 
-    Parameters
-    ----------
-    limits : ReferenceLimits
-    silence : float
-        A velocity that is older than this, s, counts no more: the reference comes to rest.
-
     Attributes
     ----------
-    limits : ReferenceLimits
+    limits : LimitParameters
     silence : float
+        A velocity that is older than this, s, counts no more: the reference comes to rest.
     pose : Pose or None
-        None until there is one to begin at.
+        None before the first `place`.
     """
 
-    def __init__(self, limits: ReferenceLimits, silence: float):
+    def __init__(self, limits: LimitParameters, silence: float):
         self.limits = limits
         self.silence = silence
         self.pose: Pose | None = None

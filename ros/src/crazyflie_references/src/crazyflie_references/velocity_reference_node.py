@@ -1,7 +1,5 @@
 """ROS interface of the velocity reference: cmd_vel in, references of the controller out."""
 
-from collections.abc import Iterator
-
 from geometry_msgs.msg import Twist
 from std_msgs.msg import String
 from typing_extensions import override
@@ -12,34 +10,11 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_references.velocity_reference import ReferenceLimits, Velocity, VelocityReference
+from crazyflie_references.velocity_reference import LimitParameters, Velocity, VelocityReference
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
-from crazyflie_utils.parameters.types import TIME_STEP, TOPIC, Number
+from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_utils.vectors import is_finite
-
-_SPEED = Number("m/s", above=0.0)
-
-
-class LimitParameters(Parameters):
-    """What a reference keeps to."""
-
-    horizontal: float = parameter(_SPEED, "largest speed, x and y together", 0.7, live=True)
-    vertical: float = parameter(_SPEED, "largest speed, z", 0.4, live=True)
-    yaw_dot: float = parameter(Number("rad/s", above=0.0), "largest yaw rate", 1.5, live=True)
-    acceleration: float = parameter(
-        Number("m/s^2", above=0.0), "largest acceleration, also when stopping", 1.0, live=True
-    )
-    min_height: float = parameter(Number("m"), "the reference sinks no lower", 0.3, live=True)
-    max_height: float = parameter(Number("m"), "and rises no higher", 2.0, live=True)
-
-    @override
-    def complaints(self) -> Iterator[str]:
-        if self.min_height > self.max_height:
-            yield (
-                f"limits/min_height is {self.min_height:g}; "
-                f"expected <= limits/max_height, {self.max_height:g} (m)"
-            )
 
 
 class VelocityReferenceParameters(Parameters):
@@ -68,18 +43,6 @@ class VelocityReferenceParameters(Parameters):
     )
     limits: LimitParameters = group(LimitParameters, "limits")
 
-    def limits_of_reference(self) -> ReferenceLimits:
-        """Return the limits as the algorithm wants them."""
-        each = self.limits
-        return ReferenceLimits(
-            each.horizontal,
-            each.vertical,
-            each.yaw_dot,
-            each.acceleration,
-            each.min_height,
-            each.max_height,
-        )
-
 
 class VelocityReferenceNode(Node):
     """Fly a vehicle by velocity: integrate cmd_vel into references while it flies.
@@ -98,9 +61,7 @@ class VelocityReferenceNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(VelocityReferenceParameters, self._reconfigure)
-        self._reference = VelocityReference(
-            self._parameters.limits_of_reference(), self._parameters.silence
-        )
+        self._reference = VelocityReference(self._parameters.limits, self._parameters.silence)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -133,7 +94,7 @@ class VelocityReferenceNode(Node):
             self._publish()
 
     def _reconfigure(self, parameters):
-        self._reference.limits = parameters.limits_of_reference()
+        self._reference.limits = parameters.limits
         self._reference.silence = parameters.silence
 
     def _on_flight_state(self, message):

@@ -10,16 +10,7 @@ from crazyflie_reports.flight_record import FlightRecord
 
 
 def save(record: FlightRecord, point: ArrayLike, path: Path) -> None:
-    """Draw a flight into a file.
-
-    Parameters
-    ----------
-    record : FlightRecord
-    point : array_like, shape (3,)
-        Hover point, m.
-    path : Path
-        PNG file.
-    """
+    """Draw a flight, with the hover point in m, into a PNG file."""
     start = record.events["takeoff"]
     figure = Figure(figsize=(9, 10), layout="constrained")
     height, error, tilt, thrust = figure.subplots(4, 1, sharex=True)

@@ -17,12 +17,7 @@ GROUND_TOLERANCE = 0.01
 class Series:
     """Rows of numbers with the times they belong to, growing.
 
-    One thread may add while another looks.
-
-    Parameters
-    ----------
-    fields : tuple of str
-        Names of the columns.
+    One thread may append while another reads. ``fields`` are the names of the columns.
     """
 
     def __init__(self, fields: tuple[str, ...]):
@@ -96,19 +91,10 @@ class FlightRecord:
         return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
 
     def time_to_hover(self, point: ArrayLike, tolerance: float) -> float:
-        """Return how long after the call of /takeoff the vehicle was at a point to stay.
+        """Return how long after the call of /takeoff the vehicle was at a point to stay, s.
 
-        Parameters
-        ----------
-        point : array_like, shape (3,)
-            m.
-        tolerance : float
-            Largest distance from the point until /land is called, m.
-
-        Returns
-        -------
-        float
-            s; infinity when it never stayed.
+        From then on until /land is called it is within ``tolerance`` of the point, m; infinity when
+        it never stayed.
         """
         times, errors = self._until_landing(point)
         outside = np.flatnonzero(errors > tolerance)
@@ -122,14 +108,7 @@ class FlightRecord:
         return max(0.0, float(self.state.column("z").max()) - height)
 
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
-        """Return mean and maximum distance (m) from a point before /land was called.
-
-        Parameters
-        ----------
-        point : array_like, shape (3,)
-            m.
-        duration : float
-            How long before, s.
+        """Return mean and maximum distance (m) from a point for ``duration`` s until /land.
 
         Raises
         ------

@@ -1,6 +1,7 @@
 """Subscribes to the topics of a flight and keeps their messages."""
 
 import threading
+from functools import partial
 
 from std_msgs.msg import Empty
 from typing_extensions import override
@@ -61,31 +62,24 @@ class FlightRecorderNode(Node):
             ("final_control", ControlStamped, "control"),
         ]
         for name, message_type, content in series:
-            callback = self._appender(name, content)
+            callback = partial(self._on_message, getattr(self.record, name), content)
             handle.subscribe(getattr(self._topics, name), message_type, callback)
         handle.subscribe(self._topics.in_flight, Empty, self._on_toggle)
 
     def stop(self) -> None:
-        """Let the record be as it is."""
+        """Record nothing more."""
         with self.received:
             self._stopped = True
 
-    def _appender(self, name, content):
-        series = getattr(self.record, name)
-
-        def append(message):
-            row = to_vector(getattr(message, content))
-            self._record(lambda: series.append(message.header.stamp.to_sec(), row))
-
-        return append
+    def _on_message(self, series, content, message):
+        row = to_vector(getattr(message, content))
+        self._record(series.append, message.header.stamp.to_sec(), row)
 
     def _on_toggle(self, _):
-        now = self._handle.stamp().to_sec()
-        self._record(lambda: self.record.toggles.append(now))
+        self._record(self.record.toggles.append, self._handle.stamp().to_sec())
 
-    def _record(self, append):
+    def _record(self, append, *values):
         with self.received:
-            if self._stopped:
-                return
-            append()
-            self.received.notify_all()
+            if not self._stopped:
+                append(*values)
+                self.received.notify_all()

@@ -48,7 +48,7 @@ class FlightReport:
 
     @classmethod
     def of(cls, record: FlightRecord, point: Sequence[float]) -> "FlightReport":
-        """Judge a record by the point x, y, z (m) where it should have hovered."""
+        """Return the report of a record with the hover point x, y, z, m."""
         mean, largest = record.hover_error(point, HOVER_WINDOW)
         try:
             touchdown = record.touchdown_speed()

@@ -19,7 +19,7 @@ Registrations = list[tuple[str, list[str]]]
 """Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them."""
 
 HIDDEN_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf_static")
-HIDDEN_NODES = ("/rosout",)
+HIDDEN_NODES = {"/rosout"}
 EXAMPLE = {
     "/simulator",
     "/state_estimator",
@@ -38,29 +38,22 @@ topics one by one."""
 
 
 def dot(published: Registrations, subscribed: Registrations) -> str:
-    """Return a graph in the language of graphviz.
-
-    Parameters
-    ----------
-    published, subscribed : Registrations
-        Topics without a publisher or without a subscriber are left out.
-    """
-    sources = {topic: nodes for topic, nodes in published if topic not in HIDDEN_TOPICS}
-    sinks = {topic: nodes for topic, nodes in subscribed if topic not in HIDDEN_TOPICS}
+    """Return a graph in the language of graphviz, of topics with a publisher and a subscriber."""
+    sources, sinks = (
+        {topic: set(nodes) - HIDDEN_NODES for topic, nodes in part if topic not in HIDDEN_TOPICS}
+        for part in (published, subscribed)
+    )
     lines = [
         "digraph {",
         '  rankdir=LR; bgcolor=white; node [fontname="Helvetica", fontsize=11];',
     ]
-    nodes = set()
+    nodes: set[str] = set()
     edges = []
-    for topic in sorted(set(sources) & set(sinks)):
+    for topic in sorted(sources.keys() & sinks.keys()):
         lines.append(f'  "topic {topic}" [label="{topic}", shape=box];')
-        for node in sorted(set(sources[topic]) - set(HIDDEN_NODES)):
-            nodes.add(node)
-            edges.append(f'  "{node}" -> "topic {topic}";')
-        for node in sorted(set(sinks[topic]) - set(HIDDEN_NODES)):
-            nodes.add(node)
-            edges.append(f'  "topic {topic}" -> "{node}";')
+        edges += [f'  "{node}" -> "topic {topic}";' for node in sorted(sources[topic])]
+        edges += [f'  "topic {topic}" -> "{node}";' for node in sorted(sinks[topic])]
+        nodes |= sources[topic] | sinks[topic]
     lines += [f'  "{node}" [shape=ellipse];' for node in sorted(nodes)]
     return "\n".join([*lines, *edges, "}"]) + "\n"
 

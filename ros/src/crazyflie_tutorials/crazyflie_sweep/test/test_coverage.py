@@ -5,12 +5,12 @@ import math
 import pytest
 
 from crazyflie_sweep.coverage import Coverage
-from crazyflie_sweep.lanes import Area
+from crazyflie_sweep.sweep_parameters import Area
 
-AREA = Area(0.0, 2.0, -1.0, 0.0)
+AREA = Area(x_min=0.0, x_max=2.0, y_min=-1.0, y_max=0.0)
 
 
-def test_nothing_is_covered_before_anybody_was_there():
+def test_nothing_is_covered_at_first():
     coverage = Coverage(AREA, 0.1, 0.5)
     assert coverage.share == 0.0
     assert coverage.middles(covered=False).shape == (200, 2)

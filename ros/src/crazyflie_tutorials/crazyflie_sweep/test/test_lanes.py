@@ -1,4 +1,4 @@
-"""The way through an area: where it leads, that it is smooth, and that it covers everything."""
+"""The path through an area: where it leads, that it is smooth, and that it covers everything."""
 
 import itertools
 import math
@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_sweep.coverage import Coverage
-from crazyflie_sweep.lanes import Arc, Area, Line, Way, back, lane_offsets, sweep
+from crazyflie_sweep.lanes import Arc, LanePath, Line, lane_offsets, reversed_path, sweep
+from crazyflie_sweep.sweep_parameters import Area
 
-AREA = Area(-1.5, 1.5, -1.0, 1.0)
+AREA = Area(x_min=-1.5, x_max=1.5, y_min=-1.0, y_max=1.0)
 WIDTH = st.floats(0.2, 5.0)
 
 
@@ -44,40 +45,40 @@ def test_length_is_that_of_lanes_and_half_circles():
 
 
 @given(WIDTH, WIDTH, st.floats(0.2, 2.0), st.booleans())
-def test_the_way_is_smooth_and_directions_are_its_derivatives(length, width, lane_width, reverse):
-    way = sweep(Area(0.0, length, 0.0, width), lane_width, 1.0)
-    way = back(way) if reverse else way
+def test_the_path_is_smooth_and_directions_are_its_derivatives(length, width, lane_width, reverse):
+    path = sweep(Area(x_min=0.0, x_max=length, y_min=0.0, y_max=width), lane_width, 1.0)
+    path = reversed_path(path) if reverse else path
     step = 1e-4
     for k in range(200):
-        s = (way.length - step) * k / 199
-        (a, direction), (b, _) = way.at(s), way.at(s + step)
+        s = (path.length - step) * k / 199
+        (a, direction), (b, _) = path.at(s), path.at(s + step)
         for d, p, q in zip(direction, a, b, strict=True):
             assert (q - p) / step == pytest.approx(d, abs=step / lane_width * 4 + 2e-3)
 
 
 def test_arcs_reach_half_a_lane_beyond_the_area():
-    way = sweep(AREA, 0.5, 1.0)
-    xs = [way.at(way.length * k / 5000)[0][0] for k in range(5001)]
+    path = sweep(AREA, 0.5, 1.0)
+    xs = [path.at(path.length * k / 5000)[0][0] for k in range(5001)]
     assert max(xs) == pytest.approx(1.75, abs=1e-4)
     assert min(xs) == pytest.approx(-1.75, abs=1e-4)
 
 
-def test_back_ends_where_the_way_began():
-    way = sweep(AREA, 0.5, 1.0)
-    for s in (0.0, 1.0, 3.2, way.length):
-        position, direction = way.at(s)
-        again, opposite = back(way).at(way.length - s)
+def test_a_reversed_path_ends_where_the_path_begins():
+    path = sweep(AREA, 0.5, 1.0)
+    for s in (0.0, 1.0, 3.2, path.length):
+        position, direction = path.at(s)
+        again, opposite = reversed_path(path).at(path.length - s)
         assert again == pytest.approx(position)
         assert opposite == pytest.approx([-d for d in direction])
 
 
-def test_beyond_its_end_a_way_ends():
-    way = Way(
+def test_beyond_its_end_a_path_ends():
+    path = LanePath(
         [Line((0.0, 0.0, 1.0), (2.0, 0.0, 1.0)), Arc((2.0, 1.0, 1.0), 1.0, -math.pi / 2, 1.0)]
     )
-    assert way.at(100.0)[0] == pytest.approx((2.0 + math.sin(1.0), 1.0 - math.cos(1.0), 1.0))
-    assert way.segment_at(100.0) is way.segments[1]
-    assert way.at(-1.0)[0] == (0.0, 0.0, 1.0)
+    assert path.at(100.0)[0] == pytest.approx((2.0 + math.sin(1.0), 1.0 - math.cos(1.0), 1.0))
+    assert path.segment_at(100.0) is path.segments[1]
+    assert path.at(-1.0)[0] == (0.0, 0.0, 1.0)
 
 
 @pytest.mark.parametrize(
@@ -95,10 +96,10 @@ def test_distance_from_a_lane(point, distance):
 
 @given(WIDTH, WIDTH, st.floats(0.2, 1.0))
 def test_a_swath_wider_than_the_lanes_covers_all(length, width, lane_width):
-    area = Area(0.0, length, 0.0, width)
-    way = sweep(area, lane_width, 1.0)
+    area = Area(x_min=0.0, x_max=length, y_min=0.0, y_max=width)
+    path = sweep(area, lane_width, 1.0)
     coverage = Coverage(area, cell=0.1, swath=1.5 * lane_width)
-    count = int(way.length / (0.1 * lane_width)) + 2
+    count = int(path.length / (0.1 * lane_width)) + 2
     for k in range(count + 1):
-        coverage.add(way.at(way.length * k / count)[0])
+        coverage.add(path.at(path.length * k / count)[0])
     assert coverage.share == 1.0

@@ -3,10 +3,8 @@
 import itertools
 import math
 from concurrent.futures import Future
-from pathlib import Path
 
 import pytest
-import rospkg
 from std_srvs.srv import EmptyResponse, TriggerRequest
 
 from crazyflie_msgs.msg import (
@@ -19,10 +17,8 @@ from crazyflie_sweep.velocity_server_node import VelocityServerNode
 from crazyflie_tutorial_msgs.msg import SweepReport
 from crazyflie_tutorial_msgs.srv import VelocityAtResponse
 from crazyflie_utils import ServiceError
-from crazyflie_utils.main import NodeClasses
-from crazyflie_utils.testing import FakeProcess, launch_files
+from crazyflie_utils.testing import FakeProcess
 
-LAUNCH = Path(rospkg.RosPack().get_path("crazyflie_sweep")) / "launch" / "sweep.launch"
 PARAMETERS = {
     "topics/state": "/state",
     "topics/reference": "/ref",
@@ -57,10 +53,11 @@ class Flight:
         self.calls.append(name)
         future = Future()
         future.set_result(EmptyResponse())
-        self.process.publish(
-            "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
-        )
+        self.publish_status(getattr(FlightStatus, state.upper()))
         return future
+
+    def publish_status(self, state):
+        self.process.publish("/in_flight_flight_status", FlightStatus(state=state))
 
     def step(self):
         references = self.process.published("/ref")
@@ -107,21 +104,7 @@ def reply(value):
 def test_a_whole_mission():
     flight = Flight()
     report = flight.until(SweepReport.DONE, SweepReport.FAILED)
-    assert (report.state, report.reason, report.is_final) == (SweepReport.DONE, "", True)
-    assert report.coverage == 1.0
-    assert report.max_lane_distance < 0.1
-    assert 10.0 < report.duration < 60.0
-    assert report.hovering < 0.2
-    assert flight.calls == ["takeoff", "land"]
-    flight.for_seconds(2.0)
-    assert flight.report.duration == report.duration
-    assert flight.calls == ["takeoff", "land"]
-
-
-def test_states_come_in_order():
-    flight = Flight()
-    flight.until(SweepReport.DONE)
-    states = [report.state for report in flight.process.published("/sweep/report")]
+    states = [each.state for each in flight.process.published("/sweep/report")]
     assert [state for state, _ in itertools.groupby(states)] == [
         "waiting",
         "taking_off",
@@ -129,16 +112,20 @@ def test_states_come_in_order():
         "landing",
         "done",
     ]
-
-
-def test_its_speed_is_published_as_vel():
-    flight = Flight()
-    flight.until(SweepReport.DONE)
+    assert (report.state, report.reason, report.is_final) == (SweepReport.DONE, "", True)
+    assert report.coverage == 1.0
+    assert report.max_lane_distance < 0.1
+    assert 10.0 < report.duration < 60.0
+    assert report.hovering < 0.2
+    assert flight.calls == ["takeoff", "land"]
     messages = flight.process.published("/sweep/velocity")
     assert {message.name for message in messages} == {"linear"}
     state = flight.process.published("/ref")[50].state
     assert messages[50].vel == pytest.approx(math.hypot(state.x_dot, state.y_dot, state.z_dot))
     assert messages[50].vel > 0.0
+    flight.for_seconds(2.0)
+    assert flight.report.duration == report.duration
+    assert flight.calls == ["takeoff", "land"]
 
 
 def test_rviz_sees_cells_turn():
@@ -157,7 +144,7 @@ def test_rviz_sees_cells_turn():
     assert pictures[-1]["lanes"].header.frame_id == "world"
 
 
-def test_without_the_service_it_hovers_and_says_so_and_goes_on_when_it_is_there():
+def test_without_the_service_it_hovers_until_the_service_is_there():
     flight = Flight(velocity=lambda _: reply(ServiceError("there is no service /oscillator")))
     report = flight.until(SweepReport.HOVERING)
     flight.for_seconds(3.0)
@@ -209,10 +196,10 @@ def test_without_states_it_hovers():
     flight.until(SweepReport.DONE)
 
 
-def test_who_lands_ends_the_sweep():
+def test_a_landing_ends_the_sweep():
     flight = Flight()
     flight.until(SweepReport.SWEEPING)
-    flight.process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.DESCENDING))
+    flight.publish_status(FlightStatus.DESCENDING)
     assert flight.report.state == SweepReport.FAILED
     assert flight.report.reason == "the flight was ended: the vehicle is landed"
     count = len(flight.process.published("/ref"))
@@ -221,7 +208,7 @@ def test_who_lands_ends_the_sweep():
     assert flight.calls == ["takeoff"]
 
 
-def test_a_refused_takeoff_is_told():
+def test_a_refused_takeoff_is_reported():
     flight = Flight({"start": False})
     flight.process.transport.services["/takeoff"] = lambda _: reply(ServiceError("refused: no"))
     flight.step()
@@ -233,7 +220,7 @@ def test_a_refused_takeoff_is_told():
     assert flight.process.published("/ref") == []
 
 
-def test_a_goal_out_of_reach_is_told_after_the_last_pass():
+def test_a_goal_out_of_reach_is_reported_after_the_last_pass():
     flight = Flight({"coverage/swath": 0.2, "coverage/max_passes": 1})
     report = flight.until(SweepReport.FAILED)
     assert report.coverage < 0.9
@@ -256,7 +243,7 @@ def test_waits_for_start_and_flies_again():
 
 def test_in_flight_it_does_not_take_off():
     flight = Flight({"start": False})
-    flight.process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    flight.publish_status(FlightStatus.FLYING)
     flight.step()
     flight.process.call("/sweep/start", TriggerRequest())
     flight.until(SweepReport.DONE)
@@ -290,26 +277,3 @@ def test_bad_parameters_are_named(name, value, complaint):
     process = FakeProcess()
     assert not process.launch(SweepNode(), "/sweep", {**PARAMETERS, name: value})
     assert complaint in process.logged("error")[0]
-
-
-@pytest.mark.parametrize("composed", ["false", "true"])
-@pytest.mark.parametrize("flight", ["sw_hover.launch", "virtual_hw_hover.launch"])
-def test_launch_file(composed, flight):
-    nodes, parameters = launch_files.expand(LAUNCH, composed=composed, flight=flight, rviz="false")
-    assert ("/sweep" in nodes) == (composed == "false")
-    process = FakeProcess(parameters)
-    assert process.launch(SweepNode(), "/sweep"), process.logged("error")
-    if composed == "true":
-        listed = NodeClasses()(launch_files.composed_nodes(parameters))
-        assert listed["sweep"] is SweepNode
-        assert listed["velocity_server"] is VelocityServerNode
-
-
-def test_the_configuration_is_the_default():
-    _, parameters = launch_files.expand(LAUNCH, rviz="false")
-    with_file, without = (FakeProcess(p) for p in (parameters, {}))
-    nodes = [SweepNode(), SweepNode()]
-    assert with_file.launch(nodes[0], "/sweep")
-    topics = {"topics/state": "/state", "topics/reference": "/ref"}
-    assert without.launch(nodes[1], "/sweep", topics)
-    assert nodes[0]._parameters.plan() == nodes[1]._parameters.plan()

@@ -1,30 +1,25 @@
 """A sweep whose vehicle is where the reference is."""
 
-import dataclasses
 import math
 
 import pytest
 
-from crazyflie_sweep.lanes import Area
-from crazyflie_sweep.sweeper import Plan, Sweeper
+from crazyflie_sweep.sweep_parameters import Plan
+from crazyflie_sweep.sweeper import Sweeper
 from crazyflie_sweep.velocities import oscillator_velocity
 
-PLAN = Plan(
-    area=Area(-1.5, 1.5, -1.0, 1.0),
-    lane_width=0.5,
-    height=1.0,
-    min_speed=0.1,
-    max_speed=0.7,
-    turn_speed=0.25,
-    acceleration=0.5,
-    swath=0.7,
-    cell=0.1,
-    goal=0.99,
-    max_passes=2,
-)
+PLAN = {"area/y_min": -1.0, "area/y_max": 1.0}
+"""Of the parameters, what is not the default."""
+
 START = (0.0, 0.0, 0.6)
 DT = 0.02
 LIMIT = 300.0
+
+
+def make(start=START, **parameters):
+    """Return a sweeper; a parameter's name has __ in place of /."""
+    given = {name.replace("__", "/"): value for name, value in parameters.items()}
+    return Sweeper(Plan.from_mapping({**PLAN, **given}), start)
 
 
 def fly(sweeper, off=(0.0, 0.0, 0.0), velocity=None):
@@ -42,7 +37,7 @@ def fly(sweeper, off=(0.0, 0.0, 0.0), velocity=None):
 
 
 def test_covers_the_area():
-    sweeper = Sweeper(PLAN, START)
+    sweeper = make()
     references = fly(sweeper)
     assert sweeper.coverage.share == 1.0
     assert sweeper.is_covered
@@ -53,7 +48,7 @@ def test_covers_the_area():
 
 
 def test_velocities_are_those_of_the_positions_and_bounded():
-    references = fly(Sweeper(PLAN, START))
+    references = fly(make())
     for a, b in zip(references, references[1:], strict=False):
         speed = math.hypot(*b[3:])
         assert speed <= 0.7 + 1e-9
@@ -63,8 +58,7 @@ def test_velocities_are_those_of_the_positions_and_bounded():
 
 
 def test_goes_through_the_oscillators_velocities_on_a_lane():
-    plan = dataclasses.replace(PLAN, max_speed=2.0, acceleration=5.0)
-    sweeper = Sweeper(plan, START)
+    sweeper = make(speed__max=2.0, speed__acceleration=5.0)
     seen = {}
     while not sweeper.is_done:
         if sweeper.is_on_lane and sweeper.reference[1] == -0.75:
@@ -77,7 +71,7 @@ def test_goes_through_the_oscillators_velocities_on_a_lane():
 
 
 def test_service_position_scales_the_lane_to_the_interval():
-    sweeper = Sweeper(PLAN, START)
+    sweeper = make()
     ends = [sweeper.service_position(x) for x in (-1.5, 0.0, 1.5)]
     assert ends == pytest.approx([2.0, 5.5, 9.0])
     assert sweeper.service_position(-2.0) == 2.0
@@ -85,7 +79,7 @@ def test_service_position_scales_the_lane_to_the_interval():
 
 
 def test_without_a_velocity_it_brakes_and_stays():
-    sweeper = Sweeper(PLAN, START)
+    sweeper = make()
     while not (sweeper.is_on_lane and sweeper.speed > 0.5):
         sweeper.advance(DT, 2.0)
     before = sweeper.reference
@@ -102,30 +96,29 @@ def test_without_a_velocity_it_brakes_and_stays():
 
 
 def test_measures_the_largest_distance_on_lanes_only():
-    sweeper = Sweeper(PLAN, START)
+    sweeper = make()
     fly(sweeper, off=(0.0, 0.03, -0.04))
     assert sweeper.max_lane_distance == pytest.approx(0.05)
 
 
 def test_a_second_pass_leads_back_and_the_last_one_ends():
-    plan = dataclasses.replace(PLAN, swath=0.3)
-    sweeper = Sweeper(plan, START)
+    sweeper = make(coverage__swath=0.3)
     references = fly(sweeper)
     assert not sweeper.is_covered
     assert sweeper.coverage.share < 0.8
     assert references[-1][:2] == pytest.approx((-1.5, -0.75), abs=0.02)
-    once = fly(Sweeper(dataclasses.replace(plan, max_passes=1), START))
+    once = fly(make(coverage__swath=0.3, coverage__max_passes=1))
     assert len(references) > 1.7 * len(once)
 
 
 def test_a_vehicle_that_is_there_needs_no_approach():
-    sweeper = Sweeper(PLAN, (-1.5, -0.75, 1.0))
+    sweeper = make((-1.5, -0.75, 1.0))
     assert sweeper.is_on_lane
     assert sweeper.reference[:3] == (-1.5, -0.75, 1.0)
 
 
 def test_slower_or_faster_than_allowed_is_neither():
     for velocity, speed in ((0.01, 0.1), (100.0, 0.7)):
-        references = fly(Sweeper(PLAN, (-1.5, -0.75, 1.0)), velocity=velocity)
+        references = fly(make((-1.5, -0.75, 1.0)), velocity=velocity)
         speeds = [math.hypot(*r[3:]) for r in references if abs(r[0]) < 0.3]
         assert speeds == pytest.approx([speed] * len(speeds))

@@ -1,4 +1,4 @@
-"""A graph of nodes that runs, as the operating system and somebody outside see it."""
+"""A running graph of nodes, as the operating system and another process see it."""
 
 import json
 import os
@@ -26,7 +26,7 @@ Arrivals = list[tuple[str, int, int]]
 
 
 def wait_for_service(name: str, limit: float = _LIMIT) -> None:
-    """Wait until somebody offers a service, at most so long (s)."""
+    """Wait until a service is offered, at most ``limit`` s."""
     end = time.monotonic() + limit
     while time.monotonic() < end:
         # There may be no master yet.
@@ -35,7 +35,7 @@ def wait_for_service(name: str, limit: float = _LIMIT) -> None:
                 return
         except (rosgraph.MasterError, OSError):
             time.sleep(0.002)
-    raise NotMeasuredError(f"nobody offers {name} after {limit:g} s")
+    raise NotMeasuredError(f"there is no service {name} after {limit:g} s")
 
 
 def call(service: str) -> None:
@@ -55,7 +55,7 @@ def process_of(node: str) -> int:
 
 
 def cpu_time(processes: Iterable[int]) -> float:
-    """Return what processes have used of CPUs until now, user and system, s."""
+    """Return the CPU time of processes until now, user and system, s."""
     total = 0.0
     for pid in processes:
         # Behind the name, which may have spaces.
@@ -75,14 +75,7 @@ def memory(processes: Iterable[int]) -> float:
 
 
 def listen(seconds: float, *topics: tuple[str, str, str]) -> Arrivals:
-    """Listen from another process; see `listener`.
-
-    Parameters
-    ----------
-    seconds : float
-    *topics
-        Node, topic and type.
-    """
+    """Listen to topics, each a node, topic and type, in another process; see `listener`."""
     command = [sys.executable, "-m", "crazyflie_dev.bench.listener", str(seconds)]
     for topic in topics:
         command += topic

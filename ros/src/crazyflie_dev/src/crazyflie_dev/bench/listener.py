@@ -1,13 +1,13 @@
-"""Somebody outside who listens to topics, and takes down when what arrived.
-
-It speaks TCPROS (http://wiki.ros.org/ROS/TCPROS) itself, in one thread, and reads no more of a
-message than its stamp, so that its own work is not measured. Nobody but the publishers knows of it:
+"""Records arrival and stamp of the messages of topics, from another process.
 
     python3 -m crazyflie_dev.bench.listener SECONDS NODE TOPIC TYPE [NODE TOPIC TYPE]...
 
-prints a list of [topic, arrival in ns, stamp in ns], as JSON; times are the machine's.
+prints a list of [topic, arrival in ns, stamp in ns], as JSON; times are the machine's. It speaks
+TCPROS (http://wiki.ros.org/ROS/TCPROS) in one thread, decodes the stamps only, and is not
+registered with the master, so that its own work is not measured.
 """
 
+import io
 import json
 import selectors
 import socket
@@ -19,6 +19,7 @@ from typing import Any
 
 import rosgraph
 import roslib.message
+from rosgraph.network import read_ros_handshake_header, write_ros_handshake_header
 
 _LENGTH = struct.Struct("<I")
 _TIME = struct.Struct("<2I")
@@ -31,15 +32,7 @@ _LIMIT = 10.0
 
 
 class Connection:
-    """A topic of one publisher.
-
-    Parameters
-    ----------
-    node, topic : str
-        Their full names.
-    message_type : str
-        Such as std_msgs/String.
-    """
+    """A connection to a topic of one node, by full names; the type is such as std_msgs/String."""
 
     def __init__(self, node: str, topic: str, message_type: str):
         self.topic = topic
@@ -59,9 +52,10 @@ class Connection:
             "callerid": "/bench_listener",
             "tcp_nodelay": "1",
         }
-        self.socket.sendall(_header(fields))
-        self._buffer = b""
-        self._is_greeted = False
+        write_ros_handshake_header(self.socket, fields)
+        received = io.BytesIO()
+        read_ros_handshake_header(self.socket, received, 65536)
+        self._buffer = received.getvalue()  # What has come behind the header.
 
     def receive(self) -> list[int]:
         """Return the stamps, in ns, of the messages that have come."""
@@ -74,24 +68,14 @@ class Connection:
             end = _LENGTH.size + _LENGTH.unpack_from(self._buffer)[0]
             if len(self._buffer) < end:
                 break
-            if self._is_greeted:
-                seconds, nanoseconds = _TIME.unpack_from(
-                    self._buffer, _LENGTH.size + self._stamp_at
-                )
-                stamps.append(seconds * 1_000_000_000 + nanoseconds)
-            self._is_greeted = True
+            seconds, nanoseconds = _TIME.unpack_from(self._buffer, _LENGTH.size + self._stamp_at)
+            stamps.append(seconds * 1_000_000_000 + nanoseconds)
             self._buffer = self._buffer[end:]
         return stamps
 
 
-def _header(fields):
-    lines = [f"{key}={value}".encode() for key, value in fields.items()]
-    body = b"".join(_LENGTH.pack(len(line)) + line for line in lines)
-    return _LENGTH.pack(len(body)) + body
-
-
 def listen(seconds: float, connections: list[Connection]) -> list[tuple[str, int, int]]:
-    """Return topic, arrival and stamp, in ns, of all that comes in some ``seconds``."""
+    """Return topic, arrival and stamp, in ns, of all messages that arrive within ``seconds``."""
     arrivals = []
     with selectors.DefaultSelector() as selector:
         for each in connections:
@@ -105,7 +89,7 @@ def listen(seconds: float, connections: list[Connection]) -> list[tuple[str, int
 
 
 if __name__ == "__main__":
-    wanted = iter(sys.argv[2:])
-    connections = [Connection(*each) for each in zip(wanted, wanted, wanted, strict=True)]
+    topics = iter(sys.argv[2:])
+    connections = [Connection(*each) for each in zip(topics, topics, topics, strict=True)]
     found = listen(float(sys.argv[1]), connections)
     json.dump(found, sys.stdout)

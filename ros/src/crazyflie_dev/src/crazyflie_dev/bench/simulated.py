@@ -1,4 +1,4 @@
-"""How fast simulated time passes in one process, as fast as it goes."""
+"""How fast simulated time passes in one process, without pacing."""
 
 import functools
 import subprocess
@@ -76,6 +76,6 @@ def _rows(name, words, least):
 
 
 ROWS = [
-    *_rows("", "nobody listens", 100.0),
+    *_rows("", "without a listener", 100.0),
     *_rows("_watched", "with a listener on /clock", 40.0),
 ]

@@ -25,8 +25,8 @@ _NUMBERS = range(10, 200, 10)
 
 _START_LIMIT = 180.0
 
-_CALM = 3.0
-"""From there to the takeoff, s: before, vehicles do not know where they are."""
+_POSITION_TIME = 3.0
+"""From the service of takeoff to its call, s: vehicles first need a position."""
 
 _SETTLING = 2.0
 """From the end of the takeoff on, s."""
@@ -60,14 +60,9 @@ class SwarmFigures:
 
 
 def measure(n: int, arguments: Sequence[str] = (), core: int = 0) -> SwarmFigures:
-    """Have vehicles take off and hover, their process on one core.
+    """Return the figures of ``n`` hovering vehicles; their process has one core.
 
-    Parameters
-    ----------
-    n : int
-    arguments : sequence of str, optional
-        Others of sw_swarm.launch.
-    core : int, optional
+    ``arguments`` are further ones of sw_swarm.launch.
     """
     launch = ["crazyflie_examples", "sw_swarm.launch", f"n:={n}", "rviz:=false", *arguments]
     with tempfile.TemporaryDirectory() as folder:
@@ -80,7 +75,7 @@ def measure(n: int, arguments: Sequence[str] = (), core: int = 0) -> SwarmFigure
                 # Some are there for a moment only.
                 with contextlib.suppress(ProcessLookupError):
                     os.sched_setaffinity(int(thread.name), {core})
-            time.sleep(_CALM)
+            time.sleep(_POSITION_TIME)
             graph.call("/all/takeoff")
             time.sleep(_SETTLING)
             used = graph.cpu_time([process])

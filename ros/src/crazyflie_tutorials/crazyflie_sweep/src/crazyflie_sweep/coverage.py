@@ -5,7 +5,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from crazyflie_sweep.lanes import Area, Point
+from crazyflie_sweep.lanes import Point
+from crazyflie_sweep.sweep_parameters import Area
 
 
 class Coverage:

@@ -1,13 +1,14 @@
-"""A way through a rectangle: parallel lanes with arcs between them."""
+"""A path through a rectangle: parallel lanes with arcs between them."""
 
 import bisect
 import itertools
 import math
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from typing_extensions import override
+
+from crazyflie_sweep.sweep_parameters import Area
 
 Point = tuple[float, float, float]
 """x, y, z in m."""
@@ -15,24 +16,8 @@ Point = tuple[float, float, float]
 _SLACK = 1e-9
 
 
-@dataclass(frozen=True)
-class Area:
-    """A rectangle along the axes of the fixed frame, m."""
-
-    x_min: float
-    x_max: float
-    y_min: float
-    y_max: float
-
-
-class Segment:
-    """A piece of a way.
-
-    Attributes
-    ----------
-    length : float
-        m.
-    """
+class Segment(ABC):
+    """A piece of a path, of a ``length`` in m."""
 
     length: float
 
@@ -107,20 +92,12 @@ class Arc(Segment):
         return position, (-sign * sine, sign * cosine, 0.0)
 
 
-class Way:
-    """Segments, one behind the other.
-
-    Parameters
-    ----------
-    segments : sequence of Segment
-        At least one.
-    """
+class LanePath:
+    """Segments, one behind the other; at least one."""
 
     def __init__(self, segments: Sequence[Segment]):
         self.segments = tuple(segments)
-        self._begins = list(
-            itertools.accumulate((segment.length for segment in segments), initial=0.0)
-        )
+        self._begins = [0.0, *itertools.accumulate(segment.length for segment in segments)]
 
     @property
     def length(self) -> float:
@@ -128,11 +105,11 @@ class Way:
         return self._begins[-1]
 
     def segment_at(self, s: float) -> Segment:
-        """Return the segment after ``s`` metres of the way; the last one beyond its end."""
+        """Return the segment after ``s`` metres of the path; the last one beyond its end."""
         return self.segments[self._number(s)]
 
     def at(self, s: float) -> tuple[Point, Point]:
-        """Return position (m) and direction (unit vector) after ``s`` metres, within the way."""
+        """Return position (m) and direction (unit vector) after ``s`` metres, within the path."""
         number = self._number(s)
         segment = self.segments[number]
         return segment.at(min(max(s - self._begins[number], 0.0), segment.length))
@@ -151,19 +128,11 @@ def lane_offsets(width: float, lane_width: float) -> list[float]:
     return [(k + 0.5) * spacing for k in range(count)]
 
 
-def sweep(area: Area, lane_width: float, height: float) -> Way:
-    """Return the way that sweeps an area: there along x, an arc, back along x, and so on.
+def sweep(area: Area, lane_width: float, height: float) -> LanePath:
+    """Return the path that sweeps an area: along x, an arc, back along x, and so on.
 
-    The arcs lie outside of the area: they reach half the distance of two lanes, at most
-    half of ``lane_width``, beyond its ends.
-
-    Parameters
-    ----------
-    area : Area
-    lane_width : float
-        The largest distance of two lanes, m.
-    height : float
-        m.
+    Lanes are at most ``lane_width`` (m) apart. The arcs are outside of the area: they reach half
+    the distance of two lanes beyond its ends.
     """
     ys = [area.y_min + offset for offset in lane_offsets(area.y_max - area.y_min, lane_width)]
     segments: list[Segment] = []
@@ -175,15 +144,15 @@ def sweep(area: Area, lane_width: float, height: float) -> Way:
             radius = (ys[number + 1] - y) / 2.0
             turn = math.pi if is_forward else -math.pi
             segments.append(Arc((end, y + radius, height), radius, -math.pi / 2.0, turn))
-    return Way(segments)
+    return LanePath(segments)
 
 
-def back(way: Way) -> Way:
-    """Return the same way from its end to its begin."""
-    return Way([_reverse(segment) for segment in reversed(way.segments)])
+def reversed_path(path: LanePath) -> LanePath:
+    """Return the same path from its end to its begin."""
+    return LanePath([_reversed(segment) for segment in reversed(path.segments)])
 
 
-def _reverse(segment):
+def _reversed(segment):
     if isinstance(segment, Line):
         return Line(segment.end, segment.begin, segment.is_lane)
     return Arc(segment.centre, segment.radius, segment.begin + segment.turn, -segment.turn)

@@ -21,14 +21,7 @@ _THICKNESS = 0.002
 
 
 def markers(sweeper: Sweeper, frame: str) -> MarkerArray:
-    """Return the cells on the ground, the lanes and the share that is covered.
-
-    Parameters
-    ----------
-    sweeper : Sweeper
-    frame : str
-        In which the area lies.
-    """
+    """Return the cells on the ground, the lanes and the share that is covered."""
     coverage = sweeper.coverage
     array = []
     for name, covered, colour in (
@@ -42,15 +35,15 @@ def markers(sweeper: Sweeper, frame: str) -> MarkerArray:
         if not cells.points:
             cells.action = Marker.DELETE
         array.append(cells)
-    way = sweeper.lanes
+    path = sweeper.lanes
     lanes = _marker("lanes", Marker.LINE_STRIP, LANE_COLOUR, frame)
     lanes.scale.x = _LINE_WIDTH
-    count = max(2, int(way.length / _SPACING))
-    lanes.points = [Point(*way.at(s)[0]) for s in np.linspace(0.0, way.length, count)]
+    count = max(2, int(path.length / _SPACING))
+    lanes.points = [Point(*path.at(s)[0]) for s in np.linspace(0.0, path.length, count)]
     label = _marker("share", Marker.TEXT_VIEW_FACING, LANE_COLOUR, frame)
     label.scale.z = _TEXT_SIZE
     label.text = f"{coverage.share:.1%}"
-    end, _ = way.at(way.length)
+    end, _ = path.at(path.length)
     label.pose.position = Point(end[0], end[1], end[2] + 2.0 * _TEXT_SIZE)
     return MarkerArray([*array, lanes, label])
 

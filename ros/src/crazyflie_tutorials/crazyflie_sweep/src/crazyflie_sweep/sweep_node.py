@@ -49,7 +49,6 @@ class SweepNode(Node):
         self._position_time = 0.0
         self._flight_state: int = FlightStatus.UNKNOWN
         self._is_asking = False
-        self._failure = ""
         self._begin = 0.0
         self._end: float | None = None
         self._hovering = 0.0
@@ -112,7 +111,6 @@ class SweepNode(Node):
 
     def _start(self):
         self._sweeper = None
-        self._failure = ""
         self._begin = self._handle.time()
         self._end = None
         self._hovering = 0.0
@@ -136,9 +134,9 @@ class SweepNode(Node):
         if self._position is None:
             self._finish("no state of the vehicle has come")
             return
-        # It has to say so by itself: the answer of takeoff may come before this topic.
+        # The reply of takeoff may come before the flight status.
         self._flight_state = FlightStatus.FLYING
-        self._sweeper = Sweeper(self._parameters.plan(), self._position)
+        self._sweeper = Sweeper(self._parameters, self._position)
         self._source = VelocitySource(
             self._parameters.velocity_limit, self._parameters.velocity_most, self._handle.time()
         )
@@ -146,14 +144,14 @@ class SweepNode(Node):
         self._set_state(SweepReport.SWEEPING)
 
     def _land(self, sweeper):
+        failure, goal = "", self._parameters.coverage
         if not sweeper.is_covered:
-            wanted = self._parameters.coverage
-            self._failure = (
-                f"{sweeper.coverage.share:.1%} is covered after {wanted.max_passes} passes; "
-                f"expected {wanted.goal:.1%}"
+            failure = (
+                f"{sweeper.coverage.share:.1%} is covered after {goal.max_passes} passes; "
+                f"expected {goal.goal:.1%}"
             )
         self._set_state(SweepReport.LANDING)
-        self._call(self._parameters.land_service, lambda: self._finish(self._failure))
+        self._call(self._parameters.land_service, lambda: self._finish(failure))
 
     def _finish(self, failure):
         self._end = self._handle.time()

@@ -4,8 +4,6 @@ from collections.abc import Iterator
 
 from typing_extensions import override
 
-from crazyflie_sweep.lanes import Area
-from crazyflie_sweep.sweeper import Plan
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import (
@@ -23,8 +21,8 @@ _WIDTH = Number("m", above=0.0)
 _SPEED = Number("m/s", above=0.0)
 
 
-class AreaParameters(Parameters):
-    """The rectangle to sweep; arcs reach half a lane beyond it, along x."""
+class Area(Parameters):
+    """The rectangle to sweep, along the axes of the fixed frame."""
 
     x_min: float = parameter(METRES, "the area begins here, in the fixed frame", -1.5)
     x_max: float = parameter(METRES, "and ends here", 1.5)
@@ -32,7 +30,7 @@ class AreaParameters(Parameters):
     y_max: float = parameter(METRES, "the last lane is beside it", 1.5)
 
 
-class SpeedParameters(Parameters):
+class SpeedLimits(Parameters):
     """How fast the reference goes."""
 
     min: float = parameter(_SPEED, "least speed on lanes", 0.1)
@@ -41,7 +39,7 @@ class SpeedParameters(Parameters):
     acceleration: float = parameter(Number("m/s^2", above=0.0), "largest along the way", 0.5)
 
 
-class CoverageParameters(Parameters):
+class CoverageGoal(Parameters):
     """What counts as covered."""
 
     swath: float = parameter(_WIDTH, "diameter of what the vehicle covers at a time", 0.7)
@@ -54,14 +52,30 @@ class CoverageParameters(Parameters):
     )
 
 
-class SweepParameters(Parameters):
-    """Parameters of `SweepNode`."""
+class Plan(Parameters):
+    """What to sweep, and how."""
 
-    area: AreaParameters = group(AreaParameters, "area")
+    area: Area = group(Area, "area")
     lane_width: float = parameter(_WIDTH, "largest distance of two lanes", 0.5)
     height: float = parameter(_WIDTH, "of the lanes, above the ground", 1.0)
-    speed: SpeedParameters = group(SpeedParameters, "speed")
-    coverage: CoverageParameters = group(CoverageParameters, "coverage")
+    speed: SpeedLimits = group(SpeedLimits, "speed")
+    coverage: CoverageGoal = group(CoverageGoal, "coverage")
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        for axis in "xy":
+            least = getattr(self.area, f"{axis}_min")
+            most = getattr(self.area, f"{axis}_max")
+            if not least < most:
+                yield f"area/{axis}_min is {least:g}; expected < area/{axis}_max, {most:g} (m)"
+        speed = self.speed
+        if speed.min > speed.max:
+            yield f"speed/min is {speed.min:g}; expected <= speed/max, {speed.max:g} (m/s)"
+
+
+class SweepParameters(Plan):
+    """Parameters of `SweepNode`."""
+
     velocity_limit: float = parameter(
         TIME_STEP, "how long an answer of the velocity service may be used", 0.5, "velocity/limit"
     )
@@ -90,31 +104,3 @@ class SweepParameters(Parameters):
         TOPIC, "speed of the reference, as `Vel` linear", "~velocity", "topics/velocity"
     )
     markers_topic: str = parameter(TOPIC, "for RViz", "~markers", "topics/markers")
-
-    @override
-    def complaints(self) -> Iterator[str]:
-        for axis in "xy":
-            least = getattr(self.area, f"{axis}_min")
-            most = getattr(self.area, f"{axis}_max")
-            if not least < most:
-                yield f"area/{axis}_min is {least:g}; expected < area/{axis}_max, {most:g} (m)"
-        speed = self.speed
-        if speed.min > speed.max:
-            yield f"speed/min is {speed.min:g}; expected <= speed/max, {speed.max:g} (m/s)"
-
-    def plan(self) -> Plan:
-        """Return what to fly."""
-        area, speed, coverage = self.area, self.speed, self.coverage
-        return Plan(
-            area=Area(area.x_min, area.x_max, area.y_min, area.y_max),
-            lane_width=self.lane_width,
-            height=self.height,
-            min_speed=speed.min,
-            max_speed=speed.max,
-            turn_speed=speed.turn,
-            acceleration=speed.acceleration,
-            swath=coverage.swath,
-            cell=coverage.cell,
-            goal=coverage.goal,
-            max_passes=coverage.max_passes,
-        )

@@ -43,7 +43,7 @@ def in_turns():
     return [calling, *([path] for path in changing[:-1]), [*changing[-1:], *others]]
 
 
-AT_A_TIME = 3
+AT_A_TIME = 2
 """So many pages are followed at a time: flights and calls mostly wait."""
 
 VIRTUAL_VEHICLE = "virtual_"

@@ -4,10 +4,10 @@ Every node is in a process of its own; messages that nobody hears are lost.
 """
 
 import pytest
-from std_msgs.msg import Empty, String
+from std_msgs.msg import Empty
 from takeoff_helpers import BARE, FILTER, SERVER, HoverNetwork, Network, control, state
 
-from crazyflie_msgs.msg import PositionVelocityStateStamped
+from crazyflie_msgs.msg import FlightStatus, PositionVelocityStateStamped
 from crazyflie_takeoff.takeoff_control_filter_node import (
     FRESH_TIME,
     LISTENING_TIME,
@@ -318,7 +318,7 @@ def test_server_with_a_foreign_filter_in_flight():
 def test_filter_with_a_foreign_server():
     """Toggles alone decide, and a restart in flight costs the time of listening."""
     network = Network()
-    network.unpublished.add("/in_flight_state")
+    network.unpublished.add("/in_flight_flight_status")
     network.start("filter", TakeoffControlFilterNode(), FILTER)
     process = network.process("filter")
     for _ in range(50):
@@ -355,6 +355,7 @@ def test_a_dead_servers_flight_state_is_not_news():
     network = HoverNetwork(BARE)
     network.advance(1.5)
     network.kill("server")
-    network.process("filter").publish("/in_flight_state", String("on_ground"))
+    status = FlightStatus(state=FlightStatus.ON_GROUND)
+    network.process("filter").publish("/in_flight_flight_status", status)
     network.advance(1.0)
     assert [m.data for _, m in network.on("/in_flight_filter")] == ["unknown", "on_ground"]

@@ -181,7 +181,7 @@ class TakeoffServerNode(Node):
     def _on_filter_status(self, message):
         try:
             report = report_of(message)
-        except KeyError:
+        except (KeyError, ValueError):
             self._handle.warn(
                 f"ignoring state {message.state}, flight_state {message.flight_state} on "
                 f"{self._parameters.filter_status_topic}; expected constants of FilterStatus and "

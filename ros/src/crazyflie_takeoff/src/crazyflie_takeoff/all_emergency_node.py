@@ -45,7 +45,7 @@ class AllEmergencyNode(Node):
         self._on_timer()
         if not self._publisher.has_subscribers():
             name = self._handle.resolve(self._parameters.topic)
-            raise ServiceError(f"nobody listens on {name}: no vehicle has been stopped")
+            raise ServiceError(f"no filter listens on {name}: no vehicle has been stopped")
         return EmptyResponse()
 
     def _on_timer(self):

@@ -44,7 +44,7 @@ class Event(enum.Enum):
     COMMANDED_CONTROL = enum.auto()  # From the controller, whose turn it is.
     FIRST_STATE = enum.auto()  # The first state of a filter that starts in flight.
     TICK = enum.auto()  # Time has passed.
-    OBJECTION = enum.auto()  # Controls are not to be obeyed.
+    OBJECTION = enum.auto()  # Controls must not be passed on any more.
     CRASH = enum.auto()  # The vehicle is where or as it must not be.
     STOP = enum.auto()  # /emergency was called.
     RESET = enum.auto()  # /emergency_reset was called.

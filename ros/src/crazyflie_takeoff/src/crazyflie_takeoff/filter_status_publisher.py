@@ -14,13 +14,7 @@ from crazyflie_utils.vectors import stamped
 
 
 class FilterStatusPublisher:
-    """Publishes the filter's status when it changes, and logs why.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    parameters : TakeoffControlFilterParameters
-    """
+    """Publishes the filter's status when it changes, and logs why."""
 
     def __init__(self, handle: NodeHandle, parameters: TakeoffControlFilterParameters):
         self._handle = handle

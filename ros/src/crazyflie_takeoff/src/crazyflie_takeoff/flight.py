@@ -7,8 +7,9 @@ that does not run backwards; if it is reset, what was under way goes on from the
 from dataclasses import dataclass
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.descent import Descent, Position
+from crazyflie_takeoff.descent import Descent
 from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.motion import Position
 from crazyflie_takeoff.server_states import Event, FilterReport, ServerState
 from crazyflie_takeoff.server_table import (
     FILTER_LIMIT,
@@ -67,10 +68,6 @@ class FlightStateMachine:
     ----------
     plan : Plan
     state : ServerState, optional
-
-    Attributes
-    ----------
-    state : ServerState
     """
 
     def __init__(self, plan: Plan, state: ServerState = ServerState.RECOVERING):

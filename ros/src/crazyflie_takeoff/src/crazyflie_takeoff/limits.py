@@ -59,10 +59,6 @@ class Walls:
     """The box, which may change in flight, and what lies outside of it.
 
     A vehicle that new walls leave outside may come back: as far outside as it was is not too far.
-
-    Parameters
-    ----------
-    limits : Limits
     """
 
     def __init__(self, limits: Limits):

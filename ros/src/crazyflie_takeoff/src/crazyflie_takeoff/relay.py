@@ -27,13 +27,6 @@ class Relay(Generic[Control]):
     limits : Limits
     hold : float
         s.
-
-    Attributes
-    ----------
-    choice : ControlFilter
-    watch : FlightWatch
-    measured : Measurement
-    ground : Ground
     """
 
     def __init__(self, limits: Limits, hold: float):

@@ -50,13 +50,6 @@ class SafeFilter(Generic[Control]):
     limits : Limits
     sees : bool
         Whether states can be expected.
-
-    Attributes
-    ----------
-    relay : Relay
-    choice : ControlFilter
-    watch : FlightWatch
-    machine : FilterMachine
     """
 
     def __init__(self, timeouts: LossTimeouts, limits: Limits, sees: bool = False):
@@ -128,7 +121,7 @@ class SafeFilter(Generic[Control]):
             Name of the node that sent it.
         """
         self.watch.gaps.run(time)
-        self.watch.hear_takeoff(time, caller, self.machine.is_on_ground)
+        self.watch.note_takeoff(time, caller, self.machine.is_on_ground)
         self._land_if_contended()
         if self._refusal and setpoint.thrust > 0.0:
             return MOTORS_OFF
@@ -154,7 +147,7 @@ class SafeFilter(Generic[Control]):
         came so much earlier.
         """
         self.watch.gaps.run(time)
-        self.watch.hear_commanded(time, caller)
+        self.watch.note_commanded(time, caller)
         # The next tick adds all of its step.
         self.machine.silence = min(self.machine.silence, age - self._step_until(time))
         self.machine.lacks_controller = False

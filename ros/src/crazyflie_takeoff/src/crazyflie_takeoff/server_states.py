@@ -41,7 +41,7 @@ class Event(enum.Enum):
     """What can change the state of the server."""
 
     RECOVER = enum.auto()  # All evidence has come, or the time for it is over.
-    TAKEOFF = enum.auto()  # The service was called, and nothing speaks against it.
+    TAKEOFF = enum.auto()  # The service was called, and no check refuses it.
     LAND = enum.auto()  # Service, critical battery, end of the launch, fault in a takeoff.
     TICK = enum.auto()  # Time has passed.
     FILTER_PASSES = enum.auto()
@@ -65,7 +65,7 @@ class FilterReport(NamedTuple):
     event : Event
         What it does.
     remembered : FlightState or None
-        Flight state that it heard last.
+        Flight state that it received last.
     is_commanded : bool
         Whether a controller sends commands, or may do so.
     reason : str

@@ -7,9 +7,10 @@ import math
 from dataclasses import dataclass
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.descent import Descent, Position
+from crazyflie_takeoff.descent import Descent
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.ground import TOUCHDOWN_HEIGHT
+from crazyflie_takeoff.motion import Position
 from crazyflie_takeoff.server_states import NO_FILTER, STOPS, Event, FilterReport, ServerState
 from crazyflie_takeoff.transition_table import Table, Transition
 

@@ -26,13 +26,6 @@ _LOG_WORDS = {
 class StatusPublisher:
     """Publishes and logs the state of a flight when it changes.
 
-    Parameters
-    ----------
-    handle : NodeHandle
-    parameters : TakeoffServerParameters
-    flight : FlightStateMachine
-    checks : TakeoffChecks
-
     Attributes
     ----------
     state : FlightState or None

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 from crazyflie_takeoff.battery import Charge
 from crazyflie_takeoff.driver_connection import DriverConnection
-from crazyflie_takeoff.measured_position import MeasuredPosition
+from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.motion import MeasuredPosition
 from crazyflie_takeoff.server_states import Event, FilterReport
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
 
@@ -32,10 +33,14 @@ class TakeoffChecks:
         self.position = MeasuredPosition()
         self.driver = DriverConnection()
         self.battery = parameters.battery()
-        # Without a filter there is nothing that could say that there is none.
+        # Without a filter nothing publishes whether there is one.
         self.has_controller = True
         self._had_controller = False
         self._resolve = resolve
+
+    def set_box(self, box: Box) -> None:
+        """Take the geofence's box."""
+        self.box = box
 
     def set_controller(self, has_controller: bool) -> None:
         """Take whether the filter sees a controller."""

@@ -266,7 +266,7 @@ class TakeoffControlFilterNode(Node):
 
     def _publish_state(self):
         status = self._filter.status
-        # Commands that come right after a launch say nothing about the vehicle.
+        # Commands that come right after a launch are no sign of a flight.
         is_commanded = status.is_commanded and not self._is_fresh
         self._status.publish(status._replace(is_commanded=is_commanded))
 

@@ -142,7 +142,7 @@ class TakeoffServerParameters(FlightTopicParameters):
         return Plan(self.hover, self.open_loop, self.settle, self.descent_speed)
 
     def battery(self) -> Battery:
-        """Return what judges the battery."""
+        """Return the watch of the battery's voltage."""
         return Battery(self.battery_low, self.battery_critical, self.battery_duration)
 
 

@@ -203,12 +203,13 @@ class RosVehicle(MissionVehicle):
         if not self._uses_driver:
             return climb()
         # The first call waits for the driver to have read the parameters, which it sets then.
-        return in_turn(lambda: self._update(), lambda: self._update(_HIGH_LEVEL), climb)
-
-    def _update(self, *parameters):
-        for name in parameters:
-            self._handle.set_param(f"{prefix(self.name)}/{name}", 1)
-        return self._call("update_params", srv.UpdateParams, list(parameters))
+        parameter = f"{prefix(self.name)}/{_HIGH_LEVEL}"
+        return in_turn(
+            lambda: self._call("update_params", srv.UpdateParams, []),
+            lambda: self._handle.set_param_later(parameter, 1),
+            lambda: self._call("update_params", srv.UpdateParams, [_HIGH_LEVEL]),
+            climb,
+        )
 
     @override
     def land(self, duration: float) -> "Future[Any]":

@@ -123,7 +123,7 @@ def test_a_step_of_three_metres_is_no_climb_to_complain_of():
 
 
 def test_the_wall_above_counts_before_the_height():
-    walls = Walls(Limits(Box((-1.0,) * 3, (1.0, 1.0, 2.0)), 0.5, -0.5, height=10.0))
+    walls = Walls(Limits(Box((-1.0,) * 3, (1.0, 1.0, 2.0)), 0.5, -0.5, 3.0, 10.0))
     assert walls.highest(0.0) == 2.25
     walls.change(Box((-1.0,) * 3, (1.0, 1.0, 30.0)))
     assert walls.highest(0.5) == 10.5

@@ -69,8 +69,8 @@ class FleetServicesNode(Node):
             return
         chosen = [name for name in self._fleet.names if name in flying]
         self._handle.error(
-            f"a mission that flew {', '.join(chosen)} has said nothing for {MISSION_TIMEOUT:g} s "
-            "and is taken for dead: landing them"
+            f"no message of the mission that flew {', '.join(chosen)} for {MISSION_TIMEOUT:g} s: "
+            "it has ended; landing them"
         )
         self._lander.land(chosen).add_done_callback(self._log_refusals)
 

@@ -184,4 +184,4 @@ class MachineSettings(Parameters):
 
     address: str = parameter(TEXT, "name or number in the network")
     env_loader: str = parameter(TEXT, "script there that sets ROS's environment")
-    user: str | None = parameter(TEXT, "who logs in there by ssh", None)
+    user: str | None = parameter(TEXT, "user that logs in there by ssh", None)

@@ -14,7 +14,7 @@ from crazyflie_utils import NodeHandle
 from crazyflie_utils.vectors import to_tuple
 
 MAX_STATE_AGE = 0.5
-"""Of a state that says where its vehicle is, s."""
+"""Of a state that counts for the position of its vehicle, s."""
 
 _IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCENDING)
 

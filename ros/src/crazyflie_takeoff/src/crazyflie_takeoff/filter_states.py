@@ -52,26 +52,12 @@ class Event(enum.Enum):
 
 @dataclass(frozen=True)
 class LossTimeouts:
-    """How long the filter waits after a loss.
+    """How long the filter waits after a loss, s."""
 
-    Attributes
-    ----------
-    hold : float
-        Without a control in flight, until the filter holds the vehicle, s; at least
-        `SHORTEST_HOLD`.
-    recovery : float
-        From then on until the descent, s: while no state comes, either, and in a takeoff or a
-        landing.
-    descent : float
-        From then on until the motors stop, s; longer by the way down from the last known height.
-    place : float
-        The same as ``recovery`` for a vehicle in flight whose state is known, s.
-    """
-
-    hold: float
-    recovery: float
-    descent: float
-    place: float = 3.0
+    hold: float  # For a control in flight, until it holds the vehicle; at least `SHORTEST_HOLD`.
+    recovery: float  # Then until the descent: without a state, and in a takeoff or a landing.
+    descent: float  # Then until the motors stop; longer by the way down from the known height.
+    place: float  # The same as ``recovery`` for a vehicle in flight whose state is known.
 
 
 _PASSING, _HOLDING, _SINKING, _DOWN, _EMERGENCY = FilterState

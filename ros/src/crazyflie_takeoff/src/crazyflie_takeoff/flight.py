@@ -44,21 +44,11 @@ REFUSALS = {
 
 @dataclass(frozen=True)
 class Output:
-    """What is to be published after a tick.
+    """What is to be published after a tick."""
 
-    Attributes
-    ----------
-    thrust : float or None
-        Takeoff control with level attitude, m/s^2.
-    reference : tuple or None
-        x, y, z in m and x_dot, y_dot, z_dot in m/s.
-    toggle : bool
-        Whether in_flight changes.
-    """
-
-    thrust: float | None = None
-    reference: tuple[float, ...] | None = None
-    toggle: bool = False
+    thrust: float | None = None  # Takeoff control with level attitude, m/s^2.
+    reference: tuple[float, ...] | None = None  # x, y, z, m, and x_dot, y_dot, z_dot, m/s.
+    toggle: bool = False  # Whether in_flight changes.
 
 
 class FlightStateMachine:

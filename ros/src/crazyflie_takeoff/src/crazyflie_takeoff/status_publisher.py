@@ -46,7 +46,7 @@ class StatusPublisher:
         self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
         self._text = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._announce_flight = handle.inhibit_shutdown()
+        self._inhibit_shutdown = handle.inhibit_shutdown()
         self.state: FlightState | None = None
         self.reason = ""
         self._published: tuple[object, ...] = ()
@@ -83,7 +83,7 @@ class StatusPublisher:
             self._handle.info(f"{word}: {reason}" if is_new else word)
             self._logged_word, self._logged_reason = word, reason
         self._state.publish(String(state.word))
-        self._announce_flight(state is not FlightState.ON_GROUND)
+        self._inhibit_shutdown(state is not FlightState.ON_GROUND)
         self.publish()
 
     def publish(self) -> None:

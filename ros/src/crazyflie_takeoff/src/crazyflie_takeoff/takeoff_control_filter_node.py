@@ -150,13 +150,11 @@ class TakeoffControlFilterNode(Node):
             return
         if state is not None:
             self._filter.choice.state = state
-            self._publish_state()
-            self._set_pace()
+            self._follow_filter()
 
     def _on_toggle(self, _):
         self._filter.toggle()
-        self._publish_state()
-        self._set_pace()
+        self._follow_filter()
 
     def _on_measured_state(self, message):
         state = message.state
@@ -179,8 +177,7 @@ class TakeoffControlFilterNode(Node):
         now, caller = self._handle.time(), self._takeoffs.caller(message)
         chosen = self._filter.takeoff(now, message, _setpoint(message), caller)
         self._publish(chosen, message.header.stamp)
-        self._publish_state()
-        self._set_pace()
+        self._follow_filter()
 
     def _on_commanded_control(self, message):
         now, caller = self._handle.time(), self._commands.caller(message)
@@ -223,6 +220,9 @@ class TakeoffControlFilterNode(Node):
                 throttle=REPETITION,
                 key="busy",
             )
+        self._follow_filter()
+
+    def _follow_filter(self):
         self._publish_state()
         self._set_pace()
 

@@ -20,13 +20,7 @@ class FleetServicesNode(Node):
 
     A call is answered when all vehicles have answered, with an error that names each one that
     has refused. Vehicles above each other land one after the other, also those of a mission that
-    has died.
-
-    Parameters
-    ----------
-    fleet : FleetConfig
-    states : VehicleStates
-        Of all its vehicles.
+    has died. ``states`` are those of all vehicles of the fleet.
     """
 
     needed_in_flight = True

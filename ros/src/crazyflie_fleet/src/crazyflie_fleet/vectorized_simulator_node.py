@@ -120,14 +120,7 @@ class VectorizedSimulatorParameters(Parameters):
 
 
 class VectorizedSimulatorNode(Node):
-    """Fly vehicles of one model of 7 states; each has its own topics.
-
-    Parameters
-    ----------
-    vehicles : sequence of VehicleConfig
-    model : str
-        Of `MODELS`.
-    """
+    """Fly vehicles of one model of 7 states, one of `MODELS`; each has its own topics."""
 
     needed_in_flight = True
 

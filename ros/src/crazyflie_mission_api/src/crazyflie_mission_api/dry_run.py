@@ -114,17 +114,8 @@ class IdealVehicle(MissionVehicle):
 class DryRun(VehicleGroup):
     """A group of ideal vehicles.
 
-    Parameters
-    ----------
-    starts : mapping of str to x, y, z
-        Position of each vehicle before takeoff, m.
-    rules : Rules, optional
-    bounds : mapping of str to Bounds, optional
-        Fences of vehicles.
-    headings : mapping of str to float, optional
-        rad; 0 by default.
-    start_skews : mapping of str to float, optional
-        s; 0 by default.
+    By the names of vehicles: ``starts``, positions before takeoff, m; fences (``bounds``);
+    ``headings``, rad, 0 by default; ``start_skews``, s, 0 by default.
     """
 
     def __init__(
@@ -149,12 +140,7 @@ class DryRun(VehicleGroup):
 def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> float:
     """Fly ``mission(group)`` with ideal vehicles; return its duration, s.
 
-    Parameters
-    ----------
-    group : VehicleGroup
-        On the ground.
-    mission : callable
-        Its commands must not depend on measurements.
+    The group is on the ground. Commands of the mission must not depend on measurements.
 
     Raises
     ------

@@ -63,12 +63,7 @@ class ClimbLimit:
     """Lowers the thrust of a vehicle that would climb too fast, or too high.
 
     The allowed speed depends on the height: at most the limit, and such that the vehicle can stop
-    below the highest place with `CLIMB_BRAKING`.
-
-    Parameters
-    ----------
-    climb : float
-        Most z_dot, m/s.
+    below the highest place with `CLIMB_BRAKING`. ``climb`` is the most z_dot, m/s.
     """
 
     def __init__(self, climb: float):

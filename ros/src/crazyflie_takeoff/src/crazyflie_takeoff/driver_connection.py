@@ -18,11 +18,7 @@ class DriverConnection:
     def refusal(self, now: float, topic: str) -> str:
         """Return why nothing can be sent to the vehicle; empty if it can.
 
-        Parameters
-        ----------
-        now : float
-        topic : str
-            Absolute name of the topic, below the vehicle's namespace.
+        ``topic`` is its absolute name, below the vehicle's namespace.
         """
         is_recent = self._time is not None and now - self._time <= MAX_CONNECTION_AGE
         if is_recent and self._is_connected:

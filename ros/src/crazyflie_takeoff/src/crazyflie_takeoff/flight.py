@@ -52,13 +52,7 @@ class Output:
 
 
 class FlightStateMachine:
-    """The vehicle's flight, from the ground to the ground.
-
-    Parameters
-    ----------
-    plan : Plan
-    state : ServerState, optional
-    """
+    """The vehicle's flight, from the ground to the ground."""
 
     def __init__(self, plan: Plan, state: ServerState = ServerState.RECOVERING):
         self.state = state
@@ -136,14 +130,7 @@ class FlightStateMachine:
             self._context.descent = None
 
     def tick(self, time: float, position: Position | None = None) -> Output:
-        """Let time pass until ``time`` (s).
-
-        Parameters
-        ----------
-        time : float
-        position : tuple of float or None
-            Measured x, y, z, m; None when it is not known at present.
-        """
+        """Let time pass until ``time`` (s); the measured position is None when it is not known."""
         context = self._context
         self._follow_clock(time)
         is_seen_again = position is not None and context.measured is None

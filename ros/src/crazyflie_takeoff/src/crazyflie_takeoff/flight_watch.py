@@ -48,13 +48,7 @@ class DescentWatch:
 class FlightWatch:
     """Watches position, climb, descent, publishers of controls, and the computer's load.
 
-    Attributes
-    ----------
-    walls : Walls
-    gaps : RunGaps
-    climb : ClimbLimit
-    is_tilted : bool
-        Whether the vehicle is tilted as only one that crashes is.
+    ``is_tilted`` is whether the vehicle is tilted as only one that crashes is.
     """
 
     def __init__(self, limits: Limits):

@@ -71,13 +71,7 @@ class Walls:
 
 
 class Debounce:
-    """Lets a complaint through that lasts.
-
-    Parameters
-    ----------
-    duration : float
-        s.
-    """
+    """Lets a complaint through that lasts longer than ``duration``, s."""
 
     def __init__(self, duration: float):
         self._duration = duration

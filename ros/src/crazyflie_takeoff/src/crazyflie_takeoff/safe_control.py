@@ -129,16 +129,8 @@ class HoverThrust:
 class SafeControl:
     """Hover at a place, and descent, without a controller.
 
-    Parameters
-    ----------
-    hover : float
-        Thrust of hover, m/s^2.
-    motion : Motion or None
-        Before the beginning; None if it is not known.
-    age : float
-        How long before, s.
-    control : Setpoint
-        What was flown since.
+    ``hover`` is the thrust of hover, m/s^2; ``motion``, if known, is that ``age`` s before the
+    beginning, and ``control`` was flown since.
     """
 
     def __init__(

@@ -43,13 +43,7 @@ class SafeFilter(Generic[Control]):
 
     Methods that return something to publish return a control as it has come, or a `Setpoint` of the
     filter's own, or None. `tick` has to be called every 10 ms, or 40 ms while `is_nominal`.
-
-    Parameters
-    ----------
-    timeouts : LossTimeouts
-    limits : Limits
-    sees : bool
-        Whether states can be expected.
+    ``sees`` is whether states can be expected.
     """
 
     def __init__(self, timeouts: LossTimeouts, limits: Limits, sees: bool = False):

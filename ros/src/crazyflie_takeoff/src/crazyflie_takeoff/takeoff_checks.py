@@ -13,18 +13,8 @@ from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters,
 class TakeoffChecks:
     """What is known of estimator, controller, driver, battery and geofence.
 
-    Parameters
-    ----------
-    parameters : TakeoffServerParameters
-    resolve : callable
-        ``resolve(topic)`` returns the absolute name of a topic.
-
-    Attributes
-    ----------
-    parameters : TakeoffServerParameters
-        May be replaced by others of the same topics.
-    box : Box
-        The geofence's.
+    ``resolve(topic)`` returns the absolute name of a topic. ``parameters`` may be replaced by
+    others of the same topics.
     """
 
     def __init__(self, parameters: TakeoffServerParameters, resolve: Callable[[str], str]):
@@ -54,14 +44,7 @@ class TakeoffChecks:
         return lacks_state or lacks_controller or bool(self._driver_refusal(now))
 
     def refusal(self, now: float, report: FilterReport) -> str:
-        """Return why the vehicle must not take off; empty if it may.
-
-        Parameters
-        ----------
-        now : float
-            s.
-        report : FilterReport
-        """
+        """Return why the vehicle must not take off at a time (s); empty if it may."""
         if report.event is Event.FILTER_REFUSES:
             return report.reason
         if report.event is Event.FILTER_EMERGENCY:

@@ -99,7 +99,7 @@ class _Parser:
             name: self._read(entry, MachineSettings)
             for name, entry in _entries(self._parts, "machines").items()
         }
-        # What vehicles inherit is checked where it stands: it is wrong once, not in each of them.
+        # What vehicles inherit is checked where it is given: once, and not in each of them.
         for entry in types.values():
             self._check(entry, Settings)
         if common is not None:

@@ -84,7 +84,7 @@ def is_memoryless(K: NDArray[np.float64], u_ref: NDArray[np.float64]) -> bool:
 
 
 class VectorizedSimulatorParameters(Parameters):
-    """Parameters of `VectorizedSimulatorNode`, named as those of the nodes that it stands for."""
+    """Parameters of `VectorizedSimulatorNode`, named as those of the nodes that it replaces."""
 
     time_step: float = parameter(
         TIME_STEP, "from one pose, state and control to the next", name="simulator/time_step"

@@ -25,18 +25,11 @@ class ControlFilter(Generic[Control]):
 
     A filter that has just started listens until a takeoff control comes or `stop_listening` is
     called; before that only a flight state can select the controller.
-
-    Attributes
-    ----------
-    state : FlightState or None
-        As the server has published it last.
-    is_commanded : bool
-        Whether a commanded control has ever come.
     """
 
     def __init__(self) -> None:
-        self.state: FlightState | None = None
-        self.is_commanded = False
+        self.state: FlightState | None = None  # As the server has published it last.
+        self.is_commanded = False  # Whether a commanded control has ever come.
         self._toggled = False
         self._listening = True
         self._waiting: Control | None = None

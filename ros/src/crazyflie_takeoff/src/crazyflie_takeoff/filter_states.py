@@ -64,26 +64,7 @@ _PASSING, _HOLDING, _SINKING, _DOWN, _EMERGENCY = FilterState
 
 
 class FilterMachine:
-    """State of the filter, with the facts on which its transitions depend.
-
-    Attributes
-    ----------
-    state : FilterState
-    reason : str
-        Why the state is not PASSING.
-    elapsed : float
-        Since the state began, s.
-    silence : float
-        Age of the last commanded control, s.
-    is_needed : bool
-        Whether the vehicle would fall without the controller.
-    lacks_controller : bool
-        Whether a flight was ended because no control came, and none has come since.
-    takeoff_thrust : float
-        Of the takeoff control that has just come, m/s^2.
-    takeovers : int
-        How often the filter has held the vehicle.
-    """
+    """State of the filter, with the facts on which its transitions depend."""
 
     def __init__(
         self,
@@ -95,13 +76,16 @@ class FilterMachine:
         self._timeouts = timeouts
         self._choice, self._measured, self._ground = choice, measured, ground
         self.state = FilterState.PASSING
-        self.reason = ""
-        self.elapsed = 0.0
-        # As if one had just come: a filter that starts in flight is not connected at once.
+        self.reason = ""  # Why the state is not PASSING.
+        self.elapsed = 0.0  # Since the state began, s.
+        # Age of the last commanded control, s. As if one had just come: a filter that starts in
+        # flight is not connected at once.
         self.silence = 0.0
-        self.is_needed = self.lacks_controller = False
-        self.takeoff_thrust = 0.0
-        self.takeovers = 0
+        self.is_needed = False  # Whether the vehicle would fall without the controller.
+        # Whether a flight was ended because no control came, and none has come since.
+        self.lacks_controller = False
+        self.takeoff_thrust = 0.0  # Of the takeoff control that has just come, m/s^2.
+        self.takeovers = 0  # How often the filter has held the vehicle.
         self._last_motion: Motion | None = None
         self._event_reason = self._cause = ""
         self._descent_limit = 0.0
@@ -132,8 +116,8 @@ class FilterMachine:
     def _lifts_off(self):
         return self.takeoff_thrust > GRAVITY
 
-    def _lies_on_ground(self):
-        return self._ground.carries(self._measured.fresh)
+    def _seen_on_ground(self):
+        return self._ground.is_below(self._measured.fresh)
 
     def _control_is_lost(self):
         return self.is_needed and self.silence > self._timeouts.hold
@@ -207,12 +191,12 @@ class FilterMachine:
         self._choice.end_flight()
 
     TABLE: ClassVar[Table[FilterState, "FilterMachine"]] = (
-        Transition(_PASSING, Event.FIRST_STATE, _lies_on_ground, _DOWN, _stay_on_ground),
+        Transition(_PASSING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
         Transition(_PASSING, Event.TICK, _control_is_lost, _HOLDING, _hold_place),
         Transition(_PASSING, Event.OBJECTION, _is_airborne, _SINKING, _take_over_and_land),
         Transition(_PASSING, Event.CRASH, _is_airborne, _EMERGENCY, _stop_at_once),
         Transition(_PASSING, Event.STOP, None, _EMERGENCY, _stop_at_once),
-        Transition(_HOLDING, Event.FIRST_STATE, _lies_on_ground, _DOWN, _stay_on_ground),
+        Transition(_HOLDING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
         Transition(_HOLDING, Event.COMMANDED_CONTROL, None, _PASSING),
         Transition(_HOLDING, Event.TAKEOFF_CONTROL, None, _PASSING),
         Transition(_HOLDING, Event.TICK, _control_is_not_needed, _PASSING),

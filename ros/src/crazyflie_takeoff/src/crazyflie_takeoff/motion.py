@@ -34,16 +34,10 @@ class Motion(NamedTuple):
 
 
 class Measurement:
-    """The last measured state, and its age.
-
-    Attributes
-    ----------
-    age : float
-        s; infinite before the first one.
-    """
+    """The last measured state, and its age."""
 
     def __init__(self) -> None:
-        self.age = math.inf
+        self.age = math.inf  # s; infinite before the first one.
         self._motion: Motion | None = None
 
     def update(self, motion: Motion, age: float) -> None:

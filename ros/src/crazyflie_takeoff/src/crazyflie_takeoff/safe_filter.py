@@ -53,7 +53,7 @@ class SafeFilter(Generic[Control]):
         self.choice, self.watch = self.relay.choice, self.relay.watch
         self._measured = self.relay.measured
         self.machine = FilterMachine(timeouts, self.choice, self._measured, self.relay.ground)
-        # The filter before this one was gone for too long if the vehicle lies on the ground:
+        # The filter before this one was away for too long if the vehicle is on the ground:
         # until that is known, nothing is passed on in flight.
         self._ground_check_pending = sees
         self._ticked = math.nan
@@ -248,5 +248,5 @@ class SafeFilter(Generic[Control]):
         if not self.machine.handle(Event.RESET):
             raise RefusalError(
                 f"the motors were stopped less than {RESET_DELAY:g} s ago; see that the vehicle "
-                "lies still"
+                "is at rest on the ground"
             )

@@ -24,15 +24,7 @@ _LOG_WORDS = {
 
 
 class StatusPublisher:
-    """Publishes and logs the state of a flight when it changes.
-
-    Attributes
-    ----------
-    state : FlightState or None
-        The state that was published last.
-    reason : str
-        Why the last landing or abort began.
-    """
+    """Publishes and logs the state of a flight when it changes."""
 
     def __init__(
         self,
@@ -47,8 +39,8 @@ class StatusPublisher:
         self._text = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         self._inhibit_shutdown = handle.inhibit_shutdown()
-        self.state: FlightState | None = None
-        self.reason = ""
+        self.state: FlightState | None = None  # The one that was published last.
+        self.reason = ""  # Why the last landing or abort began.
         self._published: tuple[object, ...] = ()
         self._published_text = ""
         self._logged_word = self._logged_reason = ""

@@ -19,7 +19,7 @@ class AllEmergencyParameters(Parameters):
     """Parameters of `AllEmergencyNode`."""
 
     topic: str = parameter(
-        TOPIC, "what every takeoff control filter hears", "/all/emergency", "topics/all_emergency"
+        TOPIC, "what every takeoff control filter reads", "/all/emergency", "topics/all_emergency"
     )
     service: str = parameter(SERVICE, "stops all vehicles", "/all/emergency", "srv/all_emergency")
 

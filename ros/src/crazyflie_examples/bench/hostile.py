@@ -28,7 +28,13 @@ _NODES = ("state_estimator", "lqr_controller", "takeoff_control_filter", "takeof
 _FLOOD = (sys.executable, "-m", "crazyflie_utils.testing.hostile_publisher")
 _ATTACKS = {
     "none": None,
-    "junk, 10 kHz": (*_FLOOD, "/in_flight_state", "std_msgs/String", "10000"),
+    "junk, 10 kHz": (
+        *_FLOOD,
+        "/in_flight_flight_status",
+        "crazyflie_msgs/FlightStatus",
+        "10000",
+        "{state: 3}",
+    ),
     "/ref, 10 kHz": (*_FLOOD, "/ref", "crazyflie_msgs/PositionVelocityStateStamped", "10000"),
     "no frames, 10 kHz": (*_FLOOD, "/tf", "tf2_msgs/TFMessage", "10000", "transforms: [{}]"),
     "/tf, 20 MB/s": (*_FLOOD, "/tf", "tf2_msgs/TFMessage", "2500", "80"),

@@ -15,7 +15,13 @@ FLOOD = (sys.executable, "-m", "crazyflie_utils.testing.hostile_publisher")
 FREEZE = Path(rospkg.RosPack().get_path("crazyflie_examples")) / "bench" / "hostile.py"
 HOVER = "{state: {z: 1.0}}"
 ATTACKS = {
-    "junk": (*FLOOD, "/in_flight_state", "std_msgs/String", "10000"),
+    "junk": (
+        *FLOOD,
+        "/in_flight_flight_status",
+        "crazyflie_msgs/FlightStatus",
+        "10000",
+        "{state: 3}",
+    ),
     "reference": (*FLOOD, "/ref", "crazyflie_msgs/PositionVelocityStateStamped", "10000", HOVER),
     "transforms": (*FLOOD, "/tf", "tf2_msgs/TFMessage", "2500", "80"),
     "frozen": (sys.executable, str(FREEZE), "freeze"),

@@ -65,6 +65,34 @@ def test_vehicles_are_added_and_their_parameters_written():
     assert process.transport.parameters["/cf1/locSrv/extPosStdDev"] == 0.001
 
 
+def test_a_slow_master_blocks_no_callback(monkeypatch):
+    process = FakeProcess()
+    driver = Driver(process)
+    writes = []
+
+    def set_later(name, value):
+        writes.append((name, value, Future()))
+        return writes[-1][2]
+
+    monkeypatch.setattr(process.transport, "set_param_later", set_later)
+    assert process.launch(FleetConnectNode(), "/fleet_add", {"fleet/file": str(EXAMPLE)})
+    assert [name for name, _, _ in writes if "extPosStdDev" in name] == [
+        "/cf1/locSrv/extPosStdDev",
+        "/cf2/locSrv/extPosStdDev",
+    ]
+    assert driver.updated == {}
+    for name, value, done in writes:
+        if name.startswith("/cf1"):
+            process.transport.parameters[name] = value
+            done.set_result(None)
+        else:
+            done.set_exception(OSError("no master"))
+    process.advance(0.1)
+    assert list(driver.updated) == ["cf1"]
+    assert "cf2, radio://0/80/2M/E7E7E7E702: no master" in process.logged("error")[0]
+    assert process.exit_status == 1
+
+
 def test_who_is_not_there_is_named_and_the_others_are_added():
     process, driver, _ = add(missing=("cf1",))
     assert process.exit_status == 1

@@ -2,7 +2,6 @@
 
 import math
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_fleet import fleet_file
-from crazyflie_fleet.fleet_config import DOWNWASH, LogTopic, close_pairs
-from crazyflie_fleet.launch_text import launch_text
+from crazyflie_fleet.fleet_config import LogTopic
 from crazyflie_fleet.settings import same_vehicle
 from crazyflie_utils import ParameterError
 
@@ -258,47 +256,3 @@ def test_a_grid(n):
 def test_no_grid(arguments, text):
     with pytest.raises(ParameterError, match=text):
         fleet_file.grid(*arguments)
-
-
-COORDINATE = st.floats(-1.0, 1.0)
-
-
-@given(
-    st.lists(
-        st.tuples(COORDINATE, COORDINATE, COORDINATE, st.floats(0.05, 0.5)), min_size=1, max_size=12
-    )
-)
-def test_pairs_are_those_that_overlap(rows):
-    table = np.array(rows)
-    scaled = table[:, :3] / (1.0, 1.0, DOWNWASH)
-    expected = {
-        (i, j)
-        for j in range(len(rows))
-        for i in range(j)
-        if math.dist(scaled[i], scaled[j]) < table[i, 3] + table[j, 3] - 1e-12
-    }
-    assert expected <= {pair[:2] for pair in close_pairs(table[:, :3], table[:, 3])}
-
-
-def test_one_above_the_other_needs_more_distance():
-    apart = ((0.0, 0.0, 0.0), (0.0, 0.5, 0.0))
-    above = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.5))
-    assert not list(close_pairs(np.array(apart), [0.2, 0.2]))
-    assert [pair[:2] for pair in close_pairs(np.array(above), [0.2, 0.2])] == [(0, 1)]
-
-
-def test_a_launch_file_for_several_computers(tmp_path):
-    path = tmp_path / "fleet.yaml"
-    path.write_text(
-        TWO + "    machine: far\nmachines:\n  far: {address: 10.0.0.2, env_loader: /env.sh}\n"
-    )
-    launch = ElementTree.fromstring(launch_text(path))
-    (machine,) = launch.findall("machine")
-    assert machine.attrib == {"name": "far", "address": "10.0.0.2", "env-loader": "/env.sh"}
-    arguments = [
-        {each.attrib["name"]: each.attrib["value"] for each in include.findall("arg")}
-        for include in launch.findall("include")
-    ]
-    assert [each["machine"] for each in arguments] == ["local", "far"]
-    assert [each["name"] for each in arguments] == ["fleet", "fleet_far"]
-    assert [each["host"] for each in arguments] == ["", "far"]

@@ -137,8 +137,8 @@ def test_vehicles_of_a_mission_that_has_died_are_landed():
     assert tower.lands(60.0) == ["on_ground"] * 3 + ["flying"]
     assert tower.nearest() > 0.3
     assert tower.process.logged("error") == [
-        "/fleet: a mission that flew cf1, cf2, cf3 has said nothing for 5 s and is taken for dead: "
-        "landing them"
+        "/fleet: no message of the mission that flew cf1, cf2, cf3 for 5 s: it has ended; landing "
+        "them"
     ]
 
 

@@ -35,7 +35,7 @@ def fly(group: DryRun, mission, gain_file: str) -> Flight:
 
         def note(pieces, name=name, vehicle=vehicle, begin=begin):
             answer = begin(pieces)
-            trajectories[name].append(vehicle._trajectory)
+            trajectories[name].append(vehicle.trajectory)
             return answer
 
         vehicle._fly = note

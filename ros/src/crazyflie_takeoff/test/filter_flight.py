@@ -13,8 +13,8 @@ from crazyflie_takeoff.safe_filter import SafeFilter
 
 G = 9.81
 ON_GROUND, TAKING_OFF, FLYING, DESCENDING, LANDING = FlightState
-LIMITS = Limits(Box((-2.0, -2.0, -1.0), (2.0, 2.0, 3.0)), 0.5, -0.5)
-TIMEOUTS = LossTimeouts(0.1, 0.5, 5.0)
+LIMITS = Limits(Box((-2.0, -2.0, -1.0), (2.0, 2.0, 3.0)), 0.5, -0.5, 3.0, 10.0)
+TIMEOUTS = LossTimeouts(0.1, 0.5, 5.0, 3.0)
 
 
 def level(thrust):

@@ -123,7 +123,7 @@ def test_a_step_of_three_metres_is_no_climb_to_complain_of():
 
 
 def test_the_wall_above_counts_before_the_height():
-    walls = Walls(Limits(Box((-1.0,) * 3, (1.0, 1.0, 2.0)), 0.5, -0.5, height=10.0))
+    walls = Walls(Limits(Box((-1.0,) * 3, (1.0, 1.0, 2.0)), 0.5, -0.5, 3.0, 10.0))
     assert walls.highest(0.0) == 2.25
     walls.change(Box((-1.0,) * 3, (1.0, 1.0, 30.0)))
     assert walls.highest(0.5) == 10.5
@@ -136,8 +136,8 @@ def test_the_wall_above_counts_before_the_height():
 def test_two_nodes_at_once_are_noticed_and_forgotten(period):
     callers = Callers("controls", 3)
     for k in range(10):
-        callers.hear(k * period, "/a")
-        callers.hear(k * period + 0.3 * period, "/b")
+        callers.note(k * period, "/a")
+        callers.note(k * period + 0.3 * period, "/b")
     assert callers.complaint == "two nodes publish controls, /a and /b; expected one"
     callers.advance(10 * period + MEMORY)
     assert callers.complaint == ""
@@ -146,9 +146,9 @@ def test_two_nodes_at_once_are_noticed_and_forgotten(period):
 def test_a_rare_publisher_beside_a_busy_one_is_noticed():
     callers = Callers("controls", 3)
     for k in range(300):
-        callers.hear(k / 100, "/busy")
+        callers.note(k / 100, "/busy")
         if k % 100 == 50:
-            callers.hear(k / 100, "/rare")
+            callers.note(k / 100, "/rare")
     assert "/busy and /rare" in callers.complaint
 
 
@@ -157,15 +157,15 @@ def test_one_after_the_other_are_not_two():
     time = 0.0
     for name in "abcdefgh":
         for _ in range(10):
-            callers.hear(time, f"/{name}")
+            callers.note(time, f"/{name}")
             time += 0.01
         time += 0.6
     assert callers.complaint == ""
     # Nor is a handover without a gap, or the clock set back.
     for k, name in enumerate(["/x", "/y", "/x", "/y", "/y"]):
-        callers.hear(time + 0.01 * k, name)
+        callers.note(time + 0.01 * k, name)
     assert callers.complaint == ""
-    callers.hear(0.0, "/z")
+    callers.note(0.0, "/z")
     assert callers.complaint == ""
 
 

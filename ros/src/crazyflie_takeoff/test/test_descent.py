@@ -7,6 +7,7 @@ from flight_clock import (
     FLYING,
     LANDING,
     ON_GROUND,
+    PLAN,
     TAKING_OFF,
     Clock,
     G,
@@ -15,6 +16,7 @@ from flight_clock import (
     in_state,
 )
 
+from crazyflie_takeoff.flight import FlightStateMachine
 from crazyflie_takeoff.server_states import Event, FilterReport
 
 
@@ -143,6 +145,18 @@ def test_a_descent_waits_while_the_filter_holds_the_vehicle(seen):
     clock.run(1.0)
     assert clock.references()[-1][1] == pytest.approx((0, 0, height - 0.3, 0, 0, -0.3), abs=0.01)
     assert clock.run_until(LANDING) == pytest.approx(3.0 + height / 0.3 + 3.0, abs=0.05)
+
+
+def test_the_descent_of_a_restarted_server_waits_while_the_filter_holds_the_vehicle():
+    flight = FlightStateMachine(PLAN)
+    flight.set_filter(FilterReport(Event.FILTER_HOLDS, DESCENDING))
+    flight.recover((0.0, 0.0, 1.0), ground=0.0)
+    clock = Clock(flight, position=(0.0, 0.0, 1.0)).run(2.0)
+    assert flight.flight_state is DESCENDING
+    assert {reference[2] for _, reference in clock.references()} == {1.0}
+    flight.set_filter(FilterReport(Event.FILTER_PASSES, DESCENDING))
+    clock.run(1.0)
+    assert clock.references()[-1][1] == pytest.approx((0, 0, 0.7, 0, 0, -0.3), abs=0.01)
 
 
 def test_a_descent_that_is_held_for_ever_ends():

@@ -26,7 +26,7 @@ class World:
 
     def __init__(self):
         self.choice, self.measured, self.ground = ControlFilter(), Measurement(), Ground()
-        timeouts = LossTimeouts(0.1, 1.5, 5.0)
+        timeouts = LossTimeouts(0.1, 1.5, 5.0, 3.0)
         self.machine = FilterMachine(timeouts, self.choice, self.measured, self.ground)
 
     def change(self, random):

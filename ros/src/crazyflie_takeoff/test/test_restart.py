@@ -4,16 +4,9 @@ Every node is in a process of its own; messages that nobody hears are lost.
 """
 
 import pytest
-from std_msgs.msg import Empty, String
-from takeoff_helpers import BARE, FILTER, SERVER, HoverNetwork, Network, control, state
+from takeoff_helpers import BARE, SERVER, HoverNetwork
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
-from crazyflie_takeoff.takeoff_control_filter_node import (
-    FRESH_TIME,
-    LISTENING_TIME,
-    TakeoffControlFilterNode,
-)
-from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.transport import ServiceError
 
 GAP = 1.0
@@ -301,60 +294,3 @@ def test_on_a_table_at_launch_with_a_reference():
     assert network.last("/in_flight_state") == "on_ground"
     assert len(network.on("/control/lqr")) > 400
     assert set(thrusts(network, "/control/final", 0.0)) == {0.0}
-
-
-def test_server_with_a_foreign_filter_in_flight():
-    """Without a memory, the height decides; it takes a second."""
-    network = Network()
-    network.start("server", TakeoffServerNode(), SERVER)
-    for _ in range(150):
-        network.process("server").publish("/state", state(1.0))
-        network.advance(0.01)
-    assert network.last("/in_flight_state") == "flying"
-    assert network.on("/control/takeoff") == []
-    assert network.on("/in_flight_state")[0][0] == pytest.approx(101.0, abs=0.03)
-
-
-def test_filter_with_a_foreign_server():
-    """Toggles alone decide, and a restart in flight costs the time of listening."""
-    network = Network()
-    network.unpublished.add("/in_flight_state")
-    network.start("filter", TakeoffControlFilterNode(), FILTER)
-    process = network.process("filter")
-    for _ in range(50):
-        process.publish("/control/lqr", control(9.0))
-        network.advance(0.01)
-    first = network.on("/control/final")[0][0]
-    assert first == pytest.approx(100.0 + LISTENING_TIME, abs=0.02)
-    process.publish("/in_flight", Empty())
-    network.advance(0.01)
-    assert network.last("/in_flight_filter") == "flying"
-    process.publish("/in_flight", Empty())
-    network.advance(0.01)
-    assert network.last("/in_flight_filter") == "unknown"
-    network.advance(FRESH_TIME)
-    assert network.last("/in_flight_filter") == "commanded"
-
-
-def test_server_takes_the_place_of_a_foreign_one_in_flight():
-    """The filter knows from the toggle that the vehicle flies."""
-    network = HoverNetwork(BARE)
-    network.vehicle_node.offset = 1.0
-    network.kill("server")
-    network.kill("filter")
-    network.start_filter()
-    network.process("filter").publish("/in_flight", Empty())
-    network.process("controller").publish("/ref", PositionVelocityStateStamped())
-    network.start_server()
-    network.advance(2.0)
-    assert network.last("/in_flight_state") == "flying"
-    assert network.on("/in_flight") == []
-
-
-def test_a_dead_servers_flight_state_is_not_news():
-    network = HoverNetwork(BARE)
-    network.advance(1.5)
-    network.kill("server")
-    network.process("filter").publish("/in_flight_state", String("on_ground"))
-    network.advance(1.0)
-    assert [m.data for _, m in network.on("/in_flight_filter")] == ["unknown", "on_ground"]

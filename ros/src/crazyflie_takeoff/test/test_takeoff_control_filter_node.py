@@ -3,11 +3,11 @@
 import math
 
 import pytest
-from std_msgs.msg import Empty, String
+from std_msgs.msg import Empty
 from takeoff_helpers import FILTER, control
 
 from crazyflie_msgs.msg import FilterStatus, FlightStatus
-from crazyflie_takeoff.filter_status_publisher import FLIGHT_STATES
+from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
 from crazyflie_utils.testing import FakeProcess
 
@@ -15,7 +15,7 @@ from crazyflie_utils.testing import FakeProcess
 def launch():
     """Return a process with a filter in it that has just started."""
     process = FakeProcess()
-    process.transport.unpublished.add("/in_flight_state")
+    process.transport.unpublished.add("/in_flight_flight_status")
     assert process.launch(TakeoffControlFilterNode(), "/filter", FILTER)
     return process
 
@@ -44,7 +44,7 @@ def test_required_parameters(name):
     assert f"/filter/{name} is not set" in process.logged("error")[0]
 
 
-@pytest.mark.parametrize("name", [*FILTER, "topics/flight_state", "topics/filter_state"])
+@pytest.mark.parametrize("name", [*FILTER, "topics/flight_status", "topics/filter_state"])
 @pytest.mark.parametrize("value", ["", 3, "no name"])
 def test_bad_parameters_are_named(name, value):
     process = FakeProcess()
@@ -116,8 +116,8 @@ def test_listens_at_first():
 
 def test_remembers_the_flight_state_for_the_server(process):
     assert memory(process) == ["unknown"]
-    process.publish("/in_flight_state", String("taking_off"))
-    process.publish("/in_flight_state", String("flying"))
+    for state in (FlightStatus.TAKING_OFF, FlightStatus.FLYING):
+        process.publish("/in_flight_flight_status", FlightStatus(state=state))
     process.publish("/in_flight", Empty())
     assert memory(process) == ["unknown", "taking_off", "flying"]
 
@@ -144,17 +144,17 @@ def test_publishes_its_status(process):
 
 
 def test_the_flight_states_are_those_of_the_message():
-    names = [None if each is None else each.name for each in FLIGHT_STATES]
-    assert [getattr(FlightStatus, name) for name in names[1:]] == list(range(1, len(names)))
+    assert all(getattr(FlightStatus, state.name) == state for state in FlightState)
+    assert FlightStatus.UNKNOWN == 0
 
 
-def test_a_word_that_is_no_flight_state_is_ignored(process):
-    process.publish("/in_flight_state", String("flying"))
-    process.publish("/in_flight_state", String("asleep"))
+def test_a_number_that_is_no_flight_state_is_ignored(process):
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    process.publish("/in_flight_flight_status", FlightStatus(state=77))
     process.publish("/control/takeoff", control(1.0))
     process.publish("/control/lqr", control(5.0))
     assert thrusts(process) == [1.0, 5.0]
-    assert "asleep" in process.logged("warn")[0]
+    assert "77 on /in_flight_flight_status" in process.logged("warn")[0]
     assert memory(process) == ["unknown", "flying"]
 
 

@@ -8,7 +8,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import EmptyResponse
 from takeoff_helpers import SERVER, filter_status, state
 
-from crazyflie_takeoff.driver_connection import MAX_AGE
+from crazyflie_takeoff.driver_connection import MAX_CONNECTION_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
 from crazyflie_utils.transport import ServiceError
 
@@ -225,7 +225,7 @@ def test_a_driver_that_has_died_is_not_connected():
     process = on_ground(DRIVEN)
     process.advance(START_LIMIT)
     process.publish("/cf1/connected", Bool(True))
-    process.advance(MAX_AGE + 0.1)
+    process.advance(MAX_CONNECTION_AGE + 0.1)
     process.publish("/state", state(0.0))
     with pytest.raises(ServiceError, match=NOT_CONNECTED.format("nothing")):
         call(process, "/takeoff")

@@ -37,20 +37,21 @@ def test_nobody_waits_for_a_frozen_master(master):
     writer.set("/a", 0)
     assert master.is_asked.wait(20.0)
     for value in range(1, 1000):
-        writer.set("/a", value)
+        replaced = writer.set("/a", value)
         writer.set("/b", -value)
     assert master.written == []
     master.may_answer.set()
     wait_until(lambda: len(master.written) == 3, "the latest values")
     assert master.written == [("/a", 0), ("/a", 999), ("/b", -999)]
+    assert replaced.done()
 
 
 def test_later_changes_are_set_too(master):
     master.may_answer.set()
     writer = ParameterWriter(master.write, print)
     for value in range(3):
-        writer.set("/a", value)
-        wait_until(lambda value=value: ("/a", value) in master.written, "the value")
+        writer.set("/a", value).result(20.0)
+        assert master.written[-1] == ("/a", value)
 
 
 def test_what_cannot_be_set_is_reported_and_ends_nothing(master):
@@ -58,8 +59,8 @@ def test_what_cannot_be_set_is_reported_and_ends_nothing(master):
     master.may_answer.set()
     master.error = OSError("no master")
     writer = ParameterWriter(master.write, reports.append)
-    writer.set("/a", 1)
-    wait_until(lambda: reports, "the report")
+    done = writer.set("/a", 1)
+    assert done.exception(20.0) is master.error
     assert "/a" in reports[0]
     assert "no master" in reports[0]
     master.error = None

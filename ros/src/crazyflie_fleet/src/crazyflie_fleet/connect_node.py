@@ -85,10 +85,20 @@ class FleetConnectNode(Node):
         if error is not None or not vehicle.firmware_params:
             self._finish(vehicle, error)
             return
-        names = []
-        for name, value in vehicle.firmware_params.items():
-            names.append(name.replace(".", "/"))
-            self._handle.set_param(f"/{vehicle.name}/{names[-1]}", value)
+        values = {name.replace(".", "/"): x for name, x in vehicle.firmware_params.items()}
+        writes = [
+            self._handle.set_param_later(f"/{vehicle.name}/{name}", value)
+            for name, value in values.items()
+        ]
+        # They are set in this order: with the last one all are.
+        write_parameters = partial(self._handle.submit, self._on_set, vehicle, [*values], writes)
+        writes[-1].add_done_callback(lambda _: write_parameters())
+
+    def _on_set(self, vehicle, names, writes):
+        errors = [error for write in writes if (error := write.exception()) is not None]
+        if errors:
+            self._finish(vehicle, errors[0])
+            return
         answer = self._handle.call_service(
             f"/{vehicle.name}/update_params", UpdateParams, UpdateParamsRequest(names), TIMEOUT
         )

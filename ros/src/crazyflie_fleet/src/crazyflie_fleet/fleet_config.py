@@ -17,47 +17,23 @@ air that rotors throw down takes lift from a vehicle below."""
 
 @dataclass(frozen=True)
 class LogTopic:
-    """A topic of firmware variables.
+    """A topic of firmware variables."""
 
-    Attributes
-    ----------
-    name : str
-        Below the vehicle's namespace.
-    frequency : float
-        Hz.
-    variables : tuple of str
-        Such as "pm.vbat".
-    """
-
-    name: str
-    frequency: float
-    variables: tuple[str, ...]
+    name: str  # Below the vehicle's namespace.
+    frequency: float  # Hz.
+    variables: tuple[str, ...]  # Such as "pm.vbat".
 
 
 @dataclass(frozen=True)
 class VehicleConfig:
-    """One vehicle.
+    """One vehicle."""
 
-    Attributes
-    ----------
-    name : str
-        Its namespace and its tf frame.
-    position : tuple of float
-        Before takeoff: x, y, z in m, fixed frame.
-    settings : RobotSettings
-        Merged from the vehicle, its type and ``all``.
-    firmware_params : dict of str to float
-        "group.name" to value, written after each connection.
-    default_topics : tuple of str
-        Standard topics that the driver publishes of it.
-    log_topics : tuple of LogTopic
-    """
-
-    name: str
-    position: tuple[float, float, float]
-    settings: RobotSettings
+    name: str  # Its namespace and its tf frame.
+    position: tuple[float, float, float]  # Before takeoff, m, fixed frame.
+    settings: RobotSettings  # Merged from the vehicle, its type and ``all``.
+    # "group.name" to value, written after each connection.
     firmware_params: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    default_topics: tuple[str, ...] = ("battery",)
+    default_topics: tuple[str, ...] = ("battery",)  # Standard ones that the driver publishes.
     log_topics: tuple[LogTopic, ...] = ()
 
     @property
@@ -84,24 +60,12 @@ class VehicleConfig:
 
 @dataclass(frozen=True)
 class FleetConfig:
-    """The vehicles that take part.
+    """The vehicles that take part."""
 
-    Attributes
-    ----------
-    vehicles : tuple of VehicleConfig
-        Those that are enabled, in the order of the file.
-    disabled : tuple of str
-        Names of the others.
-    machines : dict of str to MachineSettings
-        Other computers.
-    warnings : tuple of str
-        Entries without effect: file, line and reason.
-    """
-
-    vehicles: tuple[VehicleConfig, ...]
-    disabled: tuple[str, ...] = ()
+    vehicles: tuple[VehicleConfig, ...]  # Those that are enabled, in the order of the file.
+    disabled: tuple[str, ...] = ()  # Names of the others.
     machines: Mapping[str, MachineSettings] = dataclasses.field(default_factory=dict)
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # Entries without effect: file, line and reason.
 
     @property
     def names(self) -> tuple[str, ...]:

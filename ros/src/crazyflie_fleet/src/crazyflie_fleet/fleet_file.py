@@ -46,7 +46,7 @@ def load(path: str | Path) -> FleetConfig:
     return _Parser(load_yaml(path)).fleet()
 
 
-def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> FleetConfig:
+def grid(n: int, spacing: float = 1.0) -> FleetConfig:
     """Return n vehicles cf1, cf2, ... in rows around the origin.
 
     Parameters
@@ -54,19 +54,14 @@ def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> FleetCon
     n : int
     spacing : float
         From one to the next, m.
-    first_port : int
-        UDP port of the first one; the others have the next ones.
 
     Raises
     ------
     ParameterError
         There is no such grid.
     """
-    if n < 1 or not 1 <= first_port <= 65536 - n:
-        raise ParameterError(
-            f"a grid of {n} vehicles from port {first_port} on; expected at least one vehicle, and "
-            "ports below 65536"
-        )
+    if n < 1:
+        raise ParameterError(f"a grid of {n} vehicles; expected at least one")
     columns = math.ceil(math.sqrt(n))
     middle = (math.ceil(n / columns) - 1) / 2, (columns - 1) / 2
     vehicles = []
@@ -74,7 +69,7 @@ def grid(n: int, spacing: float = 1.0, first_port: int = FIRST_PORT) -> FleetCon
         row, column = divmod(k, columns)
         position = (row - middle[0]) * spacing, (column - middle[1]) * spacing, 0.0
         settings = RobotSettings.from_mapping(
-            {"initial_position": position, "uri": f"udp://127.0.0.1:{first_port + k}"}
+            {"initial_position": position, "uri": f"udp://127.0.0.1:{FIRST_PORT + k}"}
         )
         vehicles.append(VehicleConfig(f"cf{k + 1}", position, settings))
     for _, _, distance, limit in _close(vehicles):
@@ -96,17 +91,15 @@ class _Parser:
 
     def fleet(self) -> FleetConfig:
         """Return the fleet, or raise `ParameterError`."""
-        for key, entry in self._parts.items():
-            if key not in _TOP:
-                self._error(entry, f"is not known; expected one of {', '.join(_TOP)}")
+        self._check_keys(self._parts, _TOP)
         robots = self._top["robots"].entries()
-        types = self._entries("robot_types")
+        types = _entries(self._parts, "robot_types")
         common = self._parts.get("all")
         machines = {
             name: self._read(entry, MachineSettings)
-            for name, entry in self._entries("machines").items()
+            for name, entry in _entries(self._parts, "machines").items()
         }
-        # What vehicles inherit is checked where it stands: it is wrong once, not in each of them.
+        # What vehicles inherit is checked where it is given: once, and not in each of them.
         for entry in types.values():
             self._check(entry, Settings)
         if common is not None:
@@ -129,9 +122,6 @@ class _Parser:
         return FleetConfig(
             tuple(enabled), tuple(disabled), machines, tuple(self._warnings.values())
         )
-
-    def _entries(self, key):
-        return self._parts[key].entries() if key in self._parts else {}
 
     # What is wrong.
 
@@ -156,6 +146,11 @@ class _Parser:
             self._firmware(entry)
         except ParameterError as error:
             self._errors += error.complaints
+
+    def _check_keys(self, entries, known):
+        for key, entry in entries.items():
+            if key not in known:
+                self._error(entry, f"is not known; expected one of {', '.join(known)}")
 
     def _check_type(self, expected: ParameterType, value: Any, entry: Entry) -> Any:
         try:
@@ -209,16 +204,16 @@ class _Parser:
         return VehicleConfig(name, settings.position, settings, *self._firmware(merged))
 
     def _check_voltages(self, merged, settings):
-        # Only here it is known which of the robot, its type and all has said what.
+        # Which of the robot, its type and all has which of them is known only here.
         critical, warning = settings.voltage_critical, settings.voltage_warning
         if critical <= warning:
             return
-        said = merged["battery"].entries()
-        if "voltage_critical" in said:
-            entry, text = said["voltage_critical"], f"is {critical:g}; expected not more than"
+        given = merged["battery"].entries()
+        if "voltage_critical" in given:
+            entry, text = given["voltage_critical"], f"is {critical:g}; expected not more than"
             other = f"voltage_warning, {warning:g} (V)"
         else:
-            entry, text = said["voltage_warning"], f"is {warning:g}; expected not less than"
+            entry, text = given["voltage_warning"], f"is {warning:g}; expected not less than"
             other = f"voltage_critical, {critical:g} (V)"
         # Without the robot's name: what several inherit is wrong once.
         name = entry.name.removeprefix(f"{merged.name}/")
@@ -226,37 +221,29 @@ class _Parser:
 
     def _firmware(self, entry):
         parts = entry.entries()
-        params = {}
-        if "firmware_params" in parts:
-            for group, inner in parts["firmware_params"].entries().items():
-                for key, value in inner.entries().items():
-                    params[f"{group}.{key}"] = self._check_type(
-                        _FIRMWARE_NUMBER, value.value, value
-                    )
+        params = {
+            f"{group}.{key}": self._check_type(_FIRMWARE_NUMBER, value.value, value)
+            for group, inner in _entries(parts, "firmware_params").items()
+            for key, value in inner.entries().items()
+        }
         if "firmware_logging" not in parts:
             return params, ("battery",), ()
         return params, *self._logging(parts["firmware_logging"])
 
     def _logging(self, entry):
         parts = entry.entries()
-        for key, inner in parts.items():
-            if key not in _LOGGING:
-                self._error(inner, f"is not known; expected one of {', '.join(_LOGGING)}")
+        self._check_keys(parts, _LOGGING)
+        default_topics = _entries(parts, "default_topics")
+        self._check_keys(default_topics, DEFAULT_TOPICS)
         standard = []
-        for key, inner in (
-            parts["default_topics"].entries() if "default_topics" in parts else {}
-        ).items():
-            if key not in DEFAULT_TOPICS:
-                self._error(inner, f"is not known; expected one of {', '.join(DEFAULT_TOPICS)}")
-            elif not DEFAULT_TOPICS[key]:
+        for key, inner in default_topics.items():
+            if DEFAULT_TOPICS.get(key) == "":
                 warning = inner.error("is not offered by the driver, and left out")
                 self._warnings.setdefault(inner.line, str(warning))
-            elif self._read(inner, DefaultTopicSettings) is not None:
+            elif key in DEFAULT_TOPICS and self._read(inner, DefaultTopicSettings) is not None:
                 standard.append(DEFAULT_TOPICS[key])
         custom = []
-        for key, inner in (
-            parts["custom_topics"].entries() if "custom_topics" in parts else {}
-        ).items():
+        for key, inner in _entries(parts, "custom_topics").items():
             topic = self._read(inner, LogTopicSettings)
             self._check_type(VEHICLE_NAME, key, inner)
             if topic is not None:
@@ -264,9 +251,13 @@ class _Parser:
         enabled = "enabled" not in parts or self._check_type(
             BOOLEAN, parts["enabled"].value, parts["enabled"]
         )
-        # Without its battery a vehicle is not safe: it is watched whatever the file says.
+        # Without its battery a vehicle is not safe: it is watched in any case.
         names = ("battery", *standard) if enabled else ("battery",)
         return tuple(dict.fromkeys(names)), tuple(custom) if enabled else ()
+
+
+def _entries(parts, key):
+    return parts[key].entries() if key in parts else {}
 
 
 def _close(vehicles):
@@ -277,7 +268,7 @@ def _close(vehicles):
 
 
 def _merged(nodes):
-    """Return a mapping with what all say, the last one first; each value keeps its line."""
+    """Return a mapping with the values of all, the last one's first; each keeps its line."""
     if not all(isinstance(node, yaml.MappingNode) for node in nodes):
         return nodes[-1]
     values: dict[str, list[yaml.Node]] = {}

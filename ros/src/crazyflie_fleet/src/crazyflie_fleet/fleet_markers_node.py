@@ -21,7 +21,7 @@ _ROTOR = 0.0325
 _TEXT_SIZE = 0.12
 
 PERIOD = 1.0
-"""Between two messages, s: RViz forgets a marker that comes before its frame."""
+"""Between two messages, s: RViz drops a marker that comes before its frame."""
 
 
 class FleetMarkersParameters(FleetParameters):

@@ -1,4 +1,4 @@
-"""Parameters that say which vehicles a fleet has, and how they are flown."""
+"""Parameters: which vehicles a fleet has, and how they are flown."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -20,13 +20,7 @@ class FleetServicesNode(Node):
 
     A call is answered when all vehicles have answered, with an error that names each one that
     has refused. Vehicles above each other land one after the other, also those of a mission that
-    has died.
-
-    Parameters
-    ----------
-    fleet : FleetConfig
-    states : VehicleStates
-        Of all its vehicles.
+    has died. ``states`` are those of all vehicles of the fleet.
     """
 
     needed_in_flight = True
@@ -69,8 +63,8 @@ class FleetServicesNode(Node):
             return
         chosen = [name for name in self._fleet.names if name in flying]
         self._handle.error(
-            f"a mission that flew {', '.join(chosen)} has said nothing for {MISSION_TIMEOUT:g} s "
-            "and is taken for dead: landing them"
+            f"no message of the mission that flew {', '.join(chosen)} for {MISSION_TIMEOUT:g} s: "
+            "it has ended; landing them"
         )
         self._lander.land(chosen).add_done_callback(self._log_refusals)
 

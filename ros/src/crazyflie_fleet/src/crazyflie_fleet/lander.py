@@ -44,15 +44,7 @@ Refusals = Mapping[str, str]
 
 
 class Lander:
-    """The landings of a fleet, see `crazyflie_fleet.landing`.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    fleet : FleetConfig
-    states : VehicleStates
-        Of all its vehicles.
-    """
+    """The landings of a fleet, see `landing`; ``states`` are those of all its vehicles."""
 
     def __init__(self, handle: NodeHandle, fleet: FleetConfig, states: VehicleStates):
         self._handle = handle

@@ -10,10 +10,7 @@ from crazyflie_fleet.settings import LOCAL
 def launch_text(path: str | Path) -> str:
     """Return a launch file that has each machine of a fleet file simulate its vehicles.
 
-    Parameters
-    ----------
-    path : str or Path
-        Of the fleet file, which all these computers have at this place.
+    The file has the same ``path`` on all these computers.
 
     Raises
     ------

@@ -17,14 +17,7 @@ MISSION_TIMEOUT = 5.0
 
 
 class MissionWatch:
-    """Watchdog of missions.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    on_lost : callable
-        ``on_lost(names)`` is called with the vehicles of a mission's last message.
-    """
+    """Watchdog of missions: ``on_lost(names)`` gets the vehicles of a mission's last message."""
 
     def __init__(self, handle: NodeHandle, on_lost: Callable[[list[str]], None]):
         self._on_lost = on_lost

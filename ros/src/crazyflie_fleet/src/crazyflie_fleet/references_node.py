@@ -58,20 +58,9 @@ class _TrackedVehicle:
 class ReferencesNode(Node):
     """Pass on the references of vehicles, unless they lead one too near to another.
 
-    Parameters
-    ----------
-    vehicles : sequence of VehicleConfig
-        Those that are flown in this process.
-    others : sequence of VehicleConfig
-        Those that are flown elsewhere, from which the former keep apart.
-    fixed_frame : str
-    vectorized : mapping of str to sequence of VehicleConfig, optional
-        Topics that have the states of some of them in one message.
-
-    Attributes
-    ----------
-    states : VehicleStates
-        Of all of them.
+    ``vehicles`` are flown in this process and keep apart from ``others``, flown elsewhere, too.
+    ``vectorized`` are topics that have the states of several vehicles in one message. The attribute
+    ``states`` has those of all.
     """
 
     needed_in_flight = True

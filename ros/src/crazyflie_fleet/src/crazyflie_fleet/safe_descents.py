@@ -31,12 +31,8 @@ class _Descent:
 class SafeDescents:
     """Landing places of vehicles that descend.
 
-    A vehicle with another beneath it flies to the nearest free place while it sinks.
-
-    Parameters
-    ----------
-    buffers : sequence of float
-        Collision buffer of each vehicle, m.
+    A vehicle with another beneath it flies to the nearest free place while it sinks. ``buffers``
+    are the collision buffers of all vehicles, m.
     """
 
     def __init__(self, buffers: Sequence[float]):

@@ -15,14 +15,8 @@ from crazyflie_utils import Node, NodeHandle
 class SafeDescentsNode(Node):
     """Pass on the references of descents, beside vehicles that are beneath.
 
-    Parameters
-    ----------
-    vehicles : sequence of VehicleConfig
-        Those that are flown in this process.
-    states : VehicleStates
-        Of all vehicles, with the same numbers first.
-    buffers : sequence of float
-        Collision buffers of all vehicles, m.
+    ``vehicles`` are flown in this process; ``states`` and collision ``buffers`` (m) are those of
+    all vehicles, these first.
     """
 
     needed_in_flight = True

@@ -16,29 +16,19 @@ RELEASE_RATIO = 1.1
 
 
 class ClosePair(NamedTuple):
-    """Two vehicles that are, or soon will be, closer than their buffers.
-
-    Attributes
-    ----------
-    first, second : int
-        Their numbers.
-    distance : float
-        Now, m; heights count as in `close_pairs`.
-    limit : float
-        Sum of their buffers, m.
-    """
+    """Two vehicles, by number, that are, or soon will be, closer than their buffers."""
 
     first: int
     second: int
-    distance: float
-    limit: float
+    distance: float  # Now, m; heights count as in `close_pairs`.
+    limit: float  # Sum of their buffers, m.
 
 
 class Separation:
     """Decide which vehicles must not follow their references.
 
     A vehicle is held while it is too close to another, now or `LOOK_AHEAD` from now at the present
-    velocities, and its reference approaches the other. One whose reference leads away is not held.
+    velocities, and its reference approaches the other. One whose reference moves away is not held.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def same_vehicle(uri: str) -> str:
 
 
 class StartPosition(ParameterType):
-    """Where a vehicle stands before takeoff: x, y, z in m, z not below the ground."""
+    """Position of a vehicle before takeoff: x, y, z in m, z not below the ground."""
 
     label, unit, range = POSITION.label, POSITION.unit, "z >= 0"
 
@@ -174,7 +174,7 @@ class RobotSettings(Settings):
     enabled: bool = parameter(BOOLEAN, "whether it takes part", True)
     uri: str | None = parameter(URI, "its address; not needed in simulation", None)
     position: tuple[float, float, float] = parameter(
-        StartPosition(), "where it stands before takeoff", name="initial_position"
+        StartPosition(), "its position before takeoff", name="initial_position"
     )
     type: str | None = parameter(TEXT, "of `robot_types`", None)
 
@@ -184,4 +184,4 @@ class MachineSettings(Parameters):
 
     address: str = parameter(TEXT, "name or number in the network")
     env_loader: str = parameter(TEXT, "script there that sets ROS's environment")
-    user: str | None = parameter(TEXT, "who logs in there by ssh", None)
+    user: str | None = parameter(TEXT, "user that logs in there by ssh", None)

@@ -71,9 +71,9 @@ def batch_control(
 
 
 def is_memoryless(K: NDArray[np.float64], u_ref: NDArray[np.float64]) -> bool:
-    """Tell whether the controller with these gains, and no integrator, is `batch_control`.
+    """Return whether the controller with these gains, and no integrator, is `batch_control`.
 
-    It is not if it leads its vehicle up along a climb, instead of by a step of the reference.
+    It is not if it commands a climb in place of a step of the reference.
     """
     controller = IntegralStateFeedback(K, u_ref, YAW)
     controller.take_off()
@@ -84,7 +84,7 @@ def is_memoryless(K: NDArray[np.float64], u_ref: NDArray[np.float64]) -> bool:
 
 
 class VectorizedSimulatorParameters(Parameters):
-    """Parameters of `VectorizedSimulatorNode`, named as those of the nodes that it stands for."""
+    """Parameters of `VectorizedSimulatorNode`, named as those of the nodes that it replaces."""
 
     time_step: float = parameter(
         TIME_STEP, "from one pose, state and control to the next", name="simulator/time_step"
@@ -120,14 +120,7 @@ class VectorizedSimulatorParameters(Parameters):
 
 
 class VectorizedSimulatorNode(Node):
-    """Fly vehicles of one model of 7 states; each has its own topics.
-
-    Parameters
-    ----------
-    vehicles : sequence of VehicleConfig
-    model : str
-        Of `MODELS`.
-    """
+    """Fly vehicles of one model of 7 states, one of `MODELS`; each has its own topics."""
 
     needed_in_flight = True
 
@@ -210,7 +203,7 @@ class VectorizedSimulatorNode(Node):
     def _on_descent(self, reference, message):
         reference.descend((*to_tuple(message.state), 0.0), self._handle.time())
 
-    # What time brings.
+    # Time steps.
 
     def _on_clock_timer(self):
         self._ticks += 1
@@ -240,7 +233,7 @@ class VectorizedSimulatorNode(Node):
             self._control(header, _estimates(*before, time, states))
 
     def _broadcast_poses(self):
-        """Tell tf of the present poses, if it does not know them."""
+        """Broadcast the present poses, once."""
         if self._measured is None or self._broadcast_time == self._measured[0]:
             return
         self._broadcast_time, states = self._measured

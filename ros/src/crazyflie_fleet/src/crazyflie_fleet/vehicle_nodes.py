@@ -58,13 +58,8 @@ def parameters(
 ) -> Tree:
     """Return the parameters of a vehicle's nodes, node by node.
 
-    Parameters
-    ----------
-    vehicle : VehicleConfig
-    frames : mapping
-        Names of the tf frames, fixed and robot.
-    common : mapping
-        Of all vehicles, node by node.
+    ``frames`` are the names of the tf frames, fixed and robot; ``common`` the parameters of all
+    vehicles, node by node.
     """
     hover, settings = vehicle.hover_point, vehicle.settings
     own: Tree = {

@@ -14,7 +14,7 @@ from crazyflie_utils import NodeHandle
 from crazyflie_utils.vectors import to_tuple
 
 MAX_STATE_AGE = 0.5
-"""Of a state that says where its vehicle is, s."""
+"""Of a state that counts for the position of its vehicle, s."""
 
 _IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCENDING)
 
@@ -22,15 +22,10 @@ _IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCEND
 class VehicleStates:
     """The last states and flight states of vehicles, which have numbers in the order given.
 
-    Parameters
-    ----------
-    vehicles : sequence of VehicleConfig
-    vectorized : mapping of str to sequence of VehicleConfig
-        Topics that have the states of some of them in one message.
+    ``vectorized`` are topics that have the states of several of them in one message.
 
     Attributes
     ----------
-    names : list of str
     flight_states : ndarray, shape (n,)
         `FlightStatus.state` of each; UNKNOWN before the first.
     """

@@ -13,20 +13,14 @@ from crazyflie_mission_api.limits import Array, MissionError
 
 @dataclass(frozen=True)
 class Clearance:
-    """Distances that the vehicles of a mission keep.
+    """Distances that the vehicles of a mission keep, m.
 
-    Attributes
-    ----------
-    separation : float
-        Between any two vehicles, m; one above the other `crazyflie_fleet.fleet_config.DOWNWASH`
-        times.
-    buffers : mapping of str to float
-        Collision buffers of vehicles that a fleet process watches, m. It holds a vehicle that
-        comes nearer to another than both their buffers, and lets it go when it is
-        `crazyflie_fleet.separation.RELEASE_RATIO` times as far away: a mission keeps that distance.
+    A fleet process holds a vehicle that comes nearer to another than both their ``buffers``, and
+    releases it when it is `crazyflie_fleet.separation.RELEASE_RATIO` times as far away: a mission
+    keeps that distance.
     """
 
-    separation: float = 0.3
+    separation: float = 0.3  # Of any two; `DOWNWASH` times as much one above the other.
     buffers: Mapping[str, float] = field(default_factory=dict)
 
     def limits(self, names: Sequence[str]) -> Array:

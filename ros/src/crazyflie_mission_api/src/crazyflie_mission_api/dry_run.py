@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
+from dataclasses import dataclass
 from typing import Any
 
 from typing_extensions import override
@@ -37,41 +38,20 @@ class DryRunClock(Clock):
         return is_met
 
 
+@dataclass(eq=False)
 class IdealVehicle(MissionVehicle):
-    """A vehicle that is always at its commanded position.
+    """A vehicle that is always at its commanded position; `start_skew` is the real one's."""
 
-    Parameters
-    ----------
-    name : str
-    clock : Clock
-    position : tuple, 3 components
-        Before takeoff, m.
-    bounds : Bounds
-    heading : float
-        rad.
-    start_skew : float
-        Of the real vehicle, s.
-    """
-
-    def __init__(
-        self,
-        name: str,
-        clock: Clock,
-        position: Triple,
-        bounds: Bounds,
-        heading: float,
-        start_skew: float,
-    ):
-        self.name = name
-        self.bounds = bounds
-        self.start_skew = start_skew
-        self._clock = clock
-        self._trajectory = TimedTrajectory.hover(position, heading)
-        self._prepared: Pieces = ()
-        self._flies = False
+    name: str
+    bounds: Bounds
+    start_skew: float
+    clock: Clock
+    trajectory: TimedTrajectory
+    _prepared: Pieces = ()
+    _flies: bool = False
 
     def _goal(self):
-        return self._trajectory.goal(self._clock.time())
+        return self.trajectory.goal(self.clock.time())
 
     @override
     def position(self) -> Triple:
@@ -87,7 +67,7 @@ class IdealVehicle(MissionVehicle):
 
     @override
     def has_landed(self) -> bool:
-        return not self._flies and self._clock.time() >= self._trajectory.end
+        return not self._flies and self.clock.time() >= self.trajectory.end
 
     @override
     def take_off(self, height: float, duration: float) -> "Future[Any]":
@@ -123,28 +103,19 @@ class IdealVehicle(MissionVehicle):
     def emergency(self) -> "Future[Any]":
         x, y, _ = self.position()
         self._flies = False
-        self._trajectory = TimedTrajectory.hover((x, y, 0.0))
+        self.trajectory = TimedTrajectory.hover((x, y, 0.0))
         return done(None)
 
     def _fly(self, pieces):
-        self._trajectory = TimedTrajectory(pieces, self._clock.time())
+        self.trajectory = TimedTrajectory(pieces, self.clock.time())
         return done(None)
 
 
 class DryRun(VehicleGroup):
     """A group of ideal vehicles.
 
-    Parameters
-    ----------
-    starts : mapping of str to x, y, z
-        Position of each vehicle before takeoff, m.
-    rules : Rules, optional
-    bounds : mapping of str to Bounds, optional
-        Fences of vehicles.
-    headings : mapping of str to float, optional
-        rad; 0 by default.
-    start_skews : mapping of str to float, optional
-        s; 0 by default.
+    By the names of vehicles: ``starts``, positions before takeoff, m; fences (``bounds``);
+    ``headings``, rad, 0 by default; ``start_skews``, s, 0 by default.
     """
 
     def __init__(
@@ -161,19 +132,15 @@ class DryRun(VehicleGroup):
         for name, position in starts.items():
             fence = fences.get(name, EVERYWHERE)
             yaw, skew = yaws.get(name, 0.0), skews.get(name, 0.0)
-            vehicles.append(IdealVehicle(name, clock, position, fence, yaw, skew))
+            hover = TimedTrajectory.hover(position, yaw)
+            vehicles.append(IdealVehicle(name, fence, skew, clock, hover))
         super().__init__(vehicles, clock, rules)
 
 
 def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> float:
     """Fly ``mission(group)`` with ideal vehicles; return its duration, s.
 
-    Parameters
-    ----------
-    group : VehicleGroup
-        On the ground.
-    mission : callable
-        Its commands must not depend on measurements.
+    The group is on the ground. Commands of the mission must not depend on measurements.
 
     Raises
     ------

@@ -18,29 +18,14 @@ from crazyflie_model import trajectory
 
 @dataclass(frozen=True)
 class Rules:
-    """Limits of all commands of a mission.
+    """Limits of all commands of a mission."""
 
-    Attributes
-    ----------
-    limits : Limits
-        Of every vehicle.
-    bounds : Bounds
-        Of every vehicle; its own fence counts as well.
-    separation : float
-        Between any two vehicles in flight, m.
-    tolerance : float
-        Distance from the goal at which a vehicle has arrived, m.
-    arrival_timeout : float
-        How long a vehicle may take beyond the planned duration, s.
-    buffers : mapping of str to float
-        Collision buffers of vehicles that a fleet process keeps apart, m; see `Clearance`.
-    """
-
-    limits: Limits = field(default_factory=Limits)
-    bounds: Bounds = EVERYWHERE
-    separation: float = 0.3
-    tolerance: float = 0.15
-    arrival_timeout: float = 15.0
+    limits: Limits = field(default_factory=Limits)  # Of every vehicle.
+    bounds: Bounds = EVERYWHERE  # Of every vehicle; its own fence counts as well.
+    separation: float = 0.3  # Between any two vehicles in flight, m.
+    tolerance: float = 0.15  # Distance from the goal at which a vehicle has arrived, m.
+    arrival_timeout: float = 15.0  # How long a vehicle may take beyond the planned duration, s.
+    # Collision buffers of vehicles that a fleet process keeps apart, m; see `Clearance`.
     buffers: Mapping[str, float] = field(default_factory=dict)
 
     @property

@@ -15,14 +15,7 @@ _FROZEN = 10.0
 
 
 class RosClock(Clock):
-    """The time of a process, real or simulated.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    has_ended : callable
-        ``has_ended()`` is true when ROS has shut down.
-    """
+    """The time of a process, real or simulated; ``has_ended()`` is whether ROS has shut down."""
 
     def __init__(self, handle: NodeHandle, has_ended: Callable[[], bool]):
         self._handle = handle
@@ -39,7 +32,7 @@ class RosClock(Clock):
         last, moved_at = self.time(), time.monotonic()
         while not (done := condition()) and (now := self.time()) < deadline:
             if self._has_ended():
-                raise MissionError("ROS has shut down; expected it to live as long as the mission")
+                raise MissionError("ROS has shut down; expected it to run as long as the mission")
             if now != last:
                 last, moved_at = now, time.monotonic()
             elif time.monotonic() - moved_at > _FROZEN:

@@ -63,19 +63,10 @@ with the mission, and the vehicle would fall."""
 class RosVehicle(MissionVehicle):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`.
 
-    Parameters
-    ----------
-    name : str
-    handle : NodeHandle
-    services : dict of str to str
-        Short name, such as go_to, to absolute name.
-    synchronized_start : SynchronizedStart, optional
-        Of vehicles that a controller flies, and not the driver.
-    frames : tuple of str, optional
-        The fixed frame and its own, if its position comes by tf; with the driver only as long as
-        there are no poses.
-    has_yaw : bool
-        Whether it can have another heading than 0.
+    ``services`` are short names, such as go_to, to absolute names. Vehicles that a controller
+    flies, and not the driver, have a ``synchronized_start``. ``frames`` are the fixed and its own
+    frame, if its position comes by tf; with the driver only as long as there are no poses.
+    ``has_yaw`` is whether it can have another heading than 0.
     """
 
     def __init__(
@@ -203,12 +194,13 @@ class RosVehicle(MissionVehicle):
         if not self._uses_driver:
             return climb()
         # The first call waits for the driver to have read the parameters, which it sets then.
-        return in_turn(lambda: self._update(), lambda: self._update(_HIGH_LEVEL), climb)
-
-    def _update(self, *parameters):
-        for name in parameters:
-            self._handle.set_param(f"{prefix(self.name)}/{name}", 1)
-        return self._call("update_params", srv.UpdateParams, list(parameters))
+        parameter = f"{prefix(self.name)}/{_HIGH_LEVEL}"
+        return in_turn(
+            lambda: self._call("update_params", srv.UpdateParams, []),
+            lambda: self._handle.set_param_later(parameter, 1),
+            lambda: self._call("update_params", srv.UpdateParams, [_HIGH_LEVEL]),
+            climb,
+        )
 
     @override
     def land(self, duration: float) -> "Future[Any]":

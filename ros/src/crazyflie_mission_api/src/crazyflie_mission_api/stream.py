@@ -87,19 +87,10 @@ class SetpointStream:
         return self.hand_over(begin)
 
     def hand_over(self, send: Send, retry_time: float = 0.0) -> "Future[Any]":
-        """Send a command; setpoints end when it has been accepted.
+        """Send a command; setpoints end when it has been accepted. Return the last answer.
 
-        Parameters
-        ----------
-        send : callable
-            ``send()`` returns the future of the answer.
-        retry_time : float
-            A command that fails while there are setpoints is sent again for so long, s.
-
-        Returns
-        -------
-        Future
-            Of the last answer.
+        ``send()`` returns the future of an answer. A command that fails while there are setpoints
+        is sent again for ``retry_time``, s.
         """
         command = _Command(send, self._handle.time() + retry_time)
         self._handle.submit(self._enqueue, command)

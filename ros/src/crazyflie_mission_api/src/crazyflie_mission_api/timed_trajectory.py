@@ -25,15 +25,9 @@ after the other, has not been measured.
 
 
 class TimedTrajectory:
-    """A trajectory from a time on, then rest at its end.
+    """A trajectory from ``begin`` (s) on, then rest at its end.
 
-    Parameters
-    ----------
-    pieces : sequence of PolynomialPiece
-    begin : float
-        s.
-    start_skew : float
-        How much later the vehicle may begin, s.
+    ``start_skew`` is how much later the vehicle may begin, s.
     """
 
     def __init__(self, pieces: Pieces, begin: float, start_skew: float = 0.0):
@@ -78,17 +72,7 @@ def check_with_skew(
 ) -> None:
     """Check trajectories, also with each vehicle that may begin late later than the others.
 
-    Parameters
-    ----------
-    trajectories : mapping of str to TimedTrajectory
-    now : float
-        s.
-    check : callable
-        ``check(trajectories)`` raises `MissionError`.
-
-    Raises
-    ------
-    MissionError
+    ``check(trajectories)`` raises `MissionError`; ``now`` is in s.
     """
     check(trajectories)
     moving = {name: each for name, each in trajectories.items() if each.end > now}

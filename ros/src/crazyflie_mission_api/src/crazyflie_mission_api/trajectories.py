@@ -20,8 +20,7 @@ SAMPLES = 30
 def sampled(pieces: Pieces) -> tuple[Array, Array]:
     """Return n times (s), shape (n,), and the trajectory at them, shape (3, 4, n).
 
-    The axes are the derivative (value, first, second) and x, y, z (m), yaw (rad). There are
-    `SAMPLES` points of each piece, both its ends included.
+    Axes: derivative (value, first, second); x, y, z (m), yaw (rad); `SAMPLES` points of each piece.
     """
     begins = np.cumsum([0.0, *(piece.duration for piece in pieces)])
     times: list[Array] = [
@@ -107,15 +106,9 @@ def check_numbers(pieces: Pieces, what: str) -> None:
 
 
 def check(pieces: Pieces, limits: Limits, bounds: Bounds, what: str, slower: str) -> None:
-    """Refuse a trajectory that asks too much, or leaves the bounds.
+    """Refuse a trajectory that demands too much, or leaves the bounds.
 
-    Parameters
-    ----------
-    pieces, limits, bounds
-    what : str
-        What it is, for the text of the error.
-    slower : str
-        What would make it slower, likewise.
+    The error has ``what`` it is, and what would make it ``slower``.
 
     Raises
     ------

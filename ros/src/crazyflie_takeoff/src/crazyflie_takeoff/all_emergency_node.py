@@ -19,7 +19,7 @@ class AllEmergencyParameters(Parameters):
     """Parameters of `AllEmergencyNode`."""
 
     topic: str = parameter(
-        TOPIC, "what every takeoff control filter hears", "/all/emergency", "topics/all_emergency"
+        TOPIC, "what every takeoff control filter reads", "/all/emergency", "topics/all_emergency"
     )
     service: str = parameter(SERVICE, "stops all vehicles", "/all/emergency", "srv/all_emergency")
 
@@ -45,7 +45,7 @@ class AllEmergencyNode(Node):
         self._on_timer()
         if not self._publisher.has_subscribers():
             name = self._handle.resolve(self._parameters.topic)
-            raise ServiceError(f"nobody listens on {name}: no vehicle has been stopped")
+            raise ServiceError(f"no filter listens on {name}: no vehicle has been stopped")
         return EmptyResponse()
 
     def _on_timer(self):

@@ -4,7 +4,7 @@ import math
 from collections import deque
 
 OVERLAP = 0.5
-"""A node that takes the place of one that was heard less than this before, s, overlaps with it."""
+"""A node that takes the place of one that sent less than this before, s, overlaps with it."""
 
 MEMORY = 5.0
 """An overlap is forgotten after this, s."""
@@ -14,7 +14,7 @@ class Callers:
     """The nodes that publish on one topic.
 
     A node that ends and another one that takes its place, or the same that is started again, are no
-    two publishers: only changes count at which the former one has been heard a moment before.
+    two publishers: only changes count at which the former one has sent a moment before.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ class Callers:
         self._former = ""
         self._changes: deque[float] = deque(maxlen=tolerance + 1)
 
-    def hear(self, time: float, caller: str, overlap: float = OVERLAP) -> None:
+    def note(self, time: float, caller: str, overlap: float = OVERLAP) -> None:
         """Take a message.
 
         Parameters
@@ -46,8 +46,8 @@ class Callers:
         """
         self.advance(time)
         if self._last is not None and caller != self._last[0]:
-            self._former, heard = self._last
-            if time - heard < overlap:
+            self._former, sent = self._last
+            if time - sent < overlap:
                 self._changes.append(time)
         self._last = (caller, time)
 

@@ -18,29 +18,18 @@ class ControlFilter(Generic[Control]):
     That is in flight, or when the last takeoff control is older than
     `TAKEOFF_CONTROL_LIMIT`. Otherwise the last takeoff control is repeated.
 
-    Whether the vehicle is in flight is what the toggle says, until a flight state is known; from
-    then on only the flight state counts, so that a toggle and a state of the same event cannot
-    cancel each other. A flight state of a vehicle on the ground also keeps the controller out when
-    zero thrust is no longer repeated, because the server has died: the controller may hold a
-    reference high above.
+    The toggle decides whether the vehicle is in flight until a flight state is known; then only
+    the flight state does, so that a toggle and a state of the same event cannot cancel each other.
+    A state of a vehicle on the ground also keeps the controller out when the server has died and
+    zero thrust is not repeated: the controller may have a reference high above.
 
-    A filter that has just started does not know yet how old the last takeoff control is. So it
-    listens first, until one comes or `stop_listening` is called; before that only a flight state
-    can select the controller.
-
-    Controls can be of any type.
-
-    Attributes
-    ----------
-    state : FlightState or None
-        As the server has published it last.
-    is_commanded : bool
-        Whether a commanded control has ever come.
+    A filter that has just started listens until a takeoff control comes or `stop_listening` is
+    called; before that only a flight state can select the controller.
     """
 
     def __init__(self) -> None:
-        self.state: FlightState | None = None
-        self.is_commanded = False
+        self.state: FlightState | None = None  # As the server has published it last.
+        self.is_commanded = False  # Whether a commanded control has ever come.
         self._toggled = False
         self._listening = True
         self._waiting: Control | None = None
@@ -55,7 +44,7 @@ class ControlFilter(Generic[Control]):
 
     @property
     def is_on_ground(self) -> bool:
-        """Whether nothing says that the vehicle is off the ground."""
+        """Whether nothing is known by which the vehicle is off the ground."""
         if self.in_flight or self._takeoff_thrust > 0.0:
             return False
         # A landing that has come to zero thrust is one of a vehicle on the ground.
@@ -63,7 +52,7 @@ class ControlFilter(Generic[Control]):
 
     @property
     def server_reports_ground(self) -> bool:
-        """Whether the server says by zero thrust that the vehicle is on the ground."""
+        """Whether the server sends the zero thrust of a vehicle on the ground."""
         sends_zero = self._takeoff_control is not None and self._takeoff_thrust <= 0.0
         return sends_zero and not self.in_flight and self.state in (None, FlightState.ON_GROUND)
 
@@ -97,7 +86,7 @@ class ControlFilter(Generic[Control]):
         self._takeoff_time = min(self._takeoff_time, time)
 
     def end_flight(self) -> None:
-        """Set the flight to ended, whatever toggles have said."""
+        """Set the flight to ended, whatever the toggles."""
         self._toggled = False
         self._takeoff_thrust = 0.0
 

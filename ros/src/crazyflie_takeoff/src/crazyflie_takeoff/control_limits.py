@@ -21,7 +21,7 @@ LANDING_CLIMB = 0.5
 """Climb of a vehicle that is to land, m/s."""
 
 CLIMB_TIMEOUT = 2.0
-"""Controls that ask for too much climb for longer than this are not obeyed any more, s."""
+"""Controls that ask for too much climb for longer than this end the flight, s."""
 
 MAX_SPEED_CHANGE = 0.5
 """By which a control may change the speed while the filter does not run, m/s."""
@@ -62,13 +62,8 @@ def in_range(control: Setpoint, lowest: float) -> Setpoint:
 class ClimbLimit:
     """Lowers the thrust of a vehicle that would climb too fast, or too high.
 
-    The speed is led to what is allowed at the height, which is at most the limit, and little enough
-    to stop below the highest place with `CLIMB_BRAKING`.
-
-    Parameters
-    ----------
-    climb : float
-        Most z_dot, m/s.
+    The allowed speed depends on the height: at most the limit, and such that the vehicle can stop
+    below the highest place with `CLIMB_BRAKING`. ``climb`` is the most z_dot, m/s.
     """
 
     def __init__(self, climb: float):

@@ -1,14 +1,13 @@
 """The reference of a descent: straight down from where the vehicle is."""
 
+from crazyflie_takeoff.motion import Position
+
 DESCENT_MARGIN = 3.0
 """How much longer than calculated a descent may take, s."""
 
 PRESS_DEPTH = 0.3
 """How far below the ground a descent's reference goes, m, so that the vehicle
 meets the ground with its speed also when it hangs above the reference."""
-
-Position = tuple[float, float, float]
-"""x, y, z in m, fixed frame."""
 
 
 class Descent:

@@ -1,4 +1,4 @@
-"""What a node says about itself once a second."""
+"""Diagnostics of a node, once a second."""
 
 from collections.abc import Mapping
 
@@ -7,7 +7,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from crazyflie_utils import NodeHandle
 
 PERIOD = 1.0
-"""Of the diagnostics, s; REP 107 wants one report a second."""
+"""Of the diagnostics, s; REP 107 recommends one report a second."""
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 

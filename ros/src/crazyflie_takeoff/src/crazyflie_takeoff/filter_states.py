@@ -44,7 +44,7 @@ class Event(enum.Enum):
     COMMANDED_CONTROL = enum.auto()  # From the controller, whose turn it is.
     FIRST_STATE = enum.auto()  # The first state of a filter that starts in flight.
     TICK = enum.auto()  # Time has passed.
-    OBJECTION = enum.auto()  # Controls are not to be obeyed.
+    OBJECTION = enum.auto()  # Controls must not be passed on any more.
     CRASH = enum.auto()  # The vehicle is where or as it must not be.
     STOP = enum.auto()  # /emergency was called.
     RESET = enum.auto()  # /emergency_reset was called.
@@ -52,52 +52,19 @@ class Event(enum.Enum):
 
 @dataclass(frozen=True)
 class LossTimeouts:
-    """How long the filter waits after a loss.
+    """How long the filter waits after a loss, s."""
 
-    Attributes
-    ----------
-    hold : float
-        Without a control in flight, until the filter holds the vehicle, s; at least
-        `SHORTEST_HOLD`.
-    recovery : float
-        From then on until the descent, s: while no state comes, either, and in a takeoff or a
-        landing.
-    descent : float
-        From then on until the motors stop, s; longer by the way down from the last known height.
-    place : float
-        The same as ``recovery`` for a vehicle in flight whose state is known, s.
-    """
-
-    hold: float
-    recovery: float
-    descent: float
-    place: float = 3.0
+    hold: float  # For a control in flight, until it holds the vehicle; at least `SHORTEST_HOLD`.
+    recovery: float  # Then until the descent: without a state, and in a takeoff or a landing.
+    descent: float  # Then until the motors stop; longer by the way down from the known height.
+    place: float  # The same as ``recovery`` for a vehicle in flight whose state is known.
 
 
 _PASSING, _HOLDING, _SINKING, _DOWN, _EMERGENCY = FilterState
 
 
 class FilterMachine:
-    """State of the filter, with the facts on which its transitions depend.
-
-    Attributes
-    ----------
-    state : FilterState
-    reason : str
-        Why the state is not PASSING.
-    elapsed : float
-        Since the state began, s.
-    silence : float
-        Age of the last commanded control, s.
-    is_needed : bool
-        Whether the vehicle would fall without the controller.
-    lacks_controller : bool
-        Whether a flight was ended because no control came, and none has come since.
-    takeoff_thrust : float
-        Of the takeoff control that has just come, m/s^2.
-    takeovers : int
-        How often the filter has held the vehicle.
-    """
+    """State of the filter, with the facts on which its transitions depend."""
 
     def __init__(
         self,
@@ -109,13 +76,16 @@ class FilterMachine:
         self._timeouts = timeouts
         self._choice, self._measured, self._ground = choice, measured, ground
         self.state = FilterState.PASSING
-        self.reason = ""
-        self.elapsed = 0.0
-        # As if one had just come: a filter that starts in flight is not connected at once.
+        self.reason = ""  # Why the state is not PASSING.
+        self.elapsed = 0.0  # Since the state began, s.
+        # Age of the last commanded control, s. As if one had just come: a filter that starts in
+        # flight is not connected at once.
         self.silence = 0.0
-        self.is_needed = self.lacks_controller = False
-        self.takeoff_thrust = 0.0
-        self.takeovers = 0
+        self.is_needed = False  # Whether the vehicle would fall without the controller.
+        # Whether a flight was ended because no control came, and none has come since.
+        self.lacks_controller = False
+        self.takeoff_thrust = 0.0  # Of the takeoff control that has just come, m/s^2.
+        self.takeovers = 0  # How often the filter has held the vehicle.
         self._last_motion: Motion | None = None
         self._event_reason = self._cause = ""
         self._descent_limit = 0.0
@@ -146,8 +116,8 @@ class FilterMachine:
     def _lifts_off(self):
         return self.takeoff_thrust > GRAVITY
 
-    def _lies_on_ground(self):
-        return self._ground.carries(self._measured.fresh)
+    def _seen_on_ground(self):
+        return self._ground.is_below(self._measured.fresh)
 
     def _control_is_lost(self):
         return self.is_needed and self.silence > self._timeouts.hold
@@ -221,12 +191,12 @@ class FilterMachine:
         self._choice.end_flight()
 
     TABLE: ClassVar[Table[FilterState, "FilterMachine"]] = (
-        Transition(_PASSING, Event.FIRST_STATE, _lies_on_ground, _DOWN, _stay_on_ground),
+        Transition(_PASSING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
         Transition(_PASSING, Event.TICK, _control_is_lost, _HOLDING, _hold_place),
         Transition(_PASSING, Event.OBJECTION, _is_airborne, _SINKING, _take_over_and_land),
         Transition(_PASSING, Event.CRASH, _is_airborne, _EMERGENCY, _stop_at_once),
         Transition(_PASSING, Event.STOP, None, _EMERGENCY, _stop_at_once),
-        Transition(_HOLDING, Event.FIRST_STATE, _lies_on_ground, _DOWN, _stay_on_ground),
+        Transition(_HOLDING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
         Transition(_HOLDING, Event.COMMANDED_CONTROL, None, _PASSING),
         Transition(_HOLDING, Event.TAKEOFF_CONTROL, None, _PASSING),
         Transition(_HOLDING, Event.TICK, _control_is_not_needed, _PASSING),

@@ -3,27 +3,18 @@
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import String
 
-from crazyflie_msgs.msg import FilterStatus
+from crazyflie_msgs.msg import FilterStatus, FlightStatus
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.filter_states import FilterState
-from crazyflie_takeoff.flight_state import COMMANDED, ORIGIN, SEPARATOR, UNKNOWN, FlightState
+from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.safe_filter import SafeFilter, Status
 from crazyflie_takeoff.takeoff_control_filter_parameters import TakeoffControlFilterParameters
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.vectors import stamped
 
-FLIGHT_STATES = (None, *FlightState)
-"""Flight states at the indices that are their constants in FlightStatus; None is UNKNOWN."""
-
 
 class FilterStatusPublisher:
-    """Publishes the filter's status when it changes, and logs why.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    parameters : TakeoffControlFilterParameters
-    """
+    """Publishes the filter's status when it changes, and logs why."""
 
     def __init__(self, handle: NodeHandle, parameters: TakeoffControlFilterParameters):
         self._handle = handle
@@ -42,10 +33,10 @@ class FilterStatusPublisher:
             return
         self._status = status
         message = stamped(FilterStatus, self._handle.stamp(), **status._asdict())
-        message.flight_state = FLIGHT_STATES.index(status.flight_state)
+        message.flight_state = status.flight_state or FlightStatus.UNKNOWN
         self._typed_topic.publish(message)
-        explanation = _explanation(status)
-        text = _word(status) + (SEPARATOR + explanation if explanation else "")
+        explanation = status.takeoff_refusal or status.reason
+        text = ": ".join(filter(None, (_words(status), explanation)))
         if text == self._text:
             return
         self._text = text
@@ -73,11 +64,7 @@ class FilterStatusPublisher:
         self._diagnostics.publish(diagnostics.report(self._handle, level, self._text, figures))
 
 
-def _explanation(status):
-    return status.takeoff_refusal or status.reason
-
-
-def _word(status):
+def _words(status):
     """Return the words of the state, such as "sinking from flying"."""
     words = []
     if status.takeoff_refusal:
@@ -85,5 +72,5 @@ def _word(status):
     elif status.state not in (FilterState.PASSING, FilterState.HOLDING):
         words.append(status.state.name.lower())
     if status.flight_state is not None:
-        words.append(status.flight_state.value)
-    return ORIGIN.join(words) or (COMMANDED if status.is_commanded else UNKNOWN)
+        words.append(status.flight_state.word)
+    return " from ".join(words) or ("commanded" if status.is_commanded else "unknown")

@@ -7,8 +7,9 @@ that does not run backwards; if it is reset, what was under way goes on from the
 from dataclasses import dataclass
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.descent import Descent, Position
+from crazyflie_takeoff.descent import Descent
 from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.motion import Position
 from crazyflie_takeoff.server_states import Event, FilterReport, ServerState
 from crazyflie_takeoff.server_table import (
     FILTER_LIMIT,
@@ -43,35 +44,15 @@ REFUSALS = {
 
 @dataclass(frozen=True)
 class Output:
-    """What is to be published after a tick.
+    """What is to be published after a tick."""
 
-    Attributes
-    ----------
-    thrust : float or None
-        Takeoff control with level attitude, m/s^2.
-    reference : tuple or None
-        x, y, z in m and x_dot, y_dot, z_dot in m/s.
-    toggle : bool
-        Whether in_flight changes.
-    """
-
-    thrust: float | None = None
-    reference: tuple[float, ...] | None = None
-    toggle: bool = False
+    thrust: float | None = None  # Takeoff control with level attitude, m/s^2.
+    reference: tuple[float, ...] | None = None  # x, y, z, m, and x_dot, y_dot, z_dot, m/s.
+    toggle: bool = False  # Whether in_flight changes.
 
 
 class FlightStateMachine:
-    """The vehicle's flight, from the ground to the ground.
-
-    Parameters
-    ----------
-    plan : Plan
-    state : ServerState, optional
-
-    Attributes
-    ----------
-    state : ServerState
-    """
+    """The vehicle's flight, from the ground to the ground."""
 
     def __init__(self, plan: Plan, state: ServerState = ServerState.RECOVERING):
         self.state = state
@@ -149,14 +130,7 @@ class FlightStateMachine:
             self._context.descent = None
 
     def tick(self, time: float, position: Position | None = None) -> Output:
-        """Let time pass until ``time`` (s).
-
-        Parameters
-        ----------
-        time : float
-        position : tuple of float or None
-            Measured x, y, z, m; None when it is not known at present.
-        """
+        """Let time pass until ``time`` (s); the measured position is None when it is not known."""
         context = self._context
         self._follow_clock(time)
         is_seen_again = position is not None and context.measured is None

@@ -1,21 +1,25 @@
-"""What server and filter tell each other about a flight."""
+"""States of a flight, as server and filter publish them."""
 
 import enum
 
 
-class FlightState(enum.Enum):
-    """Where a flight stands; the values are what is published.
+class FlightState(enum.IntEnum):
+    """State of a flight; the values are those of crazyflie_msgs/FlightStatus.
 
-    A landing has two states, because the vehicle is still in flight in the
-    first: the controller brings it down (`DESCENDING`) before the server takes
-    over and ramps the thrust down (`LANDING`).
+    A landing has two states, because the vehicle is still in flight in the first: the controller
+    brings it down (`DESCENDING`) before the server ramps the thrust down (`LANDING`).
     """
 
-    ON_GROUND = "on_ground"
-    TAKING_OFF = "taking_off"
-    FLYING = "flying"
-    DESCENDING = "descending"
-    LANDING = "landing"
+    ON_GROUND = 1
+    TAKING_OFF = 2
+    FLYING = 3
+    DESCENDING = 4
+    LANDING = 5
+
+    @property
+    def word(self) -> str:
+        """The state as text topics have it."""
+        return self.name.lower()
 
     @property
     def in_flight(self) -> bool:
@@ -27,14 +31,12 @@ class FlightState(enum.Enum):
 _IN_FLIGHT = (FlightState.FLYING, FlightState.DESCENDING)
 
 
-UNKNOWN = "unknown"
-"""What a filter publishes that has not been told a flight state."""
+def flight_state(code: int) -> FlightState | None:
+    """Return the state of a constant of FlightStatus; None for UNKNOWN.
 
-COMMANDED = "commanded"
-"""The same, when a controller sends commands: there may be a flight under way."""
-
-SEPARATOR = ": "
-"""Between the word that a filter publishes and the reason in plain words, if there is one."""
-
-ORIGIN = " from "
-"""Between what a filter has done and the flight state that it heard last."""
+    Raises
+    ------
+    ValueError
+        There is no such constant.
+    """
+    return FlightState(code) if code else None

@@ -1,6 +1,7 @@
-"""What server and filter are both told: their topics, and where the vehicle may be."""
+"""Parameters of both server and filter: their topics, and where the vehicle may be."""
 
 import math
+from typing import Any
 
 from crazyflie_takeoff.limits import NO_BOX, Box
 from crazyflie_utils import Parameters, parameter
@@ -16,8 +17,18 @@ class CornerParameters(Parameters):
     z: float | None = parameter(METRES, "corner of the geofence; without it there is no wall", None)
 
     def vector(self, missing: float) -> tuple[float, ...]:
-        """Return x, y, z in m, and what stands for a missing one."""
+        """Return x, y, z in m; ``missing`` for a coordinate without a wall."""
         return tuple(missing if value is None else value for value in (self.x, self.y, self.z))
+
+
+def derived_topic(own: str, base: str, suffix: str) -> Any:
+    """Return a property: a topic of its own, else that of ``base`` with a suffix, or None."""
+
+    def topic(parameters: Parameters) -> str | None:
+        name = getattr(parameters, base)
+        return getattr(parameters, own) or (None if name is None else name + suffix)
+
+    return property(topic)
 
 
 class FlightTopicParameters(Parameters):
@@ -25,9 +36,6 @@ class FlightTopicParameters(Parameters):
 
     in_flight_topic: str = parameter(
         TOPIC, "toggles between ground and flight", name="topics/in_flight"
-    )
-    own_flight_state_topic: str | None = parameter(
-        TOPIC, "by default the name of in_flight + `_state`", None, "topics/flight_state"
     )
     own_filter_state_topic: str | None = parameter(
         TOPIC, "by default the name of in_flight + `_filter`", None, "topics/filter_state"
@@ -54,32 +62,16 @@ class FlightTopicParameters(Parameters):
 
     @property
     def box(self) -> Box:
-        """The geofence's box at the start; with `box_topic` there is none until that tells."""
+        """The geofence's box at the start; none where `box_topic` has it."""
         if self.box_topic is not None:
             return NO_BOX
         return Box(self.lower.vector(-math.inf), self.upper.vector(math.inf))
 
-    @property
-    def flight_state_topic(self) -> str:
-        """The server's flight state."""
-        return self.own_flight_state_topic or f"{self.in_flight_topic}_state"
-
-    @property
-    def filter_state_topic(self) -> str:
-        """What the filter remembers."""
-        return self.own_filter_state_topic or f"{self.in_flight_topic}_filter"
-
-    @property
-    def flight_status_topic(self) -> str:
-        """The server's flight state and what it knows, typed."""
-        return self.own_flight_status_topic or f"{self.in_flight_topic}_flight_status"
-
-    @property
-    def filter_status_topic(self) -> str:
-        """What the filter does, typed."""
-        return self.own_filter_status_topic or f"{self.in_flight_topic}_filter_status"
-
-    @property
-    def controller_topic(self) -> str:
-        """Whether the filter sees a controller."""
-        return self.own_controller_topic or f"{self.in_flight_topic}_controller"
+    filter_state_topic = derived_topic("own_filter_state_topic", "in_flight_topic", "_filter")
+    flight_status_topic = derived_topic(
+        "own_flight_status_topic", "in_flight_topic", "_flight_status"
+    )
+    filter_status_topic = derived_topic(
+        "own_filter_status_topic", "in_flight_topic", "_filter_status"
+    )
+    controller_topic = derived_topic("own_controller_topic", "in_flight_topic", "_controller")

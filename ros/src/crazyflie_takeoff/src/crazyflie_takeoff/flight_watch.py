@@ -48,17 +48,7 @@ class DescentWatch:
 class FlightWatch:
     """Watches position, climb, descent, publishers of controls, and the computer's load.
 
-    Parameters
-    ----------
-    limits : Limits
-
-    Attributes
-    ----------
-    walls : Walls
-    gaps : RunGaps
-    climb : ClimbLimit
-    is_tilted : bool
-        Whether the vehicle is tilted as only one that crashes is.
+    ``is_tilted`` is whether the vehicle is tilted as only one that crashes is.
     """
 
     def __init__(self, limits: Limits):
@@ -88,13 +78,13 @@ class FlightWatch:
         self._position_complaint = self.walls.complaint(motion.position)
         self._position_age = age
 
-    def hear_takeoff(self, time: float, caller: str, is_on_ground: bool) -> None:
+    def note_takeoff(self, time: float, caller: str, is_on_ground: bool) -> None:
         """Take the name of the node that has sent a takeoff control at ``time`` (s)."""
-        self._takeoff_callers.hear(time, caller, OVERLAP if is_on_ground else math.inf)
+        self._takeoff_callers.note(time, caller, OVERLAP if is_on_ground else math.inf)
 
-    def hear_commanded(self, time: float, caller: str) -> None:
+    def note_commanded(self, time: float, caller: str) -> None:
         """Take the name of the node that has sent a commanded control at ``time`` (s)."""
-        self._commanded_callers.hear(time, caller)
+        self._commanded_callers.note(time, caller)
 
     def advance(self, time: float, step: float, height: float | None) -> tuple[str, str]:
         """Let time pass until ``time``, of which ``step`` counts.

@@ -5,24 +5,18 @@ from crazyflie_takeoff.motion import Motion
 TOUCHDOWN_HEIGHT = 0.05
 """A vehicle less than this above the ground counts as down, m."""
 
-LYING_HEIGHT = 0.1
+ON_GROUND_HEIGHT = 0.1
 """A vehicle less than this above the ground has not been flown, m."""
 
-STANDING_SPEED = 0.1
+TOUCHDOWN_SPEED = 0.1
 """A vehicle near the ground that sinks slower than this has met it, m/s."""
 
 
 class Ground:
-    """The ground below the vehicle: where it stood when the server last sent zero thrust.
-
-    Attributes
-    ----------
-    z : float
-        m, fixed frame.
-    """
+    """The ground below the vehicle: where it was when the server last sent zero thrust."""
 
     def __init__(self) -> None:
-        self.z = 0.0
+        self.z = 0.0  # m, fixed frame.
 
     def height(self, motion: Motion) -> float:
         """Return the height of a vehicle above the ground, m."""
@@ -31,8 +25,8 @@ class Ground:
     def has_touched_down(self, motion: Motion | None) -> bool:
         """Whether a vehicle that sinks has met the ground; not if its state is not known."""
         is_low = motion is not None and self.height(motion) < TOUCHDOWN_HEIGHT
-        return motion is not None and is_low and motion.velocity[2] > -STANDING_SPEED
+        return motion is not None and is_low and motion.velocity[2] > -TOUCHDOWN_SPEED
 
-    def carries(self, motion: Motion | None) -> bool:
-        """Whether a vehicle lies on the ground; not if its state is not known."""
-        return motion is not None and self.height(motion) < LYING_HEIGHT
+    def is_below(self, motion: Motion | None) -> bool:
+        """Whether a vehicle is on the ground; not if its state is not known."""
+        return motion is not None and self.height(motion) < ON_GROUND_HEIGHT

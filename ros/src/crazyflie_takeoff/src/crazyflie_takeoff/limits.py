@@ -6,13 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Box:
-    """The geofence's box.
-
-    Attributes
-    ----------
-    lower, upper : tuple of float, length 3
-        Corners, m, fixed frame; infinite where there is no wall.
-    """
+    """The geofence's box: corners, m, fixed frame; infinite where there is no wall."""
 
     lower: tuple[float, ...]
     upper: tuple[float, ...]
@@ -32,37 +26,19 @@ NO_BOX = Box((-math.inf,) * 3, (math.inf,) * 3)
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of a vehicle in flight.
+    """Limits of a vehicle in flight."""
 
-    Attributes
-    ----------
-    box : Box
-        Of the geofence at the start.
-    outside : float
-        Largest distance outside the box, m.
-    floor : float
-        Lowest z, m, fixed frame.
-    climb : float
-        Largest z_dot that controls may reach, m/s.
-    height : float
-        Largest height above the ground that controls may reach, m.
-    """
-
-    box: Box
-    outside: float
-    floor: float
-    climb: float = 3.0
-    height: float = 10.0
+    box: Box  # Of the geofence at the start.
+    outside: float  # Largest distance outside the box, m.
+    floor: float  # Lowest z, m, fixed frame.
+    climb: float  # Largest z_dot that controls may reach, m/s.
+    height: float  # Largest height above the ground that controls may reach, m.
 
 
 class Walls:
     """The box, which may change in flight, and what lies outside of it.
 
     A vehicle that new walls leave outside may come back: as far outside as it was is not too far.
-
-    Parameters
-    ----------
-    limits : Limits
     """
 
     def __init__(self, limits: Limits):
@@ -95,13 +71,7 @@ class Walls:
 
 
 class Debounce:
-    """Lets a complaint through that lasts.
-
-    Parameters
-    ----------
-    duration : float
-        s.
-    """
+    """Lets a complaint through that lasts longer than ``duration``, s."""
 
     def __init__(self, duration: float):
         self._duration = duration

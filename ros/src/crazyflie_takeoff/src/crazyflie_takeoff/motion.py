@@ -6,8 +6,15 @@ from typing import NamedTuple
 MAX_STATE_AGE = 0.2
 """A state that is older does not count, s."""
 
+MAX_POSITION_AGE = 0.5
+"""A position that is older is not used by the server, s."""
+
 DRIFT = 0.1
 """How fast the age that is taken for usual may grow, s/s."""
+
+
+Position = tuple[float, float, float]
+"""x, y, z in m, fixed frame, z up."""
 
 
 class Motion(NamedTuple):
@@ -21,22 +28,16 @@ class Motion(NamedTuple):
         rad.
     """
 
-    position: tuple[float, float, float]
+    position: Position
     velocity: tuple[float, float, float]
     yaw: float = 0.0
 
 
 class Measurement:
-    """The last measured state, and its age.
-
-    Attributes
-    ----------
-    age : float
-        s; infinite before the first one.
-    """
+    """The last measured state, and its age."""
 
     def __init__(self) -> None:
-        self.age = math.inf
+        self.age = math.inf  # s; infinite before the first one.
         self._motion: Motion | None = None
 
     def update(self, motion: Motion, age: float) -> None:
@@ -57,10 +58,54 @@ class Measurement:
         return self.within(MAX_STATE_AGE)
 
 
+class MeasuredPosition:
+    """The latest measured position, and how old it is.
+
+    Times are s of any clock; after it has been reset, ages count from there.
+    """
+
+    def __init__(self) -> None:
+        self._position: Position | None = None
+        self._age = 0.0
+        self._received = 0.0
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether there has been any position."""
+        return self._position is not None
+
+    def measure(self, time: float, position: Position, age: float) -> None:
+        """Take a position (m) that was received at ``time`` and had an age (s) then."""
+        self._position, self._received, self._age = position, time, age
+
+    def value(self, time: float) -> Position | None:
+        """Return the position, m; None when it is older than `MAX_POSITION_AGE` at ``time``."""
+        is_known = self._silence(time) + self._age < MAX_POSITION_AGE
+        return self._position if is_known else None
+
+    def explanation(self, time: float, topic: str) -> str:
+        """Return why the position, which comes as states on a topic, is not known; or nothing."""
+        if self.value(time) is not None:
+            return ""
+        if self._position is not None and self._silence(time) < MAX_POSITION_AGE:
+            return (
+                f"states on {topic} are {self._age:.1f} s old when they come; do the clocks of all "
+                "computers agree, and are they quick enough?"
+            )
+        return (
+            f"no state has come on {topic} for {MAX_POSITION_AGE:g} s; are the estimator and the "
+            "source of /tf running?"
+        )
+
+    def _silence(self, time):
+        self._received = min(self._received, time)
+        return time - self._received
+
+
 class Delay:
     """How much later than usual messages come, by the stamps of their data.
 
-    The usual age is the smallest one, which is believed to grow at `DRIFT`: so a clock of another
+    The usual age is the smallest one, which is taken to grow at `DRIFT`: so a clock of another
     machine that is a little off, or a source that needs its time, makes nothing late.
     """
 
@@ -75,7 +120,7 @@ class Delay:
         Parameters
         ----------
         stamp : float
-            Of the data, s; zero, or the same again, says nothing about an age.
+            Of the data, s; zero, or the same again, has no age.
         now : float
             By the same clock, s.
         """

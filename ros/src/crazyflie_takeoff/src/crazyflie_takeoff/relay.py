@@ -20,20 +20,7 @@ LEARNING_STEP = 0.2
 class Relay(Generic[Control]):
     """Chooses between controls, limits them, and fades late ones to hover.
 
-    A control counts in full for half of ``hold``, and is level hover from ``hold`` on.
-
-    Parameters
-    ----------
-    limits : Limits
-    hold : float
-        s.
-
-    Attributes
-    ----------
-    choice : ControlFilter
-    watch : FlightWatch
-    measured : Measurement
-    ground : Ground
+    A control counts in full for half of ``hold`` (s), and is level hover from ``hold`` on.
     """
 
     def __init__(self, limits: Limits, hold: float):

@@ -1,12 +1,11 @@
 """What the control filter flies by itself when no control comes.
 
-The thrust is that of hover, as learned in flight, corrected such that the vertical speed follows a
-target: what leads back to the height at which the filter took over while it waits for the
-controller, then slowly more and more downwards. Roll and pitch keep the vehicle at its place; the
-yaw rate is zero. When no state comes, either, the velocity is dead-reckoned from the last one, by
-z'' = thrust - hover thrust and by the tilt, and led to zero; the tilt then ends level. So a vehicle
-that was moving when its pose was lost is stopped first; and one whose hover thrust is off by
-less than `SINK_RATE` comes down all the same.
+The thrust is that of hover, as learned in flight, plus a correction by which the vertical speed
+follows a target: first back to the height at which the filter took over, in a descent more and
+more downwards. Roll and pitch keep the vehicle at its place; the yaw rate is zero. Without a
+state the velocity is dead-reckoned from the last one, by z'' = thrust - hover thrust and by the
+tilt, and controlled to zero: a vehicle that was moving stops first, and one whose hover thrust is
+off by less than `SINK_RATE` comes down all the same.
 """
 
 import math
@@ -131,16 +130,8 @@ class HoverThrust:
 class SafeControl:
     """Hover at a place, and descent, without a controller.
 
-    Parameters
-    ----------
-    hover : float
-        Thrust of hover, m/s^2.
-    motion : Motion or None
-        Before the beginning; None if it is not known.
-    age : float
-        How long before, s.
-    control : Setpoint
-        What was flown since.
+    ``hover`` is the thrust of hover, m/s^2; ``motion``, if known, is that ``age`` s before the
+    beginning, and ``control`` was flown since.
     """
 
     def __init__(

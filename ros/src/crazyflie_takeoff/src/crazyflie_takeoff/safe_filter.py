@@ -43,20 +43,7 @@ class SafeFilter(Generic[Control]):
 
     Methods that return something to publish return a control as it has come, or a `Setpoint` of the
     filter's own, or None. `tick` has to be called every 10 ms, or 40 ms while `is_nominal`.
-
-    Parameters
-    ----------
-    timeouts : LossTimeouts
-    limits : Limits
-    sees : bool
-        Whether states can be expected.
-
-    Attributes
-    ----------
-    relay : Relay
-    choice : ControlFilter
-    watch : FlightWatch
-    machine : FilterMachine
+    ``sees`` is whether states can be expected.
     """
 
     def __init__(self, timeouts: LossTimeouts, limits: Limits, sees: bool = False):
@@ -66,7 +53,7 @@ class SafeFilter(Generic[Control]):
         self.choice, self.watch = self.relay.choice, self.relay.watch
         self._measured = self.relay.measured
         self.machine = FilterMachine(timeouts, self.choice, self._measured, self.relay.ground)
-        # The filter before this one was gone for too long if the vehicle lies on the ground:
+        # The filter before this one was away for too long if the vehicle is on the ground:
         # until that is known, nothing is passed on in flight.
         self._ground_check_pending = sees
         self._ticked = math.nan
@@ -128,7 +115,7 @@ class SafeFilter(Generic[Control]):
             Name of the node that sent it.
         """
         self.watch.gaps.run(time)
-        self.watch.hear_takeoff(time, caller, self.machine.is_on_ground)
+        self.watch.note_takeoff(time, caller, self.machine.is_on_ground)
         self._land_if_contended()
         if self._refusal and setpoint.thrust > 0.0:
             return MOTORS_OFF
@@ -154,7 +141,7 @@ class SafeFilter(Generic[Control]):
         came so much earlier.
         """
         self.watch.gaps.run(time)
-        self.watch.hear_commanded(time, caller)
+        self.watch.note_commanded(time, caller)
         # The next tick adds all of its step.
         self.machine.silence = min(self.machine.silence, age - self._step_until(time))
         self.machine.lacks_controller = False
@@ -261,5 +248,5 @@ class SafeFilter(Generic[Control]):
         if not self.machine.handle(Event.RESET):
             raise RefusalError(
                 f"the motors were stopped less than {RESET_DELAY:g} s ago; see that the vehicle "
-                "lies still"
+                "is at rest on the ground"
             )

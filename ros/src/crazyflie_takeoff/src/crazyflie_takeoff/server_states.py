@@ -41,7 +41,7 @@ class Event(enum.Enum):
     """What can change the state of the server."""
 
     RECOVER = enum.auto()  # All evidence has come, or the time for it is over.
-    TAKEOFF = enum.auto()  # The service was called, and nothing speaks against it.
+    TAKEOFF = enum.auto()  # The service was called, and no check refuses it.
     LAND = enum.auto()  # Service, critical battery, end of the launch, fault in a takeoff.
     TICK = enum.auto()  # Time has passed.
     FILTER_PASSES = enum.auto()
@@ -58,24 +58,12 @@ TAKEOVERS = (Event.FILTER_SINKS, Event.FILTER_DOWN, *STOPS)
 
 
 class FilterReport(NamedTuple):
-    """What the filter has published last.
-
-    Attributes
-    ----------
-    event : Event
-        What it does.
-    remembered : FlightState or None
-        Flight state that it heard last.
-    is_commanded : bool
-        Whether a controller sends commands, or may do so.
-    reason : str
-        Why it does not pass controls on, or refuses takeoffs.
-    """
+    """What the filter has published last."""
 
     event: Event = Event.FILTER_PASSES
-    remembered: FlightState | None = None
-    is_commanded: bool = True
-    reason: str = ""
+    remembered: FlightState | None = None  # Flight state that it received last.
+    is_commanded: bool = True  # Whether a controller sends commands, or may do so.
+    reason: str = ""  # Why it does not pass controls on, or refuses takeoffs.
 
 
 NO_FILTER = FilterReport()

@@ -7,9 +7,10 @@ import math
 from dataclasses import dataclass
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_takeoff.descent import Descent, Position
+from crazyflie_takeoff.descent import Descent
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.ground import TOUCHDOWN_HEIGHT
+from crazyflie_takeoff.motion import Position
 from crazyflie_takeoff.server_states import NO_FILTER, STOPS, Event, FilterReport, ServerState
 from crazyflie_takeoff.transition_table import Table, Transition
 
@@ -37,66 +38,29 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Plan:
-    """How to take off and land.
-
-    Attributes
-    ----------
-    hover : tuple of float
-        Hover point x, y, z, m.
-    open_loop : float
-        How long `LIFT_OFF_THRUST` is given, s.
-    settle : float
-        How long the controller has to reach the hover point, s.
-    descent_speed : float
-        Speed of the descent, m/s; 0 for none: a landing is the bare ramp.
-    """
+    """How to take off and land."""
 
     hover: Position
-    open_loop: float
-    settle: float
-    descent_speed: float
+    open_loop: float  # How long `LIFT_OFF_THRUST` is given, s.
+    settle: float  # How long the controller has to reach the hover point, s.
+    descent_speed: float  # m/s; 0 for no descent: a landing is the bare ramp.
 
 
 @dataclass
 class FlightContext:
-    """What the guards look at, and the actions change.
+    """What the guards read, and the actions change."""
 
-    Attributes
-    ----------
-    plan : Plan
-        May be replaced at any time; what has begun already goes on as it was planned.
-    filter : FilterReport
-        The latest.
-    ground : float
-        Height (z) of the ground, where the vehicle was last seen on it, m.
-    time : float
-        Of the latest tick, s.
-    begun : float or None
-        When the present activity began, s; None until the next tick.
-    measured : tuple of float or None
-        Position, m; None when it is not known at present.
-    reference : tuple of float or None
-        What the present tick publishes: x, y, z in m and x_dot, y_dot, z_dot in m/s.
-    descent : Descent or None
-    descent_speed : float
-        Of the plan, when the activity began, m/s.
-    descent_end : float
-        When a descent has to be over, s after it began.
-    zero_sent : float
-        When zero thrust was sent last, s.
-    """
-
-    plan: Plan
+    plan: Plan  # Replaced at any time; what has begun goes on as it was planned.
     filter: FilterReport = NO_FILTER
-    ground: float = 0.0
-    time: float = -math.inf
-    begun: float | None = None
-    measured: Position | None = None
-    reference: tuple[float, ...] | None = None
+    ground: float = 0.0  # Height (z) of the ground, where the vehicle was last on it, m.
+    time: float = -math.inf  # Of the latest tick, s.
+    begun: float | None = None  # When the present activity began, s; None until the next tick.
+    measured: Position | None = None  # None when it is not known at present.
+    reference: tuple[float, ...] | None = None  # To publish: x, y, z, m, x_dot, y_dot, z_dot, m/s.
     descent: Descent | None = None
-    descent_speed: float = 0.0
-    descent_end: float = math.inf
-    zero_sent: float = -math.inf
+    descent_speed: float = 0.0  # Of the plan, when the activity began, m/s.
+    descent_end: float = math.inf  # When a descent has to be over, s after it began.
+    zero_sent: float = -math.inf  # When zero thrust was sent last, s.
 
     @property
     def elapsed(self) -> float:

@@ -6,9 +6,8 @@ from std_msgs.msg import String
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.flight import REFUSALS, FlightStateMachine
-from crazyflie_takeoff.flight_state import SEPARATOR, FlightState
+from crazyflie_takeoff.flight_state import FlightState, flight_state
 from crazyflie_takeoff.server_states import TAKEOVERS, Event
-from crazyflie_takeoff.status_messages import CODES
 from crazyflie_takeoff.takeoff_checks import TakeoffChecks
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters
 from crazyflie_utils import NodeHandle
@@ -25,22 +24,7 @@ _LOG_WORDS = {
 
 
 class StatusPublisher:
-    """Publishes and logs the state of a flight when it changes.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    parameters : TakeoffServerParameters
-    flight : FlightStateMachine
-    checks : TakeoffChecks
-
-    Attributes
-    ----------
-    state : FlightState or None
-        The state that was published last.
-    reason : str
-        Why the last landing or abort began.
-    """
+    """Publishes and logs the state of a flight when it changes."""
 
     def __init__(
         self,
@@ -54,9 +38,9 @@ class StatusPublisher:
         self._status = handle.publisher(parameters.flight_status_topic, FlightStatus, latch=True)
         self._text = handle.publisher(parameters.status_topic, String, latch=True)
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
-        self._announce_flight = handle.inhibit_shutdown()
-        self.state: FlightState | None = None
-        self.reason = ""
+        self._inhibit_shutdown = handle.inhibit_shutdown()
+        self.state: FlightState | None = None  # The one that was published last.
+        self.reason = ""  # Why the last landing or abort began.
         self._published: tuple[object, ...] = ()
         self._published_text = ""
         self._logged_word = self._logged_reason = ""
@@ -75,10 +59,10 @@ class StatusPublisher:
         elif report.event in TAKEOVERS:
             evidence = "the filter has stopped the motors"
         else:
-            remembered = "nothing" if report.remembered is None else report.remembered.value
+            remembered = "nothing" if report.remembered is None else report.remembered.word
             seen = "not known" if height is None else f"{height:.2f} m"
             evidence = f"{remembered} is remembered, the height is {seen}"
-        self._handle.info(f"begins {state.value}: {evidence}")
+        self._handle.info(f"begins {state.word}: {evidence}")
         self._logged_word = _LOG_WORDS[state]
 
     def publish_state(self, state: FlightState) -> None:
@@ -88,10 +72,10 @@ class StatusPublisher:
         reason = "" if self.reason == self._flight.filter.reason else self.reason
         if (word := _LOG_WORDS[state]) != self._logged_word:
             is_new = reason and reason != self._logged_reason
-            self._handle.info(f"{word}{SEPARATOR}{reason}" if is_new else word)
+            self._handle.info(f"{word}: {reason}" if is_new else word)
             self._logged_word, self._logged_reason = word, reason
-        self._state.publish(String(state.value))
-        self._announce_flight(state is not FlightState.ON_GROUND)
+        self._state.publish(String(state.word))
+        self._inhibit_shutdown(state is not FlightState.ON_GROUND)
         self.publish()
 
     def publish(self) -> None:
@@ -99,7 +83,7 @@ class StatusPublisher:
         status = self._flight_status()
         content = (status.state, status.reason, status.takeoff_refusal)
         # Not before the state's own topics, and nothing while it is not known.
-        if content != self._published and status.state == CODES[self.state] != FlightStatus.UNKNOWN:
+        if content != self._published and status.state == self.state:
             self._published = content
             self._status.publish(status)
         if (text := _text(status)) != self._published_text:
@@ -110,7 +94,7 @@ class StatusPublisher:
         """Publish the status with figures."""
         checks, event = self._checks, self._flight.filter.event
         text = _text(self._flight_status())
-        level = diagnostics.WARN if SEPARATOR in text else diagnostics.OK
+        level = diagnostics.WARN if ": " in text else diagnostics.OK
         if event in (Event.FILTER_SINKS, Event.FILTER_EMERGENCY):
             level = diagnostics.ERROR
         figures = {
@@ -128,25 +112,16 @@ class StatusPublisher:
         return stamped(
             FlightStatus,
             self._handle.stamp(),
-            state=CODES[state],
+            state=state or FlightStatus.UNKNOWN,
             reason="; ".join(filter(None, reasons)),
             takeoff_refusal=self.takeoff_refusal() if may_refuse else REFUSALS[state],
             ground=self._flight.ground,
         )
 
 
-_TEXTS = {
-    FlightStatus.UNKNOWN: "looking for the state of the flight",
-    FlightStatus.ON_GROUND: "on ground",
-    FlightStatus.TAKING_OFF: "taking off",
-    FlightStatus.FLYING: "flying",
-    FlightStatus.DESCENDING: "descending",
-    FlightStatus.LANDING: "landing",
-}
-
-
 def _text(status):
-    reasons = [status.reason] if status.reason else []
-    if status.state == FlightStatus.ON_GROUND and status.takeoff_refusal:
+    state, reasons = flight_state(status.state), [status.reason] if status.reason else []
+    words = "looking for the state of the flight" if state is None else state.word.replace("_", " ")
+    if state is FlightState.ON_GROUND and status.takeoff_refusal:
         reasons.append(f"takeoff refused: {status.takeoff_refusal}")
-    return SEPARATOR.join(filter(None, (_TEXTS[status.state], "; ".join(reasons))))
+    return ": ".join(filter(None, (words, "; ".join(reasons))))

@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 from crazyflie_takeoff.battery import Charge
 from crazyflie_takeoff.driver_connection import DriverConnection
-from crazyflie_takeoff.measured_position import MeasuredPosition
+from crazyflie_takeoff.limits import Box
+from crazyflie_takeoff.motion import MeasuredPosition
 from crazyflie_takeoff.server_states import Event, FilterReport
 from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters, hover_complaint
 
@@ -12,18 +13,8 @@ from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters,
 class TakeoffChecks:
     """What is known of estimator, controller, driver, battery and geofence.
 
-    Parameters
-    ----------
-    parameters : TakeoffServerParameters
-    resolve : callable
-        ``resolve(topic)`` returns the absolute name of a topic.
-
-    Attributes
-    ----------
-    parameters : TakeoffServerParameters
-        May be replaced by others of the same topics.
-    box : Box
-        The geofence's.
+    ``resolve(topic)`` returns the absolute name of a topic. ``parameters`` may be replaced by
+    others of the same topics.
     """
 
     def __init__(self, parameters: TakeoffServerParameters, resolve: Callable[[str], str]):
@@ -32,10 +23,14 @@ class TakeoffChecks:
         self.position = MeasuredPosition()
         self.driver = DriverConnection()
         self.battery = parameters.battery()
-        # Without a filter there is nothing that could say that there is none.
+        # Without a filter nothing publishes whether there is one.
         self.has_controller = True
         self._had_controller = False
         self._resolve = resolve
+
+    def set_box(self, box: Box) -> None:
+        """Take the geofence's box."""
+        self.box = box
 
     def set_controller(self, has_controller: bool) -> None:
         """Take whether the filter sees a controller."""
@@ -49,14 +44,7 @@ class TakeoffChecks:
         return lacks_state or lacks_controller or bool(self._driver_refusal(now))
 
     def refusal(self, now: float, report: FilterReport) -> str:
-        """Return why the vehicle must not take off; empty if it may.
-
-        Parameters
-        ----------
-        now : float
-            s.
-        report : FilterReport
-        """
+        """Return why the vehicle must not take off at a time (s); empty if it may."""
         if report.event is Event.FILTER_REFUSES:
             return report.reason
         if report.event is Event.FILTER_EMERGENCY:

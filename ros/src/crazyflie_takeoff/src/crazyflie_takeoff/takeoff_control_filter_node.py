@@ -1,6 +1,6 @@
 """ROS interface of the choice between takeoff control and commanded control."""
 
-from std_msgs.msg import Bool, Empty, String
+from std_msgs.msg import Bool, Empty
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
@@ -13,8 +13,8 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.fence_box import follow_box
-from crazyflie_takeoff.filter_status_publisher import FLIGHT_STATES, FilterStatusPublisher
-from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.filter_status_publisher import FilterStatusPublisher
+from crazyflie_takeoff.flight_state import flight_state
 from crazyflie_takeoff.motion import Delay, Motion
 from crazyflie_takeoff.safe_control import Setpoint
 from crazyflie_takeoff.safe_filter import SafeFilter
@@ -79,9 +79,8 @@ class TakeoffControlFilterNode(Node):
         self._advertise(handle, parameters.reset_service, self._on_reset)
         handle.subscribe(parameters.all_emergency_topic, Empty, self._on_all_emergency)
         self._server = handle.subscribe(
-            parameters.flight_state_topic, String, self._on_flight_state
+            parameters.flight_status_topic, FlightStatus, self._on_flight_status
         )
-        handle.subscribe(parameters.flight_status_topic, FlightStatus, self._on_flight_status)
         handle.subscribe(parameters.in_flight_topic, Empty, self._on_toggle)
         self._subscribe_measurements(handle)
         self._takeoffs = handle.subscribe(
@@ -139,29 +138,23 @@ class TakeoffControlFilterNode(Node):
     # Inputs.
 
     def _on_flight_status(self, message):
-        if state := FLIGHT_STATES[message.state]:
-            self._set_flight_state(state)
-
-    def _on_flight_state(self, message):
         try:
-            self._set_flight_state(FlightState(message.data))
+            state = flight_state(message.state)
         except ValueError:
             self._handle.warn(
-                f"ignoring {message.data!r}, which is no flight state, on "
-                f"{self._parameters.flight_state_topic}",
+                f"ignoring state {message.state} on {self._parameters.flight_status_topic}; "
+                "expected a constant of FlightStatus",
                 throttle=1.0,
                 key="flight state",
             )
-
-    def _set_flight_state(self, state):
-        self._filter.choice.state = state
-        self._publish_state()
-        self._set_pace()
+            return
+        if state is not None:
+            self._filter.choice.state = state
+            self._follow_filter()
 
     def _on_toggle(self, _):
         self._filter.toggle()
-        self._publish_state()
-        self._set_pace()
+        self._follow_filter()
 
     def _on_measured_state(self, message):
         state = message.state
@@ -184,8 +177,7 @@ class TakeoffControlFilterNode(Node):
         now, caller = self._handle.time(), self._takeoffs.caller(message)
         chosen = self._filter.takeoff(now, message, _setpoint(message), caller)
         self._publish(chosen, message.header.stamp)
-        self._publish_state()
-        self._set_pace()
+        self._follow_filter()
 
     def _on_commanded_control(self, message):
         now, caller = self._handle.time(), self._commands.caller(message)
@@ -228,6 +220,9 @@ class TakeoffControlFilterNode(Node):
                 throttle=REPETITION,
                 key="busy",
             )
+        self._follow_filter()
+
+    def _follow_filter(self):
         self._publish_state()
         self._set_pace()
 
@@ -271,7 +266,7 @@ class TakeoffControlFilterNode(Node):
 
     def _publish_state(self):
         status = self._filter.status
-        # Commands that come right after a launch say nothing about the vehicle.
+        # Commands that come right after a launch are no sign of a flight.
         is_commanded = status.is_commanded and not self._is_fresh
         self._status.publish(status._replace(is_commanded=is_commanded))
 

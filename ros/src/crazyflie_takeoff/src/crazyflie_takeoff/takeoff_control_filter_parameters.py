@@ -1,7 +1,7 @@
 """Parameters of the takeoff control filter."""
 
 from crazyflie_takeoff.filter_states import LossTimeouts
-from crazyflie_takeoff.flight_topics import FlightTopicParameters
+from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
 from crazyflie_takeoff.limits import Limits
 from crazyflie_utils import parameter
 from crazyflie_utils.parameters.types import DURATION, METRES, SERVICE, TOPIC, Number
@@ -65,11 +65,7 @@ class TakeoffControlFilterParameters(FlightTopicParameters):
         "limits/height",
     )
 
-    @property
-    def tilted_topic(self) -> str | None:
-        """Topic on which the estimator publishes whether the vehicle is tilted like in a crash."""
-        of_state = None if self.state_topic is None else f"{self.state_topic}_tilted"
-        return self.own_tilted_topic or of_state
+    tilted_topic = derived_topic("own_tilted_topic", "state_topic", "_tilted")
 
     def timeouts(self) -> LossTimeouts:
         """Return how long the filter waits after a loss."""

@@ -52,7 +52,7 @@ controller, s: nodes that are launched together need a while to find each other.
 
 
 class TakeoffServerNode(Node):
-    """Let the vehicle take off and land when a service asks for it."""
+    """Services by which the vehicle takes off and lands."""
 
     needed_in_flight = True
 
@@ -90,7 +90,7 @@ class TakeoffServerNode(Node):
             parameters.controller_topic, Bool, lambda message: checks.set_controller(message.data)
         )
         if parameters.box_topic is not None:
-            follow_box(handle, parameters.box_topic, self._on_box)
+            follow_box(handle, parameters.box_topic, checks.set_box)
         if parameters.battery_topic is not None:
             handle.subscribe(parameters.battery_topic, Float32, self._on_battery)
         if parameters.connected_topic is not None:
@@ -181,7 +181,7 @@ class TakeoffServerNode(Node):
     def _on_filter_status(self, message):
         try:
             report = report_of(message)
-        except KeyError:
+        except (KeyError, ValueError):
             self._handle.warn(
                 f"ignoring state {message.state}, flight_state {message.flight_state} on "
                 f"{self._parameters.filter_status_topic}; expected constants of FilterStatus and "
@@ -198,9 +198,6 @@ class TakeoffServerNode(Node):
                 self._calls.fail(ServiceError(why))
         self._flight.set_filter(report)
         self._set_pace()
-
-    def _on_box(self, box):
-        self._checks.box = box
 
     def _on_connected(self, message):
         self._checks.driver.update(self._handle.time(), message.data)

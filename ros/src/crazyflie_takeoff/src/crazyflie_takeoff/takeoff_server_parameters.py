@@ -6,7 +6,7 @@ from typing import Any
 from typing_extensions import override
 
 from crazyflie_takeoff.battery import Battery
-from crazyflie_takeoff.flight_topics import FlightTopicParameters
+from crazyflie_takeoff.flight_topics import FlightTopicParameters, derived_topic
 from crazyflie_takeoff.limits import Box
 from crazyflie_takeoff.server_table import Plan
 from crazyflie_utils import parameter
@@ -56,6 +56,9 @@ class TakeoffServerParameters(FlightTopicParameters):
         "the descent goes here, too; by default the name of reference + `_descent`",
         None,
         "topics/descent_reference",
+    )
+    own_flight_state_topic: str | None = parameter(
+        TOPIC, "by default the name of in_flight + `_state`", None, "topics/flight_state"
     )
     own_status_topic: str | None = parameter(
         TOPIC, "by default the name of in_flight + `_status`", None, "topics/status"
@@ -115,6 +118,10 @@ class TakeoffServerParameters(FlightTopicParameters):
         0.0,
     )
 
+    descent_topic = derived_topic("own_descent_topic", "reference_topic", "_descent")
+    flight_state_topic = derived_topic("own_flight_state_topic", "in_flight_topic", "_state")
+    status_topic = derived_topic("own_status_topic", "in_flight_topic", "_status")
+
     @override
     def complaints(self) -> Iterator[str]:
         if complaint := hover_complaint(self.hover, self.box):
@@ -130,22 +137,12 @@ class TakeoffServerParameters(FlightTopicParameters):
         """The hover point, m."""
         return self.hover_x, self.hover_y, self.hover_z
 
-    @property
-    def descent_topic(self) -> str:
-        """Where only the server speaks, for controllers that let a descent go before others."""
-        return self.own_descent_topic or f"{self.reference_topic}_descent"
-
-    @property
-    def status_topic(self) -> str:
-        """What people read."""
-        return self.own_status_topic or f"{self.in_flight_topic}_status"
-
     def plan(self) -> Plan:
         """Return how to take off and land."""
         return Plan(self.hover, self.open_loop, self.settle, self.descent_speed)
 
     def battery(self) -> Battery:
-        """Return what judges the battery."""
+        """Return the watch of the battery's voltage."""
         return Battery(self.battery_low, self.battery_critical, self.battery_duration)
 
 

@@ -15,27 +15,13 @@ Context = TypeVar("Context")
 
 @dataclass(frozen=True)
 class Transition(Generic[State, Context]):
-    """A row of a table.
-
-    Attributes
-    ----------
-    state : enum.Enum
-        In which the row counts.
-    event : enum.Enum
-    guard : callable or None
-        ``guard(context)`` returns whether the transition is taken, and changes nothing;
-        None: always.
-    next : enum.Enum
-        State after the transition; may be the same.
-    action : callable or None
-        ``action(context)`` is called before the state changes.
-    """
+    """A row of a table: in a state, at an event, if the guard holds."""
 
     state: State
     event: enum.Enum
-    guard: Callable[[Context], bool] | None
-    next: State
-    action: Callable[[Context], object] | None = None
+    guard: Callable[[Context], bool] | None  # Changes nothing; None: always.
+    next: State  # May be the same.
+    action: Callable[[Context], object] | None = None  # Called before the state changes.
 
 
 Table = Sequence[Transition[State, Context]]

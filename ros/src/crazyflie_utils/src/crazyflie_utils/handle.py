@@ -129,9 +129,9 @@ class NodeHandle:
         """Set a parameter, or a namespace to a dictionary; waits for the master."""
         self._process.transport.set_param(self.resolve(name), value)
 
-    def set_param_later(self, name: str, value: Any) -> None:
-        """As `set_param`, without waiting; of several values that wait, the latest is set."""
-        self._process.transport.set_param_later(self.resolve(name), value)
+    def set_param_later(self, name: str, value: Any) -> "Future[None]":
+        """As `set_param`, without waiting; the latest value is set. The future is of any thread."""
+        return self._process.transport.set_param_later(self.resolve(name), value)
 
     def publisher(self, topic: str, message_type: type, latch: bool = False) -> Publisher:
         """Announce a topic; with ``latch``, later subscribers are sent the last message."""

@@ -64,9 +64,15 @@ class Transport(ABC):
     def set_param(self, name: str, value: Any) -> None:
         """Set a parameter."""
 
-    def set_param_later(self, name: str, value: Any) -> None:
-        """Set a parameter soon, without waiting for the master; by default, at once."""
+    def set_param_later(self, name: str, value: Any) -> "Future[None]":
+        """Set a parameter soon, without waiting for the master; by default, at once.
+
+        The future is done in any thread.
+        """
         self.set_param(name, value)
+        done: Future[None] = Future()
+        done.set_result(None)
+        return done
 
     @abstractmethod
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:

@@ -36,7 +36,7 @@ class ReconfiguredNode(Protocol):
     ) -> None:
         """Answer calls of a service."""
 
-    def set_param_later(self, name: str, value: Any) -> None:
+    def set_param_later(self, name: str, value: Any) -> object:
         """Set a parameter without waiting."""
 
 

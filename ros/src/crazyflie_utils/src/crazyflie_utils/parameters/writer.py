@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 from typing import Any
 
 
@@ -23,17 +24,19 @@ class ParameterWriter:
         self._write = write
         self._report = report
         self._lock = threading.Lock()
-        self._waiting: dict[str, Any] = {}
+        self._waiting: dict[str, tuple[Any, Future[None]]] = {}
         self._is_running = False
 
-    def set(self, name: str, value: Any) -> None:
-        """Have a parameter set soon."""
+    def set(self, name: str, value: Any) -> "Future[None]":
+        """Have a parameter set soon; the future is done when this value, or a later one, is set."""
         with self._lock:
-            self._waiting[name] = value
+            _, done = self._waiting.get(name, (None, Future()))
+            self._waiting[name] = value, done
             if self._is_running:
-                return
+                return done
             self._is_running = True
         threading.Thread(target=self._run, name="parameters", daemon=True).start()
+        return done
 
     def _run(self):
         while True:
@@ -42,9 +45,12 @@ class ParameterWriter:
                     self._is_running = False
                     return
                 name = next(iter(self._waiting))
-                value = self._waiting.pop(name)
+                value, done = self._waiting.pop(name)
             try:
                 self._write(name, value)
             except Exception as error:
                 # The master may be gone, or xmlrpc may know no such value.
                 self._report(f"parameter {name} is not set on the parameter server: {error!r}")
+                done.set_exception(error)
+            else:
+                done.set_result(None)

@@ -130,9 +130,9 @@ class RosTransport(Transport):
         """Set a parameter on the parameter server."""
         rospy.set_param(self._rospy_name(name), value)
 
-    def set_param_later(self, name: str, value: Any) -> None:
+    def set_param_later(self, name: str, value: Any) -> "Future[None]":
         """Set a parameter on the parameter server by a thread that may wait for it."""
-        self._parameter_writer.set(name, value)
+        return self._parameter_writer.set(name, value)
 
     def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
         """Register a publisher with the master."""

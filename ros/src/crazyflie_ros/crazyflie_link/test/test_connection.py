@@ -195,7 +195,7 @@ def test_console_lines(vehicle, make_link):
     text = "SYS: ----\nEST: Größe\r\n"
     data = text.encode()
     for k in range(0, len(data), 5):
-        vehicle.say(0, 0, data[k : k + 5])
+        vehicle.send(0, 0, data[k : k + 5])
     assert [lines.get(timeout=LIMIT) for _ in range(2)] == ["SYS: ----", "EST: Größe"]
 
 
@@ -208,7 +208,7 @@ def test_all_packets_can_be_received_and_a_bad_callback_ends_nothing(vehicle, ma
 
     link = make_link(vehicle.uri, on_packet=on_packet)
     link.connect()
-    vehicle.say(13, 2, b"app")
+    vehicle.send(13, 2, b"app")
     while received.get(timeout=LIMIT) != (13, 2, b"app"):
         pass
     assert link.parameters.read("ring.effect") == 6

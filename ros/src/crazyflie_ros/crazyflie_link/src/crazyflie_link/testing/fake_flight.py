@@ -137,7 +137,7 @@ class FakeFlight:
         self._is_streamed = False
         self._update()
 
-    def stop_for_good(self) -> None:
+    def lock(self) -> None:
         """Stop the motors and lock, until `restart`."""
         self._is_locked = True
         self._planner = _Planner.STOPPED

@@ -138,13 +138,15 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing(state):
     if state is State.LANDING:
         loop.run(3.0)
         loop.flight.land()
-    elif state is State.TAKING_OFF:
+    elif state in (State.TAKING_OFF, State.TOUCHING_DOWN):
         loop.flight.take_off()
+    if state is State.TOUCHING_DOWN:
+        loop.flight.land()
     assert loop.flight.state is state
     if state is not State.IDLE:
         with pytest.raises(RefusalError, match=state.value):
             loop.flight.take_off()
-    if state in (State.IDLE, State.LANDING):
+    if state in (State.IDLE, State.LANDING, State.TOUCHING_DOWN):
         with pytest.raises(RefusalError, match=state.value):
             loop.flight.land()
     assert loop.flight.state is state
@@ -283,7 +285,7 @@ def test_the_integrals_begin_anew_with_every_flight():
     np.testing.assert_allclose(again[:, 2], first[:, 2], atol=0.02)
 
 
-@pytest.mark.parametrize("state", [State.TAKING_OFF, State.LANDING])
+@pytest.mark.parametrize("state", [State.TAKING_OFF, State.LANDING, State.TOUCHING_DOWN])
 def test_goes_on_after_a_reset_of_the_clock(state):
     loop = flying() if state is State.LANDING else standing()
     if state is State.LANDING:
@@ -293,6 +295,9 @@ def test_goes_on_after_a_reset_of_the_clock(state):
     else:
         loop.flight.take_off()
         loop.run(1.0)
+    if state is State.TOUCHING_DOWN:
+        loop.flight.land()
+        loop.run(0.1)
     thrust = loop.setpoints[-1].thrust
     setpoint = loop.flight.tick(0.0, loop.time, loop.pose())
     assert setpoint.thrust == pytest.approx(thrust, rel=0.1)

@@ -47,12 +47,7 @@ def sine(amplitude: float, multiple: int, time: float) -> NDArray[np.float64]:
     p, v, a, j = multiple * phase(time)
     sin, cos = math.sin(p), math.cos(p)
     return amplitude * np.array(
-        [
-            sin,
-            v * cos,
-            a * cos - v * v * sin,
-            j * cos - 3.0 * v * a * sin - v**3 * cos,
-        ]
+        [sin, v * cos, a * cos - v * v * sin, j * cos - 3.0 * v * a * sin - v**3 * cos]
     )
 
 

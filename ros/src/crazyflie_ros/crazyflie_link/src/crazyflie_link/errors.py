@@ -1,4 +1,4 @@
-"""What can go wrong with a link, in words an operator can act on."""
+"""Errors of a link, with what the operator can do."""
 
 import difflib
 
@@ -59,11 +59,7 @@ UNANSWERED = "too many packets lost"
 _CAUSES = (
     # Text of a driver (lower case), error, advice to the operator.
     (
-        (
-            "cannot find a crazyradio dongle",
-            "cannot find radio with serial",
-            "cannot find crazyradio",
-        ),
+        ("cannot find a crazyradio", "cannot find radio with serial", "cannot find crazyradio"),
         NoDongleError,
         "no Crazyradio dongle found: plug it in; if `lsusb -d 1915:7777` shows it, " + UDEV_HINT,
     ),

@@ -1,8 +1,4 @@
-"""Setpoints that are streamed: the vehicle follows the latest for a short while.
-
-Units and signs are those of this module's methods; what goes over the link is in
-their descriptions, since that is what counts.
-"""
+"""Setpoints that are streamed: the vehicle follows the latest for a short while."""
 
 import math
 import struct

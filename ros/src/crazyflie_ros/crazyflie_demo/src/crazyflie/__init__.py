@@ -187,7 +187,7 @@ class Crazyflie:
         if isinstance(self.tf, str) and self._buffer is None:
             self._buffer = tf2_ros.Buffer()
             self._listener = tf2_ros.TransformListener(self._buffer)
-        buffer = self._buffer if isinstance(self.tf, str) else self.tf
+        buffer: Any = self._buffer if isinstance(self.tf, str) else self.tf
         found = buffer.lookup_transform(self._world, self._frame().strip("/"), latest, limit)
         p = found.transform.translation
         return found.header.stamp, (p.x, p.y, p.z)

@@ -255,7 +255,7 @@ def _commander(prefix):
     rospy.loginfo("waiting for update_params below %s or %s", *map(rospy.resolve_name, tops))
     while True:
         for top in tops:
-            # It is not there yet, which was said above.
+            # It is not there yet; the wait is logged above.
             with contextlib.suppress(rospy.ROSException):
                 rospy.wait_for_service(f"{top}/update_params", 0.2)
                 return top

@@ -34,7 +34,7 @@ _RAMP_INTEGRAL = (0.0, 0.0, 0.0, 0.0, 2.5, -3.0, 1.0)
 def phase(time: float) -> NDArray[np.float64]:
     """Return the phase and its first three derivatives, shape (4,), at a time (s)."""
     if time > DURATION - RAMP:
-        # The end is the beginning, backwards.
+        # The end is the beginning in reverse.
         mirrored = phase(DURATION - time)
         return np.array([2.0 * math.pi, 0.0, 0.0, 0.0]) - [1.0, -1.0, 1.0, -1.0] * mirrored
     s = min(time / RAMP, 1.0)

@@ -63,7 +63,7 @@ class Keyboard:
         self._rest = ""
 
     def feed(self, text: str, time: float) -> list[int]:
-        """Take what was typed until ``time`` (s); return the buttons that were pressed."""
+        """Return the buttons that were pressed by text that was typed until ``time`` (s)."""
         presses = []
         for key in self._keys(text):
             if key in _PRESSES:

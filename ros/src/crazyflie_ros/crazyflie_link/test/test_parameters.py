@@ -38,7 +38,7 @@ def test_a_write_whose_reply_is_lost_is_looked_up(vehicle, link):
 
 def test_a_refusal_of_another_length_is_one_at_once(vehicle, link):
     vehicle.answers[2, 2, 3] = b"\3\0\x0d"
-    with pytest.raises(RefusedError, match="sound.freq: the vehicle says 0d"):
+    with pytest.raises(RefusedError, match="sound.freq: the vehicle answers: 0d"):
         link.parameters.write("sound.freq", 100)
     assert len(vehicle.packets(2, 2)) == 1
 

@@ -1,10 +1,10 @@
-"""What the voltage of a battery means for the flight."""
+"""Charge of a battery by its voltage."""
 
 import enum
 
 
 class Charge(enum.IntEnum):
-    """How much is left; the numbers are those of crazyflie_msgs/VehicleStatus."""
+    """Charge of a battery; the numbers are those of crazyflie_msgs/VehicleStatus."""
 
     UNKNOWN = 0
     GOOD = 1
@@ -13,9 +13,9 @@ class Charge(enum.IntEnum):
 
 
 class Battery:
-    """Judge voltages as they come, by limits in V.
+    """Classify voltages by limits in V.
 
-    It is critical after a time (s) below the critical limit: the voltage sinks under load.
+    The charge is critical after a time (s) below its limit: the voltage sinks under load.
     """
 
     def __init__(self, low: float, critical: float, critical_time: float):
@@ -25,7 +25,7 @@ class Battery:
         self.charge = Charge.UNKNOWN
 
     def update(self, voltage: float, now: float) -> Charge:
-        """Take note of a voltage (V) at a moment (s); return what it means."""
+        """Return the charge after a voltage (V) at a time (s)."""
         self.voltage = voltage
         if not voltage < self._critical:
             self._critical_since = None
@@ -47,6 +47,5 @@ class Battery:
 
 def words(charge: Charge, voltage: float) -> str:
     """Return a state, such as "battery low: 3.12 V"; empty if nothing is wrong."""
-    if charge == Charge.CRITICAL:
-        return f"battery critical: {voltage:.2f} V"
-    return f"battery low: {voltage:.2f} V" if charge == Charge.LOW else ""
+    is_low = charge >= Charge.LOW
+    return f"battery {charge.name.lower()}: {voltage:.2f} V" if is_low else ""

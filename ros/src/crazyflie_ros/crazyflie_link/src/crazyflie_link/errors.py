@@ -54,7 +54,7 @@ UDEV_HINT = (
 )
 
 UNANSWERED = "too many packets lost"
-"""What the radio driver says, in small letters, when it goes on all the same."""
+"""Lower-case text of an error after which the radio driver continues."""
 
 _CAUSES = (
     # Text of a driver (lower case), error, advice to the operator.

@@ -199,7 +199,7 @@ class Link:
             if self._error is None:
                 cause = explain(self.address.uri, text)
                 if self._is_complete and UNANSWERED in text.lower():
-                    # The driver goes on, and the vehicle may be heard again.
+                    # The driver continues, and the vehicle may be heard again.
                     self._radio_error = f" ({cause})"
                     return
                 if self._monitor is not None:

@@ -68,9 +68,9 @@ class LinkSetup:
         if not self._has_answered:
             if now - self._begin > limits.first_answer:
                 raise NoAnswerError(
-                    f"{self._uri}: nobody has answered within {limits.first_answer:g} s, although "
-                    "the address can be reached: is it a Crazyflie, is it on, and is nobody else "
-                    "connected to it?"
+                    f"{self._uri}: no answer has come within {limits.first_answer:g} s, although "
+                    "the address can be reached: is it a Crazyflie, is it on, and is no other "
+                    "program connected to it?"
                 )
         elif now - self._progress_time > limits.stall:
             raise SetupError(

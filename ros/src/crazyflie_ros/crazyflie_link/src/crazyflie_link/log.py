@@ -118,5 +118,5 @@ class Log(Subsystem):
                 f"log block {block.name!r}: the vehicle has not replied within {REPLY_LIMIT:g} s"
             )
         if refusals:
-            raise RefusedError(f"log block {block.name!r}: the vehicle says: {refusals[0]}")
+            raise RefusedError(f"log block {block.name!r}: the vehicle answers: {refusals[0]}")
         link.monitor.expect_log(block.period_ms / 1000.0, time.monotonic())

@@ -115,8 +115,8 @@ def reboot(arguments: list[str] | None = None) -> int:
 
 
 def console(arguments: list[str] | None = None) -> int:
-    """Print what the firmware of a vehicle says."""
-    parser = make_parser("console", "Print what the firmware of a vehicle says.", has_timeout=False)
+    """Print the console of a vehicle's firmware."""
+    parser = make_parser("console", "Print the console of a vehicle's firmware.", has_timeout=False)
     parser.add_argument(
         "--duration",
         type=seconds,

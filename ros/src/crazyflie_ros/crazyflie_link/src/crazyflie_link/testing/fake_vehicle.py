@@ -213,7 +213,7 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         number, code, size = TRAJECTORY_MEMORY
         if data[0] == 1:
             return b"\x01\x02"
-        # The first is one that nobody asks for anything.
+        # The first memory is never read.
         details = (number, code, size) if data[1] == number else (data[1], 0x18, 0)
         return b"\x02" + struct.pack("<BBI", *details) + bytes(8)
 

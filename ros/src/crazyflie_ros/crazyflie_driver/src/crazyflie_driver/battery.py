@@ -47,5 +47,6 @@ class Battery:
 
 def words(charge: Charge, voltage: float) -> str:
     """Return a state, such as "battery low: 3.12 V"; empty if nothing is wrong."""
-    is_low = charge >= Charge.LOW
-    return f"battery {charge.name.lower()}: {voltage:.2f} V" if is_low else ""
+    if charge == Charge.CRITICAL:
+        return f"battery critical: {voltage:.2f} V"
+    return f"battery low: {voltage:.2f} V" if charge == Charge.LOW else ""

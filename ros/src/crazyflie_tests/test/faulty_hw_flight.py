@@ -1,4 +1,4 @@
-"""Fly the hardware example on virtual hardware, and let what it stands on fail.
+"""Fly the hardware example on virtual hardware with faults of vehicle, link and mocap.
 
 Prints what was seen as JSON. Usage: faulty_hw_flight.py [ARGUMENT:=VALUE ...]
 """
@@ -17,131 +17,24 @@ from pathlib import Path
 import rosgraph
 import rospy
 from dynamic_reconfigure.client import Client
-from faulty_flight import LIMIT, Observer, node_process
+from faulty_flight import LIMIT, node_process
+from hardware_observer import LOG_PARAMETER, HardwareFlight
 from std_msgs.msg import Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
 
-from crazyflie_driver.msg import GenericLogData
 from crazyflie_driver.srv import RemoveCrazyflie
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_model.supervisor import SupervisorState
-from crazyflie_reports.flight_operator import FlightError
-from crazyflie_reports.flight_record import Series
 from crazyflie_utils.testing.peer import wait_until
 from crazyflie_utils.testing.programs import free_port, running
 
-_VARIABLES = ("stateEstimate.z", "stateEstimate.vz", "motor.m1", "motor.m2", "motor.m3", "motor.m4")
-_LOG = "genericLogTopic_truth_Variables: [" + ", ".join((*_VARIABLES, "supervisor.info")) + "]"
-_RESTART = bytes((0xFF, 0xFE, 0xF0, 0x01))
-"""What the radio chip takes for the command to restart the firmware."""
-
-# A battery that is nearly empty is so, and has been for long enough, within a second; what the
-# takeoff server waits for after a takeoff is short.
+# A battery counts as nearly empty within a second, and a takeoff ends after a short hover.
 _PARAMETERS = {
     "/takeoff_server/duration/hover": 0.5,
     "/takeoff_server/battery/low": 3.45,
     "/takeoff_server/battery/critical": 3.2,
     "/takeoff_server/battery/duration": 1.0,
 }
-
-
-class Vehicle:
-    """What the virtual vehicle logs: its estimate rests on the truth, not on motion capture."""
-
-    def __init__(self, port):
-        self.uri = f"udp://127.0.0.1:{port}"
-        self._address = ("127.0.0.1", port)
-        self._log = Series((*_VARIABLES, "supervisor.info"))
-        self.words = []
-        rospy.Subscriber("/crazyflie/status", String, lambda status: self.words.append(status.data))
-        rospy.Subscriber("/crazyflie/truth", GenericLogData, self._note)
-
-    def _note(self, message):
-        self._log.append(message.header.stamp.to_sec(), message.values)
-
-    def speaks(self):
-        """Return whether there are log data of the last 0.3 s."""
-        return len(self._log) > 0 and rospy.get_time() - self._log.last_time < 0.3
-
-    def wait_for_log_of(self, moment):
-        """Wait until log data of a moment (s), or of a later one, have come."""
-        wait_until(lambda: self._log.last_time >= moment, "the vehicle's log data", LIMIT)
-
-    @property
-    def height(self):
-        """The latest, m."""
-        return float(self._log.last[0])
-
-    @property
-    def is_locked(self):
-        """Whether only a restart makes it fly again."""
-        return SupervisorState.LOCKED in SupervisorState(int(self._log.last[6]))
-
-    def fastest_descent_since(self, begin):
-        """Return the greatest speed downward since a moment (s), m/s."""
-        return -float(self._log.between(begin, float("inf"))[:, 1].min())
-
-    def highest_pwm_since(self, begin):
-        """Return the greatest of all motors since a moment (s)."""
-        return float(self._log.between(begin, float("inf"))[:, 2:6].max())
-
-    def motors_stop_after(self, begin):
-        """Return how long after a moment (s) all motors stand still for good, s."""
-        times = self._log.times
-        runs = self._log.values[: len(times), 2:6].any(axis=1)
-        return max(0.0, float(times[runs][-1]) - begin)
-
-    def rests(self):
-        """Return whether all motors stand still."""
-        return not self._log.last[2:6].any()
-
-    def restart(self):
-        """Restart the firmware, at once and without a word to its client."""
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as radio:
-            radio.sendto(_RESTART, self._address)
-
-
-class Flight:
-    """Takes the hardware example off and looks at it."""
-
-    def __init__(self, port):
-        self.observer = Observer()
-        self.vehicle = Vehicle(port)
-
-    def wait_for_the_vehicle(self):
-        """Wait until the driver has it and motion capture sees it."""
-        wait_until(self.vehicle.speaks, "the vehicle's log data", LIMIT)
-        wait_until(lambda: rospy.get_time() - self.observer.now < 0.2, "the state", LIMIT)
-
-    def lift_off(self):
-        """Take off."""
-        self.observer.takeoff()
-        wait_until(lambda: self.vehicle.height > 0.5, "the vehicle to lift off", LIMIT)
-
-    def take_off(self):
-        """Take off and hover; return the greatest height, m."""
-        begin = self.observer.now
-        self.observer.takeoff()
-        self.observer.hover(4.0)
-        return self.observer.range_since(begin)[1]
-
-    def is_back_at(self, height):
-        """Wait a while for the vehicle to be at a height (m); return where it is."""
-        with contextlib.suppress(AssertionError):
-            wait_until(lambda: abs(self.observer.height - height) < 0.05, "the height", LIMIT)
-        return self.observer.height
-
-    def wait_for_the_ground(self):
-        """Wait until the vehicle itself says that it is there."""
-        wait_until(lambda: self.vehicle.height < 0.03, "the ground", LIMIT)
-
-    def refusal(self):
-        """Return what a takeoff is refused with."""
-        try:
-            self.observer.takeoff()
-        except FlightError as error:
-            return str(error)
-        return ""
 
 
 def next_message(topic, message_type):
@@ -175,7 +68,7 @@ def lose_the_link(flight, duration):
     flight.vehicle.words.clear()
     Client("/virtual_crazyflie", LIMIT).update_configuration({"fault/silence": duration})
     flight.observer.hover(duration + 1.0)
-    wait_until(flight.vehicle.speaks, "the link", LIMIT)
+    wait_until(flight.vehicle.is_logging, "the link", LIMIT)
     end = flight.is_back_at(1.0)
     return {
         "heights": flight.observer.range_since(begin),
@@ -205,7 +98,7 @@ def lose_motion_capture(flight):
     begin = rospy.get_time()
     motion_capture = Client("/virtual_mocap", LIMIT)
     motion_capture.update_configuration({"fault/silent": True})
-    flight.wait_for_the_ground()
+    flight.wait_for_ground()
     seconds = rospy.get_time() - begin
     refusal = flight.refusal()
     motion_capture.update_configuration({"fault/silent": False})
@@ -214,7 +107,7 @@ def lose_motion_capture(flight):
         "fastest descent": flight.vehicle.fastest_descent_since(begin),
         "refusal": refusal,
     }
-    wait_until(flight.vehicle.rests, "the motors to stop", LIMIT)
+    wait_until(flight.vehicle.motors_stand_still, "the motors to stop", LIMIT)
     down = rospy.get_time()
     flight.vehicle.wait_for_log_of(down + 1.5)
     return {**seen, "highest PWM afterwards": flight.vehicle.highest_pwm_since(down)}
@@ -224,7 +117,7 @@ def stop_in_emergency(flight):
     """Call /emergency in flight, and end it again."""
     called = rospy.get_time()
     call("/emergency")
-    flight.wait_for_the_ground()
+    flight.wait_for_ground()
     refusal = flight.refusal()
     flight.vehicle.wait_for_log_of(called + 2.1)
     end_the_emergency()
@@ -238,7 +131,7 @@ def restart_the_firmware(flight):
     # Earlier data may be from before the restart.
     flight.vehicle.wait_for_log_of(begin + 0.3)
     came_back = rospy.get_time() - begin
-    flight.wait_for_the_ground()
+    flight.wait_for_ground()
     flight.vehicle.wait_for_log_of(rospy.get_time() + 2.0)
     highest = flight.vehicle.highest_pwm_since(begin + 0.3)
     flight.observer.land()
@@ -249,7 +142,7 @@ def empty_the_battery(flight):
     """Let the battery be nearly empty."""
     begin = rospy.get_time()
     Client("/virtual_crazyflie", LIMIT).update_configuration({"fault/low_battery": True})
-    flight.wait_for_the_ground()
+    flight.wait_for_ground()
     descent = flight.vehicle.fastest_descent_since(begin)
     refusal = ""
     # The landing goes on for a moment, and refuses takeoffs of its own accord.
@@ -263,7 +156,7 @@ def another_battery(flight):
     """Switch the vehicle off, and on again with another battery for the time of a with block."""
     os.kill(node_process("/virtual_crazyflie"), signal.SIGTERM)
     rospy.set_param("/virtual_crazyflie/fault/low_battery", False)
-    wait_until(lambda: not flight.vehicle.speaks(), "the vehicle to be off", LIMIT)
+    wait_until(lambda: not flight.vehicle.is_logging(), "the vehicle to be off", LIMIT)
     vehicle = ["rosrun", "crazyflie_virtual", "virtual_crazyflie", "__name:=virtual_crazyflie"]
     with running(*vehicle, stdout=subprocess.DEVNULL):
         wait_until(lambda: next_message("/crazyflie/battery", Float32) > 4.0, "4 V", LIMIT)
@@ -276,7 +169,7 @@ def stop_all_in_emergency(flight):
     wait_until(lambda: publisher.get_num_connections() >= 2, "driver and filter", LIMIT)
     begin = rospy.get_time()
     publisher.publish()
-    flight.wait_for_the_ground()
+    flight.wait_for_ground()
     flight.vehicle.wait_for_log_of(begin + 2.1)
     # The filter's stop can be reset, the driver's not.
     end_the_emergency()
@@ -292,7 +185,7 @@ def add_the_vehicle_again(flight):
     add = ["crazyflie_add", "__ns:=/crazyflie", "__name:=crazyflie_add"]
     with running("rosrun", "crazyflie_driver", *add, stdout=subprocess.DEVNULL) as adding:
         adding.wait(LIMIT)
-    flight.wait_for_the_vehicle()
+    flight.wait_for_vehicle()
 
 
 def kill_the_driver(flight):
@@ -328,7 +221,7 @@ def fly(core_command, arguments, folder):
     seen = {}
     log = folder / "launch.log"
     variables = folder / "log.yaml"
-    variables.write_text(_LOG)
+    variables.write_text(LOG_PARAMETER)
     ports = {name: free_port() for name in ("port", "observer_port", "command_port", "data_port")}
     launch = ["roslaunch", "--wait", "crazyflie_examples", "virtual_hw_hover.launch", "rviz:=false"]
     launch += [f"{name}:={port}" for name, port in ports.items()]
@@ -344,8 +237,8 @@ def fly(core_command, arguments, folder):
             rosgraph.Master("/flight").setParam(name, value)
 
         with running(*launch, stdout=output, stderr=output) as roslaunch:
-            flight = Flight(ports["port"])
-            flight.wait_for_the_vehicle()
+            flight = HardwareFlight(ports["port"])
+            flight.wait_for_vehicle()
             seen["first takeoff"] = flight.take_off()
             seen["link lost for 0.4 s"] = lose_the_link(flight, 0.4)
             seen["link lost for 1 s"] = lose_the_link(flight, 1.0)
@@ -358,7 +251,7 @@ def fly(core_command, arguments, folder):
             flight.lift_off()
             seen["Ctrl-C"] = press_ctrl_c(flight, roslaunch)
         with running(*launch, stdout=output, stderr=output):
-            flight.wait_for_the_vehicle()
+            flight.wait_for_vehicle()
             flight.lift_off()
             seen["battery low"] = empty_the_battery(flight)
             with another_battery(flight):

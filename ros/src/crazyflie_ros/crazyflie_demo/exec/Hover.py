@@ -27,10 +27,7 @@ class Crazyflie:
     Every method blocks until the vehicle should be there, and repeats its setpoints meanwhile. If
     the next one does not follow at once, and when the script is ended in flight, the vehicle falls.
 
-    Parameters
-    ----------
-    prefix : str
-        Its namespace; waits until the driver listens there.
+    The constructor waits until the driver subscribes below the prefix.
     """
 
     def __init__(self, prefix: str):
@@ -42,16 +39,9 @@ class Crazyflie:
             self._rate.sleep()
 
     def goTo(self, x: float, y: float, zDistance: float, yaw: float) -> None:  # noqa: N802, N803
-        """Fly straight to a point at `SPEED`, keeping the heading.
+        """Fly straight to a point at `SPEED`, keeping the heading; the yaw is not used.
 
-        Parameters
-        ----------
-        x, y : float
-            Where it is from here, ahead and to the left, m.
-        zDistance : float
-            Height above what is below, m.
-        yaw : float
-            Not used: the yaw rate is 0.
+        The point is x ahead and y to the left of here, at a height above what is below, m.
         """
         start, climb = self._height, zDistance - self._height
         count = math.ceil(math.hypot(x, y, climb) / SPEED * RATE)

@@ -1,5 +1,6 @@
 """Flights by high-level commands, with a driver that only remembers."""
 
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ from fake_driver import FakeDriver
 from crazyflie_demo.high_level_flight_node import HighLevelFlightNode
 from crazyflie_demo.trajectory_flight_node import TrajectoryFlightNode
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing.waiting import wait_until
 
 FIGURE8 = Path(__file__).parents[1] / "data" / "figure8.csv"
 PREPARATION = ["update_params", "update_params"]
@@ -21,6 +23,7 @@ def launch(node, refused=None, **parameters):
     assert process.launch(process.driver, "/driver")
     assert process.launch(node, "/cf/flight", parameters)
     process.node = node
+    wait_until(lambda: process.driver.names()[:2] == PREPARATION, "the parameter to be set")
     return process
 
 
@@ -58,6 +61,28 @@ def test_the_high_level_commander_is_enabled_first():
         [],
         ["commander/enHighLevel"],
     ]
+
+
+def test_a_frozen_master_blocks_no_callback_and_ends_the_flight_before_takeoff(monkeypatch):
+    process, answers = FakeProcess(), threading.Event()
+    process.driver = FakeDriver()
+    assert process.launch(process.driver, "/driver")
+    has_returned = []
+
+    def set_param(*_):
+        answers.wait(5.0)
+        has_returned.append(True)
+
+    monkeypatch.setattr(process.transport, "set_param", set_param)
+    assert process.launch(HighLevelFlightNode(), "/cf/flight", {})
+    assert not has_returned
+    process.advance(20.0)
+    assert "/cf/commander/enHighLevel" in process.logged("error")[0]
+    assert process.exit_status == 1
+    answers.set()
+    wait_until(lambda: has_returned, "the master")
+    process.advance(20.0)
+    assert process.driver.names() == ["update_params"]
 
 
 def test_a_trajectory():

@@ -1,11 +1,14 @@
 """Buttons that call services."""
 
+import threading
+
 import pytest
 from fake_driver import FakeDriver
 from sensor_msgs.msg import Joy
 
 from crazyflie_demo.joystick_controller_node import JoystickControllerNode
 from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing.waiting import wait_until
 
 
 def launch(has_controller=True, parameters=None):
@@ -50,12 +53,26 @@ def test_without_a_controller_nothing_takes_off():
 @pytest.mark.parametrize("parameters", [{}, {"/cf/ring/headlightEnable": 0}])
 def test_the_headlight_goes_on_and_off(parameters):
     process = launch(parameters=parameters)
-    for value in (1, 0, 1):
+    for count, value in enumerate((1, 0, 1), start=1):
         hold(process, 4)
         hold(process)
+        wait_until(lambda count=count: len(process.driver.calls) == count, "the call")
         assert process.transport.parameters["/cf/ring/headlightEnable"] == value
     requests = [request for _, name, request in process.driver.calls if name == "update_params"]
     assert [request.params for request in requests] == [["ring/headlightEnable"]] * 3
+
+
+@pytest.mark.parametrize("operation", ["get_param", "set_param"])
+def test_a_frozen_master_blocks_no_other_button(operation, monkeypatch):
+    process = launch()
+    answers, answer = threading.Event(), getattr(process.transport, operation)
+    delayed = lambda *arguments: answers.wait(5.0) and answer(*arguments)  # noqa: E731
+    monkeypatch.setattr(process.transport, operation, delayed)
+    hold(process, 4)
+    hold(process, 4, 1)
+    assert process.driver.names() == ["emergency"]
+    answers.set()
+    wait_until(lambda: process.driver.names() == ["emergency", "update_params"], "the headlight")
 
 
 def test_a_refusal_is_reported_and_the_buttons_go_on_working():

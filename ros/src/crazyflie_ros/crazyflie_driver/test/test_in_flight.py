@@ -49,7 +49,7 @@ def test_a_vehicle_of_which_nothing_is_known_is_not_restarted(server, radio):
     vehicle, restarts = radio
     vehicle.is_frozen = True
     wait_for_words(server, "lost")
-    with pytest.raises(ServiceError, match="no reboot: nothing tells .* crazyflie_tools reboot"):
+    with pytest.raises(ServiceError, match="no reboot: it is not known .* crazyflie_tools reboot"):
         server.call("/cf1/reboot", EmptyRequest())
     assert restarts == []
 

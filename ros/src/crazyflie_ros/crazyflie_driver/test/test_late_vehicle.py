@@ -34,8 +34,8 @@ class Vehicle:
     def clock(self):
         return self.now
 
-    def connect_within(self, limit, is_leaving=lambda: False):
-        connect_within(limit, self.connect, is_leaving, self.clock, self.sleep)
+    def connect_within(self, limit, is_closing=lambda: False):
+        connect_within(limit, self.connect, is_closing, self.clock, self.sleep)
 
 
 def connected(server):

@@ -1,4 +1,4 @@
-"""A vehicle that is told to fly and does not lift off; the flights are in real time."""
+"""A vehicle that is commanded to fly and does not lift off; the flights are in real time."""
 
 import pytest
 from conftest import LOG
@@ -91,7 +91,7 @@ def stream_until_warned(server, topic, message):
 def test_what_was_told_and_what_is_measured_is_said(server, topic, message, told):
     vehicle = stand(server, STANDING, FLYING)
     warning = stream_until_warned(server, topic, message)
-    assert f"cf1: was told to fly ({told}), and has not lifted off" in warning
+    assert f"cf1: was commanded to fly ({told}), and has not lifted off" in warning
     assert "height 0.75 m, yaw -10 degrees" in warning
     assert vehicle.wait_for_packets(7, 1) == [SETPOINTS_STOP]
     sent = len(vehicle.packets(7, 0))

@@ -56,7 +56,7 @@ def test_standard_topics_need_four_log_blocks(logging):
 
 def test_packets_of_others(server, logging):
     count = len(server.process.published("/cf1/packets"))
-    logging.say(13, 2, b"app data")
+    logging.send(13, 2, b"app data")
     packet = published(server, "/cf1/packets", count + 1)[count]
     assert (packet.size, packet.header) == (9, 0xDE)
     assert bytes(packet.data) == b"app data".ljust(30, b"\0")
@@ -66,8 +66,8 @@ def test_packets_of_the_largest_size_and_without_logging(server):
     vehicle = server.make_vehicle()
     server.add(vehicle.uri, enable_logging_packets=True)
     for port, channel in ((0, 0), (2, 1), (4, 1), (5, 1), (8, 0), (9, 0), (15, 3)):
-        vehicle.say(port, channel, b"the driver's own")
-    vehicle.say(14, 3, bytes(range(30)))
+        vehicle.send(port, channel, b"the driver's own")
+    vehicle.send(14, 3, bytes(range(30)))
     packet = published(server, "/cf1/packets")[0]
     assert (packet.size, packet.header, bytes(packet.data)) == (31, 0xEF, bytes(range(30)))
 

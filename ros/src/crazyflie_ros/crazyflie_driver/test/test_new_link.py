@@ -52,7 +52,7 @@ def test_a_vehicle_that_may_fly_is_added_and_removed_without_zeros(server, state
     assert "may be flying: its thrust stays locked until" in warnings(server)
     if state is None:
         server.remove(vehicle.uri)
-        assert "nothing tells whether the vehicle flies: it is left as it is" in warnings(server)
+        assert "it is not known whether the vehicle flies: it is left as it is" in warnings(server)
     assert commands(vehicle) == []
 
 

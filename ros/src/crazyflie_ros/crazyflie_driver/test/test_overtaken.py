@@ -47,7 +47,7 @@ def test_a_takeoff_that_waits_to_be_sent(server, vehicle, service):
     vehicle.wait_for_packets(9, 1)
     link.put(block)
     assert begun.wait(LIMIT)
-    vehicle.say(9, 1, b"\x81\x01\x01")
+    vehicle.send(9, 1, b"\x81\x01\x01")
     # The takeoff is the next packet, and has not been sent.
     wait_until(lambda: link._transmit_queue._commands, "the takeoff's packet")
     request = EmptyRequest() if service == "emergency" else StopRequest()

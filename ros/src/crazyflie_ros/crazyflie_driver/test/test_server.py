@@ -91,7 +91,7 @@ def test_a_silent_port(make_server):
     server = make_server({"connect/limit": 0.0})
     vehicle = server.make_vehicle()
     vehicle.is_frozen = True
-    with pytest.raises(ServiceError, match="nobody has answered within 2 s"):
+    with pytest.raises(ServiceError, match="no answer has come within 2 s"):
         server.add(vehicle.uri)
 
 

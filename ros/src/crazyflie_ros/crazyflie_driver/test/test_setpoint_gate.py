@@ -64,7 +64,7 @@ def test_what_was_streamed_while_a_vehicle_did_not_lift_off_stays_blocked(standi
     standing.handle(Event.FLIGHT_REPORTED)
     count, why = stream(standing, 2.0, 60.0)
     assert count == 2900
-    assert why.startswith("the vehicle was told to fly and did not lift off")
+    assert why.startswith("the vehicle was commanded to fly and did not lift off")
 
 
 def test_a_new_stream_zero_thrust_and_a_call_are_new_attempts(standing):

@@ -73,7 +73,7 @@ def test_the_port_is_open_but_silent(make_vehicle, make_link):
     vehicle = make_vehicle()
     vehicle.is_frozen = True
     link = make_link(vehicle.uri, limits=QUICK)
-    with pytest.raises(NoAnswerError, match="nobody has answered within 0.4 s"):
+    with pytest.raises(NoAnswerError, match="no answer has come within 0.4 s"):
         link.connect()
     assert link.state is LinkState.DISCONNECTED
 
@@ -171,7 +171,7 @@ def test_impossible_log_blocks(link, period, variables, error, text):
 
 def test_a_log_block_that_the_vehicle_refuses(vehicle, link):
     vehicle.answers[5, 1, 6] = b"\x06\x01\x0c"
-    with pytest.raises(RefusedError, match="'big': the vehicle says: No more memory"):
+    with pytest.raises(RefusedError, match="'big': the vehicle answers: No more memory"):
         link.add_log_block(LogBlock("big", 10, ("pm.vbat",), lambda *_: None))
 
 
@@ -195,7 +195,7 @@ def test_console_lines(vehicle, make_link):
     text = "SYS: ----\nEST: Größe\r\n"
     data = text.encode()
     for k in range(0, len(data), 5):
-        vehicle.say(0, 0, data[k : k + 5])
+        vehicle.send(0, 0, data[k : k + 5])
     assert [lines.get(timeout=LIMIT) for _ in range(2)] == ["SYS: ----", "EST: Größe"]
 
 
@@ -208,7 +208,7 @@ def test_all_packets_can_be_received_and_a_bad_callback_ends_nothing(vehicle, ma
 
     link = make_link(vehicle.uri, on_packet=on_packet)
     link.connect()
-    vehicle.say(13, 2, b"app")
+    vehicle.send(13, 2, b"app")
     while received.get(timeout=LIMIT) != (13, 2, b"app"):
         pass
     assert link.parameters.read("ring.effect") == 6

@@ -132,7 +132,7 @@ def test_groups(flight):
 
 def test_an_emergency_locks(flight):
     flight.command(takeoff())
-    flight.stop_for_good()
+    flight.lock()
     recorded = RECORDED["emergency_stop"]["firmware"]
     assert int(flight.state) & 0x5F == int(recorded["bits_end"], 16) & 0x5F
     assert flight.command(takeoff()) == recorded["takeoff_errno"]

@@ -19,7 +19,7 @@ def test_a_start_that_the_vehicle_refuses_is_none(vehicle, make_link, states):
     link = make_link(vehicle.uri, reconnect=True, on_state=states)
     link.connect()
     vehicle.answers[5, 1, 3] = b"\3\1\2"
-    with pytest.raises(RefusedError, match="'refused': the vehicle says: No such block id"):
+    with pytest.raises(RefusedError, match="'refused': the vehicle answers: No such block id"):
         link.add_log_block(log_block("refused"))
     # Its data are not missed.
     vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 10)
@@ -28,7 +28,7 @@ def test_a_start_that_the_vehicle_refuses_is_none(vehicle, make_link, states):
 
 def test_an_error_code_that_nobody_knows_is_a_refusal(vehicle, link):
     vehicle.answers[5, 1, 3] = b"\3\1\x63"
-    with pytest.raises(RefusedError, match="'odd': the vehicle says: error 99"):
+    with pytest.raises(RefusedError, match="'odd': the vehicle answers: error 99"):
         link.add_log_block(log_block("odd"))
 
 

@@ -85,7 +85,7 @@ def test_a_restart_takes_the_trajectories_along(vehicle, link):
     # The clock of a vehicle that was switched on a moment ago; the fake one's counts on, which is
     # no restart: it may have been late by so much.
     now = int.from_bytes(received.get(timeout=LIMIT)[0].to_bytes(4, "little")[:3], "little")
-    vehicle.say(5, 2, b"\1" + ((now - 30_000) % (1 << 24)).to_bytes(3, "little") + bytes(4))
+    vehicle.send(5, 2, b"\1" + ((now - 30_000) % (1 << 24)).to_bytes(3, "little") + bytes(4))
     assert vehicle.wait_for(lambda: link.restarts == 1, LIMIT)
     with pytest.raises(RefusedError, match="known: none"):
         link.high_level.start_trajectory(3)
@@ -96,7 +96,7 @@ def test_a_restart_takes_the_trajectories_along(vehicle, link):
 def test_no_packet_ends_the_thread_that_receives(shared, packets):
     vehicle, link, _ = shared
     for datagram in packets:
-        vehicle.say_datagram(datagram)
+        vehicle.send_datagram(datagram)
     assert link.link().cflib.incoming.is_alive()
     # The answer comes through the same thread, after all of them.
     assert link.parameters.read("ring.effect") == 6

@@ -17,7 +17,7 @@ def test_an_old_reply_is_not_the_answer_to_the_next_write(vehicle, link):
         writing = pool.submit(link.parameters.write, "ring.effect", 9)
         vehicle.wait_for_packets(2, 2)
         # To a write of 3, which was given up.
-        vehicle.say(2, 2, EFFECT + b"\3")
+        vehicle.send(2, 2, EFFECT + b"\3")
         vehicle.deaf.clear()
         assert writing.result(timeout=LIMIT) == 9
     assert vehicle.parameters["ring.effect"][1] == 9
@@ -38,7 +38,7 @@ def test_a_write_whose_reply_is_lost_is_looked_up(vehicle, link):
 
 def test_a_refusal_of_another_length_is_one_at_once(vehicle, link):
     vehicle.answers[2, 2, 3] = b"\3\0\x0d"
-    with pytest.raises(RefusedError, match="sound.freq: the vehicle says 0d"):
+    with pytest.raises(RefusedError, match="sound.freq: the vehicle answers: 0d"):
         link.parameters.write("sound.freq", 100)
     assert len(vehicle.packets(2, 2)) == 1
 
@@ -54,7 +54,7 @@ def test_an_old_confirmation_of_disarming_is_none_of_arming(vehicle, link):
     with ThreadPoolExecutor() as pool:
         arming = pool.submit(link.supervisor.arm)
         vehicle.wait_for_packets(9, 1)
-        vehicle.say(9, 1, b"\x81\1\0")
+        vehicle.send(9, 1, b"\x81\1\0")
         # Were it taken, nothing would be sent again.
         assert len(vehicle.wait_for_packets(9, 1, 2)) >= 2
         vehicle.deaf.clear()

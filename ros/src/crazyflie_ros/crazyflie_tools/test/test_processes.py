@@ -126,7 +126,7 @@ def silent_uri():
 def test_a_silent_port_is_reported(silent_uri):
     status, out, err = run("listParams", "--uri", silent_uri)
     assert (status, out) == (1, "")
-    assert "nobody has answered within 2 s" in err
+    assert "no answer has come within 2 s" in err
 
 
 def test_the_time_limit_ends_the_process(silent_uri):

@@ -125,7 +125,7 @@ def test_the_console_is_printed_line_by_line_until_the_link_is_lost(answer, vehi
         # Reading the tables comes before the vehicle is frozen: wait for a ping.
         vehicle.wait_for_packets(15, 0, 3)
         for piece in (b"SYS: up and ", b"running\nESTIMATOR: Kal", b"man\n"):
-            vehicle.say(0, 0, piece)
+            vehicle.send(0, 0, piece)
         vehicle.is_frozen = True
 
     speaker = threading.Thread(target=speak)

@@ -16,7 +16,7 @@ from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.refusal import RefusalError
 
-_LEAVE_LIMIT = 7.0
+_DESCENT_LIMIT = 7.0
 """Longest descent at a shutdown, s: the process is killed after 10 s."""
 
 
@@ -54,7 +54,7 @@ class ControllerNode(Node):
     needed_in_flight = True
 
     def __init__(self) -> None:
-        self._announced = False
+        self._is_inhibited = False
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -65,7 +65,7 @@ class ControllerNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._publisher = handle.publisher("cmd_vel", Twist)
-        self._announce_flight = handle.inhibit_shutdown()
+        self._inhibit_shutdown = handle.inhibit_shutdown()
         self._source = PoseSource(handle, self._parameters)
         handle.advertise_service("takeoff", Empty, self._on_takeoff)
         handle.advertise_service("land", Empty, self._on_land)
@@ -78,7 +78,7 @@ class ControllerNode(Node):
         # On the ground, or landing already.
         with contextlib.suppress(RefusalError):
             self._flight.land()
-        self._flight.land_within(_LEAVE_LIMIT)
+        self._flight.land_within(_DESCENT_LIMIT)
 
     def _reconfigure(self, parameters):
         self._controller.reconfigure(parameters.pids)
@@ -130,6 +130,6 @@ class ControllerNode(Node):
         if self._flight.state is not before:
             self._handle.info(self._flight.state.value)
         in_flight = self._flight.state is not State.IDLE
-        if in_flight is not self._announced:
-            self._announced = in_flight
-            self._announce_flight(in_flight)
+        if in_flight is not self._is_inhibited:
+            self._is_inhibited = in_flight
+            self._inhibit_shutdown(in_flight)

@@ -1,4 +1,4 @@
-"""A flight from the ground to a goal and back, as a state machine driven by `GoToFlight.tick`.
+"""A flight from the ground to a goal and back, as a state machine.
 
 Times are s of any monotonic clock; after a reset of the clock, a manoeuvre continues.
 """
@@ -46,29 +46,21 @@ TOUCHDOWN_DURATION = 1.0
 """Duration of that part, s; zero thrust follows."""
 
 
-_UNKNOWN = Pose(0.0, 0.0, 0.0, 0.0)
-"""Placeholder before the first pose; never used for control."""
-
-
 class State(Enum):
-    """States of the controller, with the words of its messages."""
+    """States of the controller, as its messages name them."""
 
     IDLE = "idle"
     TAKING_OFF = "taking off"
     AUTOMATIC = "automatic"
     LANDING = "landing"
+    TOUCHING_DOWN = "touching down"
 
 
 class GoToFlight:
     """One vehicle's flights.
 
-    Without a new pose within `HOLD_LIMIT`, a vehicle in the air gets no setpoints, so
-    that its own watchdog levels it out. After `OFF_AGE` its motors are off, and the
-    flight has ended.
-
-    Parameters
-    ----------
-    controller : GoToController
+    Without a new pose within `HOLD_LIMIT`, a vehicle in the air gets no setpoints, so that its own
+    watchdog levels it out. After `OFF_AGE` its motors are off, and the flight has ended.
     """
 
     def __init__(self, controller: GoToController):
@@ -76,8 +68,8 @@ class GoToFlight:
         self._state = State.IDLE
         self._warning: str | None = None
         self._goal: Pose | None = None
-        self._hover = _UNKNOWN
-        self._pose = _UNKNOWN
+        # Never used before the first pose.
+        self._pose = self._hover = self._descent_start = Pose(0.0, 0.0, 0.0, 0.0)
         self._stamp: float | None = None
         self._pose_time = -math.inf
         self._time = -math.inf
@@ -85,9 +77,8 @@ class GoToFlight:
         self._interval: float | None = None
         self._setpoint: Setpoint | None = Setpoint()
         self._ground = 0.0
-        self._descent_from = _UNKNOWN
         self._descent_speed = DESCENT_SPEED
-        self._touchdown: tuple[float, float] | None = None
+        self._touchdown_thrust = 0.0
 
     @property
     def state(self) -> State:
@@ -104,13 +95,7 @@ class GoToFlight:
         self._goal = goal
 
     def take_off(self) -> None:
-        """Start a takeoff.
-
-        Raises
-        ------
-        RefusalError
-            The vehicle is in flight, or there is no new pose.
-        """
+        """Start a takeoff; `RefusalError` if the vehicle is in flight, or without a new pose."""
         if self._state is not State.IDLE:
             raise RefusalError(f"the controller is {self._state.value}; land first")
         if self._is_pose_older_than(HOLD_LIMIT):
@@ -119,45 +104,27 @@ class GoToFlight:
         self._enter(State.TAKING_OFF)
 
     def land(self) -> None:
-        """Start a landing at the vehicle's position.
-
-        Raises
-        ------
-        RefusalError
-            The vehicle is on the ground, or landing already.
-        """
-        if self._state in (State.IDLE, State.LANDING):
-            raise RefusalError(f"the controller is {self._state.value}")
-        self._descent_from = self._pose
-        self._descent_speed = DESCENT_SPEED
-        self._touchdown = None
+        """Start a landing at the vehicle's position; `RefusalError` on the ground or in one."""
         if self._state is State.TAKING_OFF:
             self._touch_down()
-        self._enter(State.LANDING)
+        elif self._state is State.AUTOMATIC:
+            self._descent_start, self._descent_speed = self._pose, DESCENT_SPEED
+            self._enter(State.LANDING)
+        else:
+            raise RefusalError(f"the controller is {self._state.value}")
 
-    def land_within(self, within: float) -> None:
+    def land_within(self, limit: float) -> None:
         """Speed a descent up to end within a time (s); other states are not affected."""
-        if self._state is State.LANDING and self._touchdown is None:
-            self._descent_from = self._descent_from._replace(z=self._pose.z)
-            self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / within)
+        if self._state is State.LANDING:
+            self._descent_start = self._descent_start._replace(z=self._pose.z)
+            self._descent_speed = max(DESCENT_SPEED, (self._pose.z - self._ground) / limit)
             self._enter(State.LANDING)
 
     def tick(self, time: float, stamp: float | None, pose: Pose | None) -> Setpoint | None:
-        """Return the setpoint for this time.
+        """Return the setpoint for a time (s); None leaves the vehicle to its own watchdog.
 
-        Parameters
-        ----------
-        time : float
-            Now, s.
-        stamp : float or None
-            Of the pose, s of any clock; the same stamp is the same pose.
-        pose : Pose or None
-            The latest one; None when there is none.
-
-        Returns
-        -------
-        Setpoint or None
-            None to leave the vehicle to its own watchdog.
+        The pose is the latest one, None if there is none. Its stamp is in s of any clock; the same
+        stamp is the same pose.
         """
         self._follow_clock(time)
         self._update_pose(stamp, pose)
@@ -166,7 +133,7 @@ class GoToFlight:
 
     # One action for each state.
 
-    def _rest(self):
+    def _idle(self):
         return Setpoint()
 
     def _take_off(self):
@@ -186,28 +153,29 @@ class GoToFlight:
         return self._fly_to(self._hover if self._goal is None else self._goal)
 
     def _land(self):
-        touchdown = self._touchdown
-        if touchdown is None:
-            elapsed = self._time - self._entered
-            start = self._descent_from
-            lowest = min(self._ground - PRESS_DEPTH, start.z)
-            limit = max(start.z - self._ground, 0.0) / self._descent_speed + DESCENT_MARGIN
-            if self._pose.z > self._ground + LIFT_OFF_HEIGHT and elapsed <= limit:
-                z = max(start.z - self._descent_speed * elapsed, lowest)
-                return self._fly_to(start._replace(z=z))
-            touchdown = self._touch_down()
-        began, thrust = touchdown
-        elapsed = self._time - began
+        elapsed = self._time - self._entered
+        start = self._descent_start
+        lowest = min(self._ground - PRESS_DEPTH, start.z)
+        limit = max(start.z - self._ground, 0.0) / self._descent_speed + DESCENT_MARGIN
+        if self._pose.z > self._ground + LIFT_OFF_HEIGHT and elapsed <= limit:
+            z = max(start.z - self._descent_speed * elapsed, lowest)
+            return self._fly_to(start._replace(z=z))
+        self._touch_down()
+        return self._sink()
+
+    def _sink(self):
+        elapsed = self._time - self._entered
         if elapsed >= TOUCHDOWN_DURATION:
             self._enter(State.IDLE)
             return Setpoint()
-        return Setpoint(thrust=max(thrust - TOUCHDOWN_RATE * elapsed, 0.0))
+        return Setpoint(thrust=max(self._touchdown_thrust - TOUCHDOWN_RATE * elapsed, 0.0))
 
     _ACTIONS = {
-        State.IDLE: _rest,
+        State.IDLE: _idle,
         State.TAKING_OFF: _take_off,
         State.AUTOMATIC: _go,
         State.LANDING: _land,
+        State.TOUCHING_DOWN: _sink,
     }
 
     def _fly_to(self, goal):
@@ -229,9 +197,8 @@ class GoToFlight:
         return Setpoint()
 
     def _touch_down(self):
-        thrust = 0.0 if self._setpoint is None else self._setpoint.thrust
-        self._touchdown = (self._time, thrust)
-        return self._touchdown
+        self._touchdown_thrust = 0.0 if self._setpoint is None else self._setpoint.thrust
+        self._enter(State.TOUCHING_DOWN)
 
     def _enter(self, state):
         self._state = state
@@ -258,6 +225,4 @@ class GoToFlight:
             step = time - self._time
             self._pose_time += step
             self._entered += step
-            if self._touchdown is not None:
-                self._touchdown = (self._touchdown[0] + step, self._touchdown[1])
         self._time = time

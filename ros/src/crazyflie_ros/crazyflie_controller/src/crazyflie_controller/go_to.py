@@ -21,16 +21,8 @@ class Pose(NamedTuple):
 class Setpoint(NamedTuple):
     """What cmd_vel carries.
 
-    Attributes
-    ----------
-    pitch : float
-        deg, positive accelerates ahead: ``linear.x``.
-    roll : float
-        deg, positive accelerates to the right: ``linear.y``.
-    thrust : float
-        PWM: ``linear.z``.
-    yaw_rate : float
-        deg/s, positive is clockwise: ``angular.z``.
+    Pitch (deg, positive accelerates ahead) is ``linear.x``, roll (deg, positive accelerates to the
+    right) ``linear.y``, thrust (PWM) ``linear.z``, yaw rate (deg/s, clockwise) ``angular.z``.
     """
 
     pitch: float = 0.0
@@ -40,17 +32,11 @@ class Setpoint(NamedTuple):
 
 
 class GoToController:
-    """Four PID controllers on the error in the vehicle's heading frame.
+    """Four PID controllers on the error in the vehicle's heading frame (ahead, to the left, up).
 
-    The position error is the goal's position there: ahead, to the left, up. The
-    vehicle's tilt is left out of it on purpose: to a vehicle that leans ahead, a goal
-    far below would seem to lie ahead, and make it lean even more.
-
-    Parameters
-    ----------
-    parameters : dict of str to PidParameters
-        One for each of `AXES`; their outputs are pitch, roll, thrust and yaw rate of
-        `Setpoint`, from errors in m and rad.
+    The tilt is left out on purpose: to a vehicle that leans ahead, a goal far below would seem to
+    lie ahead, and make it lean even more. Parameters are by `AXES`; outputs are pitch, roll, thrust
+    and yaw rate of `Setpoint`, from errors in m and rad.
     """
 
     def __init__(self, parameters: dict[str, PidParameters]):
@@ -83,12 +69,8 @@ class GoToController:
     def update(self, pose: Pose, goal: Pose, interval: float) -> Setpoint:
         """Return the setpoint.
 
-        Parameters
-        ----------
-        pose, goal : Pose
-        interval : float
-            Time between the last pose and this one, s; > 0 except after
-            `restart_derivatives`.
+        The interval is the time between the last pose and this one, s; > 0 except after
+        `restart_derivatives`.
         """
         error = [*(g - p for g, p in zip(goal[:3], pose[:3], strict=True))]
         error.append(wrap_to_pi(goal.yaw - pose.yaw))
@@ -100,17 +82,9 @@ class GoToController:
             change[3] = wrap_to_pi(change[3])
             slope = [c / interval for c in change]
         self._error = error
-        outputs = [
-            pid.update(its_error, its_slope, interval)
-            for pid, its_error, its_slope in zip(
-                self._pids,
-                _in_heading_frame(error, pose.yaw),
-                _in_heading_frame(slope, pose.yaw),
-                strict=True,
-            )
-        ]
-        pitch, roll, thrust, yaw_rate = outputs
-        return Setpoint(pitch, roll, thrust, yaw_rate)
+        errors, slopes = _in_heading_frame(error, pose.yaw), _in_heading_frame(slope, pose.yaw)
+        columns = zip(self._pids, errors, slopes, strict=True)
+        return Setpoint(*(pid.update(e, rate, interval) for pid, e, rate in columns))
 
 
 def _in_heading_frame(error, yaw):

@@ -43,10 +43,6 @@ class SaturatedPid:
 
     The integral itself, not its part in the output, is limited against windup; see also
     `INTEGRATED_ERROR`.
-
-    Parameters
-    ----------
-    parameters : PidParameters
     """
 
     def __init__(self, parameters: PidParameters):
@@ -75,16 +71,9 @@ class SaturatedPid:
             self._integrate(output / self._parameters.ki)
 
     def update(self, error: float, slope: float, interval: float) -> float:
-        """Return the output.
+        """Return the output for an error (goal minus measurement) and its slope (per s).
 
-        Parameters
-        ----------
-        error : float
-            Goal minus measurement.
-        slope : float
-            Rate of change of the error, per s.
-        interval : float
-            Time since the last update, s, >= 0.
+        The interval is the time since the last update, s, >= 0.
         """
         gains = self._parameters
         integrated = min(max(error, -INTEGRATED_ERROR), INTEGRATED_ERROR)

@@ -21,13 +21,7 @@ class PoseParameters(WorldFrameParameters):
 
 
 class PoseSource:
-    """The latest pose of a vehicle; a warning while there is none.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    parameters : PoseParameters
-    """
+    """The latest pose of a vehicle; a warning while there is none."""
 
     def __init__(self, handle: NodeHandle, parameters: PoseParameters):
         self._handle = handle

@@ -1,7 +1,7 @@
-"""A Crazyflie as scripts see it: the driver's services as methods.
+"""The driver's services as methods of a class: the module that users' scripts import by this name.
 
-The module that users' scripts import by this name. Such a script is a node of its own and
-calls rospy.init_node first; so this is plain rospy, and its methods block.
+Such a script is a node of its own and calls rospy.init_node first: this is plain rospy, and its
+methods block.
 """
 
 import contextlib
@@ -58,9 +58,10 @@ _SERVICES = {
 
 
 class Crazyflie:
-    """A vehicle that the driver flies, or a simulated one; waits until it is there.
+    """A vehicle of the driver, or a simulated one; the constructor blocks until it is there.
 
-    A command returns when the vehicle has received it, not when it has been carried out.
+    A command returns when the vehicle has received it, not when it has been carried out. Every
+    method raises `rospy.ServiceException` when the driver refuses.
 
     Parameters
     ----------
@@ -69,11 +70,6 @@ class Crazyflie:
     tf : str or tf.TransformListener or tf2_ros.Buffer
         For `position` only: the vehicle's tf frame; or a listener or buffer, which is asked for
         the frame ``prefix``.
-
-    Raises
-    ------
-    rospy.ServiceException
-        By every method: the driver refuses.
     """
 
     # The names of arguments, here and below, are those of scripts that exist.
@@ -141,16 +137,7 @@ class Crazyflie:
         self._call("go_to", groupMask, relative, Point(*goal), yaw, period)
 
     def uploadTrajectory(self, trajectoryId: int, pieceOffset: int, trajectory: Trajectory) -> None:  # noqa: N802, N803
-        """Write a trajectory into the vehicle's memory.
-
-        Parameters
-        ----------
-        trajectoryId : int
-            What to call it.
-        pieceOffset : int
-            Pieces in the memory before it.
-        trajectory : uav_trajectory.Trajectory
-        """
+        """Write a trajectory into the vehicle's memory, after ``pieceOffset`` pieces."""
         pieces = [
             TrajectoryPolynomialPiece(
                 *(axis.p.tolist() for axis in (piece.px, piece.py, piece.pz, piece.pyaw)),
@@ -172,12 +159,9 @@ class Crazyflie:
         self._call("start_trajectory", groupMask, trajectoryId, timescale, reverse, relative)
 
     def position(self) -> NDArray[np.float64]:
-        """Return where tf has the vehicle, shape (3,), m in the fixed frame.
+        """Return the vehicle's position by tf, shape (3,), m in the fixed frame.
 
-        Raises
-        ------
-        tf2_ros.TransformException, tf.Exception
-            It has not been seen for 10 s.
+        Raises `tf2_ros.TransformException` or `tf.Exception` when there was none for 10 s.
         """
         deadline = time.monotonic() + _TF_LIMIT
         while True:
@@ -200,7 +184,10 @@ class Crazyflie:
             self.tf.waitForTransform(*frames, latest, limit)
             stamp = self.tf.getLatestCommonTime(*frames)
             return stamp, self.tf.lookupTransform(*frames, latest)[0]
-        buffer = self._listening_buffer() if isinstance(self.tf, str) else self.tf
+        if isinstance(self.tf, str) and self._buffer is None:
+            self._buffer = tf2_ros.Buffer()
+            self._listener = tf2_ros.TransformListener(self._buffer)
+        buffer: Any = self._buffer if isinstance(self.tf, str) else self.tf
         found = buffer.lookup_transform(self._world, self._frame().strip("/"), latest, limit)
         p = found.transform.translation
         return found.header.stamp, (p.x, p.y, p.z)
@@ -208,20 +195,8 @@ class Crazyflie:
     def _frame(self):
         return self.tf if isinstance(self.tf, str) else self.prefix
 
-    def _listening_buffer(self):
-        if self._buffer is None:
-            self._buffer = tf2_ros.Buffer()
-            self._listener = tf2_ros.TransformListener(self._buffer)
-        return self._buffer
-
     def getVoltage(self) -> float:  # noqa: N802
-        """Return the voltage of the battery, V.
-
-        Raises
-        ------
-        rospy.ROSException
-            No voltage was published for 10 s.
-        """
+        """Return the battery's voltage, V; `rospy.ROSException` if none comes for 10 s."""
         return rospy.wait_for_message(f"{self.prefix}/battery", Float32, _TF_LIMIT).data
 
     # Setpoints: the firmware levels out 0.5 s after the last one.
@@ -280,7 +255,7 @@ def _commander(prefix):
     rospy.loginfo("waiting for update_params below %s or %s", *map(rospy.resolve_name, tops))
     while True:
         for top in tops:
-            # It is not there yet, which was said above.
+            # It is not there yet; the wait is logged above.
             with contextlib.suppress(rospy.ROSException):
                 rospy.wait_for_service(f"{top}/update_params", 0.2)
                 return top

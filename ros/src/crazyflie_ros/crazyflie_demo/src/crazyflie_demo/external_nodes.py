@@ -1,4 +1,4 @@
-"""ROS interface between motion capture of others and a vehicle's estimator."""
+"""ROS interface between VRPN or Vicon and a vehicle's estimator."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +23,7 @@ class _ExternalNode(Node):
     finite: str
     output: str
     output_type: type
-    convert: Callable[[Any], Any]
+    _convert: Callable[[Any], Any]
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -37,7 +37,7 @@ class _ExternalNode(Node):
         )
 
     def _on_measurement(self, message):
-        self._publisher.publish(self.convert(message))
+        self._publisher.publish(self._convert(message))
 
 
 class ExternalPoseViconNode(_ExternalNode):
@@ -47,8 +47,7 @@ class ExternalPoseViconNode(_ExternalNode):
     output, output_type = "external_pose", PoseStamped
 
     @staticmethod
-    def convert(message: TransformStamped) -> PoseStamped:
-        """Return the pose that a transform is."""
+    def _convert(message: TransformStamped) -> PoseStamped:
         pose = PoseStamped(header=message.header)
         pose.pose.position = _point(message)
         pose.pose.orientation = message.transform.rotation
@@ -62,8 +61,7 @@ class ExternalPositionViconNode(_ExternalNode):
     output, output_type = "external_position", PointStamped
 
     @staticmethod
-    def convert(message: TransformStamped) -> PointStamped:
-        """Return the position in a transform."""
+    def _convert(message: TransformStamped) -> PointStamped:
         return PointStamped(message.header, _point(message))
 
 
@@ -74,8 +72,7 @@ class ExternalPositionVrpnNode(_ExternalNode):
     output, output_type = "external_position", PointStamped
 
     @staticmethod
-    def convert(message: PoseStamped) -> PointStamped:
-        """Return the position in a pose."""
+    def _convert(message: PoseStamped) -> PointStamped:
         return PointStamped(message.header, message.pose.position)
 
 

@@ -34,7 +34,7 @@ _RAMP_INTEGRAL = (0.0, 0.0, 0.0, 0.0, 2.5, -3.0, 1.0)
 def phase(time: float) -> NDArray[np.float64]:
     """Return the phase and its first three derivatives, shape (4,), at a time (s)."""
     if time > DURATION - RAMP:
-        # The end is the beginning, backwards.
+        # The end is the beginning in reverse.
         mirrored = phase(DURATION - time)
         return np.array([2.0 * math.pi, 0.0, 0.0, 0.0]) - [1.0, -1.0, 1.0, -1.0] * mirrored
     s = min(time / RAMP, 1.0)
@@ -47,12 +47,7 @@ def sine(amplitude: float, multiple: int, time: float) -> NDArray[np.float64]:
     p, v, a, j = multiple * phase(time)
     sin, cos = math.sin(p), math.cos(p)
     return amplitude * np.array(
-        [
-            sin,
-            v * cos,
-            a * cos - v * v * sin,
-            j * cos - 3.0 * v * a * sin - v**3 * cos,
-        ]
+        [sin, v * cos, a * cos - v * v * sin, j * cos - 3.0 * v * a * sin - v**3 * cos]
     )
 
 

@@ -1,8 +1,6 @@
 """Base class of flights by high-level commands: one service call after the other."""
 
 from collections import deque
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
 import genpy
@@ -20,9 +18,11 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import Number
+from crazyflie_utils.parameters.writer import ParameterWriter
 
 _LIMIT = 15.0
-"""Longest time of a service call, and of the driver's connection before the first one, s."""
+"""Longest time of a service call, of the driver's connection before the first one, and of the
+master's answer, s."""
 
 _PAUSE = 0.5
 """Between the end of one manoeuvre and the next, s."""
@@ -36,25 +36,17 @@ _HIGH_LEVEL = "commander/enHighLevel"
 
 
 class Step(NamedTuple):
-    """A service call.
+    """A call of a service in the node's namespace.
 
-    Attributes
-    ----------
-    service : str
-        In the node's namespace.
-    service_type : type
-    request : genpy.Message
-    duration : float
-        Of the manoeuvre that it starts, s.
-    parameters : dict of str to int
-        Set before the call: name in the node's namespace -> value.
+    It starts a manoeuvre of a duration (s). The parameter (name in the node's namespace, value) is
+    set before the call.
     """
 
     service: str
     service_type: type
     request: genpy.Message
     duration: float = 0.0
-    parameters: Mapping[str, int] = MappingProxyType({})
+    parameter: tuple[str, int] | None = None
 
 
 class FlightPlanParameters(Parameters):
@@ -102,7 +94,7 @@ class FlightPlanNode(Node):
                 # Answered when the driver has connected and read all parameters of the vehicle,
                 # which overwrites those that were set before.
                 Step("update_params", UpdateParams, UpdateParamsRequest()),
-                Step("update_params", UpdateParams, enable, parameters={_HIGH_LEVEL: 1}),
+                Step("update_params", UpdateParams, enable, parameter=(_HIGH_LEVEL, 1)),
                 *self.preparations(),
                 Step("takeoff", Takeoff, takeoff, duration),
                 *self.manoeuvres(),
@@ -110,6 +102,7 @@ class FlightPlanNode(Node):
                 Step("stop", Stop, StopRequest()),
             ]
         )
+        self._writer = ParameterWriter(self._write, lambda text: handle.submit(self._end, text))
         self._next()
 
     @override
@@ -125,8 +118,26 @@ class FlightPlanNode(Node):
     def _next(self):
         step = self._steps[0]
         self._handle.info(f"{step.service}, {step.duration:g} s")
-        for name, value in step.parameters.items():
-            self._handle.set_param(name, value)
+        if step.parameter is None:
+            self._call(step)
+            return
+        name, value = step.parameter
+        error = f"parameter {self._handle.resolve(name)} is not set within {_LIMIT:g} s"
+        self._timer = self._handle.timer(_LIMIT, lambda: self._end(error))
+        self._writer.set(name, value)
+
+    def _write(self, name, value):
+        # In the writer's thread: the master may be slow.
+        self._handle.set_param(name, value)
+        self._handle.submit(self._on_parameter_set)
+
+    def _on_parameter_set(self):
+        # Later than the limit there are no steps any more.
+        if self._steps:
+            self._timer.stop()
+            self._call(self._steps[0])
+
+    def _call(self, step):
         # A takeoff may have started although its call fails.
         self._is_flying |= step.service == "takeoff"
         answer = self._handle.call_service(step.service, step.service_type, step.request, _LIMIT)
@@ -136,21 +147,28 @@ class FlightPlanNode(Node):
         step = self._steps.popleft()
         error = done.exception()
         if error is not None:
-            self._handle.error(f"{self._handle.resolve(step.service)} failed: {error}")
-            self._handle.end(1)
-        elif not self._steps:
-            self._handle.info("done")
-            self._handle.end(0)
+            self._end(f"{self._handle.resolve(step.service)} failed: {error}")
+            return
+        if step.service == "land":
+            self._is_flying = False
+        if not self._steps:
+            self._end()
         elif step.duration > 0.0:
             self._timer = self._handle.timer(step.duration + _PAUSE, self._on_pause)
         else:
             self._next()
-        if error is None and step.service == "land":
-            self._is_flying = False
 
     def _on_pause(self):
         self._timer.stop()
         self._next()
+
+    def _end(self, error=""):
+        self._steps.clear()
+        if error:
+            self._handle.error(error)
+        else:
+            self._handle.info("done")
+        self._handle.end(1 if error else 0)
 
 
 def seconds(duration: float) -> genpy.Duration:

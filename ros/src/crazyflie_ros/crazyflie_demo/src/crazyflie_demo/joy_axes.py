@@ -1,4 +1,4 @@
-"""The axes of a joystick at present, for nodes that follow them."""
+"""The latest axes of a joystick."""
 
 import math
 
@@ -7,26 +7,20 @@ from sensor_msgs.msg import Joy
 from crazyflie_utils import NodeHandle
 
 JOY_LIMIT = 0.5
-"""How long, in s, the last message counts of a joystick that is repeated all the time."""
+"""Age, s, at which the last message of a joystick that repeats itself expires."""
 
 REPEATED = "repeated"
-"""frame_id of a Joy whose publisher promises the next one well within `JOY_LIMIT`.
+"""frame_id, which has no other use, of a Joy whose publisher sends the next one within `JOY_LIMIT`.
 
-The field has no other use. Without the promise silence means that the sticks are held still;
-with it, that the publisher is stuck, which a connection does not show.
+Without it silence means that the sticks are held still; with it, that the publisher is stuck, which
+a connection does not show.
 """
 
 
 class JoyAxes:
-    """The axes that were received last, as long as their source is alive.
+    """The axes that were received last, as long as their publisher is connected.
 
-    It is alive while it is connected; one that promises to repeat itself (see
-    `REPEATED`) must keep the promise, too.
-
-    Parameters
-    ----------
-    handle : NodeHandle
-    topic : str
+    One that repeats itself (`REPEATED`) must not be silent, either.
     """
 
     def __init__(self, handle: NodeHandle, topic: str):
@@ -41,9 +35,9 @@ class JoyAxes:
         self._expiry = self._handle.time() + JOY_LIMIT if is_repeated else math.inf
 
     def are_alive(self) -> bool:
-        """Tell whether there is a joystick at present."""
+        """Return whether there is a joystick at present."""
         if not self._subscriber.has_publishers():
-            # What a source said before it went does not count when another one comes.
+            # Its last message does not count when another publisher comes.
             self._expiry = -math.inf
         return self._handle.time() <= self._expiry
 

@@ -12,7 +12,7 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TEXT, Number
 
 _POLL_PERIOD = 0.01
-"""Time between two looks at the device, s."""
+"""Time between two reads of the device, s."""
 
 _OPEN_PERIOD = 1.0
 """Time between two tries to open it, s."""
@@ -46,8 +46,8 @@ class JoyNodeParameters(Parameters):
 class JoyNode(Node):
     """Publish the state of a joystick.
 
-    The device is looked for again and again. When it is unplugged, one message has all
-    axes and buttons at zero.
+    The device is opened again and again. When it is unplugged, one message has all axes and buttons
+    at zero.
     """
 
     def __init__(self) -> None:

@@ -22,19 +22,8 @@ JoystickState = tuple[list[float], list[int]]
 class Joystick:
     """Axes and buttons of a joystick, as far as there were events of them.
 
-    Parameters
-    ----------
-    deadzone : float
-        How far an axis may be off its centre without counting, as a fraction, < 1.
-
-    Attributes
-    ----------
-    axes : list of float
-        -1 to 1; left and up are positive.
-    buttons : list of int
-        1 is pressed.
-    deadzone : float
-        For the events to come.
+    Axes are -1 to 1, left and up positive; within the deadzone (a fraction, < 1) of the centre they
+    are 0. A pressed button is 1.
     """
 
     def __init__(self, deadzone: float = 0.0):
@@ -44,13 +33,9 @@ class Joystick:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[JoystickState]:
-        """Take what has been read from the device.
+        """Return the states that data from the device bring about.
 
-        Returns
-        -------
-        list of tuple
-            The states (axes, buttons) that have come about: one after every change of a
-            button, so that no short press is lost, and the last one.
+        There is one after every change of a button, so that no short press is lost, and the last.
         """
         data = self._rest + data
         whole = len(data) - len(data) % EVENT.size

@@ -9,6 +9,7 @@ from crazyflie_demo.parameters import JoyParameters
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, Integer
+from crazyflie_utils.parameters.writer import ParameterWriter
 
 _HEADLIGHT_PARAMETER = "ring/headlightEnable"
 
@@ -42,6 +43,7 @@ class JoystickControllerNode(Node):
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
+        self._writer = ParameterWriter(self._switch, handle.error)
         handle.subscribe(self._parameters.joy_topic, Joy, self._on_joy)
 
     def _on_joy(self, message):
@@ -57,17 +59,15 @@ class JoystickControllerNode(Node):
         elif button in (LAND, TAKEOFF) and self._parameters.has_controller:
             self._call("land" if button == LAND else "takeoff")
         elif button == HEADLIGHT:
-            self._switch_headlight()
+            self._writer.set(_HEADLIGHT_PARAMETER, None)
 
-    def _switch_headlight(self):
-        name = self._handle.resolve(_HEADLIGHT_PARAMETER)
+    def _switch(self, name, _):
+        # In the writer's thread: the master may be slow, and no other button may wait for it.
         is_on = self._handle.get_param(name, Integer(0, 255), 0)
         self._handle.set_param(name, 0 if is_on else 1)
-        request = UpdateParamsRequest([_HEADLIGHT_PARAMETER])
-        self._call("update_params", UpdateParams, request)
+        self._handle.submit(self._call, "update_params", UpdateParams, UpdateParamsRequest([name]))
 
     def _call(self, service, service_type=Empty, request=None):
-        request = EmptyRequest() if request is None else request
         self._handle.info(f"{self._handle.resolve(service)} requested")
 
         def report(done):
@@ -75,4 +75,5 @@ class JoystickControllerNode(Node):
             if error is not None:
                 self._handle.error(f"{self._handle.resolve(service)} failed: {error}")
 
-        self._handle.call_service(service, service_type, request, _LIMIT).add_done_callback(report)
+        answer = self._handle.call_service(service, service_type, request or EmptyRequest(), _LIMIT)
+        answer.add_done_callback(report)

@@ -1,23 +1,14 @@
-"""A keyboard in the place of a joystick: keys come, axes and buttons go out.
+"""A keyboard in the place of a joystick: keys become axes and buttons.
 
-A terminal reports a key when it is pressed and repeats it while it is held, but does not
-report its release. So a deflection lasts until the next repetition is due.
+A terminal reports a key when it is pressed and repeats it while it is held, but does not report its
+release. So a deflection lasts until the next repetition is due.
 """
 
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from crazyflie_demo.gamepad import (
-    AXES,
-    EMERGENCY,
-    HEADLIGHT,
-    LAND,
-    PITCH,
-    ROLL,
-    TAKEOFF,
-    THRUST,
-    YAW,
-)
+from crazyflie_demo import gamepad
+from crazyflie_demo.gamepad import PITCH, ROLL, THRUST, YAW
 
 FIRST_HOLD = 0.6
 """How long a key counts as held after it was pressed, s: repetition begins late."""
@@ -36,7 +27,12 @@ _DEFLECTIONS = {
     "d": (YAW, -1.0),
 }
 
-_PRESSES = {"t": TAKEOFF, "l": LAND, " ": EMERGENCY, "h": HEADLIGHT}
+_PRESSES = {
+    "t": gamepad.TAKEOFF,
+    "l": gamepad.LAND,
+    " ": gamepad.EMERGENCY,
+    "h": gamepad.HEADLIGHT,
+}
 
 _RELEASE = "x"
 
@@ -55,18 +51,8 @@ class _Deflection(NamedTuple):
 class Keyboard:
     """Axes and buttons that keys move.
 
-    Parameters
-    ----------
-    deflection : float
-        How far a key moves an axis, up to 1.
-    lift_step : float
-        0: w and s move their axis while they are held, like the others. Otherwise each
-        time by this much, and it stays there, from 0 to 1: a thrust.
-
-    Attributes
-    ----------
-    deflection : float
-        For the keys to come.
+    A key moves its axis to the deflection, up to 1. With a lift step of 0, so do w and s; otherwise
+    they move the thrust by this step, and it stays, from 0 to 1.
     """
 
     def __init__(self, deflection: float, lift_step: float = 0.0):
@@ -77,7 +63,7 @@ class Keyboard:
         self._rest = ""
 
     def feed(self, text: str, time: float) -> list[int]:
-        """Take what was typed until ``time`` (s); return the buttons that were pressed."""
+        """Return the buttons that were pressed by text that was typed until ``time`` (s)."""
         presses = []
         for key in self._keys(text):
             if key in _PRESSES:
@@ -91,7 +77,7 @@ class Keyboard:
 
     def axes(self, time: float) -> list[float]:
         """Return the axes at ``time`` (s)."""
-        axes = [0.0] * AXES
+        axes = [0.0] * gamepad.AXES
         for axis, held in self._held.items():
             if time < held.until:
                 axes[axis] = held.value

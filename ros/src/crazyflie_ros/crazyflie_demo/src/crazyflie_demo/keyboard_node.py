@@ -35,7 +35,7 @@ class KeyboardParameters(Parameters):
 
 
 class KeyboardNode(Node):
-    """Publish what is typed on the terminal as if a joystick had done it."""
+    """Publish the keys of the terminal as the axes and buttons of a joystick."""
 
     def __init__(self) -> None:
         self._presses: deque[int] = deque()

@@ -18,7 +18,7 @@ class PositionFlightParameters(SetpointParameters):
     y: float = parameter(METRES, "start of the flight", 0.0)
     height: float = parameter(Number("m", above=0.0, maximum=3.0), "how high it flies", 0.4)
     distance: float = parameter(METRES, "how far ahead and to the left it goes", 0.2)
-    speed: float = parameter(Number("m/s", above=0.0, maximum=1.0), "of all ways", 0.2)
+    speed: float = parameter(Number("m/s", above=0.0, maximum=1.0), "of the whole flight", 0.2)
 
 
 class PositionFlightNode(StreamNode):
@@ -33,9 +33,9 @@ class PositionFlightNode(StreamNode):
         above = [0.0, 0.0, p.height]
         # Each place twice, to stay there for a second.
         places = np.repeat([[0.0, 0.0, 0.0], above, side, above, [0.0, 0.0, 0.0]], 2, axis=0)
-        ways = np.linalg.norm(np.diff(places, axis=0), axis=1) / p.speed
-        ways[ways == 0.0] = 1.0
-        self._times = np.concatenate([[0.0], np.cumsum(ways)])
+        durations = np.linalg.norm(np.diff(places, axis=0), axis=1) / p.speed
+        durations[durations == 0.0] = 1.0
+        self._times = np.concatenate([[0.0], np.cumsum(durations)])
         self._places = places + [p.x, p.y, 0.0]
         self.duration, self.rate = float(self._times[-1]), p.rate
 

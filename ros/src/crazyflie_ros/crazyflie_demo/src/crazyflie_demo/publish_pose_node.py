@@ -1,4 +1,4 @@
-"""ROS interface of a goal that stays where it is, and of one that is moved by hand."""
+"""ROS interface of a constant goal, and of one that a joystick moves."""
 
 from geometry_msgs.msg import PoseStamped
 from typing_extensions import override
@@ -38,14 +38,14 @@ class PublishPoseTeleopParameters(PublishPoseParameters, JoyParameters):
     )
 
     @property
-    def axes(self) -> tuple[int, int, int, int]:
-        """Axes for x, y, z and yaw."""
-        return (self.x_axis, self.y_axis, self.z_axis, self.yaw_axis)
-
-    @property
-    def speeds(self) -> tuple[float, float, float, float]:
-        """Speeds along x, y, z (m/s) and of yaw (rad/s) at full deflection."""
-        return (self.x_speed, self.y_speed, self.z_speed, self.yaw_speed)
+    def axes(self) -> tuple[tuple[int, float], ...]:
+        """Axis and speed (m/s, rad/s) at full deflection, for x, y, z and yaw."""
+        return (
+            (self.x_axis, self.x_speed),
+            (self.y_axis, self.y_speed),
+            (self.z_axis, self.z_speed),
+            (self.yaw_axis, self.yaw_speed),
+        )
 
 
 class PublishPoseNode(Node):
@@ -96,8 +96,6 @@ class PublishPoseTeleopNode(PublishPoseNode):
         self._moved = now
         self._goal = [
             value + speed * self._axes.axis(axis) * elapsed
-            for value, speed, axis in zip(
-                self._goal, parameters.speeds, parameters.axes, strict=True
-            )
+            for value, (axis, speed) in zip(self._goal, parameters.axes, strict=True)
         ]
         super()._on_timer()

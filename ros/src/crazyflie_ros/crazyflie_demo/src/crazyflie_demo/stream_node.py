@@ -34,16 +34,8 @@ class StreamNode(Node):
 
     The last setpoint is repeated until the driver has accepted `finish`: without setpoints the
     firmware levels out after 0.5 s and stops the motors after 2 s. If the node is ended in
-    flight, the vehicle is landed.
-
-    Attributes
-    ----------
-    topic : str
-    message_type : type
-    duration : float
-        Of the flight, s.
-    rate : float
-        Setpoints a second, Hz. A subclass sets all of them, at the latest in `load_parameters`.
+    flight, the vehicle is landed. A subclass sets topic, message type, duration (s) and rate (Hz)
+    at the latest in `load_parameters`.
     """
 
     topic: str

@@ -1,4 +1,4 @@
-"""Files of trajectories made of polynomials, and what these ask of a vehicle."""
+"""Files of polynomial trajectories, and their speed and acceleration."""
 
 import csv
 import io
@@ -42,13 +42,9 @@ class TrajectoryFile(ParameterType):
 def load(path: str | Path) -> list[PolynomialPiece]:
     """Return the pieces of a trajectory in a CSV file.
 
-    Each line is a piece, with `COLUMNS` numbers; a first line without any number is a
-    heading, and empty lines do not count.
-
-    Raises
-    ------
-    TrajectoryError
-        The file cannot be read; a line is malformed; or two pieces do not meet.
+    Each line is a piece, with `COLUMNS` numbers; a first line without any number is a heading, and
+    empty lines do not count. Raises `TrajectoryError` for a file that cannot be read, a malformed
+    line, or two pieces that do not meet.
     """
     pieces = []
     for index, (line, cells) in enumerate(_rows(path)):
@@ -127,7 +123,7 @@ class Summary(NamedTuple):
 
 
 def summary(pieces: list[PolynomialPiece]) -> Summary:
-    """Return what a trajectory asks of a vehicle, from 100 points a piece."""
+    """Return duration and largest values of a trajectory, from 100 points a piece."""
     largest = [0.0, 0.0]
     for piece in pieces:
         times = np.linspace(0.0, piece.duration, 100, dtype=np.float64)

@@ -27,13 +27,7 @@ class TrajectoryStreamParameters(Parameters):
 
 
 class TrajectoryStreamNode(StreamNode):
-    """Stream a trajectory as it is in its file, in the world frame; then land.
-
-    Parameters
-    ----------
-    file : str
-        CSV file.
-    """
+    """Stream the trajectory of a CSV file as it is, in the world frame; then land."""
 
     message_type = FullState
 

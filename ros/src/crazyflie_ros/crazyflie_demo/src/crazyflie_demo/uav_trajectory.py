@@ -1,7 +1,4 @@
-"""Trajectories of polynomials, with what a vehicle has to do to fly them.
-
-Users' scripts know these classes as ``uav_trajectory``.
-"""
+"""Polynomial trajectories and their body rates; users' scripts import it as uav_trajectory."""
 
 import math
 from pathlib import Path
@@ -19,16 +16,10 @@ Array = NDArray[np.float64]
 
 
 class TrajectoryOutput(NamedTuple):
-    """What a trajectory asks for at some moment.
+    """A trajectory at a moment.
 
-    Attributes
-    ----------
-    pos, vel, acc : ndarray, shape (3,)
-        In the world frame: m, m/s, m/s^2.
-    omega : ndarray, shape (3,)
-        Angular velocity in the body frame (forward-left-up), rad/s.
-    yaw : float
-        rad.
+    Position (m), velocity (m/s) and acceleration (m/s^2) in the world frame, angular velocity in
+    the body frame (forward-left-up, rad/s), each of shape (3,); yaw (rad).
     """
 
     pos: Array
@@ -54,14 +45,9 @@ class Polynomial:
 
 
 class Polynomial4D:
-    """A piece of a trajectory: polynomials for x, y, z (m) and yaw (rad) of the time in it.
+    """A piece of a trajectory: polynomials for x, y, z (m) and yaw (rad) of the time (s) in it.
 
-    Parameters
-    ----------
-    duration : float
-        s.
-    px, py, pz, pyaw : array_like
-        Coefficients, at most eight each; kept as `Polynomial`.
+    They are given by their coefficients, at most eight each, and kept as `Polynomial`.
     """
 
     def __init__(
@@ -79,7 +65,7 @@ class Polynomial4D:
         return Polynomial4D(self.duration, *(axis.derivative().p for axis in axes))
 
     def eval(self, t: float) -> TrajectoryOutput:
-        """Return what the piece asks for ``t`` (s) after its beginning."""
+        """Return the piece at a time ``t`` (s) from its beginning."""
         axes = [evaluate(axis.p, t, 3) for axis in (self.px, self.py, self.pz)]
         position, velocity, acceleration, jerk = np.array(axes).T
         yaw, yaw_rate = map(float, evaluate(self.pyaw.p, t, 1))
@@ -88,38 +74,19 @@ class Polynomial4D:
 
 
 class Trajectory:
-    """Pieces, one after the other.
-
-    Attributes
-    ----------
-    polynomials : list of Polynomial4D
-    duration : float
-        Of all of them, s.
-    """
+    """Pieces, one after the other, and the duration (s) of all."""
 
     def __init__(self) -> None:
         self.polynomials: list[Polynomial4D] = []
         self.duration = 0.0
 
     def loadcsv(self, filename: str | Path) -> None:
-        """Take the pieces of a file.
-
-        Raises
-        ------
-        TrajectoryError
-            It holds no trajectory that can be flown; see `crazyflie_demo.trajectory_file`.
-        """
+        """Load a file; raises `TrajectoryError`, see `crazyflie_demo.trajectory_file.load`."""
         self.polynomials = [Polynomial4D(piece.duration, *piece.axes) for piece in load(filename)]
         self.duration = sum(piece.duration for piece in self.polynomials)
 
     def eval(self, t: float) -> TrajectoryOutput:
-        """Return what the trajectory asks for ``t`` (s) after its beginning, 0 to `duration`.
-
-        Raises
-        ------
-        ValueError
-            It is not in progress then.
-        """
+        """Return the trajectory at a time ``t`` (s), 0 to `duration`; otherwise `ValueError`."""
         if not self.polynomials or not 0.0 <= t <= self.duration:
             raise ValueError(f"t is {t:g} s; the trajectory takes 0 to {self.duration:g} s")
         for piece in self.polynomials[:-1]:
@@ -137,18 +104,9 @@ def angular_velocity(acceleration: Array, jerk: Array, yaw: float, yaw_rate: flo
     (ICRA 2011), with thrust along the body's z axis, and x axis and heading in one vertical
     plane. Its third component is theirs: the part of the yaw rate along that axis.
 
-    Parameters
-    ----------
-    acceleration, jerk : ndarray, shape (3,)
-        In the world frame: m/s^2, m/s^3.
-    yaw, yaw_rate : float
-        rad, rad/s.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        In the body frame (forward-left-up), rad/s. In free fall, and with the body's x axis
-        vertical, it is not defined: NaN.
+    Acceleration (m/s^2) and jerk (m/s^3) are of shape (3,), in the world frame; yaw and its rate
+    in rad and rad/s. The result, of shape (3,), is in the body frame (forward-left-up), rad/s; NaN
+    in free fall, and with the body's x axis vertical, where it is not defined.
     """
     thrust = acceleration + [0.0, 0.0, GRAVITY]
     heading = np.array([math.cos(yaw), math.sin(yaw), 0.0])

@@ -99,6 +99,6 @@ class Demo1Node(DemoNode):
 
 
 class Demo2Node(DemoNode):
-    """The second of two vehicles that fly together: x < 0, the first one's way reflected."""
+    """The second of two vehicles that fly together: x < 0, the path of the first one, reflected."""
 
     waypoints = tuple(Waypoint(-x, -y, z, yaw, s) for x, y, z, yaw, s in Demo1Node.waypoints)

@@ -1,4 +1,4 @@
-"""Lists of waypoints, and the way along them."""
+"""Lists of waypoints, and which of them is the goal."""
 
 import math
 from typing import NamedTuple
@@ -33,9 +33,7 @@ class WaypointList(ParameterType):
 
     def __str__(self) -> str:
         """Return what is expected."""
-        return (
-            "a list of waypoints [x, y, z, yaw, seconds] in m, rad and s, all finite, seconds >= 0"
-        )
+        return f"a {self.label} in {self.unit}, {self.range}"
 
     @staticmethod
     def _waypoint(number: int, entry: object) -> Waypoint:
@@ -52,17 +50,8 @@ class WaypointList(ParameterType):
 class WaypointFollower:
     """Which waypoint is the goal.
 
-    A waypoint is reached when the vehicle is near enough; after its seconds the next
-    one comes. The last one stays.
-
-    Parameters
-    ----------
-    waypoints : list of Waypoint
-        At least one.
-    position_tolerance : float
-        How near to a waypoint it is reached, m.
-    yaw_tolerance : float
-        Likewise for the heading, rad.
+    A waypoint is reached within the tolerances (m and rad); after its seconds the next one is the
+    goal. The last one stays.
     """
 
     def __init__(self, waypoints: list[Waypoint], position_tolerance: float, yaw_tolerance: float):
@@ -79,17 +68,7 @@ class WaypointFollower:
         return self._waypoints[self.index]
 
     def update(self, time: float, position: tuple[float, float, float], yaw: float) -> None:
-        """Update with the pose of the vehicle; advance to the next waypoint if it is due.
-
-        Parameters
-        ----------
-        time : float
-            Now, s.
-        position : tuple of float
-            x, y, z, m.
-        yaw : float
-            rad.
-        """
+        """Advance to the next waypoint if it is due, at a time (s), position (m) and yaw (rad)."""
         if self._reached is None and self._is_there(position, yaw):
             self._reached = time
         if self._reached is None or time - self._reached < self.goal.seconds:

@@ -3,75 +3,46 @@
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import Protocol, Self
-
-
-class Stamp(Protocol):
-    """A time that can be compared, such as rospy.Time or a number."""
-
-    def __lt__(self, other: Self, /) -> bool:
-        """Tell whether this is before another."""
 
 
 class FlownPath:
     """Positions of a vehicle, thinned out and bounded, for drawing.
 
-    Parameters
+    A position nearer than the spacing (m) to the last one kept is dropped; of more positions than
+    the capacity the oldest are dropped.
+
+    Attributes
     ----------
-    spacing : float
-        A position nearer than this (m) to the last one kept is dropped.
-    capacity : int
-        How many positions are kept; the oldest go first.
+    positions : deque of (x, y, z)
+        m, oldest first.
     """
 
     def __init__(self, spacing: float, capacity: int):
         self._spacing = spacing
-        self._positions: deque[tuple[float, ...]] = deque(maxlen=capacity)
-        self._stamp: Stamp | None = None
+        self.positions: deque[tuple[float, ...]] = deque(maxlen=capacity)
+        self._stamp: float | None = None
 
-    @property
-    def positions(self) -> list[tuple[float, ...]]:
-        """Positions (x, y, z) in m, oldest first."""
-        return list(self._positions)
+    def add(self, stamp: float, position: Sequence[float]) -> bool:
+        """Append the vehicle's position (x, y, z, m); return whether ``positions`` has changed.
 
-    def add(self, stamp: Stamp, position: Sequence[float]) -> bool:
-        """Take note of where the vehicle was.
-
-        Parameters
-        ----------
-        stamp : Stamp
-            When. A stamp before the last one means that time has been reset: the path begins anew.
-        position : sequence of float, length 3
-            Where, m, fixed frame.
-
-        Returns
-        -------
-        bool
-            Whether ``positions`` has changed.
+        A stamp (s) before the last one means that time has been reset: the path begins anew.
         """
         is_reset = self._stamp is not None and stamp < self._stamp
         self._stamp = stamp
         if is_reset:
-            self._positions.clear()
-        elif self._positions and math.dist(position, self._positions[-1]) < self._spacing:
+            self.positions.clear()
+        elif self.positions and math.dist(position, self.positions[-1]) < self._spacing:
             return False
-        self._positions.append(tuple(position))
+        self.positions.append(tuple(position))
         return True
 
 
 def circle(
     centre: Sequence[float], radius: float, corners: int
 ) -> list[tuple[float, float, float]]:
-    """Return a closed horizontal polygon: its corners (x, y, z), the first again as the last.
+    """Return a closed horizontal polygon about a centre (x, y, z, m): its corners, m.
 
-    Parameters
-    ----------
-    centre : sequence of float, length 3
-        m.
-    radius : float
-        From the centre to the corners, m.
-    corners : int
-        At least 3.
+    The corners, at least 3, have the distance ``radius`` (m); the first is also the last.
     """
     x, y, z = centre
     angles = [2.0 * math.pi * (k % corners) / corners for k in range(corners + 1)]

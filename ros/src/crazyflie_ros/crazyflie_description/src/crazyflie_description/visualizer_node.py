@@ -1,4 +1,4 @@
-"""What RViz cannot draw by itself: the path a vehicle has flown, and its reference."""
+"""ROS interface of the flown path and the reference, as markers for RViz."""
 
 import genpy
 from geometry_msgs.msg import Point
@@ -98,8 +98,9 @@ class VisualizerNode(Node):
                 f"no transform {fixed} -> {robot}: {error}", throttle=5.0, key="no transform"
             )
             return False
-        translation = transform.transform.translation
-        return self._path.add(transform.header.stamp, (translation.x, translation.y, translation.z))
+        position = transform.transform.translation
+        stamp = transform.header.stamp.to_sec()
+        return self._path.add(stamp, (position.x, position.y, position.z))
 
     def _markers(self):
         path = self._marker("path", Marker.LINE_STRIP, PATH_COLOUR)
@@ -110,9 +111,8 @@ class VisualizerNode(Node):
             ring.action = label.action = Marker.DELETE
         else:
             x, y, z = self._shown_reference
-            ring.points = [
-                Point(*corner) for corner in circle((x, y, z), _RING_RADIUS, _RING_CORNERS)
-            ]
+            corners = circle((x, y, z), _RING_RADIUS, _RING_CORNERS)
+            ring.points = [Point(*corner) for corner in corners]
             label.text = f"reference ({x:.2f}, {y:.2f}, {z:.2f}) m"
             label.scale.z = _TEXT_SIZE
             label.pose.position = Point(x, y, z + _LABEL_HEIGHT)

@@ -1,10 +1,10 @@
-"""What the voltage of a battery means for the flight."""
+"""Charge of a battery by its voltage."""
 
 import enum
 
 
 class Charge(enum.IntEnum):
-    """How much is left; the numbers are those of crazyflie_msgs/VehicleStatus."""
+    """Charge of a battery; the numbers are those of crazyflie_msgs/VehicleStatus."""
 
     UNKNOWN = 0
     GOOD = 1
@@ -13,9 +13,9 @@ class Charge(enum.IntEnum):
 
 
 class Battery:
-    """Judge voltages as they come, by limits in V.
+    """Classify voltages by limits in V.
 
-    It is critical after a time (s) below the critical limit: the voltage sinks under load.
+    The charge is critical after a time (s) below its limit: the voltage sinks under load.
     """
 
     def __init__(self, low: float, critical: float, critical_time: float):
@@ -25,7 +25,7 @@ class Battery:
         self.charge = Charge.UNKNOWN
 
     def update(self, voltage: float, now: float) -> Charge:
-        """Take note of a voltage (V) at a moment (s); return what it means."""
+        """Return the charge after a voltage (V) at a time (s)."""
         self.voltage = voltage
         if not voltage < self._critical:
             self._critical_since = None

@@ -20,13 +20,13 @@ PAUSE = 0.2
 def connect_within(
     limit: float,
     connect: Callable[[], None],
-    is_leaving: Callable[[], bool],
+    is_closing: Callable[[], bool],
     clock: Callable[[], float] = time.monotonic,
     sleep: Callable[[float], None] = time.sleep,
 ) -> None:
     """Call ``connect()`` again and again while the vehicle does not answer; blocks.
 
-    Raises the last `NoAnswerError` after a limit (s) or once ``is_leaving()``; other errors at
+    Raises the last `NoAnswerError` after a limit (s) or once ``is_closing()``; other errors at
     once.
     """
     end = clock() + limit
@@ -34,7 +34,7 @@ def connect_within(
         try:
             return connect()
         except NoAnswerError:
-            if is_leaving() or clock() >= end:
+            if is_closing() or clock() >= end:
                 raise
         sleep(PAUSE)
 
@@ -57,7 +57,7 @@ class Connection:
     _delivery: Delivery
     _publish: Callable[[], None]
     text: str = field(init=False)
-    is_leaving: bool = False
+    is_closing: bool = False
     is_established: bool = False
     # Held while topics and services are announced, or taken down.
     _announcing: threading.Lock = field(default_factory=threading.Lock)
@@ -75,27 +75,27 @@ class Connection:
         removed.
         """
         try:
-            connect_within(limit, self._crazyflie.connect, lambda: self.is_leaving)
+            connect_within(limit, self._crazyflie.connect, lambda: self.is_closing)
             prepare()
             with self._announcing:
-                if self.is_leaving:
+                if self.is_closing:
                     raise ServiceError("removed while connecting")
                 self._connection_count = self._crazyflie.connection_count
                 announce()
                 self.is_established = True
         except BaseException:
-            self.is_leaving = True
+            self.is_closing = True
             self.end()
             raise
         self._delivery.submit(self._publish)
         self._handle.info(f"{self._name}: connected to {self._crazyflie.address.uri}")
 
-    def leave(self, before: Callable[[], str]) -> Future[str]:
+    def close(self, before: Callable[[], str]) -> Future[str]:
         """End the connection, also while it is being set up; does not block.
 
         First ``before()`` is called, in a thread; what it returns is the result.
         """
-        self.is_leaving = True
+        self.is_closing = True
         self._gate.handle(Event.REMOVAL)
         self._jobs.supersede("the removal")
         done: Future[str] = Future()
@@ -108,7 +108,7 @@ class Connection:
             except BaseException as error:
                 done.set_exception(error)
 
-        threading.Thread(target=work, name=f"{self._name}-leave", daemon=True).start()
+        threading.Thread(target=work, name=f"{self._name}-close", daemon=True).start()
         return done
 
     def end(self) -> None:
@@ -131,7 +131,7 @@ class Connection:
             self._gate.handle(Event.LINK_LOST)
         elif state is LinkState.CONNECTED:
             self._gate.handle(Event.LINK_BACK)
-        if not self.is_leaving:
+        if not self.is_closing:
             self._delivery.submit(self._report, state, text, resume)
 
     def _report(self, state, text, resume):

@@ -1,4 +1,4 @@
-"""From the threads of a link to the callbacks of the node, without blocking the link."""
+"""Callbacks of the node for events of a link, whose threads are not blocked."""
 
 import queue
 import threading

@@ -26,11 +26,7 @@ class Emergency:
     def latch(self) -> None:
         """Stop the motors at once and for good; does not block.
 
-        Raises
-        ------
-        LinkLostError
-            The vehicle is not heard; the stop is sent again and again, and arrives as soon as
-            anything does.
+        Raises `LinkLostError` if the vehicle is not heard; the stop is repeated until it arrives.
         """
         self._gate.handle(Event.EMERGENCY_STOP)
         self._crazyflie.supervisor.emergency_stop()

@@ -1,11 +1,10 @@
 """Whether a vehicle lifts off when setpoints ask for it.
 
-While the ground holds a vehicle, the firmware's integrators wind up: it stands with running
-motors, and leaps as soon as what has held it goes away. So it does when a position is asked for
-with another heading than its own. The supervisor's FLYING does not show it: thrust sets it.
-
-Nothing is certain of a vehicle whose estimate moves. Where motion capture is frozen, the estimate
-hardly rises, but its vertical speed, which the accelerometer drives, is that of the flight.
+While the ground holds a vehicle, the firmware's integrators wind up, and it leaps as soon as it is
+free. So it does when a position is asked for with another heading than its own. The supervisor's
+FLYING does not show it: thrust sets it. A vehicle whose estimate moves may be flying: where motion
+capture is frozen, the estimate hardly rises, but its vertical speed, which the accelerometer
+drives, is that of the flight.
 """
 
 from typing import NamedTuple

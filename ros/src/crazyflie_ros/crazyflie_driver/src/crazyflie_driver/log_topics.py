@@ -1,4 +1,4 @@
-"""Publish what a vehicle sends by itself."""
+"""Log data and application packets of a vehicle, as topics."""
 
 import threading
 from collections.abc import Callable
@@ -41,7 +41,7 @@ comes from there is for the driver."""
 
 @dataclass(eq=False)
 class LogTopics:
-    """Have a vehicle send log blocks and publish them.
+    """Start a vehicle's log blocks and publish them.
 
     Attributes
     ----------
@@ -80,8 +80,8 @@ class LogTopics:
             self._packets = self._publisher("packets", crtpPacket)
         known = self._crazyflie.log.variables()
         self._start_status(known, self._publisher("rssi", Float32))
-        wanted = [topic for topic in telemetry.STANDARD if topic.name in parameters.topics]
-        groups, missing = telemetry.packed(wanted, known)
+        selected = [topic for topic in telemetry.STANDARD if topic.name in parameters.topics]
+        groups, missing = telemetry.packed(selected, known)
         for name, variables in missing.items():
             self._handle.warn(
                 f"{parameters.name}: no topic {name}: the firmware has no " + ", ".join(variables)
@@ -122,16 +122,12 @@ class LogTopics:
         if not variables:
             return
 
-        def named(values):
-            return dict(zip(variables, values, strict=True))
+        def deliver(_, values):
+            latest = dict(zip(variables, values, strict=True))
+            self._note_state(latest)
+            self._delivery.submit_data(self._note_status, latest, rssi_publisher)
 
-        def receive(_, values):
-            self._note_status(named(values), rssi_publisher)
-
-        def note(values):
-            self._note_state(named(values))
-
-        self._add("status", STATUS_PERIOD_MS, variables, receive, note)
+        self._crazyflie.add_log_block(LogBlock("status", STATUS_PERIOD_MS, variables, deliver))
 
     def _note_state(self, latest):
         # In the link's thread: the state is waited for where no callback has its turn.
@@ -173,7 +169,8 @@ class LogTopics:
         publisher = self._publisher(block.topic_name, GenericLogData)
 
         def publish(stamp, values):
-            publisher.publish(telemetry.generic(self._header(stamp, False), values))
+            header = self._header(stamp, False)
+            publisher.publish(GenericLogData(header=header, values=list(map(float, values))))
 
         # The field is called frequency, and is a period.
         period = block.frequency - block.frequency % PERIOD_STEP_MS
@@ -185,10 +182,9 @@ class LogTopics:
             )
         self._add(block.topic_name, period, tuple(block.variables), publish)
 
-    def _add(self, name, period_ms, variables, receive, note=lambda values: None):
+    def _add(self, name, period_ms, variables, publish):
         def deliver(time_ms, values):
-            note(values)
-            self._delivery.submit_data(receive, self._stamp(time_ms), values)
+            self._delivery.submit_data(publish, self._stamp(time_ms), values)
 
         self._crazyflie.add_log_block(LogBlock(name, period_ms, variables, deliver))
 

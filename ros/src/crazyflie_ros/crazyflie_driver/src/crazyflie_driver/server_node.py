@@ -25,8 +25,8 @@ ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"
 
 _DIAGNOSTICS_PERIOD = 1.0
 _FLIGHTS_PERIOD = 0.2
-_LEAVE_LIMIT, _LANDING_LIMIT = 1.5, 0.5
-"""How long, in s, the end of the server waits for its vehicles to be left, and each of these for
+_SHUTDOWN_LIMIT, _LANDING_LIMIT = 1.5, 0.5
+"""How long, in s, the end of the server waits for its vehicles to be removed, and each of these for
 the end of a landing, which it flies without a link, too."""
 
 
@@ -39,7 +39,7 @@ class CrazyflieServerNode(Node):
         # By URI.
         self._vehicles: dict[str, DriverVehicle] = {}
         self._in_flight = False
-        self._is_leaving = False
+        self._is_shutting_down = False
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -51,20 +51,20 @@ class CrazyflieServerNode(Node):
         handle.advertise_service(ADD, AddCrazyflie, self._on_add)
         handle.advertise_service(REMOVE, RemoveCrazyflie, self._on_remove)
         handle.subscribe(self._parameters.emergency_topic, Empty, self._on_emergency)
-        self._announce_flight = handle.inhibit_shutdown()
+        self._inhibit_shutdown = handle.inhibit_shutdown()
         handle.timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         handle.timer(_FLIGHTS_PERIOD, self._follow_flights)
 
     @override
     def prepare_shutdown(self) -> None:
-        self._is_leaving = True
+        self._is_shutting_down = True
         self._follow_flights()
 
     def shutdown(self) -> None:
         """Have vehicles in the air land, stop the motors of all others, disconnect from all."""
         wait(
-            [vehicle.leave(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())],
-            _LEAVE_LIMIT,
+            [vehicle.remove(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())],
+            _SHUTDOWN_LIMIT,
         )
 
     def _follow_flights(self):
@@ -73,27 +73,27 @@ class CrazyflieServerNode(Node):
         flying = [each for each in commands if each.is_high_level_flight_active]
         if bool(flying) != self._in_flight:
             self._in_flight = bool(flying)
-            self._announce_flight(self._in_flight)
-        if self._is_leaving:
+            self._inhibit_shutdown(self._in_flight)
+        if self._is_shutting_down:
             for each in flying:
                 each.land_with_retry("shutdown")
 
     def _on_add(self, request):
-        wanted = VehicleParameters.from_request(request)
+        requested = VehicleParameters.from_request(request)
         for other in (vehicle.parameters for vehicle in self._vehicles.values()):
-            if other.uri == wanted.uri:
+            if other.uri == requested.uri:
                 raise ServiceError(f"{other.uri} has been added already, as {other.name}")
-            if other.tf_prefix == wanted.tf_prefix:
+            if other.tf_prefix == requested.tf_prefix:
                 raise ServiceError(
                     f"tf_prefix {other.tf_prefix!r} is in use by {other.uri}; choose another"
                 )
         try:
-            vehicle = DriverVehicle(self._handle, wanted, self._parameters)
+            vehicle = DriverVehicle(self._handle, requested, self._parameters)
         except CrazyflieError as error:
-            self._handle.error(f"{wanted.name}: {error}")
+            self._handle.error(f"{requested.name}: {error}")
             raise ServiceError(str(error)) from None
-        self._vehicles[wanted.uri] = vehicle
-        self._handle.info(f"{wanted.name}: connecting to {wanted.uri}")
+        self._vehicles[requested.uri] = vehicle
+        self._handle.info(f"{requested.name}: connecting to {requested.uri}")
         return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
 
     def _finish_adding(self, vehicle, done):
@@ -106,10 +106,10 @@ class CrazyflieServerNode(Node):
         if vehicle is None:
             known = ", ".join(self._vehicles) or "none"
             raise ServiceError(f"no vehicle {request.uri!r} has been added; known: {known}")
-        if vehicle.is_leaving:
+        if vehicle.is_closing:
             raise ServiceError(f"{request.uri} is being removed already")
-        leaving = vehicle.leave(self._parameters.landing_limit)
-        return self._when_done(leaving, self._finish_removing, vehicle)
+        removed = vehicle.remove(self._parameters.landing_limit)
+        return self._when_done(removed, self._finish_removing, vehicle)
 
     def _finish_removing(self, vehicle, done):
         self._forget(vehicle)

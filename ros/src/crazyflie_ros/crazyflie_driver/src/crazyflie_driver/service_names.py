@@ -1,8 +1,8 @@
-"""Names for a vehicle's services, such that no service of another node is taken away.
+"""Names for a vehicle's services that belong to no other node.
 
-rosmaster gives a name to the node that registers it last, and the callers of the other node then
-get the error that the md5 sums differ. A controller in the vehicle's namespace, such as
-crazyflie_controller, has services takeoff and land as well.
+rosmaster gives a name to the node that registers it last, and callers of the other node get an
+error about md5 sums. A controller in the vehicle's namespace, such as crazyflie_controller, has
+services takeoff and land as well.
 """
 
 import time
@@ -58,11 +58,11 @@ class ServiceNames:
         nodes = self._handle.service_nodes()
         found = {}
         for name in names:
-            wanted = found[name] = f"{self._prefix}/{name}"
-            if wanted in nodes:
+            desired = found[name] = f"{self._prefix}/{name}"
+            if desired in nodes:
                 found[name] = f"{self._prefix}/{ASIDE}/{name}"
                 self._handle.warn(
-                    f"{wanted} is a service of {nodes[wanted]}: the driver's is {found[name]}"
+                    f"{desired} is a service of {nodes[desired]}: the driver's is {found[name]}"
                 )
         return found
 

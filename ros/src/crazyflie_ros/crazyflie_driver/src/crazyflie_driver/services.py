@@ -54,16 +54,11 @@ class VehicleServices:
 
     What blocks on the vehicle is a job, where landing and stopping supersede what was asked
     before; all else is done at once.
-
-    Attributes
-    ----------
-    names : ServiceNames
-        Where they are.
     """
 
     _handle: NodeHandle
     _name: str
-    names: ServiceNames
+    _names: ServiceNames
     _crazyflie: Crazyflie
     _jobs: Jobs
     _gate: SetpointGate
@@ -87,7 +82,7 @@ class VehicleServices:
             offered[name] = service_type, self._command_callback(name, service_type, send)
         if self._crazyflie.address.is_radio:
             offered["reboot"] = Empty, self._on_reboot
-        names = self.names.free(offered)
+        names = self._names.free(offered)
         for name, (service_type, callback) in offered.items():
             self._handle.advertise_service(names[name], service_type, callback)
 
@@ -190,7 +185,7 @@ class VehicleServices:
             state = None
         if state is None:
             raise ServiceError(
-                "no reboot: nothing tells whether the vehicle flies, and it would fall; on the "
+                "no reboot: it is not known whether the vehicle flies, and it would fall; on the "
                 "ground, remove the vehicle and call `rosrun crazyflie_tools reboot --uri "
                 f"{self._crazyflie.address.uri}`"
             )

@@ -46,7 +46,7 @@ TRANSITIONS = {
     Event.LINK_LOST: (_NONE, Block.LINK_LOST, Block.UNCONFIRMED),
     # The vehicle may have been restarted, or its battery been changed, and be in a hand.
     Event.LINK_BACK: (Block.LINK_LOST, Block.UNCONFIRMED, Block.LINK_LOST),
-    # The vehicle says that it flies, which it does of thrust on the ground, too.
+    # The vehicle reports a flight, as it does with thrust on the ground, too.
     Event.FLIGHT_REPORTED: (_NONE, _NONE, Block.UNCONFIRMED),
     # A call has the vehicle fly.
     Event.FLIGHT_CALLED: (_NONE, _NONE, _ON_TRIAL),
@@ -66,9 +66,9 @@ REASONS = {
     Block.UNCONFIRMED: (
         f"the link was lost, and the vehicle does not fly: {_ADVICE} that has it fly"
     ),
-    Block.NOT_LIFTED: f"the vehicle was told to fly and did not lift off: {_ADVICE}",
+    Block.NOT_LIFTED: f"the vehicle was commanded to fly and did not lift off: {_ADVICE}",
 }
-"""What is said of each, in the order in which they count."""
+"""Block -> words of the warning; the first that holds is named."""
 
 
 class SetpointGate:

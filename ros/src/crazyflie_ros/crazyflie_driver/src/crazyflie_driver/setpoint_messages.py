@@ -1,4 +1,4 @@
-"""Messages with setpoints and external poses, as they go to the link."""
+"""Messages with setpoints and external poses, and how they are sent over the link."""
 
 import math
 from collections.abc import Callable
@@ -11,24 +11,15 @@ from crazyflie_link.crazyflie import Crazyflie
 
 
 class Sender(NamedTuple):
-    """How the messages of a topic are sent.
+    """How the messages of a topic are sent, by ``send(crazyflie, message)``.
 
-    Attributes
-    ----------
-    message_type : type
-    send : callable
-        ``send(crazyflie, message)``.
-    height_and_yaw : callable
-        ``height_and_yaw(message)`` returns the height (m) and the yaw (degrees) that a setpoint
-        asks for; None for none.
+    ``height_and_yaw(message)`` returns the height (m) and the yaw (degrees) that a setpoint asks
+    for; None for none.
     """
 
     message_type: type
     send: Callable[[Crazyflie, Any], None]
-    height_and_yaw: Callable[[Any], tuple[float | None, float | None]] = lambda message: (
-        None,
-        None,
-    )
+    height_and_yaw: Callable[[Any], tuple[float | None, float | None]] = lambda _: (None, None)
 
 
 def _full_state(crazyflie, message):

@@ -1,4 +1,4 @@
-"""Topics with setpoints and external poses, turned into what goes over the link."""
+"""Topics with setpoints and external poses, sent over the link."""
 
 import contextlib
 import enum
@@ -43,13 +43,12 @@ class Control(enum.Enum):
 class SetpointTopics:
     """Subscribe to a vehicle's setpoints and pass them on, as long as that is allowed.
 
-    Nothing is repeated or made up: when messages stop coming, the firmware's own
-    watchdogs act, after 0.5 s and 2 s. But when the last one had the motors stand still,
-    "setpoints stop" is sent: otherwise the vehicle would be locked 2 s later.
+    Nothing is repeated: when messages stop coming, the firmware's watchdogs act, after 0.5 s and
+    2 s. But when the last one had the motors stand still, "setpoints stop" is sent: otherwise the
+    vehicle would be locked 2 s later.
 
     Attributes
     ----------
-    gate : SetpointGate
     control : Control
         What the vehicle was sent last: setpoints, or the notice that they stop.
     ignored : int
@@ -78,9 +77,9 @@ class SetpointTopics:
             **SETPOINTS,
         }
         for name, sender in senders.items():
-            self._subscribe(name, sender.message_type, partial(self._on_setpoint, name, sender))
+            self._subscribe(name, sender, self._on_setpoint)
         for name, sender in EXTERNAL.items():
-            self._subscribe(name, sender.message_type, partial(self._on_external, name, sender))
+            self._subscribe(name, sender, self._on_external)
         self._handle.timer(_REST_PERIOD, self._end_stream_at_rest)
 
     @property
@@ -134,11 +133,7 @@ class SetpointTopics:
         The last setpoint still counts for some ms. At once means in the calling thread, which has
         to be the one that sends: see `Subsystem.guarded`.
         """
-        setpoints = self._crazyflie.setpoints
-        if at_once:
-            setpoints.notify_setpoints_stop_now(remain_valid_ms)
-        else:
-            setpoints.notify_setpoints_stop(remain_valid_ms)
+        self._crazyflie.setpoints.notify_setpoints_stop(remain_valid_ms, at_once)
         self._setpoints_stopped()
 
     def _setpoints_stopped(self):
@@ -164,24 +159,25 @@ class SetpointTopics:
         command = f"{self._topic}, {finding.height:.2f} m"
         if self._commanded_yaw is not None:
             command += f", yaw {self._commanded_yaw:.0f} degrees"
-        advice = "is it free, do all propellers turn, and is it told its own yaw?"
+        advice = "is it free, do all propellers turn, and is its own yaw commanded?"
         if finding.is_certain:
             self.gate.handle(Event.NOT_LIFTED)
-            # Without a link, which is said by its state, the firmware stops the motors.
+            # Without a link, which its state shows, the firmware stops the motors.
             with contextlib.suppress(CrazyflieError):
                 self.notify_setpoints_stop()
             advice += " Its motors are stopped, since it might leap; pause the stream to try again"
         self._handle.warn(
-            f"{self._parameters.name}: was told to fly ({command}), and has not lifted off within "
-            f"{LIMIT:g} s ({', '.join(words)}): {advice}"
+            f"{self._parameters.name}: was commanded to fly ({command}), and has not lifted off "
+            f"within {LIMIT:g} s ({', '.join(words)}): {advice}"
         )
 
     def high_level_until(self, moment: float) -> None:
         """Take note that a high-level command is carried out until a moment (s)."""
         self._high_level_end = moment
 
-    def _subscribe(self, name, message_type, callback):
-        self._handle.subscribe(f"{self._parameters.prefix}/{name}", message_type, callback)
+    def _subscribe(self, name, sender, callback):
+        topic = f"{self._parameters.prefix}/{name}"
+        self._handle.subscribe(topic, sender.message_type, partial(callback, name, sender))
 
     def _on_external(self, name, sender, message):
         self._external_time = self._handle.time()
@@ -217,7 +213,7 @@ class SetpointTopics:
 
     def _end_stream_at_rest(self):
         if self.control is Control.ZERO_THRUST and self._handle.time() - self._times[-1] > _REST:
-            # Without a link, which is said by its state; it is tried again.
+            # Without a link, which its state shows; it is tried again.
             with contextlib.suppress(CrazyflieError):
                 self.notify_setpoints_stop()
 

@@ -54,7 +54,7 @@ class Shutdown:
                 else:
                     # Unless it is the link that has been lost meanwhile.
                     crazyflie.link()
-                    self._warn("nothing tells whether the vehicle flies: it is left as it is")
+                    self._warn("it is not known whether the vehicle flies: it is left as it is")
         except CrazyflieError as error:
             problem = f"its motors could not be stopped: {error}"
         if problem:

@@ -1,13 +1,14 @@
-"""The topics that say what state a vehicle is in, and whether the driver is connected to it."""
+"""Topics with the state of a vehicle, and whether the driver is connected to it."""
 
+import contextlib
 import math
 from dataclasses import dataclass
-from typing import Protocol
 
 from std_msgs.msg import Bool, Header, String
 
 from crazyflie_driver import status
 from crazyflie_driver.battery import Battery
+from crazyflie_driver.connection import Connection
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_driver.vehicle_parameters import (
@@ -30,14 +31,6 @@ _STATES = ("text", "link", "supervisor", "has_supervisor", "is_emergency", "batt
 """Fields that are published when they change."""
 
 
-class ConnectionState(Protocol):
-    """What is published of a connection; see `Connection`."""
-
-    text: str
-    is_leaving: bool
-    is_established: bool
-
-
 @dataclass(eq=False)
 class StatusPublisher:
     """Publish the status of a vehicle, in words and typed, and whether it is connected."""
@@ -48,7 +41,7 @@ class StatusPublisher:
     _log: LogTopics
     _setpoints: SetpointTopics
     _battery: Battery
-    _connection: ConnectionState
+    _connection: Connection
     _published: VehicleStatus | None = None
     _is_connected: bool = False
 
@@ -85,14 +78,12 @@ class StatusPublisher:
             are_setpoints_blocked=self._setpoints.gate.is_blocking(self._handle.time()),
             restarts=crazyflie.restarts,
         )
-        try:
+        # Without a link there are no figures.
+        with contextlib.suppress(LinkLostError):
             message.link_quality = crazyflie.quality()
             message.is_link_poor = crazyflie.is_poor()
             message.latency = crazyflie.latency()
             message.last_heard = crazyflie.age()
-        except LinkLostError:
-            # Without a link there are no figures.
-            pass
         message.text = status.words(message)
         return message
 
@@ -104,7 +95,7 @@ class StatusPublisher:
             self._typed.publish(message)
         if before is None or message.text != before.text:
             self._text.publish(String(message.text))
-        is_ready = self._connection.is_established and not self._connection.is_leaving
+        is_ready = self._connection.is_established and not self._connection.is_closing
         self.publish_connected(is_ready and message.link == VehicleStatus.CONNECTED)
 
     def publish_connected(self, is_connected: bool) -> None:

@@ -1,7 +1,7 @@
 """Log data of the firmware as messages: which variables, how often, in which units."""
 
 import math
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Container, Sequence
 from typing import NamedTuple
 
 import genpy
@@ -9,12 +9,14 @@ from geometry_msgs.msg import Point, PoseStamped, Quaternion, Vector3
 from sensor_msgs.msg import Imu, MagneticField, Temperature
 from std_msgs.msg import Float32, Header
 
-from crazyflie_driver.msg import GenericLogData
 from crazyflie_link.log import quaternion_from_compressed
 from crazyflie_model.units import GRAVITY
 
 FAST_MS, SLOW_MS = 10, 100
 """Periods of imu and pose, and of the rest, ms: those of the C++ driver."""
+
+_MOST_VARIABLES = 6
+"""Variables of four bytes that fit in a log packet's 26 bytes."""
 
 _UNKNOWN = -1.0
 """First element of a covariance: there is no such measurement (sensor_msgs/Imu)."""
@@ -50,6 +52,10 @@ def _pose(header, values):
     return message
 
 
+def _float(_, values):
+    return Float32(values[0])
+
+
 STANDARD = (
     StandardTopic(
         "imu", Imu, FAST_MS, ("acc.x", "acc.y", "acc.z", "gyro.x", "gyro.y", "gyro.z"), _imu
@@ -76,12 +82,8 @@ STANDARD = (
         ("baro.temp",),
         lambda header, values: Temperature(header=header, temperature=values[0]),
     ),
-    StandardTopic(
-        "pressure", Float32, SLOW_MS, ("baro.pressure",), lambda header, values: Float32(values[0])
-    ),
-    StandardTopic(
-        "battery", Float32, SLOW_MS, ("pm.vbat",), lambda header, values: Float32(values[0])
-    ),
+    StandardTopic("pressure", Float32, SLOW_MS, ("baro.pressure",), _float),
+    StandardTopic("battery", Float32, SLOW_MS, ("pm.vbat",), _float),
 )
 
 
@@ -108,12 +110,3 @@ def packed(
         else:
             groups.append([topic])
     return groups, missing
-
-
-_MOST_VARIABLES = 6
-"""Variables of four bytes that fit in a log packet's 26 bytes."""
-
-
-def generic(header: Header, values: Iterable[float]) -> GenericLogData:
-    """Return the message of a custom log block."""
-    return GenericLogData(header=header, values=list(map(float, values)))

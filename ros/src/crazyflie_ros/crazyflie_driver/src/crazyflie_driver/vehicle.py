@@ -77,9 +77,9 @@ class DriverVehicle:
         self.status.publish()
 
     @property
-    def is_leaving(self) -> bool:
+    def is_closing(self) -> bool:
         """Whether the vehicle is being removed."""
-        return self._connection.is_leaving
+        return self._connection.is_closing
 
     def connect(self) -> Future[None]:
         """Connect and announce all topics and services; the result is None.
@@ -94,19 +94,19 @@ class DriverVehicle:
             ),
         )
 
-    def leave(self, limit: float) -> Future[str]:
+    def remove(self, limit: float) -> Future[str]:
         """Land, stop the motors, end the link, take topics and services down.
 
         Also while the vehicle is being connected, or its jobs are blocked by it. The limit (s) is
         that of a landing: the vehicle lands without its link, too. The result is what could not be
         done.
         """
-        self._connection.is_leaving = True
+        self._connection.is_closing = True
         self.status.publish_connected(False)
-        return self._connection.leave(lambda: self._shutdown.land_or_stop(limit))
+        return self._connection.close(lambda: self._shutdown.land_or_stop(limit))
 
     def _wait_for_controllers(self):
-        self._names.wait_for_controllers(lambda: self.is_leaving)
+        self._names.wait_for_controllers(lambda: self.is_closing)
 
     def _announce(self):
         self._log.start()
@@ -142,10 +142,10 @@ class DriverVehicle:
 
     def _on_link_state(self, state, text):
         if state is LinkState.LOST:
-            # What it was before the loss says nothing about now.
+            # The state before the loss is not that of now.
             self._log.supervisor = None
         self._connection.on_state(state, text, self._resume)
 
     def _on_packet(self, port, channel, data):
-        if not self.is_leaving:
+        if not self.is_closing:
             self._log.publish_packet(port, channel, data)

@@ -21,13 +21,13 @@ from crazyflie_utils.parameters.types import (
 )
 
 STATUS_TOPIC = "status"
-"""Topic that says what state a vehicle is in."""
+"""Topic with the state of a vehicle in words."""
 
 VEHICLE_STATUS_TOPIC = "vehicle_status"
 """The same with more details, as crazyflie_msgs/VehicleStatus."""
 
 CONNECTED_TOPIC = "connected"
-"""Topic that says whether the driver is connected to a vehicle."""
+"""Topic with whether the driver is connected to a vehicle."""
 
 
 class EachLogBlock(ListOf):

@@ -1,14 +1,13 @@
 """Link to a Crazyflie: connections with limits, log blocks, parameters, commands.
 
-The names below are loaded when they are first used, so that the modules that need
-little (`crazyflie_link.errors`, `crazyflie_link.address`, ...) can be had without the rest.
+The names below are imported at their first use: `crazyflie_link.errors`, `crazyflie_link.address`
+and the like do not need the rest.
 """
 
 import importlib
 import warnings
 
-# cflib switches deprecation warnings on for the whole process, so that rospy's were
-# printed to the operator. Its drivers, which take long to load, are not loaded here.
+# cflib switches deprecation warnings on for the whole process, and rospy has some.
 with warnings.catch_warnings():
     import cflib  # noqa: F401
 
@@ -20,13 +19,7 @@ _HOME = {
     "scan": "crazyflie_link.scanning",
 }
 
-__all__ = [
-    "Crazyflie",
-    "CrazyflieError",
-    "LinkState",
-    "LogBlock",
-    "scan",
-]
+__all__ = ["Crazyflie", "CrazyflieError", "LinkState", "LogBlock", "scan"]
 
 
 def __getattr__(name):

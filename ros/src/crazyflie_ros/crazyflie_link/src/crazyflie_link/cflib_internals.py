@@ -3,8 +3,6 @@
 All vehicles of a dongle share one thread of cflib, which ends at an error of the USB device.
 Every later send through it blocks for ever, and later connections are given the dead thread
 again. An attempt to open a dongle that is absent leaves an entry that is never removed.
-
-cflib is licensed under the GPL, version 3; nothing of it is copied here.
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""A vehicle, whose link may come and go."""
+"""A vehicle, over a link that is set up again after a loss."""
 
 import threading
 import time
@@ -31,13 +31,14 @@ _STAMP_END = 4
 class Crazyflie:
     """A vehicle: connect, use, close; or use it in a ``with`` statement.
 
-    The first `connect` succeeds or raises. After that the link is watched: when
-    no sign of life has come for 0.45 s, or no log data, it is lost. If the vehicle is
-    heard again soon, the link is taken up as it was; otherwise, with ``reconnect``, a new one
-    is tried at once and then with growing pauses until `close`, and log blocks are started anew;
-    those that the vehicle then refuses are named in the text of the state.
+    The first `connect` succeeds or raises. After that the link is watched: when no packet has come
+    for 0.45 s, or no log data, it is lost. If the vehicle is heard again soon, the link is taken up
+    as it was; otherwise, with ``reconnect``, a new one is tried at once, then with growing pauses
+    until `close`, and log blocks are started anew; those that the vehicle then refuses are named in
+    the text of the state.
 
-    All callbacks come from threads of this object or of cflib, and must be quick.
+    All callbacks come from threads of this object or of cflib, and must be quick. Raises
+    `AddressError` if the address is malformed.
 
     Parameters
     ----------
@@ -60,14 +61,11 @@ class Crazyflie:
     Attributes
     ----------
     setpoints, high_level, trajectories, localization, parameters, log, supervisor
-        What can be done with the vehicle; see their classes.
+        Parts of the firmware; see their classes.
     restarts : int
         How many times the vehicle's clock was seen to begin anew.
-
-    Raises
-    ------
-    AddressError
-        The address is malformed.
+    rssi : float or None
+        Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere.
     """
 
     def __init__(
@@ -104,7 +102,7 @@ class Crazyflie:
         self._blocks: list[LogBlock] = []
         self._blocks_lock = threading.Lock()
         self._console = Console(on_console) if on_console is not None else None
-        self._rssi: float | None = None
+        self.rssi: float | None = None
 
     def __enter__(self) -> "Crazyflie":
         """Connect."""
@@ -143,7 +141,7 @@ class Crazyflie:
             self._blocks.append(block)
 
     def send_packet(self, port: int, channel: int, data: bytes) -> None:
-        """Send a CRTP packet of one's own, with at most 30 bytes of data."""
+        """Send a CRTP packet with at most 30 bytes of data."""
         self.link().send(port, channel, data)
 
     def latency(self) -> float:
@@ -158,13 +156,8 @@ class Crazyflie:
         """Return whether hardly any of the latest pings were answered."""
         return self.link().monitor.is_poor()
 
-    @property
-    def rssi(self) -> float | None:
-        """Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere."""
-        return self._rssi
-
     def age(self) -> float:
-        """Return the age of the last sign of life, s."""
+        """Return the age of the vehicle's last packet, s."""
         return self.link().monitor.age(time.monotonic())
 
     def reboot(self, mode: str = "firmware") -> None:
@@ -211,4 +204,4 @@ class Crazyflie:
             self._on_packet(port, channel, data)
 
     def _on_rssi(self, rssi):
-        self._rssi = rssi
+        self.rssi = rssi

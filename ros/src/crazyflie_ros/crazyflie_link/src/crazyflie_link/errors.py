@@ -1,4 +1,4 @@
-"""What can go wrong with a link, in words an operator can act on."""
+"""Errors of a link, with what the operator can do."""
 
 import difflib
 
@@ -54,16 +54,12 @@ UDEV_HINT = (
 )
 
 UNANSWERED = "too many packets lost"
-"""What the radio driver says, in small letters, when it goes on all the same."""
+"""Lower-case text of an error after which the radio driver continues."""
 
 _CAUSES = (
     # Text of a driver (lower case), error, advice to the operator.
     (
-        (
-            "cannot find a crazyradio dongle",
-            "cannot find radio with serial",
-            "cannot find crazyradio",
-        ),
+        ("cannot find a crazyradio", "cannot find radio with serial", "cannot find crazyradio"),
         NoDongleError,
         "no Crazyradio dongle found: plug it in; if `lsusb -d 1915:7777` shows it, " + UDEV_HINT,
     ),

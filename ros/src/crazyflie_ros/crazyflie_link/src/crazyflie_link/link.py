@@ -41,7 +41,8 @@ class Link:
     """A connection that is opened once and closed once.
 
     The cache is the folder of the tables; ``on_packet(port, channel, data)`` is called for every
-    packet, in cflib's thread; ``backend(cache, on_error)`` makes the object of cflib.
+    packet, in cflib's thread; ``backend(cache, on_error)`` makes the object of cflib. For ``put``,
+    ``put_latest`` and ``discard`` see `TransmitQueue`.
     """
 
     def __init__(
@@ -65,6 +66,9 @@ class Link:
         self._is_closed = False
         self._request_reply = RequestReply()
         self._transmit_queue = TransmitQueue()
+        self.put = self._transmit_queue.put
+        self.put_latest = self._transmit_queue.put_latest
+        self.discard = self._transmit_queue.discard
         self.cflib = backend(cache, self._fail)
         self.cflib.packet_received.add_callback(self._on_received)
         self.cflib.packet_sent.add_callback(self._on_sent)
@@ -128,7 +132,7 @@ class Link:
 
     @property
     def monitor(self) -> LinkMonitor:
-        """Signs of life of the vehicle; `LinkLostError` if the link is not set up."""
+        """Age of the vehicle's packets; `LinkLostError` if the link is not set up."""
         if self._monitor is None:
             raise LinkLostError(f"{self.address.uri}: not connected yet")
         return self._monitor
@@ -151,18 +155,6 @@ class Link:
             text = f"the vehicle has not been heard for {self._limits.lost:g} s{self._radio_error}"
         return state, f"{self.address.uri}: {text}"
 
-    def put(self, send: Send, urgent: bool = False) -> None:
-        """See `TransmitQueue.put`."""
-        self._transmit_queue.put(send, urgent)
-
-    def put_latest(self, stream: str, send: Send) -> None:
-        """See `TransmitQueue.put_latest`."""
-        self._transmit_queue.put_latest(stream, send)
-
-    def discard(self, stream: str) -> None:
-        """See `TransmitQueue.discard`."""
-        self._transmit_queue.discard(stream)
-
     def send(self, port: int, channel: int, data: bytes) -> None:
         """Send a packet with at most 30 bytes of data."""
         most = CRTPPacket.MAX_DATA_SIZE
@@ -184,11 +176,8 @@ class Link:
         What is sent is a call, or data for the port and channel of the answer.
         """
         if isinstance(send, bytes):
-            data = packet(request.port, request.channel, send)
-            transmit: Send = partial(self.cflib.send_packet, data)
-        else:
-            transmit = send
-        return self._request_reply.request(partial(put or self.put, transmit), request)
+            send = partial(self.cflib.send_packet, packet(request.port, request.channel, send))
+        return self._request_reply.request(partial(put or self.put, send), request)
 
     # End.
 
@@ -210,7 +199,7 @@ class Link:
             if self._error is None:
                 cause = explain(self.address.uri, text)
                 if self._is_complete and UNANSWERED in text.lower():
-                    # The driver goes on, and the vehicle may be heard again.
+                    # The driver continues, and the vehicle may be heard again.
                     self._radio_error = f" ({cause})"
                     return
                 if self._monitor is not None:

@@ -1,17 +1,16 @@
-"""Whether the vehicle is still there, which only its own packets show.
+"""Whether the vehicle is still there, by its own packets.
 
-cflib never notices a vehicle that is frozen: a UDP socket stays open, and a
-radio's acknowledgements come from a second processor. So a link counts as lost
-when neither a log packet nor the answer to a ping has come for a while. Firmware that
-restarts within that time answers pings as before, but knows no log blocks any more: so
-the log data, too, have to come.
+cflib never notices a vehicle that is frozen: a UDP socket stays open, and a radio's answers
+come from a second processor. So a link is lost when neither a log packet nor the answer to a ping
+has come for a while. Firmware that restarts within that time answers pings, but knows no log blocks
+any more: so the log data, too, have to come.
 """
 
 import enum
 import threading
 
 LOST_AFTER = 0.45
-"""Age of the last sign of life, in s, at which a link is lost; noticed before 0.5 s, when the
+"""Age of the last packet, in s, at which a link is lost; noticed before 0.5 s, when the
 firmware gives up on a setpoint."""
 
 _PERIODS_MISSED = 4
@@ -70,10 +69,10 @@ class Uptime:
 
 
 class LinkMonitor:
-    """The age of the last sign of life, and how many pings were answered.
+    """The age of the last packet, and how many pings were answered.
 
-    All times are in s, of one steady clock. The link is alive at first, and lost when the last sign
-    of life is older than the limit.
+    All times are in s, of one steady clock. It is alive at first, and lost when its last packet is
+    older than the limit.
     """
 
     def __init__(self, now: float, limit: float = LOST_AFTER):
@@ -87,7 +86,7 @@ class LinkMonitor:
         self._pings: dict[bytes, bool] = {}
 
     def received(self, now: float) -> None:
-        """Take note of a sign of life."""
+        """Take note of a packet that shows that the vehicle is alive."""
         if now - self._received > self._limit:
             self._heard_since = now
         self._received = now
@@ -118,7 +117,7 @@ class LinkMonitor:
             self._pings[content] = True
 
     def age(self, now: float) -> float:
-        """Return the age of the last sign of life, s."""
+        """Return the age of the last such packet, s."""
         return max(0.0, now - self._received)
 
     def quality(self) -> float:
@@ -139,8 +138,8 @@ class LinkMonitor:
     def state(self, now: float) -> LinkHealth:
         """Return what the packets show; to be called several times within the limit.
 
-        When this call itself comes late, the machine was busy, and packets of the
-        vehicle may wait to be read: it gets a new period.
+        When this call itself comes late, the machine was busy, and packets may not have been read
+        yet: the vehicle gets a new period.
         """
         late = now - self._checked > 0.5 * self._limit
         self._checked = now

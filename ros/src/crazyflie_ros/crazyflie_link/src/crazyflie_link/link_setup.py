@@ -1,4 +1,4 @@
-"""The set-up of a connection: how far it has come, and when it is given up."""
+"""The set-up of a connection: its progress and its time limits."""
 
 import struct
 import time
@@ -21,16 +21,9 @@ _TABLES = {CRTPPort.LOGGING: "log table", CRTPPort.PARAM: "parameter table"}
 class Limits:
     """Time limits of a connection, s.
 
-    Attributes
-    ----------
-    first_answer : float
-        From opening the link to the first packet.
-    stall : float
-        Without progress, while tables and parameter values are read.
-    total : float
-        For the whole set-up.
-    lost : float
-        Age of the last sign of life at which a link is lost.
+    The first answer is the time from opening the link to the first packet; stall that without
+    progress, while tables and parameter values are read; total that of the whole set-up. A link is
+    lost when the last packet is older than ``lost``.
     """
 
     first_answer: float = 2.0
@@ -40,7 +33,7 @@ class Limits:
 
 
 class LinkSetup:
-    """The present step of a connection's set-up, as the packets that arrive show it."""
+    """The present step of a connection's set-up, by the packets that arrive."""
 
     def __init__(self, uri: str, limits: Limits):
         self._uri = uri
@@ -75,9 +68,9 @@ class LinkSetup:
         if not self._has_answered:
             if now - self._begin > limits.first_answer:
                 raise NoAnswerError(
-                    f"{self._uri}: nobody has answered within {limits.first_answer:g} s, although "
-                    "the address can be reached: is it a Crazyflie, is it on, and is nobody else "
-                    "connected to it?"
+                    f"{self._uri}: no answer has come within {limits.first_answer:g} s, although "
+                    "the address can be reached: is it a Crazyflie, is it on, and is no other "
+                    "program connected to it?"
                 )
         elif now - self._progress_time > limits.stall:
             raise SetupError(

@@ -1,4 +1,4 @@
-"""Log blocks: variables that the vehicle sends by itself, every so many milliseconds."""
+"""Log blocks: variables that the vehicle sends periodically."""
 
 import threading
 import time
@@ -33,18 +33,9 @@ def quaternion_from_compressed(number: int) -> tuple[float, ...]:
 class LogBlock:
     """Variables that come together.
 
-    Attributes
-    ----------
-    name : str
-        For messages.
-    period_ms : int
-        Time between two packets, in ms: 10 to 2540, in steps of 10.
-    variables : tuple of str
-        Such as "stateEstimate.x"; in the vehicle's own type, together at most 26
-        bytes.
-    callback : callable
-        ``callback(time_ms, values)``, from cflib's thread: the vehicle's time (24
-        bits, ms) and a tuple of numbers in the order of ``variables``.
+    The period is 10 to 2540 ms, in steps of 10. Variables, such as "stateEstimate.x", come in the
+    vehicle's own types, together at most 26 bytes. ``callback(time_ms, values)`` is called in
+    cflib's thread with the vehicle's time (ms, 24 bits) and numbers in the order of the variables.
     """
 
     name: str
@@ -127,5 +118,5 @@ class Log(Subsystem):
                 f"log block {block.name!r}: the vehicle has not replied within {REPLY_LIMIT:g} s"
             )
         if refusals:
-            raise RefusedError(f"log block {block.name!r}: the vehicle says: {refusals[0]}")
+            raise RefusedError(f"log block {block.name!r}: the vehicle answers: {refusals[0]}")
         link.monitor.expect_log(block.period_ms / 1000.0, time.monotonic())

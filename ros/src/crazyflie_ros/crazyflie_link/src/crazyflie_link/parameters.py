@@ -40,7 +40,7 @@ class FirmwareParameters(Subsystem):
         answer = link.request(ident, request)
         # Identifier, status, value.
         if len(answer) < 3 or answer[2] != 0:
-            raise RefusedError(f"reading {name}: the vehicle says {answer[2:].hex() or 'nothing'}")
+            raise _refusal(request, answer)
         return self._keep(link, element, answer[3:])
 
     def write(self, name: str, value: int | float) -> int | float:
@@ -56,14 +56,13 @@ class FirmwareParameters(Subsystem):
             # The reply to an earlier write has another value.
             return answer == data or len(answer) != len(data)
 
-        what = f"writing {name}"
-        request = Request(CRTPPort.PARAM, WRITE_CHANNEL, ident, what, accepts=accepts)
+        request = Request(CRTPPort.PARAM, WRITE_CHANNEL, ident, f"writing {name}", accepts=accepts)
         try:
             answer = link.request(data, request)
         except NoReplyError as error:
             return self._look_up(name, data[2:], error)
         if answer != data:
-            raise RefusedError(f"{what}: the vehicle says {answer[2:].hex() or 'nothing'}")
+            raise _refusal(request, answer)
         return self._keep(link, element, answer[2:])
 
     def _look_up(self, name: str, expected: bytes, error: NoReplyError) -> int | float:
@@ -104,6 +103,10 @@ class FirmwareParameters(Subsystem):
         (value,) = struct.unpack(element.pytype, data)
         link.cflib.param.values.setdefault(element.group, {})[element.name] = str(value)
         return value
+
+
+def _refusal(request, answer):
+    return RefusedError(f"{request.what}: the vehicle answers: {answer[2:].hex() or 'nothing'}")
 
 
 def _number(element, text):

@@ -41,15 +41,8 @@ class Reconnector:
 
     ``make_link()`` returns a new `Link`; ``restore()`` does on one that was opened anew what the
     vehicle has forgotten, and returns what it could not do; ``is_urgent()`` returns whether to
-    connect again without pauses.
-
-    Attributes
-    ----------
-    state : LinkState
-    opening : Link or None
-        The link that is being opened.
-    connection_count : int
-        How many times the link has been set up.
+    connect again without pauses. ``opening`` is the link that is being opened,
+    ``connection_count`` how many times one has been set up.
     """
 
     _uri: str
@@ -64,7 +57,7 @@ class Reconnector:
     _link: Link | None = None
     _silent_since: float | None = None
     _reason: str = "not connected yet"
-    _announced: tuple[LinkState, str] | None = None
+    _reported: tuple[LinkState, str] | None = None
     _closed: threading.Event = field(default_factory=threading.Event)
     _closing: threading.Thread | None = None
     _watcher: threading.Thread | None = None
@@ -142,7 +135,7 @@ class Reconnector:
                 health, why = link.health()
                 if self._is_usable(health, why):
                     continue
-            # First announce it: to close the link takes a moment.
+            # First report it: to close the link takes a moment.
             self._link = None
             self._silent_since = None
             if self._closed.is_set():
@@ -200,8 +193,7 @@ class Reconnector:
     def _set_state(self, state, text):
         self.state = state
         self._reason = text
-        if (state, text) == self._announced:
-            return
-        self._announced = (state, text)
-        if self._on_state is not None:
-            self._on_state(state, text)
+        if (state, text) != self._reported:
+            self._reported = (state, text)
+            if self._on_state is not None:
+                self._on_state(state, text)

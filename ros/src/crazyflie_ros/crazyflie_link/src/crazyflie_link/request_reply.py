@@ -1,8 +1,7 @@
 """Requests to the vehicle and its answers, with a time limit.
 
-CRTP has no request numbers: an answer is known by its port, its channel and its
-first bytes, and by what it repeats of the request. A late answer to an earlier, equal request
-cannot be distinguished from the expected one.
+CRTP has no request numbers: an answer is known by its port, its channel and its first bytes. A late
+answer to an earlier, equal request cannot be distinguished from the expected one.
 """
 
 import threading
@@ -22,24 +21,11 @@ RESEND_PERIOD = 0.2
 
 @dataclass(frozen=True)
 class Request:
-    """A request to the vehicle, and how its answer is recognised.
+    """A request to the vehicle, and its answer: port, channel, first bytes, time limit (s).
 
-    Attributes
-    ----------
-    port, channel : int
-        Where the answer comes from.
-    prefix : bytes
-        What the answer's data begin with.
-    what : str
-        For the error, such as "the takeoff command".
-    resend : bool
-        Whether the request may be sent again when no answer comes: not when
-        doing it twice is different from doing it once.
-    limit : float
-        Time limit of the answer, s.
-    accepts : callable
-        ``accepts(data)`` returns whether data that begin so are the answer, not that to an
-        earlier request.
+    What is requested is for errors, such as "the takeoff command". Without ``resend`` it is sent
+    once: doing it twice is different from doing it once. ``accepts(data)`` returns whether data
+    with the prefix are the answer, not that to an earlier request.
     """
 
     port: int

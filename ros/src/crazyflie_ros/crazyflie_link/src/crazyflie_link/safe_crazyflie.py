@@ -124,8 +124,8 @@ class SafeCrazyflie(CflibCrazyflie):
     ) -> None:
         """Send a packet; never raises.
 
-        An error in a driver, or a link that is closed meanwhile, would leave cflib's
-        lock taken, and every later call would wait for ever.
+        An error in a driver, or a link that is closed meanwhile, would keep cflib's lock, and
+        block every later call for ever.
         """
         try:
             super().send_packet(pk, expected_reply, resend, timeout)

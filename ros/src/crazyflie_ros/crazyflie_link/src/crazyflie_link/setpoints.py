@@ -1,14 +1,11 @@
-"""Setpoints that are streamed: the vehicle follows the latest for a short while.
-
-Units and signs are those of this module's methods; what goes over the link is in
-their descriptions, since that is what counts.
-"""
+"""Setpoints that are streamed: the vehicle follows the latest for a short while."""
 
 import math
 import struct
 import threading
 import time
 from collections.abc import Sequence
+from functools import partial
 
 from cflib.crazyflie.commander import (
     SET_SETPOINT_CHANNEL,
@@ -26,7 +23,7 @@ from crazyflie_model.limits import FULL_PWM
 ZEROS = 100
 """Setpoints of zero thrust after connecting and before leaving."""
 
-_SENT_LIMIT = 1.0
+_ZERO_PERIOD, _SENT_LIMIT = 0.001, 1.0
 _STREAM = "setpoint"
 _MOST_MILLI = 32.767
 
@@ -102,8 +99,8 @@ class Setpoints(Subsystem):
         """Stop the motors."""
         self._stream(lambda c: c.send_stop_setpoint())
 
-    def send_zero_thrust(self, count: int = ZEROS, period: float = 0.001) -> None:
-        """Send zero thrust ``count`` times, every ``period`` seconds; blocks until they are sent.
+    def send_zero_thrust(self) -> None:
+        """Send zero thrust `ZEROS` times, every millisecond; blocks until they are sent.
 
         It opens the firmware's thrust lock, and stops a vehicle that flies on setpoints. In the
         end "setpoints stop" is sent: otherwise the vehicle would be locked 2 s later.
@@ -111,29 +108,28 @@ class Setpoints(Subsystem):
         link = self._current_link()
         link.discard(_STREAM)
         sent = threading.Event()
-        for _ in range(count):
+        for _ in range(ZEROS):
             link.put(lambda: link.cflib.commander.send_setpoint(0, 0, 0, 0))
-            time.sleep(period)
+            time.sleep(_ZERO_PERIOD)
         self.notify_setpoints_stop()
         link.put(sent.set)
         sent.wait(_SENT_LIMIT)
 
-    def notify_setpoints_stop(self, remain_valid_ms: int = 0) -> None:
+    def notify_setpoints_stop(self, remain_valid_ms: int = 0, at_once: bool = False) -> None:
         """Announce that no more setpoints follow; the last one still counts for some ms.
 
-        Without it the firmware ignores high-level commands after a streamed setpoint.
+        Without it the firmware ignores high-level commands after a streamed setpoint. At once means
+        in the calling thread, which has to be the one that sends: see `Subsystem.guarded`.
         """
         if not 0 <= remain_valid_ms < 2**32:
             raise ValueRangeError(f"{remain_valid_ms} ms is not in 0 to 2^32 - 1")
         link = self._current_link()
         link.discard(_STREAM)
-        link.put(lambda: link.cflib.commander.send_notify_setpoint_stop(remain_valid_ms))
-
-    def notify_setpoints_stop_now(self, remain_valid_ms: int = 0) -> None:
-        """Do the same at once, in the thread that sends: see `Subsystem.guarded`."""
-        link = self._current_link()
-        link.discard(_STREAM)
-        link.cflib.commander.send_notify_setpoint_stop(remain_valid_ms)
+        notify = partial(link.cflib.commander.send_notify_setpoint_stop, remain_valid_ms)
+        if at_once:
+            notify()
+        else:
+            link.put(notify)
 
     def _stream(self, send):
         link = self._current_link()

@@ -1,16 +1,15 @@
-"""What the subsystems of a vehicle have in common: a link, tables of names."""
+"""Base class of the parts of the firmware, and the tables of its names."""
 
 import copy
 from collections.abc import Callable
-from typing import Any, Protocol, Self, TypeVar, cast
+from typing import Any, Self, TypeVar, cast
 
 from crazyflie_link.link import Link
 from crazyflie_link.request_reply import Request
 from crazyflie_link.transmit_queue import Send
 
 MaySend = Callable[[], bool]
-"""Is called by the thread that sends, right before each packet: whether it is sent. Of two queued
-packets, the second cannot overtake the first between this call and the sending."""
+"""Is called in the thread that sends, right before each packet: whether it is sent."""
 
 
 class _GuardedLink:
@@ -50,16 +49,10 @@ class Subsystem:
         return guarded
 
 
-class TableElement(Protocol):
-    """An element of cflib's table of parameters or of log variables."""
-
-    ctype: str
+Element = TypeVar("Element")
 
 
-E = TypeVar("E", bound=TableElement)
-
-
-def elements(table: dict[str, dict[str, E]]) -> dict[str, E]:
+def elements(table: dict[str, dict[str, Element]]) -> dict[str, Element]:
     """Return the elements of one of cflib's tables: "group.name" -> element, sorted by name."""
     return {
         f"{group}.{name}": element

@@ -57,7 +57,7 @@ class Supervisor(Subsystem):
         self._command(link, bytes([CMD_RECOVER_SYSTEM]), "recovering from a crash")
 
     def emergency_stop(self) -> None:
-        """Stop the motors at once, before anything else that waits to be sent; does not block.
+        """Stop the motors at once, before anything that is queued; does not block.
 
         Sent again and again until the vehicle is seen to be locked, also on a link that is silent
         or being opened, and on every later one. The vehicle has to be restarted before it can fly
@@ -76,8 +76,8 @@ class Supervisor(Subsystem):
     def feed_watchdog(self) -> None:
         """Feed the emergency-stop watchdog; does not block.
 
-        It begins with the first feed and cannot be ended: 1 s after the last one the vehicle stops
-        its motors and is locked until it is restarted, also on the ground.
+        It cannot be ended: 1 s after the last feed the vehicle stops its motors and is locked until
+        it is restarted, also on the ground.
         """
         link = self._current_link()
         link.put_latest(_WATCHDOG, link.cflib.supervisor.send_emergency_stop_watchdog)

@@ -1,8 +1,7 @@
 """One thread per link that sends, so that no caller ever blocks on a radio.
 
-cflib's radio driver blocks a sender for up to 2 s when the vehicle is out of
-range. A setpoint that is that old is worse than none; so of setpoints (and of
-external positions) only the latest is kept. Commands are all sent, in order.
+cflib's radio driver blocks a sender for up to 2 s when the vehicle is out of range. Of setpoints
+and external positions, stale by then, only the latest is kept. Commands are sent in order.
 """
 
 import logging

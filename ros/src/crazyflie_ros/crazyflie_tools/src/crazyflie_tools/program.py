@@ -20,45 +20,36 @@ LIMIT = 40.0
 """When to give up, s: later than a connection does by itself."""
 
 
-def make_parser(name: str, description: str) -> argparse.ArgumentParser:
-    """Return a parser of a tool's arguments."""
-    return argparse.ArgumentParser(
+def make_parser(
+    name: str, description: str, has_uri: bool = True, has_timeout: bool = True
+) -> argparse.ArgumentParser:
+    """Return a parser, with the arguments ``--uri`` (an `Address`) and ``--timeout`` (s)."""
+    parser = argparse.ArgumentParser(
         prog=name,
         description=description,
         epilog="Exit status: 0 fine, 1 failed with a message on stderr, 2 wrong usage.",
     )
-
-
-def add_uri(parser: argparse.ArgumentParser) -> None:
-    """Add the argument ``--uri``, an `Address`."""
-    parser.add_argument(
-        "--uri",
-        type=_address,
-        default=DEFAULT_URI,
-        help="address of the vehicle: radio://DONGLE/CHANNEL/RATE/ADDRESS or udp://HOST:PORT; "
-        "by default %(default)s",
-    )
-
-
-def add_timeout(parser: argparse.ArgumentParser) -> None:
-    """Add the argument ``--timeout``, s."""
-    parser.add_argument(
-        "--timeout",
-        type=seconds,
-        default=LIMIT,
-        metavar="SECONDS",
-        help="when to give up; by default %(default)g",
-    )
+    if has_uri:
+        parser.add_argument(
+            "--uri",
+            type=_address,
+            default=DEFAULT_URI,
+            help="address of the vehicle: radio://DONGLE/CHANNEL/RATE/ADDRESS or udp://HOST:PORT; "
+            "by default %(default)s",
+        )
+    if has_timeout:
+        parser.add_argument(
+            "--timeout",
+            type=seconds,
+            default=LIMIT,
+            metavar="SECONDS",
+            help="when to give up; by default %(default)g",
+        )
+    return parser
 
 
 def seconds(text: str) -> float:
-    """Return the number of seconds, above 0, that a text stands for.
-
-    Raises
-    ------
-    argparse.ArgumentTypeError
-        It is none.
-    """
+    """Return a number of seconds above 0; raise `argparse.ArgumentTypeError` for another text."""
     try:
         value = float(text)
     except ValueError:
@@ -78,17 +69,9 @@ def _address(text):
 def run(name: str, work: Callable[[], None], limit: float | None, interrupted: int = FAILED) -> int:
     """Do the work of a tool and return its exit status.
 
-    Parameters
-    ----------
-    name : str
-        Of the tool; its messages begin with it.
-    work : callable
-        ``work()`` prints what was asked for, or raises `CrazyflieError`.
-    limit : float or None
-        Time limit, s. Work that does not end by then is left alone and the process
-        ends on the spot: it may hang in the driver of a USB device.
-    interrupted : int
-        Exit status after Ctrl-C.
+    ``work()`` prints what was asked for, or raises `CrazyflieError`. When it does not end within
+    the limit (s) the process ends at once: it may hang in the driver of a USB device. After Ctrl-C
+    the status is ``interrupted``.
     """
     outcome: list[int] = []
     worker = threading.Thread(
@@ -98,7 +81,7 @@ def run(name: str, work: Callable[[], None], limit: float | None, interrupted: i
     try:
         worker.join(limit)
         if not worker.is_alive():
-            # Nothing: a mistake in the tool, whose traceback is on stderr.
+            # Without an outcome: a bug of the tool, whose traceback is on stderr.
             return outcome[0] if outcome else FAILED
         status = FAILED
         _print_error(name, f"not done within {limit:g} s: gave up")

@@ -1,7 +1,6 @@
-"""The tools: each reads its arguments, prints what was asked for and returns its exit status.
+"""The tools: each parses its arguments, by default the process's, and returns its exit status.
 
-Their arguments are by default those of the process. What needs cflib is loaded when the
-arguments are right, or where they depend on it.
+What needs cflib is imported when the arguments are right, or where they depend on it.
 """
 
 import argparse
@@ -13,7 +12,7 @@ import numpy as np
 
 import crazyflie_link
 from crazyflie_link.errors import NoAnswerError
-from crazyflie_tools.program import FINE, LIMIT, add_timeout, add_uri, make_parser, run, seconds
+from crazyflie_tools.program import FINE, LIMIT, make_parser, run, seconds
 
 _CHECK_PERIOD = 0.1
 
@@ -25,6 +24,7 @@ def scan(arguments: list[str] | None = None) -> int:
         "List the addresses of the vehicles within reach: by radio on all channels and data rates, "
         "by USB, and on the UDP ports 19850 to 19859 of 127.0.0.1 or of the environment variable "
         "SCAN_ADDRESS.",
+        has_uri=False,
     )
     parser.add_argument(
         "--address",
@@ -32,7 +32,6 @@ def scan(arguments: list[str] | None = None) -> int:
         default="E7E7E7E7E7",
         help="radio address to call; by default %(default)s",
     )
-    add_timeout(parser)
     options = parser.parse_args(arguments)
     return run(parser.prog, lambda: _scan(options.address), options.timeout)
 
@@ -81,8 +80,7 @@ def get_param(arguments: list[str] | None = None) -> int:
 
 
 def _get_param(vehicle, options):
-    values = [vehicle.parameters.read(name) for name in options.name]
-    print(*map(_text, values), sep="\n")
+    print(*(_text(vehicle.parameters.read(name)) for name in options.name), sep="\n")
 
 
 def set_param(arguments: list[str] | None = None) -> int:
@@ -111,16 +109,14 @@ def reboot(arguments: list[str] | None = None) -> int:
         help="restart into the firmware (default) or the boot loader; switch the main processor "
         "and the decks off or on; switch everything off",
     )
-    add_uri(parser)
-    add_timeout(parser)
     options = parser.parse_args(arguments)
     vehicle = crazyflie_link.Crazyflie(options.uri.uri)
     return run(parser.prog, lambda: vehicle.reboot(options.mode), options.timeout)
 
 
 def console(arguments: list[str] | None = None) -> int:
-    """Print what the firmware of a vehicle says."""
-    parser = make_parser("console", "Print what the firmware of a vehicle says.")
+    """Print the console of a vehicle's firmware."""
+    parser = make_parser("console", "Print the console of a vehicle's firmware.", has_timeout=False)
     parser.add_argument(
         "--duration",
         type=seconds,
@@ -128,11 +124,11 @@ def console(arguments: list[str] | None = None) -> int:
         metavar="SECONDS",
         help="when to end; by default at Ctrl-C",
     )
-    add_uri(parser)
     options = parser.parse_args(arguments)
     limit = LIMIT + options.duration if math.isfinite(options.duration) else None
-    work = lambda: _console(options.uri.uri, options.duration)  # noqa: E731
-    return run(parser.prog, work, limit, interrupted=FINE)
+    return run(
+        parser.prog, lambda: _console(options.uri.uri, options.duration), limit, interrupted=FINE
+    )
 
 
 def _console(uri, duration):
@@ -148,9 +144,7 @@ def _console(uri, duration):
 
 
 def _talk(parser, arguments, work):
-    """Connect, let ``work(vehicle, options)`` talk to the vehicle, return the exit status."""
-    add_uri(parser)
-    add_timeout(parser)
+    """Connect, call ``work(vehicle, options)``, return the exit status."""
     options = parser.parse_args(arguments)
 
     def talk():

@@ -37,21 +37,10 @@ class _Planner(enum.Enum):
 
 
 class FakeFlight:
-    """A planner and a supervisor, which follow commands, setpoints and a clock.
+    """A planner and a supervisor, which follow commands, setpoints and a clock (s).
 
-    The firmware's own watchdogs are left out: silence changes nothing.
-
-    Parameters
-    ----------
-    protocol : int
-        Version of the protocol; `SUPERVISOR_PROTOCOL` decides what is reported.
-    clock : callable
-        Returns the time, s.
-
-    Attributes
-    ----------
-    starts : int
-        How many times the motors have begun to run.
+    The firmware's own watchdogs are left out: silence changes nothing. The protocol decides what is
+    reported; ``starts`` is how many times the motors have begun to run.
     """
 
     def __init__(self, protocol: int = 12, clock: Callable[[], float] = time.monotonic):
@@ -133,11 +122,11 @@ class FakeFlight:
         self._update()
 
     def end_stream(self) -> None:
-        """Give the motors to the planner, which holds them off if it was told nothing since."""
+        """Give the motors to the planner, which holds them off without a command since."""
         self._is_streamed = False
         self._update()
 
-    def stop_for_good(self) -> None:
+    def lock(self) -> None:
         """Stop the motors and lock, until `restart`."""
         self._is_locked = True
         self._planner = _Planner.STOPPED

@@ -1,10 +1,9 @@
-"""A vehicle for tests, which answers over UDP as a test lets it and has no dynamics.
+"""A vehicle without dynamics for tests, which answers over UDP; its commands are `FakeFlight`'s.
 
-It knows the set-up of a connection, log blocks, parameters and replies, and keeps
-every packet that it gets. Commands and the supervisor are those of `FakeFlight`.
-`crazyflie_virtual` is a vehicle that flies.
+It knows the set-up of a connection, log blocks, parameters and replies.
 """
 
+import contextlib
 import socket
 import struct
 import threading
@@ -22,28 +21,20 @@ TRAJECTORY_MEMORY = (1, 0x12, 4096)
 
 _ATTITUDE = struct.Struct("<fffH")
 _EMERGENCY_STOP = 0x03
+_NULL_PACKET = (15, 3)
+"""Port and channel of the packet by which vehicles are searched."""
 
 
-class FakeVehicle:
-    """A vehicle on a UDP port of this machine.
+class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
+    """A vehicle on a UDP port of this machine, by default any free one.
 
-    Parameters
-    ----------
-    log : dict
-        Log variables: "group.name" -> (struct format of the type, value).
-    parameters : dict
-        "group.name" -> (struct format of the type, value, flags).
-    protocol : int
-        Version of the protocol.
-    port : int
-        By default any free one.
-    clock : callable
-        Returns the time of the flight, s.
+    Log variables are "group.name" -> (struct format of the type, value), parameters "group.name" ->
+    (struct format of the type, value, flags); ``clock()`` returns the time of the flight, s.
 
     Attributes
     ----------
     flight : FakeFlight
-        What is answered to commands and reported by the supervisor, also as the log variable
+        Answers commands and reports the supervisor's state, also as the log variable
         supervisor.info if ``log`` has it.
     received : list of (port, channel, bytes)
         All packets, oldest first.
@@ -52,7 +43,7 @@ class FakeVehicle:
     answers : dict
         (port, channel, first byte) -> data to answer with, in the place of its own.
     lose : callable
-        ``lose(count)`` tells whether to lose the reply with this number.
+        ``lose(count)`` returns whether the reply with this number is lost.
     is_frozen : bool
         Whether it neither receives nor sends anything.
     """
@@ -78,7 +69,6 @@ class FakeVehicle:
         self._replies = 0
         self._blocks: dict[int, list[str]] = {}
         self._started: dict[int, tuple[float, float]] = {}
-        self._forgets_logs = threading.Event()
         self._peer: tuple[str, int] | None = None
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.bind(("127.0.0.1", port))
@@ -93,10 +83,6 @@ class FakeVehicle:
         """Address of the vehicle."""
         return f"udp://127.0.0.1:{self.port}"
 
-    def __enter__(self) -> "FakeVehicle":
-        """Return the vehicle."""
-        return self
-
     def __exit__(self, *_: object) -> None:
         """Close the port."""
         self.close()
@@ -107,11 +93,11 @@ class FakeVehicle:
         self._thread.join(timeout=2.0)
         self._socket.close()
 
-    def say(self, port: int, channel: int, data: bytes) -> None:
+    def send(self, port: int, channel: int, data: bytes) -> None:
         """Send a packet without being asked."""
-        self.say_datagram(bytes([port << 4 | 3 << 2 | channel]) + data)
+        self.send_datagram(bytes([port << 4 | 3 << 2 | channel]) + data)
 
-    def say_datagram(self, datagram: bytes) -> None:
+    def send_datagram(self, datagram: bytes) -> None:
         """Send any datagram."""
         if self._peer is not None and not self.is_frozen:
             self._socket.sendto(datagram, self._peer)
@@ -121,35 +107,26 @@ class FakeVehicle:
         return [data for p, c, data in list(self.received) if (p, c) == (port, channel)]
 
     def wait_for(self, condition: Callable[[], bool], limit: float = 60.0) -> bool:
-        """Wait until ``condition()`` holds, looking after every packet; tell whether it does."""
+        """Wait until ``condition()`` holds, checked after every packet; return whether it does."""
         with self._changed:
             return self._changed.wait_for(condition, limit)
 
     def wait_for_packets(
         self, port: int, channel: int, count: int = 1, limit: float = 60.0
     ) -> list[bytes]:
-        """Wait for so many packets on a port and channel, and return all of them.
-
-        Raises
-        ------
-        AssertionError
-            They have not come within the limit (s).
-        """
-        is_there = self.wait_for(lambda: len(self.packets(port, channel)) >= count, limit)
-        assert is_there, (
-            f"{len(self.packets(port, channel))} of {count} packets on {port}/{channel}"
-        )
-        return self.packets(port, channel)
+        """Return all packets on a port and channel once there are so many within a limit (s)."""
+        self.wait_for(lambda: len(self.packets(port, channel)) >= count, limit)
+        found = self.packets(port, channel)
+        assert len(found) >= count, f"{len(found)} of {count} packets on {port}/{channel}"
+        return found
 
     def _run(self):
         while not self._stopped.is_set():
             self._send_logs()
             try:
                 datagram, peer = self._socket.recvfrom(64)
-            except TimeoutError:
-                continue
             except OSError:
-                # Nobody listened to what was sent.
+                # Nothing has come, or nothing listens to what was sent.
                 continue
             if self.is_frozen or not datagram:
                 continue
@@ -158,15 +135,15 @@ class FakeVehicle:
             with self._changed:
                 self.received.append((port, channel, data))
                 self._changed.notify_all()
-            for deaf_port, deaf_channel, prefix in self.deaf:
-                if (port, channel) == (deaf_port, deaf_channel) and data.startswith(prefix):
-                    break
-            else:
+            is_deaf = any(
+                (p, c) == (port, channel) and data.startswith(prefix) for p, c, prefix in self.deaf
+            )
+            if not is_deaf:
                 self._reply(port, channel, data)
 
     def _reply(self, port, channel, data):
-        if datagram_is_null(port, channel):
-            self.say(15, 3, b"")
+        if (port, channel) == _NULL_PACKET:
+            self.send(*_NULL_PACKET, b"")
             return
         answer = self.answers.get((port, channel, data[0] if data else None))
         if answer is None:
@@ -176,7 +153,7 @@ class FakeVehicle:
             return
         self._replies += 1
         if not self.lose(self._replies):
-            self.say(port, channel, answer)
+            self.send(port, channel, answer)
 
     # Link and platform.
 
@@ -213,21 +190,18 @@ class FakeVehicle:
 
     def forget_logs(self) -> None:
         """Send no log data any more, as after a restart between two pings."""
-        self._forgets_logs.set()
+        self._started = {}
 
     def _send_logs(self):
-        if self._forgets_logs.is_set():
-            self._forgets_logs.clear()
-            self._started.clear()
-        now = time.monotonic()
-        for block, (period, due) in list(self._started.items()):
+        now, started = time.monotonic(), self._started
+        for block, (period, due) in list(started.items()):
             if now < due:
                 continue
-            self._started[block] = (period, max(due + period, now))
+            started[block] = (period, max(due + period, now))
             values = [self._log_value(name) for name in self._blocks[block]]
             packed = struct.pack("<" + "".join(code for code, _ in values), *(v for _, v in values))
             stamp = (int(now * 1000) & 0xFFFFFF).to_bytes(3, "little")
-            self.say(5, 2, bytes([block]) + stamp + packed)
+            self.send(5, 2, bytes([block]) + stamp + packed)
 
     def _log_value(self, name):
         code, value = self.log[name]
@@ -239,7 +213,7 @@ class FakeVehicle:
         number, code, size = TRAJECTORY_MEMORY
         if data[0] == 1:
             return b"\x01\x02"
-        # The first is one that nobody asks for anything.
+        # The first memory is never read.
         details = (number, code, size) if data[1] == number else (data[1], 0x18, 0)
         return b"\x02" + struct.pack("<BBI", *details) + bytes(8)
 
@@ -290,13 +264,8 @@ class FakeVehicle:
 
     def _on_9_1(self, data):
         if data[0] == _EMERGENCY_STOP:
-            self.flight.stop_for_good()
+            self.flight.lock()
         return bytes([0x80 | data[0], 1, data[1] if len(data) > 1 else 1])
-
-
-def datagram_is_null(port: int, channel: int) -> bool:
-    """Tell whether a packet is the null packet by which vehicles are searched."""
-    return (port, channel) == (15, 3)
 
 
 def _table(data, items, seed, tail):

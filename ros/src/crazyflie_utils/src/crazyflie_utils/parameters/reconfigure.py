@@ -8,7 +8,7 @@ for many nodes in one process. What goes over the wire is encoded by the library
 import contextlib
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any
 
 from dynamic_reconfigure import encoding
 from dynamic_reconfigure.msg import Config, ConfigDescription
@@ -16,28 +16,7 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, ParameterError, Parameters
 from crazyflie_utils.parameters.types import Boolean, Integer, Number, Text
-from crazyflie_utils.topics import Publisher
 from crazyflie_utils.transport import ServiceError
-
-
-class ReconfiguredNode(Protocol):
-    """What is needed of a node's handle."""
-
-    name: str
-
-    def resolve(self, name: str) -> str:
-        """Return an absolute name."""
-
-    def publisher(self, topic: str, message_type: type, latch: bool = False) -> Publisher:
-        """Announce a topic."""
-
-    def advertise_service(
-        self, name: str, service_type: type, callback: Callable[[Any], Any]
-    ) -> None:
-        """Answer calls of a service."""
-
-    def set_param_later(self, name: str, value: Any) -> None:
-        """Set a parameter without waiting."""
 
 
 class Reconfiguration:
@@ -45,8 +24,8 @@ class Reconfiguration:
 
     Parameters
     ----------
-    handle : ReconfiguredNode
-        Of the node.
+    handle : NodeHandle
+        Its module imports this one.
     parameters : Parameters
         As they are now.
     get : callable
@@ -57,7 +36,7 @@ class Reconfiguration:
 
     def __init__(
         self,
-        handle: ReconfiguredNode,
+        handle: Any,
         parameters: Parameters,
         get: Callable[[str], Any],
         on_change: Callable[[Any], None],

@@ -50,11 +50,9 @@ class Gains:
         return iter(self._numbers)
 
     def __repr__(self) -> str:
-        """Return the numbers."""
         return f"Gains({self._numbers})"
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> "NDArray[np.float64]":
-        """Return the array; it is a copy, whatever is asked for."""
         import numpy as np
 
         return np.array(self._numbers, dtype)
@@ -190,7 +188,6 @@ class MatrixFile(ParameterType):
         return _matrix(TEXT(value), self.rows, self.columns)
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return f"the path of a text file with {self.rows} rows of {self.columns} numbers"
 
 
@@ -206,7 +203,6 @@ class VectorFile(ParameterType):
         return _vector(TEXT(value), self.length)
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return f"the path of a text file with {self.length} numbers in one row or one column"
 
 

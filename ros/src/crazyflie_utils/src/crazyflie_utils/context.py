@@ -86,11 +86,8 @@ class ProcessContext:
     ) -> Timer:
         """Add a timer by the process's clock, or by the machine's if ``steady``.
 
-        Raises
-        ------
-        ValueError
-            The period is negative or not finite; or zero by simulated time,
-            where the moment would never end.
+        ValueError for a period that is negative or not finite; or zero by simulated time, where the
+        moment would never end.
         """
         if self.uses_sim_time and not steady:
             if period == 0.0:

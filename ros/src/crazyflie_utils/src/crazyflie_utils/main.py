@@ -13,6 +13,7 @@ from typing import Any
 
 import rosgraph
 import rospy
+from typing_extensions import override
 
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.node import Node
@@ -38,9 +39,9 @@ def run(node_class: type | str, default_name: str) -> None:
     Parameters
     ----------
     node_class : type or str
-        Subclass of `Node`, or its place, "package.module:Class".
+        Subclass of `Node`, or "package.module:Class".
     default_name : str
-        Name of the node unless the launch file gives another.
+        Unless the launch file gives another.
     """
 
     def make_node(handle):
@@ -85,14 +86,13 @@ class NodeClasses(ParameterType):
 
     label = "dictionary, string to string"
 
+    @override
     def __call__(self, value: Any) -> dict[str, type[Node]]:
-        """Return node name -> node class."""
         if not isinstance(value, dict) or not value:
             raise ValueError
         return {GraphName()(name): _node_class(path) for name, path in _flatten(value).items()}
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return 'a dictionary of node name: "package.module:Class"'
 
 

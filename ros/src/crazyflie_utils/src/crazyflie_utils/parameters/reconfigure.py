@@ -1,8 +1,7 @@
 """Parameters that may be changed in flight, as dynamic_reconfigure and rqt_reconfigure do it.
 
-The library's own server uses rospy, in threads of rospy's; this one goes
-through the node handle, so that a change comes between two callbacks and works
-for many nodes in one process. What goes over the wire is encoded by the library.
+Through the node handle, so that a change comes between two callbacks; the library's own server has
+threads of rospy's.
 """
 
 import contextlib
@@ -20,18 +19,9 @@ from crazyflie_utils.transport import ServiceError
 
 
 class Reconfiguration:
-    """Offer the live parameters of a node.
+    """Offers the live parameters of a node, which were read with ``get``; see `NodeHandle.load`.
 
-    Parameters
-    ----------
-    handle : NodeHandle
-        Its module imports this one.
-    parameters : Parameters
-        As they are now.
-    get : callable
-        Where they were read from; see `Parameters.read`.
-    on_change : callable
-        See `NodeHandle.load`.
+    The handle is a `NodeHandle`, whose module imports this one.
     """
 
     def __init__(

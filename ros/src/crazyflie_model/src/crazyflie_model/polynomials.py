@@ -31,12 +31,7 @@ def evaluate(
 ) -> list[Number]:
     """Return the value at t and as many derivatives of a polynomial, by Horner's scheme.
 
-    Parameters
-    ----------
-    coefficients : sequence of float
-        The constant first.
-    t : float or ndarray
-    derivatives : int
+    Of its coefficients, the constant is the first.
     """
     terms = [0.0 * t] * (derivatives + 1)
     for c in reversed(coefficients):

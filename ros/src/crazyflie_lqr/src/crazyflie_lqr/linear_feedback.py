@@ -97,18 +97,14 @@ class LinearFeedback:
     def control(
         self, x: "NDArray[np.float64]", x_ref: "NDArray[np.float64]", time: float
     ) -> "NDArray[np.float64]":
-        """Return the control for a state.
+        """Return the control, shape (u_dim,), for a state.
 
         Parameters
         ----------
         x, x_ref : ndarray, shape (x_dim,)
             State and reference.
         time : float
-            When the vehicle was in this state, s: the state's stamp.
-
-        Returns
-        -------
-        ndarray, shape (u_dim,)
+            The state's stamp, s.
         """
         return _array(self.law(_floats(x), _floats(x_ref), time))
 
@@ -146,8 +142,6 @@ class IntegralStateFeedback(LinearFeedback):
 
     Parameters
     ----------
-    K, u_ref, yaw_index
-        See `LinearFeedback`.
     integrator_k : sequence, 3 components, optional
         Gains of x, y, z in rad/(m s), rad/(m s), 1/s^3, with the signs of the
         position gains in K.
@@ -192,11 +186,7 @@ class IntegralStateFeedback(LinearFeedback):
 
     @override
     def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
-        """Return the control for a state; see `LinearFeedback.control`.
-
-        A state that is not younger than the last one, or comes more than
-        `MAX_GAP` after it, adds nothing to the integral.
-        """
+        """Return the control; states with a gap before them, see `MAX_GAP`, are not integrated."""
         dt = self._time_since_last(time)
         reference, climb_thrust = self._follow_climb(x, x_ref, dt)
         error = heading_error(x, reference, self.yaw_index)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 MAX_GAIN = 1e6
-"""Largest number of a gain file: more of it makes controls that are not finite."""
+"""Largest number of a gain file: larger ones make controls that are not finite."""
 
 
 class LinearFeedbackParameters(Parameters):
@@ -94,9 +94,8 @@ class LinearFeedbackParameters(Parameters):
 class LinearFeedbackNode(Node):
     """Answer every state with a control that leads towards the reference.
 
-    A subclass describes its state in class attributes, and may override
-    `complete_reference` and `make_controller`. Where neither `complete_reference` nor the
-    controller's `control` is overridden, no arrays are made.
+    A subclass describes its state in class attributes, and may override `complete_reference` and
+    `make_controller`. Unless it does, or the controller overrides `control`, no arrays are made.
 
     Attributes
     ----------
@@ -127,25 +126,13 @@ class LinearFeedbackNode(Node):
         self._age = StateAge()
 
     def complete_reference(self, reference: "NDArray[np.float64]") -> "NDArray[np.float64]":
-        """Return the reference state, shape (x_dim,), that a reference message means.
-
-        Parameters
-        ----------
-        reference : ndarray, shape (number of fields,)
-            The fields of the message.
-        """
+        """Return the reference state, shape (x_dim,), of the fields of a reference message."""
         import numpy as np
 
         return np.append(reference, self.reference_tail)
 
     def make_controller(self, parameters: Any) -> LinearFeedback:
-        """Return the control law, at the start and after a change of live parameters.
-
-        Parameters
-        ----------
-        parameters : LinearFeedbackParameters
-            Of the type `parameters_type`.
-        """
+        """Return the control law for parameters of the type `parameters_type`."""
         return LinearFeedback(parameters.K, parameters.u_ref, self.yaw_index)
 
     @override

@@ -39,5 +39,5 @@ class SupervisorState(enum.IntFlag):
 
     def words(self) -> str:
         """Return the state in words, such as "armed, flying"."""
-        flags = (flag for flag in SupervisorState if flag in self)
-        return ", ".join(flag.name.lower().replace("_", " ") for flag in flags) or "nothing"
+        names = [name for name, flag in SupervisorState.__members__.items() if flag in self]
+        return ", ".join(names).lower().replace("_", " ") or "nothing"

@@ -64,8 +64,7 @@ def test_another_type_is_refused_once(process, handle, warnings):
     with HostilePublisher("/md5", String, "0" * 32) as hostile:
         connected(hostile).send(frame(String("junk")))
         wait_until(lambda: warnings, "a complaint")
-        # Each time the master tells of the topic, it may be tried again; rospy by itself
-        # would after half a second.
+        # rospy by itself would try again after half a second.
         for _ in range(3):
             with HostilePublisher("/md5", String) as proper:
                 connected(proper).send(frame(String("proper")))

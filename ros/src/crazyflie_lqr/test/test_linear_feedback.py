@@ -182,11 +182,11 @@ def test_on_the_ground_the_integral_is_zero_and_stays_so():
     for time in np.arange(0.0, 3.0, 0.1):
         u = controller.control(state(z=-1.0), np.zeros(7), time)
     assert u[3] == pytest.approx(9.81 + 2.9)
-    controller.rest()
+    controller.reset_integrator()
     for time in np.arange(3.0, 33.0, 0.1):
         u = controller.control(state(z=-1.0), np.zeros(7), time)
     assert u[3] == 9.81
-    controller.fly()
+    controller.enable_integrator()
     u = controller.control(state(z=-1.0), np.zeros(7), time + 0.1)
     assert u[3] == pytest.approx(9.81 + 0.1)
 

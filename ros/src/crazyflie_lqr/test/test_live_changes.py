@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from test_position_velocity_yaw_state_lift_lqr_node import answer, lifting, reconfigure, refer, tell
+from lift_controller import answer, lifting, publish_flight_state, reconfigure, refer
 
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_lqr.reference import GuardedReference
@@ -64,7 +64,7 @@ def test_any_integrator_and_gains_at_any_moment_of_a_takeoff(changes):
 
 def test_a_climb_goes_on_without_the_integrator_of_the_height():
     process = lifting()
-    tell(process, "taking_off")
+    publish_flight_state(process, "taking_off")
     refer(process, z=1.0)
     for k in range(10):
         process.advance(0.05)

@@ -1,20 +1,16 @@
 """The node of the integral state feedback on a fake process."""
 
 import math
-from pathlib import Path
 
 import genpy
 import numpy as np
 import pytest
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
-from std_msgs.msg import String
+from lift_controller import PARAMETERS, answer, launch, publish_flight_state, reconfigure, refer
 
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
 )
 from crazyflie_msgs.msg import (
-    FlightStatus,
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawState,
@@ -22,26 +18,11 @@ from crazyflie_msgs.msg import (
 )
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
-from crazyflie_utils.vectors import to_vector
-
-CONFIG = Path(__file__).parents[1] / "config"
-PARAMETERS = {
-    "x_dim": 7,
-    "u_dim": 4,
-    "K_file": str(CONFIG / "K_soft.txt"),
-    "u_ref_file": str(CONFIG / "u_ref_hover.txt"),
-    "topics/reference": "/ref",
-    "topics/state": "/state",
-    "topics/control": "/control/lqr",
-}
 
 
 @pytest.fixture
 def process():
-    """Return a process with a controller in it."""
-    process = FakeProcess()
-    assert process.launch(PositionVelocityYawStateLiftLqrNode(), "/lqr_controller", PARAMETERS)
-    return process
+    return launch()
 
 
 def refused(parameters):
@@ -50,21 +31,6 @@ def refused(parameters):
     node = PositionVelocityYawStateLiftLqrNode()
     assert not process.launch(node, "/lqr_controller", parameters)
     return process.logged("error")[0]
-
-
-def refer(process, x=0.0, **values):
-    process.publish(
-        "/ref", PositionVelocityStateStamped(state=PositionVelocityState(x=x, **values))
-    )
-
-
-def answer(process, **values):
-    """Send a state stamped now; return the new controls, as vectors."""
-    before = len(process.published("/control/lqr"))
-    message = PositionVelocityYawStateStamped(state=PositionVelocityYawState(**values))
-    message.header.stamp = process.clock.stamp()
-    process.publish("/state", message)
-    return [to_vector(m.control) for m in process.published("/control/lqr")[before:]]
 
 
 @pytest.mark.parametrize("name", PARAMETERS)
@@ -143,10 +109,8 @@ def test_signs_and_sizes_of_the_soft_gains(process):
 
 
 def test_parameters_of_the_integrator_arrive():
-    process = FakeProcess()
     extra = {"integrator/k/x": -0.1, "integrator/thresh/x": 0.03, "integrator/k/z": -1}
-    node = PositionVelocityYawStateLiftLqrNode()
-    assert process.launch(node, "/lqr_controller", {**PARAMETERS, **extra})
+    process = launch(**extra)
     refer(process)
     for _ in range(10):
         [control] = answer(process, x=0.1, z=0.1)
@@ -233,9 +197,7 @@ def test_bad_references_of_a_descent_are_ignored(process):
 
 
 def test_the_topic_of_the_descent_can_be_chosen():
-    process = FakeProcess()
-    parameters = {**PARAMETERS, "topics/descent_reference": "/down"}
-    assert process.launch(PositionVelocityYawStateLiftLqrNode(), "/lqr_controller", parameters)
+    process = launch(**{"topics/descent_reference": "/down"})
     assert "/down" in process.transport.subscribers
     assert "/ref_descent" not in process.transport.subscribers
 
@@ -295,132 +257,11 @@ def test_states_without_stamps_of_this_clock_are_answered(process, stamp):
         process.advance(1.0)
 
 
-# When it integrates.
-
-LIFT = {"integrator/k/z": -0.5, "integrator/thresh/z": 6.0}
-
-
-def lifting(**changes):
-    process = FakeProcess()
-    node = PositionVelocityYawStateLiftLqrNode()
-    assert process.launch(node, "/lqr_controller", {**PARAMETERS, **LIFT, **changes})
-    return process
-
-
-def thrusts(process, duration, **state):
-    """Return the thrusts that answer a state for some seconds."""
-    return [
-        answer(process, **state)[0][3]
-        for _ in range(round(duration / 0.1))
-        if process.advance(0.1) is None
-    ]
-
-
-def tell(process, state):
-    status = FlightStatus(state=getattr(FlightStatus, state.upper()))
-    process.publish("/in_flight_flight_status", status)
-
-
-def test_on_the_ground_nothing_is_integrated_and_a_takeoff_begins_from_zero():
-    process = lifting()
-    tell(process, "on_ground")
-    refer(process, z=1.0)
-    assert thrusts(process, 30.0) == pytest.approx([9.81 + 1.5] * 300)
-    tell(process, "taking_off")
-    assert thrusts(process, 1.0) == pytest.approx([9.81 + 1.5] * 10)
-    refer(process, z=1.0)
-    course = thrusts(process, 1.5)
-    assert course[0] == pytest.approx(9.81)
-    # It grows until the vehicle lifts off, without a step.
-    assert course[-1] > course[0] + 1.5
-    assert max(np.abs(np.diff(course))) < 0.6
-    tell(process, "on_ground")
-    assert thrusts(process, 1.0) == pytest.approx([9.81 + 1.5] * 10)
-
-
-def test_in_flight_it_integrates():
-    process = lifting()
-    tell(process, "flying")
-    refer(process, z=1.0)
-    thrusts(process, 3.0, z=1.0)
-    course = thrusts(process, 1.0, z=0.9)
-    assert course[-1] - course[0] == pytest.approx(0.9 * 0.1 * 0.5)
-    tell(process, "landing")
-    assert thrusts(process, 1.0, z=0.9) == pytest.approx([9.81 + 0.15] * 10)
-
-
-def test_without_a_flight_state_it_integrates_in_the_air_and_while_it_may_lift_off():
-    process = lifting()
-    refer(process, z=1.0)
-    standing = thrusts(process, 30.0)
-    assert standing[20] > standing[0] + 0.9
-    assert standing[-1] == pytest.approx(9.81 + 1.5)
-    flying = thrusts(process, 1.0, z=0.5)
-    assert flying[-1] - flying[0] == pytest.approx(0.9 * 0.5 * 0.5)
-
-
-@pytest.mark.parametrize(
-    ("parameter", "message"),
-    [
-        ("topics/flight_state", String("on_ground")),
-        ("topics/flight_status", FlightStatus(state=FlightStatus.ON_GROUND)),
-    ],
-)
-def test_the_topic_of_the_flight_state_can_be_chosen(parameter, message):
-    process = lifting(**{parameter: "/cf1/state_of_flight"})
-    process.publish("/cf1/state_of_flight", message)
-    refer(process, z=1.0)
-    assert thrusts(process, 2.0) == pytest.approx([9.81 + 1.5] * 20)
-
-
-# Changes in flight.
-
-
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    request = ReconfigureRequest(encode_config(values))
-    return process.call("/lqr_controller/set_parameters", request)
-
-
-def test_gains_may_be_changed_in_flight(process, tmp_path):
-    gains = tmp_path / "K.txt"
-    gains.write_text("0 0 0 0 0 0 0\n" * 3 + "0 0 -2 0 0 0 0\n")
-    refer(process, z=1.0)
-    reconfigure(process, K_file=str(gains))
-    [control] = answer(process, z=0.5)
-    np.testing.assert_allclose(control, [0.0, 0.0, 0.0, 9.81 + 1.0])
-
-
-def test_a_change_of_the_integrator_keeps_its_integral(process):
-    reconfigure(process, **{"integrator/k/z": -1.0, "integrator/thresh/z": 1.0})
-    refer(process, z=1.0)
-    for _ in range(6):
-        [before] = answer(process, z=0.8)
-        process.advance(0.1)
-    reconfigure(process, **{"integrator/k/x": -0.1})
-    [after] = answer(process, z=0.8)
-    assert before[3] == pytest.approx(9.81 + 0.3 + 0.1)
-    assert after[3] == pytest.approx(9.81 + 0.3 + 0.12)
-
-
-def test_bad_gains_are_refused_and_the_old_ones_stay(process, tmp_path):
-    gains = tmp_path / "K.txt"
-    gains.write_text("0 0 0\n")
-    refer(process, z=1.0)
-    [before] = answer(process, z=0.5)
-    with pytest.raises(ServiceError, match=r"line 1: 3 numbers, expected 4 rows of 7 numbers"):
-        reconfigure(process, K_file=str(gains))
-    [after] = answer(process, z=0.5)
-    np.testing.assert_array_equal(after, before)
-
-
 @pytest.mark.parametrize(("state", "warnings"), [("flying", 1), ("landing", 0)])
 def test_the_end_of_a_descent_is_no_reason_to_warn(process, state, warnings):
-    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    publish_flight_state(process, "flying")
     refer(process, z=1.0, z_dot=-0.3)
-    process.publish(
-        "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
-    )
+    publish_flight_state(process, state)
     process.advance(0.6)
     answer(process, z=1.0)
     assert len(process.logged("warn")) == warnings

@@ -2,30 +2,23 @@
 
 import numpy as np
 import pytest
-from test_position_velocity_yaw_state_lift_lqr_node import PARAMETERS, answer, refer
+from lift_controller import answer, launch, publish_flight_state, refer
 
-from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
-    PositionVelocityYawStateLiftLqrNode,
-)
 from crazyflie_msgs.msg import (
-    FlightStatus,
     PositionVelocityYawState,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils.testing import FakeProcess
 
 HOVER = [0.0, 0.0, 0.0, 9.81]
 
 
 @pytest.fixture
 def process():
-    process = FakeProcess()
-    assert process.launch(PositionVelocityYawStateLiftLqrNode(), "/lqr_controller", PARAMETERS)
-    return process
+    return launch()
 
 
 def test_without_a_reference_it_keeps_the_place_of_a_vehicle_in_flight(process):
-    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    publish_flight_state(process, "flying")
     [first] = answer(process, x=1.0, y=-2.0, z=1.5, yaw=0.3)
     np.testing.assert_allclose(first, HOVER, atol=1e-12)
     [second] = answer(process, x=1.1, y=-2.0, z=1.5)
@@ -38,9 +31,7 @@ def test_without_a_reference_it_keeps_the_place_of_a_vehicle_in_flight(process):
 
 @pytest.mark.parametrize("state", ["on_ground", "taking_off", "landing"])
 def test_it_is_silent_without_a_reference_otherwise(process, state):
-    process.publish(
-        "/in_flight_flight_status", FlightStatus(state=getattr(FlightStatus, state.upper()))
-    )
+    publish_flight_state(process, state)
     assert answer(process, z=1.0) == []
 
 

@@ -125,6 +125,21 @@ def test_only_the_latest_message_comes_before_timers_and_services(process, handl
     assert seen[2:] == ["4", "go", "tick"]
 
 
+def test_of_two_that_want_the_latest_message_one_may_close(process, handle):
+    first, second = [], []
+    part = handle.child()
+    for owner, seen in ((handle, first), (part, second)):
+        owner.subscribe("a", String, seen.append, latest_only=True)
+        owner.timer(1.0, lambda: None)
+    process.publish("/ns/a", String("1"))
+    process.advance(1.0)
+    part.close()
+    process.publish("/ns/a", String("2"))
+    process.advance(1.0)
+    assert first == [String("1"), String("2")]
+    assert second == [String("1")]
+
+
 def test_timers_go_on_after_a_reset_of_time(process, handle):
     moments = []
     handle.timer(0.5, lambda: moments.append(handle.time()))

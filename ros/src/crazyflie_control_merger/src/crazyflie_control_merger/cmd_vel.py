@@ -12,22 +12,8 @@ def cmd_vel_from_control(
 ) -> tuple[Vector, Vector]:
     """Return the two vectors of the twist that carries a control.
 
-    Parameters
-    ----------
-    roll, pitch : float
-        rad.
-    yaw_dot : float
-        rad/s, counter-clockwise.
-    thrust : float
-        m/s^2, mass-normalised.
-
-    Returns
-    -------
-    linear : tuple of float
-        (pitch in degrees, roll in degrees, thrust in PWM). Not limited: the
-        driver limits it.
-    angular : tuple of float
-        (0, 0, yaw rate in deg/s, clockwise).
+    From rad, rad/s (counter-clockwise) and m/s^2 to linear (pitch in degrees, roll in degrees,
+    thrust in PWM, which the driver limits) and angular (0, 0, yaw rate in deg/s, clockwise).
     """
     return (
         (math.degrees(pitch), math.degrees(roll), float(pwm_from_thrust(thrust))),

@@ -43,13 +43,7 @@ class MergerNode(Node):
     entries: tuple[int, ...] = ALL_ENTRIES
 
     def split(self, prioritized: genpy.Message) -> tuple[ArrayLike, float]:
-        """Return the control, array_like of shape (len(entries),), and the priority of a message.
-
-        Parameters
-        ----------
-        prioritized : genpy.Message
-            The field ``control`` of a prioritised message.
-        """
+        """Return the control, shape (len(entries),), and priority of a message's ``control``."""
         raise NotImplementedError
 
     @override

@@ -25,15 +25,10 @@ class Merger:
     A prioritised control counts for `crazyflie_utils.last_valid.HOLD_LIMIT`. Without
     one the regular control is left as it is, in every mode.
 
-    Attributes
-    ----------
-    mode : str
-        One of `MODES`; may be changed at any time.
-
     Parameters
     ----------
     mode : str
-        Its first value.
+        One of `MODES`; the attribute may be changed at any time.
     entries : tuple of int
         Entries of the control that are mixed; the others stay regular.
     """
@@ -46,29 +41,16 @@ class Merger:
         self._time: float | None = None
 
     def prioritize(self, control: ArrayLike, priority: float, time: float) -> None:
-        """Take a prioritised control.
+        """Take a prioritised control, shape (len(entries),), at ``time`` (s).
 
-        Parameters
-        ----------
-        control : array_like, shape (len(entries),)
-        priority : float
-            0 leaves the regular control alone, 1 replaces it; clipped to [0, 1].
-        time : float
-            Now, s.
+        Priority 0 leaves the regular control alone, 1 replaces it; it is clipped to [0, 1].
         """
         self._prioritized = np.asarray(control, dtype=float)
         self._priority = min(max(priority, 0.0), 1.0)
         self._time = time
 
     def merged(self, regular: NDArray[np.float64], time: float) -> NDArray[np.float64]:
-        """Return (1 - p) regular + p prioritised, shape (4,).
-
-        Parameters
-        ----------
-        regular : ndarray, shape (4,)
-        time : float
-            Now, s.
-        """
+        """Return (1 - p) regular + p prioritised, shape (4,), at ``time`` (s)."""
         p = self._weight(time)
         if p == 0.0:
             return regular

@@ -143,10 +143,8 @@ class Geofence:
 
         Returns
         -------
-        ndarray, shape (4,)
-            Control; the yaw rate is the regular one.
-        float
-            Priority, 0 ... 1.
+        ndarray, shape (4,), and float
+            Control, with the regular yaw rate, and priority, 0 ... 1.
         """
         excess = self.excess(position, velocity)
         weight = self.weight(excess)

@@ -31,18 +31,15 @@ _MIN_BRAKING = 0.01
 """m/s^2"""
 
 
+_CORNER_HELP = "lowest and highest corner, in the frame of the state"
+
+
 class CornerParameters(Parameters):
     """A corner of the box."""
 
-    x: float = parameter(
-        _COORDINATE, "lowest and highest corner, in the frame of the state", live=True
-    )
-    y: float = parameter(
-        _COORDINATE, "lowest and highest corner, in the frame of the state", live=True
-    )
-    z: float = parameter(
-        _COORDINATE, "lowest and highest corner, in the frame of the state", live=True
-    )
+    x: float = parameter(_COORDINATE, _CORNER_HELP, live=True)
+    y: float = parameter(_COORDINATE, _CORNER_HELP, live=True)
+    z: float = parameter(_COORDINATE, _CORNER_HELP, live=True)
 
     def vector(self) -> tuple[float, float, float]:
         """Return x, y, z in m."""

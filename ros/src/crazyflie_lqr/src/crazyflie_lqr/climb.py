@@ -1,16 +1,14 @@
-"""A takeoff's way up: a height reference that climbs gently, and a thrust that is learned.
+"""The climb of a takeoff: a height reference that rises gently, and a thrust that is learned.
 
-A step of the reference from the ground to the hover point asks more of a soft height loop
-than it can do: its integrator finds what weight and battery differ from nominal in
-seconds, during which it also collects the error of the climb, and the vehicle overshoots by
-as much. So the reference climbs as fast as a vehicle can follow, and what differs is
-found by a disturbance observer (Ohnishi et al., Motion control for advanced mechatronics,
-IEEE/ASME Trans. Mechatronics 1(1), 1996) from what the vehicle does with the thrust it gets:
+After a step of the reference, the integrator of a soft height loop would collect the error of the
+climb, and the vehicle overshoot. So the reference climbs as fast as a vehicle can follow, and what
+differs from nominal is found by a disturbance observer (Ohnishi et al., Motion control for
+advanced mechatronics, IEEE/ASME Trans. Mechatronics 1(1), 1996):
 
     z_ddot = thrust - u_ref + d,    d' = RATE (z_ddot - (thrust - u_ref) - d).
 
-On the ground z_ddot is 0, so that the thrust grows until the vehicle lifts off. When it
-has arrived, the integrator goes on from where it gives the thrust that was found.
+On the ground z_ddot is 0, so that the thrust grows until the vehicle lifts off. At the goal, the
+integrator continues with the thrust that was found.
 """
 
 import math
@@ -66,12 +64,12 @@ class Climb:
         self.disturbance = _within(self.disturbance, limit)
 
     def advance(self, dt: float, z: float, z_dot: float, goal: float, excess: float) -> None:
-        """Go on by ``dt`` (s).
+        """Advance to the next state.
 
         Parameters
         ----------
         dt : float
-            Since the last state; what the first one says is the beginning.
+            Since the last state, s; not used with the first one.
         z, z_dot : float
             Height and speed of the vehicle, m and m/s.
         goal : float

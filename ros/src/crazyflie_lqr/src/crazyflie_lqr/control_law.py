@@ -39,21 +39,10 @@ MAX_GAP = 0.5
 def heading_error(
     x: Sequence[Number], x_ref: Sequence[Number], yaw_index: int = YAW
 ) -> Vector[Number]:
-    """Return the error of a state in the heading frame.
+    """Return the error of a state, x_dim components, in the heading frame (x forward, y left).
 
-    Parameters
-    ----------
-    x, x_ref : sequence, x_dim components
-        State and reference.
-    yaw_index : int
-        Where the yaw is in the state.
-
-    Returns
-    -------
-    list, x_dim components
-        ``x - x_ref``, with the horizontal position and velocity turned by
-        ``-yaw`` into the heading frame (x forward, y left), and the yaw error
-        wrapped to [-pi, pi].
+    It is ``x - x_ref``, with the horizontal position and velocity turned by ``-yaw``, which is at
+    ``yaw_index`` of the state, and the yaw error wrapped to [-pi, pi].
     """
     e = [a - b for a, b in zip(x, x_ref, strict=True)]
     yaw = x[yaw_index]

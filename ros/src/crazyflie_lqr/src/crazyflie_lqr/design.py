@@ -120,23 +120,16 @@ class Design:
 def design_gains(
     model: LinearModel, weights: Weights, sample_time: float = 0.0, delay: float = 0.0
 ) -> Design:
-    """Return the gains of least cost.
+    """Return the gains of least cost; `DesignError` if there are none, or inputs are unusable.
 
     Parameters
     ----------
     model : LinearModel
     weights : Weights
     sample_time : float
-        Time between two controls, s, each held until the next; 0 designs in
-        continuous time.
+        Time between two controls, s, each held until the next; 0 designs in continuous time.
     delay : float
         Time from the measurement of a state until its control acts, s.
-
-    Raises
-    ------
-    DesignError
-        The weights or times are unusable, or no gain stabilises the plant at
-        finite cost.
 
     Notes
     -----
@@ -147,10 +140,9 @@ def design_gains(
     cost of the best gains on the state alone.
     """
     weights.check()
-    if not math.isfinite(sample_time) or sample_time < 0.0:
-        raise DesignError(f"the sample time is {sample_time:g} s; expected a number >= 0")
-    if not math.isfinite(delay) or delay < 0.0:
-        raise DesignError(f"the delay is {delay:g} s; expected a number >= 0")
+    for name, value in (("sample time", sample_time), ("delay", delay)):
+        if not 0.0 <= value < math.inf:
+            raise DesignError(f"the {name} is {value:g} s; expected a number >= 0")
     if delay > 0.0 and sample_time == 0.0:
         raise DesignError("a delay needs a sample time")
     if delay > _MAX_DELAY_STEPS * sample_time:

@@ -26,14 +26,7 @@ of a text file with them
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command; return its exit status: 0, 1 for a design that cannot be, 2 for usage.
-
-    Parameters
-    ----------
-    arguments : list of str, optional
-        Of the command line, by default the process's.
-    """
-    arguments = sys.argv[1:] if arguments is None else arguments
+    """Run the command; return its exit status: 0, or 1 for a design that cannot be."""
     options = _parser().parse_args(arguments)
     model = MODELS[options.model]()
     try:

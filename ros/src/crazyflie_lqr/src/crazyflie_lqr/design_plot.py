@@ -26,11 +26,6 @@ def step_responses(
 ) -> tuple[NDArray[np.float64], Responses, Responses]:
     """Return what follows a unit step of the reference in x, y, z and yaw, each alone.
 
-    Parameters
-    ----------
-    model : LinearModel
-    design : Design
-
     Returns
     -------
     time : ndarray, shape (n,)
@@ -58,13 +53,7 @@ def step_responses(
 
 
 def save_plot(path: str, model: LinearModel, design: Design) -> None:
-    """Draw step responses and Bode diagrams into a file.
-
-    Raises
-    ------
-    OSError, ValueError
-        The file cannot be written, or its name ends in no format of pictures.
-    """
+    """Draw step responses and Bode diagrams into a file whose name ends in a picture format."""
     figure = Figure(figsize=(11.0, 7.0), layout="constrained")
     (position, magnitude), (effort, phase) = figure.subplots(2, 2)
     time, states, controls = step_responses(model, design)

@@ -1,21 +1,16 @@
-"""Whether the control is flown, as far as a controller can know."""
+"""Whether a vehicle flies, where no takeoff server publishes it."""
 
 import math
 
 LIFTED = 0.05
 """A vehicle so far above the lowest height it has been at flies, m."""
 
-PATIENCE = 3.0
-"""How long after a reference has moved a vehicle that nobody says anything about may take to
-lift off, s."""
+LIFTOFF_TIMEOUT = 3.0
+"""Longest time from a change of the reference's height to the liftoff, s."""
 
 
 class GroundGuess:
-    """A guess whether a vehicle stands on the ground, where no takeoff server tells.
-
-    It flies when it is `LIFTED`; and for `PATIENCE` after the reference moved: it may
-    be about to lift off.
-    """
+    """A guess whether a vehicle flies: when it is `LIFTED`, or may be about to lift off."""
 
     def __init__(self) -> None:
         self._lowest = math.inf
@@ -23,11 +18,11 @@ class GroundGuess:
         self._moved_at = -math.inf
 
     def is_flying(self, z: float, goal: float, time: float) -> bool:
-        """Tell whether it flies, at height and goal (m) and ``time`` (s)."""
+        """Return the guess for a height and that of the reference (m) at ``time`` (s)."""
         self._lowest = min(self._lowest, z)
-        # After a reset of the clock the patience begins anew.
+        # After a reset of the clock the timeout begins anew.
         self._moved_at = min(self._moved_at, time)
         if self._goal is None or abs(goal - self._goal) > LIFTED:
             self._goal = goal
             self._moved_at = time
-        return z > self._lowest + LIFTED or time - self._moved_at < PATIENCE
+        return z > self._lowest + LIFTED or time - self._moved_at < LIFTOFF_TIMEOUT

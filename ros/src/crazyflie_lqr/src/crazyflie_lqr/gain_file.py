@@ -3,9 +3,6 @@
 One row of the matrix a line, numbers separated by blanks; empty lines, and what
 follows a ``#``, are skipped. Files that are written have their comments at the end:
 the reader of the C++ workspace knows no comments, and stops at the first.
-
-Of a file that was cut, as when a disk was full, can be seen that numbers are missing, and that the
-last one ends in its point (``-1.``), its sign or its exponent. That 9.8 was once 9.81 cannot.
 """
 
 import math
@@ -30,14 +27,9 @@ class GainFileError(ValueError):
 
 
 class Gains:
-    """What a gain file holds, as a parameter: an array to everybody who calculates with it.
+    """A vector or matrix as a parameter, which numpy and Python's operators take as an array.
 
-    It becomes one only then: a controller that takes the numbers as they are does without numpy,
-    which is a third of the time in which its node starts.
-
-    Parameters
-    ----------
-    numbers : list of float or list of list of float
+    It is made into one only then: a node that takes the numbers as they are starts without numpy.
     """
 
     def __init__(self, numbers: list[Any]):
@@ -50,11 +42,9 @@ class Gains:
         return iter(self._numbers)
 
     def __repr__(self) -> str:
-        """Return the numbers."""
         return f"Gains({self._numbers})"
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> "NDArray[np.float64]":
-        """Return the array; it is a copy, whatever is asked for."""
         import numpy as np
 
         return np.array(self._numbers, dtype)
@@ -81,23 +71,7 @@ for _name in ("neg", "abs", "eq", "ne", "lt", "le", "gt", "ge", "getitem"):
 
 
 def load_matrix(path: str, rows: int, columns: int) -> "NDArray[np.float64]":
-    """Return the matrix in a file.
-
-    Parameters
-    ----------
-    path : str
-    rows, columns : int
-        Shape that the matrix must have.
-
-    Returns
-    -------
-    ndarray, shape (rows, columns)
-
-    Raises
-    ------
-    GainFileError
-        The file cannot be read, or does not hold such a matrix of finite numbers.
-    """
+    """Return the matrix of finite numbers in a file, shape (rows, columns), or `GainFileError`."""
     return _matrix(path, rows, columns).__array__()
 
 
@@ -117,23 +91,7 @@ def _matrix(path, rows, columns):
 
 
 def load_vector(path: str, length: int) -> "NDArray[np.float64]":
-    """Return the vector in a file, which may be one row or one column.
-
-    Parameters
-    ----------
-    path : str
-    length : int
-        Number of entries that the vector must have.
-
-    Returns
-    -------
-    ndarray, shape (length,)
-
-    Raises
-    ------
-    GainFileError
-        The file cannot be read, or does not hold such a vector of finite numbers.
-    """
+    """Return the vector in a file, shape (length,): one row or one column; see `load_matrix`."""
     return _vector(path, length).__array__()
 
 
@@ -153,20 +111,7 @@ def _vector(path, length):
 
 
 def save_matrix(path: str, matrix: "ArrayLike", comment: str = "") -> None:
-    """Write a matrix so that `load_matrix` reads it back to 12 digits.
-
-    Parameters
-    ----------
-    path : str
-    matrix : array_like, shape (rows, columns)
-    comment : str
-        Lines for the end of the file, without the ``#``.
-
-    Raises
-    ------
-    OSError
-        The file cannot be written.
-    """
+    """Write a matrix, shape (rows, columns), with 12 digits, and a comment at the end."""
     import numpy as np
 
     with open(path, "w", encoding="utf-8") as file:
@@ -190,7 +135,6 @@ class MatrixFile(ParameterType):
         return _matrix(TEXT(value), self.rows, self.columns)
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return f"the path of a text file with {self.rows} rows of {self.columns} numbers"
 
 
@@ -206,7 +150,6 @@ class VectorFile(ParameterType):
         return _vector(TEXT(value), self.length)
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return f"the path of a text file with {self.length} numbers in one row or one column"
 
 

@@ -97,18 +97,14 @@ class LinearFeedback:
     def control(
         self, x: "NDArray[np.float64]", x_ref: "NDArray[np.float64]", time: float
     ) -> "NDArray[np.float64]":
-        """Return the control for a state.
+        """Return the control, shape (u_dim,), for a state.
 
         Parameters
         ----------
         x, x_ref : ndarray, shape (x_dim,)
             State and reference.
         time : float
-            When the vehicle was in this state, s: the state's stamp.
-
-        Returns
-        -------
-        ndarray, shape (u_dim,)
+            The state's stamp, s.
         """
         return _array(self.law(_floats(x), _floats(x_ref), time))
 
@@ -120,14 +116,14 @@ class LinearFeedback:
     def take_over(self, previous: Self) -> None:
         """Continue in flight where a controller with other parameters ends."""
 
-    def rest(self) -> None:
-        """Take note that the control is not flown: the vehicle stands on the ground, say."""
+    def reset_integrator(self) -> None:
+        """Integrate no more: the control is not flown; the vehicle is on the ground, say."""
 
-    def fly(self) -> None:
-        """Take note that the control is flown from now on, if it was not already."""
+    def enable_integrator(self) -> None:
+        """Integrate from now on: the control is flown."""
 
     def take_off(self) -> None:
-        """Take note that the control is flown from now on, from the ground or the unknown."""
+        """Begin to fly the control, from the ground or an unknown state."""
 
 
 class IntegralStateFeedback(LinearFeedback):
@@ -139,15 +135,13 @@ class IntegralStateFeedback(LinearFeedback):
     the same when the vehicle turns. Roll and pitch are then limited to
     `MAX_TILT`, thrust to `MIN_THRUST` ... `MAX_THRUST`.
 
-    While a control is at its limit, its integral does not grow into the limit. Between
-    `rest` and the next flight it is zero. After `take_off`, height reference and height
+    While a control is at its limit, its integral does not grow into the limit. From
+    `reset_integrator` to the next flight it is zero. After `take_off`, height reference and height
     integral are those of a `Climb` until the vehicle has arrived; but not where a step of the
     reference does no harm, with a height loop that is well damped and has no integrator.
 
     Parameters
     ----------
-    K, u_ref, yaw_index
-        See `LinearFeedback`.
     integrator_k : sequence, 3 components, optional
         Gains of x, y, z in rad/(m s), rad/(m s), 1/s^3, with the signs of the
         position gains in K.
@@ -168,40 +162,36 @@ class IntegralStateFeedback(LinearFeedback):
         self._integrator_limit = [float(each) for each in integrator_limit]
         self._integral = [0.0, 0.0, 0.0]
         self._time: float | None = None
-        self._is_resting = False
+        self._integrates = True
         self._climb: Climb | None = None
         self._thrust = self._u_ref[THRUST]
 
     @override
-    def rest(self) -> None:
-        self._is_resting = True
+    def reset_integrator(self) -> None:
+        self._integrates = False
         self._climb = None
         self._integral = [0.0, 0.0, 0.0]
 
     @override
-    def fly(self) -> None:
-        self._is_resting = False
+    def enable_integrator(self) -> None:
+        self._integrates = True
 
     @override
     def take_off(self) -> None:
-        self.rest()
-        self.fly()
+        self.reset_integrator()
+        self.enable_integrator()
         limit = self._climb_limit()
         self._climb = Climb(limit) if limit > 0.0 or self._height_overshoots() else None
         self._thrust = self._u_ref[THRUST]
 
     @override
     def law(self, x: Components, x_ref: Components, time: float) -> list[float]:
-        """Return the control for a state; see `LinearFeedback.control`.
-
-        A state that is not younger than the last one, or comes more than
-        `MAX_GAP` after it, adds nothing to the integral.
-        """
+        """Return the control; states with a gap before them, see `MAX_GAP`, are not integrated."""
         dt = self._time_since_last(time)
         reference, climb_thrust = self._follow_climb(x, x_ref, dt)
         error = heading_error(x, reference, self.yaw_index)
         u = linear_control(self._rows, self._u_ref, error)
-        if not self._is_resting:
+        if self._integrates:
             self._integrate(error[:3], dt, u)
         u = with_integrals(u, self._integral, self._integrator_k)
         u[THRUST] += climb_thrust
@@ -220,7 +210,7 @@ class IntegralStateFeedback(LinearFeedback):
                 integral = before * integral / now
             self._integral[axis] = self._within_limit(axis, integral)
         self._time = previous._time
-        self._is_resting = previous._is_resting
+        self._integrates = previous._integrates
         self._climb = previous._climb
         if self._climb is not None:
             self._climb.set_limit(self._climb_limit())

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import TYPE_CHECKING, Any
 
-from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_lqr.flight_phase import GroundGuess
@@ -15,7 +14,7 @@ from crazyflie_lqr.reference import GuardedReference
 from crazyflie_lqr.state_age import StateAge
 from crazyflie_model.limits import MAX_SPEED
 from crazyflie_msgs.msg import Control, ControlStamped, FlightStatus
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import TOPIC, Integer, Number
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple, to_vector
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
 
 MAX_GAIN = 1e6
-"""Largest number of a gain file: more of it makes controls that are not finite."""
+"""Largest number of a gain file: larger ones make controls that are not finite."""
 
 
 class LinearFeedbackParameters(Parameters):
@@ -95,9 +94,8 @@ class LinearFeedbackParameters(Parameters):
 class LinearFeedbackNode(Node):
     """Answer every state with a control that leads towards the reference.
 
-    A subclass describes its state in class attributes, and may override
-    `complete_reference` and `make_controller`. Where neither `complete_reference` nor the
-    controller's `control` is overridden, no arrays are made.
+    A subclass describes its state in class attributes, and may override `complete_reference` and
+    `make_controller`. Unless it does, or the controller overrides `control`, no arrays are made.
 
     Attributes
     ----------
@@ -128,25 +126,13 @@ class LinearFeedbackNode(Node):
         self._age = StateAge()
 
     def complete_reference(self, reference: "NDArray[np.float64]") -> "NDArray[np.float64]":
-        """Return the reference state, shape (x_dim,), that a reference message means.
-
-        Parameters
-        ----------
-        reference : ndarray, shape (number of fields,)
-            The fields of the message.
-        """
+        """Return the reference state, shape (x_dim,), of the fields of a reference message."""
         import numpy as np
 
         return np.append(reference, self.reference_tail)
 
     def make_controller(self, parameters: Any) -> LinearFeedback:
-        """Return the control law, at the start and after a change of live parameters.
-
-        Parameters
-        ----------
-        parameters : LinearFeedbackParameters
-            Of the type `parameters_type`.
-        """
+        """Return the control law for parameters of the type `parameters_type`."""
         return LinearFeedback(parameters.K, parameters.u_ref, self.yaw_index)
 
     @override
@@ -170,13 +156,12 @@ class LinearFeedbackNode(Node):
         handle.subscribe(
             parameters.descent_topic, self.reference_type, self._on_descent, finite="state"
         )
-        handle.subscribe(
+        flight_status.subscribe(
+            handle,
             parameters.flight_status_topic,
-            FlightStatus,
-            lambda message: self._set_flight_state(message.state),
+            parameters.flight_state_topic,
+            self._on_flight_status,
         )
-        if parameters.flight_state_topic is not None:
-            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
         handle.subscribe(parameters.state_topic, self.state_type, self._on_state, finite="state")
 
     def _reconfigure(self, parameters):
@@ -212,9 +197,8 @@ class LinearFeedbackNode(Node):
                 throttle=1.0,
                 key="old reference",
             )
-        elif self._flight_state == FlightStatus.TAKING_OFF and not self._is_flown:
-            self._is_flown = True
-            self._controller.take_off()
+        elif self._flight_state == FlightStatus.TAKING_OFF:
+            self._take_off()
 
     def _completed(self, message):
         if self._completes_itself:
@@ -228,21 +212,21 @@ class LinearFeedbackNode(Node):
         x_ref = self._completed(message)
         self._reference.descend(x_ref, self._handle.time())
 
-    def _on_flight_state(self, message):
-        self._set_flight_state(getattr(FlightStatus, message.data.upper(), self._flight_state))
-
-    def _set_flight_state(self, state):
-        before, self._flight_state = self._flight_state, state
-        if state == before:
+    def _on_flight_status(self, status):
+        if status.state in (self._flight_state, FlightStatus.UNKNOWN):
             return
-        if state in (FlightStatus.FLYING, FlightStatus.DESCENDING):
-            # Who did not see the takeoff does not know what the vehicle weighs, either.
-            if not self._is_flown:
-                self._controller.take_off()
-            self._is_flown = True
+        self._flight_state = status.state
+        if status.state in (FlightStatus.FLYING, FlightStatus.DESCENDING):
+            # A controller that did not see the takeoff has not learned the weight, either.
+            self._take_off()
         else:
             self._is_flown = False
-            self._controller.rest()
+            self._controller.reset_integrator()
+
+    def _take_off(self):
+        if not self._is_flown:
+            self._is_flown = True
+            self._controller.take_off()
 
     def _on_state(self, message):
         if self._is_old(message.header.stamp):
@@ -250,7 +234,7 @@ class LinearFeedbackNode(Node):
         x = to_tuple(message.state)
         x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None and self._flight_state == FlightStatus.FLYING:
-            # Started anew in flight; the reference may have been said once, long ago.
+            # Started anew in flight; the reference may have been published once, long ago.
             self._reference.update(at_rest(x, self.yaw_index))
             x_ref = self._reference.value(self._handle.time(), x)
         if x_ref is None:
@@ -272,7 +256,7 @@ class LinearFeedbackNode(Node):
         if age <= self._parameters.max_age:
             self._clocks_agree = True
             return False
-        # Clocks that have agreed still do; then a message was late on its way.
+        # Clocks that have agreed still do; then the message was late.
         cause = (
             "this computer, or the network, is too busy"
             if self._clocks_agree
@@ -288,9 +272,9 @@ class LinearFeedbackNode(Node):
 
     def _guess_flight(self, x, x_ref):
         if self._ground_guess.is_flying(x[2], x_ref[2], self._handle.time()):
-            self._controller.fly()
+            self._controller.enable_integrator()
         else:
-            self._controller.rest()
+            self._controller.reset_integrator()
 
     def _warn_of_reference(self, text):
         # The last reference of every descent has a velocity.

@@ -42,13 +42,7 @@ class Margins:
 
 
 def loop_response(design: Design, loop: int) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    """Return the frequency response of one loop broken at the plant's input.
-
-    Parameters
-    ----------
-    design : Design
-    loop : int
-        Index of the control.
+    """Return the frequency response of one loop (of a control) broken at the plant's input.
 
     Returns
     -------

@@ -26,15 +26,7 @@ attitudes 10 ms apart."""
 
 @dataclass(frozen=True)
 class LinearModel:
-    """A linear model with named states.
-
-    Attributes
-    ----------
-    name : str
-    states : tuple of str
-    A : ndarray, shape (x_dim, x_dim)
-    B : ndarray, shape (x_dim, u_dim)
-    """
+    """A linear model with named states; A has shape (x_dim, x_dim), B (x_dim, u_dim)."""
 
     name: str
     states: tuple[str, ...]
@@ -52,43 +44,28 @@ class LinearModel:
         return len(CONTROLS)
 
 
-class _Builder:
-    """Fills in A and B by the names of states and controls."""
-
-    def __init__(self, name: str, states: tuple[str, ...]):
-        self._name = name
-        self._states = states
-        self._A = np.zeros((len(states), len(states)))
-        self._B = np.zeros((len(states), len(CONTROLS)))
-
-    def rate(self, of, **coefficients):
-        """Set the time derivative of a state: state or ``u_`` control = coefficient."""
-        row = self._states.index(of)
-        for name, coefficient in coefficients.items():
-            if name.startswith("u_"):
-                self._B[row, CONTROLS.index(name[2:])] = coefficient
-            else:
-                self._A[row, self._states.index(name)] = coefficient
-
-    def model(self):
-        return LinearModel(self._name, self._states, self._A, self._B)
+def _model(name, rates):
+    """Return the model with these time derivatives: state -> {state or u_control: coefficient}."""
+    inputs = [*rates, *(f"u_{control}" for control in CONTROLS)]
+    matrix = np.array([[rate.get(each, 0.0) for each in inputs] for rate in rates.values()])
+    return LinearModel(name, tuple(rates), matrix[:, : len(rates)], matrix[:, len(rates) :])
 
 
 def near_hover() -> LinearModel:
     """Return the 7-dimensional model: attitude and thrust follow their commands at once.
 
-    The near-hover and the coupled 7-dimensional dynamics have this
-    linearisation in common.
+    It linearises both the near-hover and the coupled 7-dimensional dynamics.
     """
-    states = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
-    builder = _Builder("near_hover", states)
-    for axis in "xyz":
-        builder.rate(axis, **{f"{axis}_dot": 1.0})
-    builder.rate("x_dot", u_pitch=GRAVITY)
-    builder.rate("y_dot", u_roll=-GRAVITY)
-    builder.rate("z_dot", u_thrust=1.0)
-    builder.rate("yaw", u_yaw_dot=1.0)
-    return builder.model()
+    rates = {
+        "x": {"x_dot": 1.0},
+        "y": {"y_dot": 1.0},
+        "z": {"z_dot": 1.0},
+        "x_dot": {"u_pitch": GRAVITY},
+        "y_dot": {"u_roll": -GRAVITY},
+        "z_dot": {"u_thrust": 1.0},
+        "yaw": {"u_yaw_dot": 1.0},
+    }
+    return _model("near_hover", rates)
 
 
 def full_state() -> LinearModel:
@@ -99,29 +76,23 @@ def full_state() -> LinearModel:
     on them their gains are therefore zero, and the noise of differentiated
     attitudes stays out of the control.
     """
-    translation = ("x", "y", "z", "x_dot", "y_dot", "z_dot")
-    states = (*translation, "roll", "pitch", "yaw", "roll_dot", "pitch_dot", "yaw_dot")
-    builder = _Builder("full_state", states)
-    for axis in "xyz":
-        builder.rate(axis, **{f"{axis}_dot": 1.0})
-    builder.rate("x_dot", pitch=GRAVITY)
-    builder.rate("y_dot", roll=-GRAVITY)
-    builder.rate("z_dot", u_thrust=1.0)
-    builder.rate("yaw", u_yaw_dot=1.0)
-    builder.rate("yaw_dot", u_yaw_dot=1.0 / RATE_TIME_CONSTANT, yaw_dot=-1.0 / RATE_TIME_CONSTANT)
-    for angle in ("roll", "pitch"):
-        follow = 1.0 / ATTITUDE_TIME_CONSTANT
-        builder.rate(angle, **{f"u_{angle}": follow, angle: -follow})
-        measure = 1.0 / RATE_TIME_CONSTANT
-        builder.rate(
-            f"{angle}_dot",
-            **{
-                f"u_{angle}": follow * measure,
-                angle: -follow * measure,
-                f"{angle}_dot": -measure,
-            },
-        )
-    return builder.model()
+    follow, measure = 1.0 / ATTITUDE_TIME_CONSTANT, 1.0 / RATE_TIME_CONSTANT
+    both = follow * measure
+    rates = {
+        "x": {"x_dot": 1.0},
+        "y": {"y_dot": 1.0},
+        "z": {"z_dot": 1.0},
+        "x_dot": {"pitch": GRAVITY},
+        "y_dot": {"roll": -GRAVITY},
+        "z_dot": {"u_thrust": 1.0},
+        "roll": {"u_roll": follow, "roll": -follow},
+        "pitch": {"u_pitch": follow, "pitch": -follow},
+        "yaw": {"u_yaw_dot": 1.0},
+        "roll_dot": {"u_roll": both, "roll": -both, "roll_dot": -measure},
+        "pitch_dot": {"u_pitch": both, "pitch": -both, "pitch_dot": -measure},
+        "yaw_dot": {"u_yaw_dot": measure, "yaw_dot": -measure},
+    }
+    return _model("full_state", rates)
 
 
 MODELS = {"near_hover": near_hover, "full_state": full_state}

@@ -14,14 +14,11 @@ DESCENT_LIMIT = 0.3
 class GuardedReference:
     """The last valid reference; or, some time after invalid ones came, a hold point.
 
-    A setpoint from a broken source is not followed for ever, yet the vehicle is
-    not dropped: `crazyflie_utils.last_valid.HOLD_LIMIT` after the first invalid
-    reference it stops where it is, and stays there until a valid one comes.
-
-    A reference that is older than the present one does not count: a publisher of long ago
-    may have latched it. One that is far away is moved nearer. One with a velocity becomes a
-    place to rest at when no other has followed for `VELOCITY_LIMIT`, and at once when the points
-    of the references do not move with their velocities (see `VelocityCheck`).
+    `crazyflie_utils.last_valid.HOLD_LIMIT` after the first invalid reference the vehicle stops
+    where it is, until a valid one comes. A reference that is older than the present one is
+    ignored; one that is far away is moved nearer. One with a velocity becomes a position at rest
+    when no other has followed for `VELOCITY_LIMIT`, and at once when the positions of the
+    references do not move with their velocities (see `VelocityCheck`).
 
     Parameters
     ----------
@@ -56,7 +53,7 @@ class GuardedReference:
         self._velocity_check = VelocityCheck()
         self._time = 0.0
         self._is_new = False
-        self._has_arrived = False
+        self._received = False
         self._stamp = 0.0
         self._descent: Components | None = None
         self._descent_time = 0.0
@@ -64,7 +61,7 @@ class GuardedReference:
     def update(
         self, x_ref: Components, stamp: float = 0.0, now: float = 0.0, time: float = 0.0
     ) -> bool:
-        """Take a valid reference.
+        """Take a valid reference; return False if it is older than the present one, and ignored.
 
         Parameters
         ----------
@@ -72,14 +69,9 @@ class GuardedReference:
         stamp : float
             When it was made, s; 0 if that is not known.
         now : float
-            By the same clock. What has a stamp ahead of it counts as made now.
+            By the same clock. A later stamp counts as this.
         time : float
             Now, s, by the clock of `value`.
-
-        Returns
-        -------
-        bool
-            False if it is older than the present one, and does not count.
         """
         # After a reset of the clock nothing can be told from the stamps of before.
         if self._stamp > now:
@@ -91,7 +83,7 @@ class GuardedReference:
         self._last_valid.update(self._with_velocity(x_ref, time))
         self._time = time
         self._hold_point = self._rest = None
-        self._has_arrived = True
+        self._received = True
         self._is_new = True
         return True
 
@@ -105,25 +97,15 @@ class GuardedReference:
         self._descent_time = time
 
     def value(self, time: float, x: Components) -> Components | None:
-        """Return what to follow.
+        """Return what to follow, x_dim components, at ``time`` (s) and the vehicle's state ``x``.
 
-        Parameters
-        ----------
-        time : float
-            Now, s.
-        x : sequence, x_dim components
-            State of the vehicle.
-
-        Returns
-        -------
-        sequence, x_dim components, or None
-            None before the first valid reference.
+        None before the first valid reference.
         """
         if self._descent is not None and 0.0 <= time - self._descent_time < DESCENT_LIMIT:
             return self._descent
         x_ref = self._last_valid.value(time)
         if x_ref is None:
-            return self._hold(x) if self._has_arrived else None
+            return self._hold(x) if self._received else None
         if self._is_new:
             self._is_new = False
             x_ref = self._within_reach(x_ref, x)
@@ -170,7 +152,7 @@ class GuardedReference:
         self._report(
             f"the reference is {distance:.1f} m away; going {self.max_jump:g} m in its direction"
         )
-        # Who repeats one that is far away must not lead the vehicle there step by step.
+        # A distant reference that is repeated must not lead the vehicle there step by step.
         is_repeated = self._far is not None and math.dist(x_ref[:3], self._far[:3]) < self.max_jump
         if self._near is None or not is_repeated:
             self._far = x_ref

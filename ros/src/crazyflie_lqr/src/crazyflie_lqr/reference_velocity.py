@@ -38,15 +38,7 @@ class VelocityCheck:
         self._lead: Vector = _HERE
 
     def update(self, position: Vector, velocity: Vector, time: float) -> bool:
-        """Take a reference; return whether its velocity counts.
-
-        Parameters
-        ----------
-        position, velocity : sequence, 3 components
-            m and m/s.
-        time : float
-            When it came, s.
-        """
+        """Take a reference (m, m/s) at ``time`` (s); return whether its velocity counts."""
         velocity = limited(velocity, _FASTEST)
         if self._last is not None and time >= self._last[2]:
             self._advance(*self._last, position, time)

@@ -22,13 +22,7 @@ class StateAge:
         self._stamp = self._now = 0.0
 
     def update(self, stamp: float, now: float) -> float:
-        """Return the age of a state that has come, s; negative for one of the future.
-
-        Parameters
-        ----------
-        stamp, now : float
-            s; a stamp of 0 is none.
-        """
+        """Return the age, s, of a state with a stamp (s; 0 is none); negative in the future."""
         if stamp == 0.0:
             return 0.0
         difference, elapsed = now - stamp, now - self._now

@@ -29,18 +29,7 @@ def wrap_to_pi(angle: Many) -> Many: ...
 
 
 def wrap_to_pi(angle: Many) -> Many:
-    """Return the angle in [-pi, pi] that points the same way.
-
-    Parameters
-    ----------
-    angle : float or ndarray
-        Any finite angle, rad.
-
-    Returns
-    -------
-    float or ndarray
-        Same shape, rad.
-    """
+    """Return the angle in [-pi, pi] that points the same way as a finite one, rad."""
     turned = angle + math.pi
     if isinstance(turned, float):
         return turned % (2.0 * math.pi) - math.pi
@@ -53,18 +42,9 @@ def wrap_to_pi(angle: Many) -> Many:
 def quaternion_from_rpy(
     roll: Number, pitch: Number, yaw: Number
 ) -> tuple[Number, Number, Number, Number]:
-    """Return the quaternion of ``Rx(roll) Ry(pitch) Rz(yaw)``.
+    """Return the quaternion (x, y, z, w) of norm 1 of ``Rx(roll) Ry(pitch) Rz(yaw)``, in rad.
 
-    Parameters
-    ----------
-    roll, pitch, yaw : float or ndarray
-        rad.
-
-    Returns
-    -------
-    tuple of float or ndarray
-        (x, y, z, w), of norm 1: the product of the three half-angle
-        quaternions in that order.
+    It is the product of the three half-angle quaternions in that order.
     """
     f = functions(roll)
     sr, cr = f.sin(roll / 2.0), f.cos(roll / 2.0)
@@ -79,26 +59,11 @@ def quaternion_from_rpy(
 
 
 def rpy_from_quaternion(x: float, y: float, z: float, w: float) -> Triple:
-    """Return the (roll, pitch, yaw) of a quaternion of any non-zero norm.
+    """Return the (roll, pitch, yaw), rad, of a quaternion of any norm; ValueError if it is zero.
 
-    With the rotation matrix ``R`` of the quaternion: roll = atan2(-R12, R22),
-    pitch = asin(R02), yaw = atan2(-R01, R00).
-
-    Parameters
-    ----------
-    x, y, z, w : float
-        Quaternion, real part last.
-
-    Returns
-    -------
-    tuple of float
-        rad; roll and yaw in [-pi, pi], pitch in [-pi/2, pi/2]. At pitch =
-        +-pi/2, where only their sum or difference is defined, roll is 0.
-
-    Raises
-    ------
-    ValueError
-        The quaternion is zero.
+    With the rotation matrix ``R`` of the quaternion: roll = atan2(-R12, R22), pitch = asin(R02),
+    yaw = atan2(-R01, R00). At pitch = +-pi/2, where only the sum or difference of roll and yaw is
+    defined, roll is 0.
     """
     norm_squared = x * x + y * y + z * z + w * w
     if norm_squared == 0.0:
@@ -124,15 +89,10 @@ def rotate_by_yaw(x: float, y: float, yaw: float) -> tuple[float, float]:
 
 
 def zyx_from_quaternion(quaternion: Sequence[Number]) -> tuple[Number, Number, Number]:
-    """Return (roll, pitch, yaw) with ``R = Rz(yaw) Ry(pitch) Rx(roll)``, rad.
+    """Return (roll, pitch, yaw), rad, of a unit quaternion, ``R = Rz(yaw) Ry(pitch) Rx(roll)``.
 
     This is the order of the firmware, whose roll and pitch are those in the
     heading frame; messages use that of `rpy_from_quaternion`.
-
-    Parameters
-    ----------
-    quaternion : sequence, 4 components
-        (x, y, z, w), of norm 1; floats, or arrays for many.
     """
     x, y, z, w = quaternion
     f = functions(x)
@@ -157,14 +117,7 @@ def quaternion_from_zyx(roll: float, pitch: float, yaw: float) -> Quaternion:
 
 
 def rotate(quaternion: Sequence[Number], vector: Sequence[Number]) -> tuple[Number, Number, Number]:
-    """Return a vector given in the body frame in the fixed frame.
-
-    Parameters
-    ----------
-    quaternion : sequence, 4 components
-        (x, y, z, w), of norm 1, from body to fixed frame.
-    vector : sequence, 3 components
-    """
+    """Return a body-frame vector in the fixed frame, by a quaternion of norm 1."""
     x, y, z, w = quaternion
     a, b, c = vector
     # R v = v + 2 w (u x v) + 2 u x (u x v), with u the quaternion's vector part.

@@ -44,15 +44,7 @@ class Dynamics(ABC):
 
     @abstractmethod
     def rates(self, t: float, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """Return the time derivative of every component of the state.
-
-        Parameters
-        ----------
-        t : float
-            Time since the beginning, s.
-        x : list, x_dim components
-        u : list, u_dim components
-        """
+        """Return the time derivative of every component of the state, ``t`` s after the start."""
 
     @abstractmethod
     def apply_ground_contact(self, x: Vector[Number]) -> Vector[Number]:
@@ -66,30 +58,16 @@ class Dynamics(ABC):
         """Return the position, in m, and the quaternion (x, y, z, w) of one vehicle."""
 
     def step(self, count: int, x: Vector[Number], u: Vector[Number]) -> Vector[Number]:
-        """Return the state one `STEP` later.
-
-        Parameters
-        ----------
-        count : int
-            How many steps have been done since the beginning.
-        x, u : list
-            State, and control, constant over the step.
-        """
+        """Return the state one `STEP` later; ``count`` steps have been done since the start."""
         return self.apply_ground_contact(rk4_step(self.rates, count * STEP, x, u, STEP))
 
     def derivative(self, t: float, x: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
-        """Return the time derivative of states as arrays.
+        """Return the time derivative, shape as x, ``t`` s after the start.
 
         Parameters
         ----------
-        t : float
-            Time since the beginning, s.
         x : array_like, shape (x_dim,) or (..., x_dim)
         u : array_like, shape (u_dim,) or (..., u_dim)
-
-        Returns
-        -------
-        ndarray, shape (x_dim,) or (..., x_dim)
         """
         return join(self.rates(t, split(x), split(u)))
 

@@ -32,17 +32,7 @@ Vector = list[Number]
 
 
 def split(vectors: ArrayLike) -> Vector[Many]:
-    """Return the components of a vector, or of vectors along the last axis.
-
-    Parameters
-    ----------
-    vectors : array_like, shape (m,) or (..., m)
-
-    Returns
-    -------
-    list of float, or of ndarray, shape (...)
-        m entries.
-    """
+    """Return the m components, float or shape (...), of vectors of shape (m,) or (..., m)."""
     import numpy as np
 
     vectors = np.asarray(vectors, dtype=float)
@@ -68,15 +58,8 @@ def _numpy() -> Any:
 def _numpy_functions() -> SimpleNamespace:
     """Return numpy by math's names, which numpy itself knows since version 2 only."""
     np = _numpy()
-    return SimpleNamespace(
-        sin=np.sin,
-        cos=np.cos,
-        tan=np.tan,
-        sqrt=np.sqrt,
-        hypot=np.hypot,
-        asin=np.arcsin,
-        atan2=np.arctan2,
-    )
+    same = {name: getattr(np, name) for name in ("sin", "cos", "tan", "sqrt", "hypot")}
+    return SimpleNamespace(**same, asin=np.arcsin, atan2=np.arctan2)
 
 
 def functions(value: Many) -> ModuleType | SimpleNamespace:

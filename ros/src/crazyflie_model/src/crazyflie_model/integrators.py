@@ -10,25 +10,10 @@ Rates = Callable[[float, Vector[Number], Vector[Number]], Vector[Number]]
 def rk4_step(
     rates: Rates[Number], t: float, x: Vector[Number], u: Vector[Number], dt: float
 ) -> Vector[Number]:
-    """Return the state one classical Runge-Kutta step (4th order) later.
+    """Return the state one classical Runge-Kutta step (4th order) of ``dt`` (s) later.
 
-    Parameters
-    ----------
-    rates : callable
-        ``rates(t, x, u)``, the time derivative of every component of x.
-    t : float
-        Time at the beginning of the step, s.
-    x : list of float or ndarray
-        State at ``t``, by components (see `elementwise`).
-    u : list of float or ndarray
-        Control, constant over the step.
-    dt : float
-        Step, s.
-
-    Returns
-    -------
-    list of float or ndarray
-        State at ``t + dt``.
+    ``rates(t, x, u)`` is the time derivative of every component of the state x at time t (s); the
+    control u is constant over the step.
     """
     half = dt / 2.0
     sixth = dt / 6.0

@@ -13,14 +13,10 @@ from crazyflie_model.limits import FULL_PWM
 
 
 def mix(thrust: Number, about_x: Number, about_y: Number, about_z: Number) -> Vector[Number]:
-    """Return what is asked of motors 1 to 4, PWM, not limited.
+    """Return the requests to motors 1 to 4, PWM, not limited.
 
-    Parameters
-    ----------
-    thrust : float or ndarray
-        Of each motor, PWM.
-    about_x, about_y, about_z : float or ndarray
-        Outputs of the rate controllers about forward, left and up, PWM.
+    From the thrust of each motor and the outputs of the rate controllers about forward, left and
+    up, PWM.
     """
     x, y, z = about_x / 2.0, about_y / 2.0, about_z
     return [
@@ -32,17 +28,9 @@ def mix(thrust: Number, about_x: Number, about_y: Number, about_z: Number) -> Ve
 
 
 def limit(requested: Sequence[Number], idle: float = 0.0) -> Vector[Number]:
-    """Return commands that motors can follow, PWM.
+    """Return commands from ``idle`` to `FULL_PWM` for four requested ones, PWM.
 
-    Where one would exceed `FULL_PWM`, all are lowered alike: attitude comes
-    before height.
-
-    Parameters
-    ----------
-    requested : sequence, 4 components
-        PWM.
-    idle : float
-        Least command, PWM.
+    Where one would exceed `FULL_PWM`, all are lowered alike: attitude comes before height.
     """
     highest = requested[0]
     for request in requested[1:]:

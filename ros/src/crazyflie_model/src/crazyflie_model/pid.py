@@ -40,11 +40,6 @@ def terms(
         Rate of change of the measurement.
     dt : float
         Time between two updates, s.
-
-    Returns
-    -------
-    tuple of float or ndarray
-        The output is the sum of the first three.
     """
     integral = clip(integral + error * dt, -gains.limit, gains.limit)
     return gains.kp * error, gains.ki * integral, -gains.kd * slope, integral

@@ -31,12 +31,7 @@ def evaluate(
 ) -> list[Number]:
     """Return the value at t and as many derivatives of a polynomial, by Horner's scheme.
 
-    Parameters
-    ----------
-    coefficients : sequence of float
-        The constant first.
-    t : float or ndarray
-    derivatives : int
+    Of its coefficients, the constant is the first.
     """
     terms = [0.0 * t] * (derivatives + 1)
     for c in reversed(coefficients):
@@ -63,14 +58,9 @@ def hermite(start: ArrayLike, end: ArrayLike, duration: float) -> tuple[float, .
 
 
 def bezier(points: Sequence[float], duration: float) -> tuple[float, ...]:
-    """Return the coefficients, the constant first, of the Bezier curve of control points.
+    """Return the coefficients, the constant first, of the Bezier curve of n control points.
 
-    Parameters
-    ----------
-    points : sequence of float
-        n points make a polynomial of degree n - 1.
-    duration : float
-        Time between the first and the last point, s, > 0.
+    It has degree n - 1; ``duration`` (s, > 0) is the time from the first to the last point.
     """
     from scipy.interpolate import BPoly
 
@@ -139,12 +129,8 @@ class PolynomialPiece:
     def unpack(cls, data: bytes) -> Self:
         """Return the piece in `PIECE_SIZE` bytes of the vehicle's memory.
 
-        Memory that was never written is a piece without duration, at the origin.
-
-        Raises
-        ------
-        ValueError
-            It holds numbers that are not finite, or a negative duration.
+        Memory that was never written is a piece without duration, at the origin. ValueError for
+        numbers that are not finite, or a negative duration.
         """
         *numbers, duration = _PIECE.unpack(data)
         if not all(map(math.isfinite, numbers)) or not 0.0 <= duration < math.inf:

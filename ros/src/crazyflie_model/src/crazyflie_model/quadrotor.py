@@ -111,10 +111,6 @@ class Airframe:
     Thrust and torque of a rotor go with the square of its speed, drag with the
     airspeed and the speed of the rotors [F, chapter 3]. A rotor without command
     runs down; one that has failed is one that is commanded zero.
-
-    Parameters
-    ----------
-    parameters : QuadrotorParameters
     """
 
     def __init__(self, parameters: QuadrotorParameters):

@@ -24,11 +24,7 @@ class SupervisorState(enum.IntFlag):
     @classmethod
     def of(cls, **flags: bool) -> "SupervisorState":
         """Return the state in which the flags hold that are true; names in small letters."""
-        state = cls(0)
-        for name, holds in flags.items():
-            if holds:
-                state |= cls[name.upper()]
-        return state
+        return cls(sum(cls[name.upper()] for name, holds in flags.items() if holds))
 
     @property
     def reports_planner(self) -> bool:
@@ -37,20 +33,11 @@ class SupervisorState(enum.IntFlag):
         In all recordings of firmware that does, one of its flags is set at any time, but while a
         stream keeps out a plan whose time has not run out.
         """
-        return bool(
-            self
-            & (
-                SupervisorState.HIGH_LEVEL_ACTIVE
-                | SupervisorState.TRAJECTORY_FINISHED
-                | SupervisorState.HIGH_LEVEL_DISABLED
-            )
-        )
+        cls = SupervisorState
+        reported = cls.HIGH_LEVEL_ACTIVE | cls.TRAJECTORY_FINISHED | cls.HIGH_LEVEL_DISABLED
+        return bool(self & reported)
 
     def words(self) -> str:
         """Return the state in words, such as "armed, flying"."""
-        names = [
-            name.lower().replace("_", " ")
-            for name, flag in SupervisorState.__members__.items()
-            if flag in self
-        ]
-        return ", ".join(names) or "nothing"
+        names = [name for name, flag in SupervisorState.__members__.items() if flag in self]
+        return ", ".join(names).lower().replace("_", " ") or "nothing"

@@ -10,17 +10,9 @@ HOVER_PWM = 42000.0
 
 
 def pwm_from_thrust(thrust: Number) -> Number:
-    """Convert mass-normalised thrust to the link's command, linear through zero.
+    """Convert mass-normalised thrust, m/s^2, to the link's command, PWM, linear through zero.
 
-    Parameters
-    ----------
-    thrust : float or ndarray
-        m/s^2; ``GRAVITY`` is hover.
-
-    Returns
-    -------
-    float or ndarray
-        PWM; ``HOVER_PWM`` at hover. Not limited: the driver limits it.
+    Not limited: the driver limits it.
     """
     return thrust * (HOVER_PWM / GRAVITY)
 

@@ -1,7 +1,6 @@
 """ROS interface of the velocity reference: cmd_vel in, references of the controller out."""
 
 from geometry_msgs.msg import Twist
-from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_msgs.msg import (
@@ -11,7 +10,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityYawStateStamped,
 )
 from crazyflie_references.velocity_reference import LimitParameters, Velocity, VelocityReference
-from crazyflie_utils import Node, NodeHandle, Parameters, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, flight_status, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_utils.vectors import is_finite
@@ -69,13 +68,12 @@ class VelocityReferenceNode(Node):
         self._publisher = handle.publisher(
             parameters.controller_reference_topic, PositionVelocityYawStateStamped, latch=True
         )
-        handle.subscribe(
+        flight_status.subscribe(
+            handle,
             parameters.flight_status_topic,
-            FlightStatus,
-            lambda message: self._set_flight_state(message.state),
+            parameters.flight_state_topic,
+            self._on_flight_status,
         )
-        if parameters.flight_state_topic is not None:
-            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
         handle.subscribe(
             parameters.reference_topic,
             PositionVelocityStateStamped,
@@ -97,12 +95,9 @@ class VelocityReferenceNode(Node):
         self._reference.limits = parameters.limits
         self._reference.silence = parameters.silence
 
-    def _on_flight_state(self, message):
-        self._set_flight_state(getattr(FlightStatus, message.data.upper(), FlightStatus.UNKNOWN))
-
-    def _set_flight_state(self, state):
-        self._flight_state = state
-        if state != FlightStatus.FLYING:
+    def _on_flight_status(self, status):
+        self._flight_state = status.state
+        if status.state != FlightStatus.FLYING:
             self._is_moving = False
             self._reference.stop()
 

@@ -36,8 +36,6 @@ class MotionCapture:
 
     Parameters
     ----------
-    position_noise, attitude_noise, latency, dropout : float
-        The attributes.
     seed : int or sequence of int
         The same seed gives the same errors to the same poses.
     """
@@ -71,17 +69,9 @@ class MotionCapture:
         return not (any(errors) or self._in_transit)
 
     def measure(self, time: float, position: Triple, quaternion: Quaternion) -> None:
-        """Measure the pose that holds at ``time`` (s).
+        """Measure the pose at ``time`` (s): position (m) and quaternion (x, y, z, w).
 
-        Parameters
-        ----------
-        time : float
-            Later than at the call before, s; an earlier one is a reset of the
-            clock, at which poses in transit are lost.
-        position : tuple of float
-            x, y, z in m.
-        quaternion : tuple of float
-            (x, y, z, w).
+        A time before that of the last call is a reset of the clock: poses in transit are lost.
         """
         if self._in_transit and time < self._in_transit[-1][0]:
             self._in_transit.clear()

@@ -25,18 +25,17 @@ from crazyflie_utils.parameters.types import (
 from crazyflie_utils.vectors import to_tuple
 
 MAX_CATCH_UP = 1.0
-"""The most that is integrated at once, s, when the clock jumps or the machine was busy; what is
-beyond it is skipped, so that the process goes on living."""
+"""Longest time that is integrated at once, s; more, after a jump of the clock, is skipped."""
 
 MAX_LATENESS = 0.1
-"""Poses that the machine was too busy for are made up for if it was so no longer than this, s."""
+"""Poses of the last so many seconds are broadcast late when the machine was busy."""
 
 IDLE_PERIOD = 0.1
-"""How often a simulator whose poses nobody hears looks whether that has changed, s."""
+"""Period at which a simulator without pose consumers checks for them, s."""
 
 
 class MotionCaptureParameters(Parameters):
-    """Errors of the motion capture system."""
+    """Errors of the motion capture system: the attributes of `MotionCapture`."""
 
     position_noise: float = parameter(
         Number("m", minimum=0.0, maximum=100.0), "standard deviation, each axis", 0.0, live=True
@@ -116,22 +115,13 @@ class SimulatorNode(Node):
         self._crash_is_known = False
 
     def make_dynamics(self, parameters: Any) -> Dynamics:
-        """Return the model of the vehicle.
-
-        Parameters
-        ----------
-        parameters : SimulatorParameters
-            Of the type `parameters_type`.
-        """
+        """Return the model of the vehicle for parameters of the type `parameters_type`."""
         raise NotImplementedError
 
     def reconfigure(self, parameters: Any) -> None:
         """Apply live parameters that were changed; see `NodeHandle.load`."""
-        errors = parameters.mocap
-        self._motion_capture.position_noise = errors.position_noise
-        self._motion_capture.attitude_noise = errors.attitude_noise
-        self._motion_capture.latency = errors.latency
-        self._motion_capture.dropout = errors.dropout
+        for name, value in vars(parameters.mocap).items():
+            setattr(self._motion_capture, name, value)
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
@@ -139,14 +129,11 @@ class SimulatorNode(Node):
         if parameters.publishes_clock and not handle.uses_sim_time:
             raise ParameterError(
                 f"parameter {handle.resolve('~clock/publish')} is true, but /use_sim_time is "
-                "not; expected both, so that somebody listens to /clock"
+                "not; expected both, so that nodes live by /clock"
             )
         self._parameters = parameters
         self._motion_capture = MotionCapture(
-            parameters.mocap.position_noise,
-            parameters.mocap.attitude_noise,
-            parameters.mocap.latency,
-            parameters.mocap.dropout,
+            **vars(parameters.mocap),
             # Vehicles with the same seed do not make the same errors.
             seed=(parameters.seed, zlib.crc32(handle.name.encode())),
         )
@@ -192,24 +179,20 @@ class SimulatorNode(Node):
             self._catch_up()
 
     def _catch_up(self):
-        """Be where the clock is, with all poses that somebody hears."""
+        """Advance to the clock, and broadcast all poses that have consumers."""
         if self._parameters.publishes_clock:
             self._advance_to(self._tick_time(self._ticks))
             self._broadcast_pose()
         elif not self._handle.uses_sim_time:
-            self._make_up(self._handle.time())
+            self._broadcast_missed(self._handle.time())
             self._set_pace()
 
-    def _make_up(self, now):
-        """Broadcast the poses of all time steps until now, s, that have not been.
-
-        The machine may have been busy. Who counts on so many poses a second gets them, with the
-        stamps that they are of.
-        """
+    def _broadcast_missed(self, now):
+        """Broadcast the poses of all time steps until now, s, with their own stamps."""
         step = self._parameters.time_step
         due = math.floor((now - self._start) / step + 1e-6)
         missed = min(due - self._ticks, math.ceil(MAX_LATENESS / step))
-        if missed > 1 and (self._is_idle or self._is_unheard()):
+        if missed > 1 and (self._is_idle or self._has_no_consumers()):
             missed = 1
         for tick in range(due - missed + 1, due + 1):
             self._advance_to(self._tick_time(tick))
@@ -217,12 +200,12 @@ class SimulatorNode(Node):
         self._ticks = due
 
     def _set_pace(self):
-        self._is_idle = self._is_unheard()
+        self._is_idle = self._has_no_consumers()
         step = self._parameters.time_step
         self._timer.set_period(max(IDLE_PERIOD, step) if self._is_idle else step)
 
-    def _is_unheard(self):
-        """Tell whether it is early enough to broadcast a pose when it is looked up."""
+    def _has_no_consumers(self):
+        """Return whether poses need not be broadcast before they are looked up."""
         # Errors are those of a sequence of poses.
         return self._motion_capture.is_perfect and not self._handle.has_pose_consumers()
 
@@ -248,19 +231,19 @@ class SimulatorNode(Node):
 
     def _on_clock_timer(self):
         before = self._ticks
-        if self._is_unheard():
-            self._ticks += self._ticks_until_anything_happens()
+        if self._has_no_consumers():
+            self._ticks += self._ticks_to_next_event()
         else:
             self._ticks += 1
             self._catch_up()
         self._set_clock(*map(self._tick_time, range(before + 1, self._ticks + 1)))
 
-    def _ticks_until_anything_happens(self):
+    def _ticks_to_next_event(self):
         parameters = self._parameters
         if parameters.real_time_factor > 0.0:
             return 1
         wait = self._handle.next_event() - self._tick_time(self._ticks)
-        # Somebody who begins to listen does not miss much.
+        # A new consumer does not miss much.
         wait = min(max(wait, 0.0), IDLE_PERIOD)
         return max(math.ceil((wait - 1e-6) / parameters.time_step), 1)
 

@@ -26,9 +26,9 @@ class Wind:
     mean : array_like, shape (3,)
         m/s, fixed frame.
     gust : float
-        Standard deviation of the gust along each axis, m/s.
+        Standard deviation along each axis, m/s.
     gust_time : float
-        Correlation time of the gust, s.
+        Correlation time, s.
     seed : int or sequence of int
         The same seed gives the same gust.
     """

@@ -15,24 +15,15 @@ class ControlInput:
         self._time = 0.0
 
     def command(self, control: Sequence[float], time: float) -> None:
-        """Take a control given at ``time`` (s).
-
-        Parameters
-        ----------
-        control : sequence, 4 components
-            Roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2.
-        """
+        """Take a control (roll, pitch, yaw rate, thrust; rad, rad/s, m/s^2) at ``time`` (s)."""
         self._control = control
         self._time = time
 
     def acceleration(self, yaw: float, time: float) -> list[float] | None:
-        """Return the acceleration (3,), m/s^2, at a yaw (rad) and time (s), if it is known.
+        """Return the acceleration (3,), m/s^2, at a yaw (rad) and time (s).
 
-        Returns
-        -------
-        list of float or None
-            None when there is no control, when it is older than `HOLD_LIMIT`,
-            and when its thrust is less than that of flight.
+        None without a control, when it is older than `HOLD_LIMIT`, and when its thrust is less than
+        that of flight.
         """
         if self._control is None or not 0.0 <= time - self._time <= HOLD_LIMIT:
             return None

@@ -126,14 +126,8 @@ class ResponseMonitor:
     def update(self, time: float, position: Vector, acceleration: Vector) -> Departure | None:
         """Take a pose; return where the vehicle is if the poses do not respond to the control.
 
-        Parameters
-        ----------
-        time : float
-            Stamp of the pose, s.
-        position : sequence, 3 components
-            m, fixed frame.
-        acceleration : sequence, 3 components
-            That the control commands, m/s^2, fixed frame.
+        ``time`` is the pose's stamp, s; position, m, and commanded acceleration, m/s^2, are in the
+        fixed frame.
         """
         if self._block and not 0.0 < time - self._block[-1][0] < MAX_GAP:
             self.reset()
@@ -171,12 +165,10 @@ class ResponseMonitor:
         disturbance = [
             total - a for total, a in zip(self._filter.acceleration, self._commanded, strict=True)
         ]
+        integrals = self._commanded, self._speed, self._way
         self._latest.append(
-            _Estimate(
-                time, value, rate, disturbance, self._filter.covariance,
-                self._commanded, self._speed, self._way,
-            )
-        )  # fmt: skip
+            _Estimate(time, value, rate, disturbance, self._filter.covariance, *integrals)
+        )
         while self._estimates and time - self._estimates[0].time > WINDOW:
             self._estimates.popleft()
         if not self._estimates or time - self._estimates[-1].time >= ESTIMATE_PERIOD:

@@ -73,9 +73,8 @@ class StateEstimatorNode(Node):
             self._estimator = self._load_kalman_filters(handle)
         else:
             least_step = self._parameters.time_step / 2.0
-            self._estimator = MotionEstimator(
-                FiniteDifference(least_step), FiniteDifference(least_step)
-            )
+            filters = FiniteDifference(least_step), FiniteDifference(least_step)
+            self._estimator = MotionEstimator(*filters)
 
     def _load_kalman_filters(self, handle):
         knows_control = self._parameters.control_topic is not None
@@ -187,26 +186,23 @@ class StateEstimatorNode(Node):
             self._handle.warn("the vehicle has tipped over", throttle=1.0)
 
     def _rejections(self):
-        return (
-            self._gate.rejected
-            + self._frozen_poses
-            + sum(self._handle.rejected_transforms().values())
-        )
-
-    def _report(self):
-        silence = self._handle.time() - self._last_success
-        is_silent = silence > HOLD_LIMIT
-        reasons = {
+        """Return the numbers of rejected poses by reason."""
+        return {
             "is too far away": self._gate.rejected,
             "does not follow the control": self._frozen_poses,
             **self._handle.rejected_transforms(),
         }
-        values = [KeyValue(f"rejected: {key}", str(count)) for key, count in reasons.items()]
+
+    def _report(self):
+        silence = self._handle.time() - self._last_success
+        is_silent = silence > HOLD_LIMIT
+        rejected = self._rejections()
+        values = [KeyValue(f"rejected: {key}", str(count)) for key, count in rejected.items()]
         status = DiagnosticStatus(
             level=DiagnosticStatus.ERROR if is_silent else DiagnosticStatus.OK,
             name=f"{self._handle.name.lstrip('/')}: poses",
             message=f"no state for {silence:.1f} s" if is_silent else "states are published",
-            values=[KeyValue("rejected", str(self._rejections())), *values],
+            values=[KeyValue("rejected", str(sum(rejected.values()))), *values],
         )
         header = Header(stamp=self._handle.stamp())
         self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
@@ -217,9 +213,9 @@ class StateEstimatorNode(Node):
         if now - self._last_success < HOLD_LIMIT:
             return
         if pose is not None:
-            seconds = pose.stamp * 1e-9
+            rejected = sum(self._rejections().values())
             reason = (
-                f"the latest is that of {seconds:.3f} s; {self._rejections()} poses were rejected"
+                f"the latest is that of {pose.stamp * 1e-9:.3f} s; {rejected} poses were rejected"
             )
         self._handle.warn(
             f"no state: no new transform {self._parameters.fixed_frame} -> "

@@ -1,12 +1,8 @@
-"""Whether poses still are those of the vehicle, or a camera repeats what it has seen last.
+"""Whether poses are those of the vehicle, or a frozen camera sends its last one with new stamps.
 
-A camera that is frozen goes on sending poses with fresh stamps: the same one, or the same with
-noise. The controller sees a vehicle that does not answer, and asks for more and more.
-
-Two things do not happen to a vehicle in flight. It does not come to rest within one pose and
-stay at the same place to the last bit: what is measured has noise, and what is simulated gets
-slower gradually. And it does not stay at a place while its control accelerates it; see
-`control_response`.
+A vehicle in flight does not come to rest within one pose and stay there to the last bit: measured
+poses have noise, and simulated vehicles get slower gradually. And it does not stay at a place, to
+within the noise, while its control accelerates it; see `control_response`.
 """
 
 import math
@@ -81,13 +77,10 @@ class FrozenPoseMonitor:
         ----------
         time : float
             Its stamp, s, later than the one before.
-        position : sequence, 3 components
-            m, fixed frame.
-        rotation : sequence, 4 components
-            Quaternion.
+        position, rotation : sequence, 3 and 4 components
+            m, fixed frame, and quaternion.
         acceleration : sequence, 3 components, or None
-            That the control commands, m/s^2, fixed frame; None while the control is unknown or
-            not that of flight.
+            Of the control, m/s^2, fixed frame; None while it is unknown or not that of flight.
         """
         self.departure = None
         if self._ground is None or (self._knows_control and acceleration is None):

@@ -39,12 +39,9 @@ class MotionEstimator:
     Parameters
     ----------
     position_filter : RateFilter
-        What turns positions into positions and velocities.
     angle_filter : RateFilter
-        What turns roll, pitch and yaw (unwrapped: without jumps by 2 pi) into
-        their rates. The angles themselves are passed on as they are: their noise
-        is small beside what a controller does with them, and smoothing would
-        cost the yaw loop its phase.
+        Of unwrapped roll, pitch and yaw, for their rates. The angles are passed on as they are:
+        smoothing would cost the yaw loop its phase.
     """
 
     def __init__(self, position_filter: RateFilter, angle_filter: RateFilter):
@@ -64,24 +61,18 @@ class MotionEstimator:
         attitude: Components,
         acceleration: Components | None = None,
     ) -> Motion | None:
-        """Take the next pose and return the motion at its time.
+        """Take the next pose and return the motion, or None when it is the first or ignored.
 
         Parameters
         ----------
         stamp : int
-            Time of the pose, ns. Whole nanoseconds, because a float cannot tell
-            times of the day apart by less than 0.2 us.
+            Time of the pose, ns: floats resolve the time of day to 0.2 us only.
         position : sequence, 3 components
             m.
         attitude : sequence, 3 components
             Roll, pitch, yaw in rad.
         acceleration : sequence, 3 components, optional
             Commanded since the last pose, if it is known, m/s^2.
-
-        Returns
-        -------
-        Motion or None
-            None when the pose is the first or ignored.
         """
         if not (_is_finite(position) and _is_finite(attitude)):
             return None

@@ -36,19 +36,7 @@ class Classification(Enum):
 
 
 class PoseGate:
-    """Rejects poses that the vehicle cannot have flown to.
-
-    Attributes
-    ----------
-    rejected : int
-        How many.
-    max_speed : float
-
-    Parameters
-    ----------
-    max_speed : float
-        The fastest that a vehicle flies, m/s.
-    """
+    """Rejects poses that a vehicle of ``max_speed`` (m/s) cannot have flown to, and counts them."""
 
     def __init__(self, max_speed: float):
         self.rejected = 0
@@ -66,15 +54,7 @@ class PoseGate:
         self._is_doubtful = False
 
     def classify(self, time: float, position: Sequence[float]) -> Classification:
-        """Classify a pose.
-
-        Parameters
-        ----------
-        time : float
-            Its stamp, s, later than the last one's; an earlier one resets the gate.
-        position : sequence, 3 components
-            m.
-        """
+        """Classify a pose by its position (m) and stamp (s); an earlier one resets the gate."""
         pose = (time, tuple(position))
         if self._last is None or time < self._last[0]:
             self.reset()
@@ -107,14 +87,9 @@ class PoseGate:
 
 
 class TiltMonitor:
-    """Detects that the vehicle has tipped over.
+    """Detects that the vehicle has tipped over by more than ``max_tilt`` (rad).
 
     A single pose is not enough: motion capture may mistake one marker for another.
-
-    Parameters
-    ----------
-    max_tilt : float
-        rad.
     """
 
     _POSES = 5
@@ -125,13 +100,7 @@ class TiltMonitor:
         self._is_tilted = False
 
     def update(self, x: float, y: float) -> bool:
-        """Return whether it has, after the next pose.
-
-        Parameters
-        ----------
-        x, y : float
-            Of its unit quaternion.
-        """
+        """Return whether it has, after the next pose; x, y are of its unit quaternion."""
         # The cosine of the angle between the vehicle's z axis and that of the fixed frame.
         is_tilted = 1.0 - 2.0 * (x * x + y * y) < math.cos(self.max_tilt)
         self._count = 0 if is_tilted == self._is_tilted else self._count + 1

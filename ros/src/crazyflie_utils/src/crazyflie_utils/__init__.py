@@ -8,13 +8,17 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from crazyflie_utils.handle import NodeHandle
-    from crazyflie_utils.main import run, run_composed, run_nodes
-    from crazyflie_utils.node import Node
-    from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
-    from crazyflie_utils.tf.buffer import TransformError
-    from crazyflie_utils.tf.poses import StampedPose
-    from crazyflie_utils.transport import ServiceError
+    from crazyflie_utils.handle import NodeHandle as NodeHandle
+    from crazyflie_utils.main import run as run
+    from crazyflie_utils.main import run_composed as run_composed
+    from crazyflie_utils.main import run_nodes as run_nodes
+    from crazyflie_utils.node import Node as Node
+    from crazyflie_utils.parameters.declaration import ParameterError as ParameterError
+    from crazyflie_utils.parameters.declaration import Parameters as Parameters
+    from crazyflie_utils.parameters.declaration import parameter as parameter
+    from crazyflie_utils.tf.buffer import TransformError as TransformError
+    from crazyflie_utils.tf.poses import StampedPose as StampedPose
+    from crazyflie_utils.transport import ServiceError as ServiceError
 
 _HOME = {
     "Node": "crazyflie_utils.node",
@@ -29,20 +33,6 @@ _HOME = {
     "run_composed": "crazyflie_utils.main",
     "run_nodes": "crazyflie_utils.main",
 }
-
-__all__ = [
-    "Node",
-    "NodeHandle",
-    "ParameterError",
-    "Parameters",
-    "ServiceError",
-    "StampedPose",
-    "TransformError",
-    "parameter",
-    "run",
-    "run_composed",
-    "run_nodes",
-]
 
 
 def __getattr__(name):

@@ -31,8 +31,7 @@ def ros_time(nanoseconds: int) -> genpy.Time:
 class SteadyClock:
     """The machine's monotonic clock; stamps are wall-clock time, as ROS has it.
 
-    The same moment always has the same stamp, unless somebody sets the machine's
-    wall clock.
+    The same moment always has the same stamp, unless the wall clock is set.
     """
 
     def __init__(self) -> None:

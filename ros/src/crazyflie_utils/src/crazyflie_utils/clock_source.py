@@ -12,17 +12,7 @@ from crazyflie_utils.transport import Transport
 
 
 class ClockSource:
-    """The way of a process to /clock.
-
-    Parameters
-    ----------
-    transport : Transport
-    topics : Topics
-    clock : SimulatedClock or SteadyClock
-        By which the process lives.
-    timers : TimerQueue
-        By simulated time.
-    """
+    """Publishes /clock from a process with this clock and these timers by simulated time."""
 
     def __init__(
         self,

@@ -1,44 +1,80 @@
-"""What a node handle needs of the process that its node is in."""
+"""What the nodes of one process share."""
 
 from collections.abc import Callable
-from typing import Protocol
+from functools import partial
+
+from rosgraph_msgs.msg import Clock
 
 from crazyflie_utils.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.clock_source import ClockSource
 from crazyflie_utils.executor import Executor
 from crazyflie_utils.flights import ShutdownInhibitor
-from crazyflie_utils.tf.transforms import Transforms
-from crazyflie_utils.timers import Timer
+from crazyflie_utils.log import NodeLog
+from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED, Transforms
+from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
 from crazyflie_utils.topics import Topics
 from crazyflie_utils.transport import Transport
 
 
-class ProcessContext(Protocol):
-    """What the nodes of a process share; `Process` is one."""
+class ProcessContext:
+    """One executor, one clock, one set of topics, one tf buffer.
 
-    @property
-    def transport(self) -> Transport:
-        """The graph outside the process."""
+    Parameters
+    ----------
+    transport : Transport
+    use_sim_time : bool
+        Use simulated time, which stands still until it is set.
 
-    @property
-    def executor(self) -> Executor:
-        """Runs all callbacks."""
+    Attributes
+    ----------
+    exit_status : int or None
+        With which the process is to end; None while it is not.
+    """
 
-    @property
-    def clock(self) -> SimulatedClock | SteadyClock:
-        """By which the process lives."""
+    def __init__(self, transport: Transport, use_sim_time: bool):
+        self.transport = transport
+        self.executor = Executor()
+        self.topics = Topics(transport)
+        self.clock: SimulatedClock | SteadyClock = (
+            SimulatedClock() if use_sim_time else SteadyClock()
+        )
+        self.transforms = Transforms(
+            self.topics,
+            self._warn_about_transform,
+            self.clock.nanoseconds,
+            MAX_FUTURE_STAMP_SIMULATED if use_sim_time else MAX_FUTURE_STAMP,
+        )
+        self._tf_log = NodeLog(transport, "/tf")
+        # The poses of vehicles that are simulated in one tick are one message.
+        tf = self.transforms.gather, self.transforms.send_gathered
+        self._steady = SteadyTimers(TimerQueue(self.executor, *tf), SteadyClock())
+        self._simulated = TimerQueue(self.executor, *tf)
+        self.clock_source = ClockSource(transport, self.topics, self.clock, self._simulated)
+        self._inhibitors: list[ShutdownInhibitor] = []
+        self.exit_status: int | None = None
+        if isinstance(self.clock, SimulatedClock):
+            self.clock.on_change(self._run_simulated)
+            self.topics.subscribe("/clock", Clock, partial(self._on_clock, self.clock))
 
-    @property
-    def topics(self) -> Topics:
-        """All topics."""
-
-    @property
-    def transforms(self) -> Transforms:
-        """Tf."""
+    def end(self, status: int) -> None:
+        """Have the process shut down and exit with ``status``."""
+        self.exit_status = status
 
     @property
     def uses_sim_time(self) -> bool:
         """Whether the clock is simulated time (/use_sim_time)."""
+        return isinstance(self.clock, SimulatedClock)
+
+    def inhibit_shutdown(self, node: str) -> ShutdownInhibitor:
+        """Return what publishes the flights of a node, named absolutely."""
+        inhibitor = ShutdownInhibitor(self.topics, node)
+        self._inhibitors.append(inhibitor)
+        return inhibitor
+
+    @property
+    def own_flights(self) -> list[str]:
+        """Names of the nodes of this process that are in flight."""
+        return [each.node for each in self._inhibitors if each.in_flight]
 
     def add_timer(
         self,
@@ -48,14 +84,31 @@ class ProcessContext(Protocol):
         stagger: bool = False,
         align_phase: bool = False,
     ) -> Timer:
-        """Add a timer by the process's clock, or by the machine's if ``steady``."""
+        """Add a timer by the process's clock, or by the machine's if ``steady``.
 
-    @property
-    def clock_source(self) -> ClockSource:
-        """For the node that publishes /clock."""
+        ValueError for a period that is negative or not finite; or zero by simulated time, where the
+        moment would never end.
+        """
+        if self.uses_sim_time and not steady:
+            if period == 0.0:
+                raise ValueError("a timer by simulated time needs a period > 0")
+            return self._simulated.add(period, work, self.clock.time(), stagger, align_phase)
+        return self._steady.add(period, work, stagger, align_phase)
 
-    def inhibit_shutdown(self, node: str) -> ShutdownInhibitor:
-        """Return what publishes the flights of a node, named absolutely."""
+    def next_simulated_deadline(self) -> float:
+        """Return when the next timer by simulated time is due, s."""
+        return self._simulated.next_deadline()
 
-    def end(self, status: int) -> None:
-        """Have the process shut down and exit with ``status``."""
+    def _on_clock(self, clock, message):
+        # As work among the other work: time does not move within a callback, and
+        # a reset does not overtake messages of the simulation before it.
+        self.executor.submit(partial(clock.set, message.clock.to_sec()))
+
+    def _run_simulated(self, now, is_reset):
+        if is_reset:
+            self.transforms.clear()
+            self._simulated.rebase(now)
+        self._simulated.run_due(now)
+
+    def _warn_about_transform(self, text, key):
+        self._tf_log.warn(text, throttle=1.0, key=key)

@@ -1,14 +1,8 @@
 """One callback at a time: the counterpart of roscpp's single spin thread.
 
-rospy runs subscribers, timers and services in threads of their own, so that
-two callbacks of one node can meet half way through. Here every callback of
-every node in a process passes through one `Executor`, which runs them one at a
-time in the order they were submitted. Nodes therefore need no locks, messages
-keep their order, and a callback never runs before the nodes are complete.
-
-It has no thread of its own: the thread that submits work while the executor is free
-runs it, and what is submitted meanwhile. Python's interpreter lock leaves
-nothing to gain from more threads.
+Every callback of every node in a process passes through one `Executor`, in the order of
+submission. It has no thread of its own: the thread that submits work while the executor is free
+runs it, and what is submitted meanwhile.
 """
 
 import threading

@@ -22,12 +22,6 @@ class ShutdownInhibitor:
         Its absolute name.
     in_flight : bool
         What was published last.
-
-    Parameters
-    ----------
-    topics : Topics
-        Of the process.
-    node : str
     """
 
     def __init__(self, topics: Topics, node: str):
@@ -55,15 +49,7 @@ class ShutdownInhibitor:
 
 
 class Flights:
-    """The flights that matter to some nodes: those in their namespaces, above and below.
-
-    Parameters
-    ----------
-    topics : Topics
-        Of the process.
-    nodes : iterable of str
-        Absolute names.
-    """
+    """The flights that matter to nodes, by absolute name: in their namespaces, above and below."""
 
     def __init__(self, topics: Topics, nodes: Iterable[str]):
         self._namespaces = [_namespace(node) for node in nodes]

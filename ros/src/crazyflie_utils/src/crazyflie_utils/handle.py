@@ -96,7 +96,7 @@ class NodeHandle:
         return self._process.transport.remap(rosgraph.names.resolve_name(name, self.name))
 
     def load(self, parameters: type[P], on_change: Callable[[P], None] | None = None) -> P:
-        """Return the node's own (private) parameters, all of them checked.
+        """Return the node's own (private) parameters; `ParameterError` about all that is wrong.
 
         Parameters
         ----------
@@ -105,11 +105,6 @@ class NodeHandle:
         on_change : callable, optional
             Offers the live ones to dynamic_reconfigure: ``on_change(parameters)`` is called with
             all of them, checked, after some were changed. It may raise `ParameterError` to refuse.
-
-        Raises
-        ------
-        ParameterError
-            About everything that is not set though required, or not what is expected.
         """
         source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
         loaded = parameters.read(source.get, source.full_name)

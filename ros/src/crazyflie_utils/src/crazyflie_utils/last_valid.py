@@ -11,16 +11,7 @@ too, gives up on a setpoint after 500 ms."""
 
 
 class LastValid(Generic[T]):
-    """The latest valid value of an input that may turn invalid.
-
-    A valid value holds until the next one; but when invalid ones come, for at most
-    ``limit`` after the first of them.
-
-    Parameters
-    ----------
-    limit : float
-        s.
-    """
+    """The latest valid value of an input; it holds at most ``limit`` (s) after an invalid one."""
 
     def __init__(self, limit: float = HOLD_LIMIT):
         self._limit = limit

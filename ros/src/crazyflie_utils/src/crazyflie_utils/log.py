@@ -11,11 +11,7 @@ _MAX_KEYS = 64
 
 
 class Throttle:
-    """Lets each key pass once in a period.
-
-    It remembers a bounded number of keys. While it remembers that many, new ones do not pass:
-    there is more in the log than anybody reads.
-    """
+    """Lets each key pass once in a period; new keys do not pass while it remembers `_MAX_KEYS`."""
 
     def __init__(self) -> None:
         self._allowed_from: dict[Hashable, float] = {}
@@ -33,14 +29,7 @@ class Throttle:
 
 
 class NodeLog:
-    """Log of one node.
-
-    Parameters
-    ----------
-    transport : Transport
-    node : str
-        Absolute name, which begins each text.
-    """
+    """Log of one node, whose absolute name begins each text."""
 
     def __init__(self, transport: Transport, node: str):
         self._transport = transport
@@ -54,8 +43,7 @@ class NodeLog:
     def warn(self, text: str, throttle: float = 0.0, key: Hashable = None) -> None:
         """Log a warning; the same ``key`` (the text) at most once in ``throttle`` seconds.
 
-        The seconds are those of the machine's clock, so that a simulation that
-        runs fast does not flood the screen. A text that varies needs a key.
+        They are of the machine's clock, also in simulated time. A text that varies needs a key.
         """
         key = text if key is None else key
         if throttle <= 0.0 or self._throttle.passes(key, throttle, time.monotonic()):

@@ -13,6 +13,7 @@ from typing import Any
 
 import rosgraph
 import rospy
+from typing_extensions import override
 
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.node import Node
@@ -38,9 +39,9 @@ def run(node_class: type | str, default_name: str) -> None:
     Parameters
     ----------
     node_class : type or str
-        Subclass of `Node`, or its place, "package.module:Class".
+        Subclass of `Node`, or "package.module:Class".
     default_name : str
-        Name of the node unless the launch file gives another.
+        Unless the launch file gives another.
     """
 
     def make_node(handle):
@@ -77,7 +78,7 @@ def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, No
         What it raises ends the process with status 1.
     """
     signals = catch_signals()
-    _run(_begin(default_name, signals), make_nodes, signals)
+    _run(begin(default_name, signals), make_nodes, signals)
 
 
 class NodeClasses(ParameterType):
@@ -85,14 +86,13 @@ class NodeClasses(ParameterType):
 
     label = "dictionary, string to string"
 
+    @override
     def __call__(self, value: Any) -> dict[str, type[Node]]:
-        """Return node name -> node class."""
         if not isinstance(value, dict) or not value:
             raise ValueError
         return {GraphName()(name): _node_class(path) for name, path in _flatten(value).items()}
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return 'a dictionary of node name: "package.module:Class"'
 
 
@@ -124,16 +124,12 @@ def _node_class(path):
     return found
 
 
-def begin(default_name: str) -> Process:
+def begin(default_name: str, signals: list[int] | None = None) -> Process:
     """Make this process a ROS node and return what its nodes share, not yet started.
 
-    Exits with status 1 when there is no ROS master.
+    Exits with status 1 without a ROS master, and at ``signals``, see `catch_signals`.
     """
-    return _begin(default_name, None)
-
-
-def _begin(default_name, signals):
-    # rospy's log does not flush: what a node said before it died would be lost in a pipe.
+    # rospy's log does not flush: the last texts of a node that dies would be lost in a pipe.
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=True)
     _wait_for_master(signals)
@@ -142,16 +138,10 @@ def _begin(default_name, signals):
 
 
 def begin_script(default_name: str) -> tuple[Process, Callable[[], None]]:
-    """Make a user's script a ROS node, unless it is one already.
+    """Make a user's script, where Ctrl-C is Python's, a ROS node, unless it is one already.
 
-    Ctrl-C remains what it is in Python; ROS does not end by it.
-
-    Returns
-    -------
-    Process
-        Not yet started. When ROS has shut down, it has an exit status.
-    callable
-        ``end()`` stops the process, and the ROS node if it was made here.
+    Returns the process, not yet started, which has an exit status when ROS has shut down; and
+    ``end()``, which stops it, and the ROS node if it was made here.
     """
     is_own = not rospy.core.is_initialized()
     if is_own:

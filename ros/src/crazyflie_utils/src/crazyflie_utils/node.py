@@ -10,18 +10,11 @@ from crazyflie_utils.parameters.declaration import ParameterError
 class Node:
     """A ROS node as an object: give it a `NodeHandle` and it is one.
 
-    A subclass
+    A subclass overrides `load_parameters`, `register_callbacks` and, if silence is not safe enough,
+    `enter_safe_state`. ``__init__`` holds what changes while the node runs, and makes no ROS call.
 
-    1. declares its parameters in a class derived from `Parameters`, loads them in
-       `load_parameters` with one call, and builds its algorithm from them;
-    2. announces itself in `register_callbacks`: publishers, then services,
-       then subscribers, timers last;
-    3. if silence is not safe enough, says what is in `enter_safe_state`.
-
-    What changes while it runs begins in ``__init__``, without a ROS call.
-
-    Callbacks never run before `initialize` is through and never at the same
-    time, so a node needs no locks.
+    Callbacks never run before `initialize` has returned and never at the same time, so a node
+    needs no locks.
     """
 
     needed_in_flight: ClassVar[bool] = False
@@ -30,17 +23,7 @@ class Node:
     _handle: NodeHandle
 
     def initialize(self, handle: NodeHandle) -> bool:
-        """Become a living node.
-
-        Parameters
-        ----------
-        handle : NodeHandle
-
-        Returns
-        -------
-        bool
-            False when the node must not run; the reason is in the log.
-        """
+        """Load parameters, register callbacks; False if it cannot run, the reason is in the log."""
         self._handle = handle
         try:
             self.load_parameters(handle)
@@ -57,10 +40,7 @@ class Node:
     def load_parameters(self, handle: NodeHandle) -> None:
         """Load the parameters, with `NodeHandle.load`, and build the algorithm.
 
-        Raises
-        ------
-        ParameterError
-            With the full names of parameters and what was expected.
+        May raise `ParameterError`, with full names and what was expected.
         """
         raise NotImplementedError
 

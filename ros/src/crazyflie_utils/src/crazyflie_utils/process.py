@@ -1,109 +1,16 @@
-"""What the nodes of one process share, and the node handles into it."""
+"""A process of any number of nodes: their handles, their start and their end."""
 
-from collections.abc import Callable
-from functools import partial
-
-from rosgraph_msgs.msg import Clock
-
-from crazyflie_utils.clock import SimulatedClock, SteadyClock
-from crazyflie_utils.clock_source import ClockSource
-from crazyflie_utils.executor import Executor
-from crazyflie_utils.flights import ShutdownInhibitor
+from crazyflie_utils.context import ProcessContext
 from crazyflie_utils.handle import NodeHandle
-from crazyflie_utils.log import NodeLog
 from crazyflie_utils.node import Node
-from crazyflie_utils.tf.transforms import MAX_FUTURE_STAMP, MAX_FUTURE_STAMP_SIMULATED, Transforms
-from crazyflie_utils.timers import SteadyTimers, Timer, TimerQueue
-from crazyflie_utils.topics import Topics
-from crazyflie_utils.transport import Transport
 
 
-class Process:
-    """One executor, one clock, one set of topics, one tf buffer; any number of nodes.
-
-    Parameters
-    ----------
-    transport : Transport
-        The world outside.
-    use_sim_time : bool
-        Use simulated time, which stands still until it is set.
-    """
-
-    def __init__(self, transport: Transport, use_sim_time: bool):
-        self.transport = transport
-        self.executor = Executor()
-        self.topics = Topics(transport)
-        self.clock: SimulatedClock | SteadyClock = (
-            SimulatedClock() if use_sim_time else SteadyClock()
-        )
-        self.transforms = Transforms(
-            self.topics,
-            self._warn_about_transform,
-            self.clock.nanoseconds,
-            MAX_FUTURE_STAMP_SIMULATED if use_sim_time else MAX_FUTURE_STAMP,
-        )
-        self._tf_log = NodeLog(transport, "/tf")
-        self._steady_clock = SteadyClock()
-        # The poses of vehicles that are simulated in one tick are one message.
-        tf = self.transforms.gather, self.transforms.send_gathered
-        self._steady = SteadyTimers(TimerQueue(self.executor, *tf), self._steady_clock)
-        self._simulated = TimerQueue(self.executor, *tf)
-        self.clock_source = ClockSource(transport, self.topics, self.clock, self._simulated)
-        self._inhibitors: list[ShutdownInhibitor] = []
-        self.exit_status: int | None = None
-        if isinstance(self.clock, SimulatedClock):
-            self.clock.on_change(self._run_simulated)
-            self.topics.subscribe("/clock", Clock, partial(self._on_clock, self.clock))
-
-    def end(self, status: int) -> None:
-        """Have the process shut down and exit with ``status``."""
-        self.exit_status = status
-
-    @property
-    def uses_sim_time(self) -> bool:
-        """Whether this process lives by simulated time."""
-        return isinstance(self.clock, SimulatedClock)
+class Process(ProcessContext):
+    """A process, whose nodes are given by absolute name where it ends."""
 
     def handle(self, name: str) -> NodeHandle:
         """Return the handle of the node with this absolute name."""
         return NodeHandle(self, name)
-
-    def inhibit_shutdown(self, node: str) -> ShutdownInhibitor:
-        """Return what publishes the flights of a node, named absolutely."""
-        inhibitor = ShutdownInhibitor(self.topics, node)
-        self._inhibitors.append(inhibitor)
-        return inhibitor
-
-    @property
-    def own_flights(self) -> list[str]:
-        """Names of the nodes of this process that are in flight."""
-        return [each.node for each in self._inhibitors if each.in_flight]
-
-    def add_timer(
-        self,
-        period: float,
-        work: Callable[[], None],
-        steady: bool = False,
-        stagger: bool = False,
-        align_phase: bool = False,
-    ) -> Timer:
-        """Add a timer by this process's clock, or by the machine's if ``steady``.
-
-        Raises
-        ------
-        ValueError
-            The period is negative or not finite; or zero by simulated time,
-            where the moment would never end.
-        """
-        if self.uses_sim_time and not steady:
-            if period == 0.0:
-                raise ValueError("a timer by simulated time needs a period > 0")
-            return self._simulated.add(period, work, self.clock.time(), stagger, align_phase)
-        return self._steady.add(period, work, stagger, align_phase)
-
-    def next_simulated_deadline(self) -> float:
-        """Return when the next timer by simulated time is due, s."""
-        return self._simulated.next_deadline()
 
     def start(self) -> None:
         """Let callbacks run: every node is complete."""
@@ -116,40 +23,14 @@ class Process:
         self._simulated.stop()
 
     def prepare_shutdown(self, nodes: dict[str, Node]) -> None:
-        """Have every node begin to end what needs time, and publish that it does.
-
-        Parameters
-        ----------
-        nodes : dict of str to Node
-            By absolute name.
-        """
+        """Have every node begin to end what needs time, and publish that it does."""
         for inhibitor in self._inhibitors:
             self.executor.submit(inhibitor.publish_ending)
         for name, node in nodes.items():
             self.executor.submit(self.handle(name).guard(node.prepare_shutdown))
 
     def shut_down(self, nodes: dict[str, Node]) -> None:
-        """Stop all timers, and have every node leave its vehicle safe.
-
-        Parameters
-        ----------
-        nodes : dict of str to Node
-            By absolute name.
-        """
+        """Stop all timers, and have every node leave its vehicle safe."""
         self.stop()
         for name, node in nodes.items():
             self.executor.submit(self.handle(name).guard(node.shutdown))
-
-    def _on_clock(self, clock, message):
-        # As work among the other work: time does not move within a callback, and
-        # a reset is not overtaken by what the last simulation still said.
-        self.executor.submit(partial(clock.set, message.clock.to_sec()))
-
-    def _run_simulated(self, now, is_reset):
-        if is_reset:
-            self.transforms.clear()
-            self._simulated.rebase(now)
-        self._simulated.run_due(now)
-
-    def _warn_about_transform(self, text, key):
-        self._tf_log.warn(text, throttle=1.0, key=key)

@@ -3,46 +3,23 @@
 import traceback
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any, Protocol
+from typing import Any
 
 from typing_extensions import override
 
 from crazyflie_utils.transport import ServiceError
 
-
-class ServiceNode(Protocol):
-    """What is needed of a node's handle."""
-
-    name: str
-    is_closed: bool
-
-    @property
-    def error(self) -> Callable[[str], None]:
-        """Logs an error."""
-
-    @property
-    def report_fault(self) -> Callable[[Callable[..., Any], Exception], None]:
-        """Reports what a callback has raised."""
-
-    def guard(self, callback: Callable[..., Any]) -> Callable[..., None]:
-        """Return a callback whose exceptions are reported."""
+Handle = Any
+"""The `NodeHandle` of the node that offers or calls the service; its module imports this one."""
 
 
 def serve(
-    callback: Callable[[Any], Any], request: Any, answer: Future[Any], handle: ServiceNode
+    callback: Callable[[Any], Any], request: Any, answer: Future[Any], handle: Handle
 ) -> None:
-    """Answer a request of a service.
+    """Give ``answer`` the response to a request, or a `ServiceError`.
 
-    Parameters
-    ----------
-    callback : callable
-        See `NodeHandle.advertise_service`.
-    request : genpy.Message
-    answer : Future
-        Is given the response, or a `ServiceError`; now, or when the future that the
-        callback has returned is done.
-    handle : ServiceNode
-        Of the node that offers the service.
+    That is now, or when the future that the callback returns is done; see
+    `NodeHandle.advertise_service`.
     """
     if handle.is_closed:
         answer.set_exception(ServiceError(f"{handle.name} has ended this service"))
@@ -65,14 +42,9 @@ class Reply(Future[Any]):
     """The response to a call; what is added to it is a callback of the node.
 
     A plain future would only log what that raises, and the node would not be made safe.
-
-    Parameters
-    ----------
-    handle : ServiceNode
-        Of the node that calls.
     """
 
-    def __init__(self, handle: ServiceNode):
+    def __init__(self, handle: Handle):
         super().__init__()
         self._guard = handle.guard
 
@@ -81,7 +53,7 @@ class Reply(Future[Any]):
         super().add_done_callback(self._guard(fn))
 
 
-def forward(done: Future[Any], to: Future[Any], handle: ServiceNode) -> None:
+def forward(done: Future[Any], to: Future[Any], handle: Handle) -> None:
     """Let one future have the outcome of another, any error as a `ServiceError`."""
     if not to.set_running_or_notify_cancel():
         return

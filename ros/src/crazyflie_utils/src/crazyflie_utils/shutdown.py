@@ -52,13 +52,7 @@ def catch_signals() -> list[int]:
 
 
 class Shutdown:
-    """What a process does before rospy closes its connections.
-
-    Parameters
-    ----------
-    process : Process
-    nodes : dict of str to Node
-        By absolute name.
+    """What a process with nodes, by absolute name, does before rospy closes its connections.
 
     Attributes
     ----------
@@ -85,13 +79,7 @@ class Shutdown:
         time.sleep(FLUSH_TIME)
 
     def wait_for_flights(self, signals: list[int]) -> None:
-        """Wait for the end of flights that nodes of this process are needed for, 10 s at most.
-
-        Parameters
-        ----------
-        signals : list of int
-            See `catch_signals`; a second one ends the waiting.
-        """
+        """Wait, 10 s at most, for flights that need these nodes; a second signal ends that."""
         flights = self._flights
         if flights is None or not flights.in_flight:
             return

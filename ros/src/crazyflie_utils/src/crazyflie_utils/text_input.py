@@ -12,14 +12,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
 class TextFileError(Exception):
-    """A file holds no text.
-
-    Parameters
-    ----------
-    reason : str
-    line : int or None
-        Number of the line at fault, from 1.
-    """
+    """A file holds no text; ``line`` is the number of the line at fault, from 1, or None."""
 
     def __init__(self, reason: str, line: int | None = None):
         super().__init__(reason)
@@ -60,11 +53,7 @@ def read_text(path: str | Path, max_size: int = MAX_SIZE) -> str:
 def number_from_text(text: str) -> float:
     """Return the number in a text as all other programs read it: 1e-3, but not 1_000.
 
-    ``nan`` and ``inf`` are numbers that the caller may refuse.
-
-    Raises
-    ------
-    ValueError
+    ``nan`` and ``inf`` are numbers that the caller may refuse. ValueError if there is none.
     """
     word = text.strip()
     if _NUMBER.fullmatch(word) or word.lower().lstrip("+-") in ("nan", "inf", "infinity"):

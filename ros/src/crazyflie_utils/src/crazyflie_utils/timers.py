@@ -72,12 +72,7 @@ _number = attrgetter("number")
 class TimerQueue:
     """Timers in the order of their deadlines.
 
-    Parameters
-    ----------
-    executor : Executor
-        Where their callbacks run.
-    before, after : callable, optional
-        Called before and after several that are due at once.
+    ``before()`` and ``after()`` are called before and after several that are due at once.
     """
 
     def __init__(
@@ -107,17 +102,11 @@ class TimerQueue:
     ) -> Timer:
         """Add a timer whose first deadline is one period from ``now`` (s), or a little later.
 
-        Before the first `run_due`, that of a short period, up to 0.1 s, is due at multiples of it
-        since the first timer began, so that many of them need not wake the process up often.
-        Those that are to be spread are due at different ones of such moments, 10 ms apart; the
-        first deadline comes up to one period later. What is added later may be waited for, and is
-        not delayed. But where the first deadline may be early, it is at such a moment all the
-        same, spread or not.
-
-        Raises
-        ------
-        ValueError
-            The period is negative or not finite.
+        Before the first `run_due`, one of a period up to 0.1 s is due at multiples of it since the
+        first timer began, so that many wake the process up together; those that ``stagger`` are due
+        10 ms apart, up to one period later. Timers that are added later are not delayed; but with
+        ``align_phase`` the first deadline may be early, at such a moment. ValueError for a period
+        that is negative or not finite.
         """
         if not 0.0 <= period < math.inf:
             raise ValueError(f"the period of a timer is {period!r} s; expected a number >= 0")
@@ -213,16 +202,7 @@ class TimerQueue:
 
 
 class VaryingTimer:
-    """A timer whose period can change; see `NodeHandle.varying_timer`.
-
-    Parameters
-    ----------
-    add_timer : callable
-        See `ProcessContext.add_timer`.
-    work : callable
-    period : float
-        s.
-    """
+    """A timer whose period (s) can change; for ``add_timer`` see `ProcessContext`."""
 
     def __init__(self, add_timer: Callable[..., Timer], work: Callable[[], None], period: float):
         self._add_timer = add_timer

@@ -1,8 +1,6 @@
-"""Topics within a process: messages go from hand to hand.
+"""Topics within a process: subscribers here are given the published object itself, by a call.
 
-A message that is published goes to the subscribers in this process as the very
-object, by a call, and to those outside only when there are any. Subscribers
-must therefore not change what they receive.
+They must therefore not change it. Messages are sent outside only when somebody subscribes there.
 """
 
 from collections.abc import Callable, Sequence
@@ -54,13 +52,7 @@ class Publisher:
         return self._topic.name
 
     def has_subscribers(self, beside: int = 0) -> bool:
-        """Return whether anyone, here or outside, is connected and receives.
-
-        Parameters
-        ----------
-        beside : int
-            So many receivers in this process do not count.
-        """
+        """Return whether anyone, here (beside so many receivers) or outside, is connected."""
         return self.is_read_here(beside) or self.is_heard_outside()
 
     def is_heard_outside(self) -> bool:
@@ -68,22 +60,13 @@ class Publisher:
         return self._external.has_subscribers()
 
     def is_read_here(self, beside: int = 0) -> bool:
-        """Return whether anyone in this process receives; so many do not count."""
+        """Return whether this process has more receivers than ``beside``."""
         return len(self._topic.receivers) > beside
 
     def publish(self, message: genpy.Message, before: Sequence[genpy.Message] = ()) -> None:
-        """Send a message; it must not be changed afterwards.
+        """Send a message of the topic's type (or TypeError), which must not be changed afterwards.
 
-        Parameters
-        ----------
-        message : genpy.Message
-        before : sequence of genpy.Message, optional
-            Sent before it, in one go, to other processes only.
-
-        Raises
-        ------
-        TypeError
-            The message is not of the topic's type.
+        Those ``before`` it are sent to other processes only, all in one go.
         """
         if not isinstance(message, self._topic.message_type):
             raise TypeError(
@@ -134,13 +117,7 @@ class Subscriber:
 
 
 class LatestMessage:
-    """The latest message of a topic that has not been delivered.
-
-    Parameters
-    ----------
-    callback : callable
-        ``callback(message)``
-    """
+    """The latest message of a topic, until ``callback(message)`` is called with it."""
 
     def __init__(self, callback: Callable[[Any], None]):
         self._callback = callback
@@ -164,10 +141,7 @@ def finite_only(
     topic: str,
     warn: Callable[..., None],
 ) -> Callable[[Any], None]:
-    """Return a callback that drops messages with a NaN or infinity in a field.
-
-    See `NodeHandle.subscribe`; ``warn`` is that of its log.
-    """
+    """Return a callback that drops messages with a NaN or infinity; see `NodeHandle.subscribe`."""
 
     def check(message):
         if is_finite(getattr(message, field)):
@@ -181,25 +155,14 @@ def finite_only(
 
 
 class Topics:
-    """All topics of a process.
-
-    Parameters
-    ----------
-    transport : Transport
-    """
+    """All topics of a process; TypeError for one that has another type in it already."""
 
     def __init__(self, transport: Transport):
         self._transport = transport
         self._topics: dict[str, Topic] = {}
 
     def publisher(self, name: str, message_type: type[genpy.Message], latch: bool) -> Publisher:
-        """Return a publisher; a latched one repeats its last message to late subscribers.
-
-        Raises
-        ------
-        TypeError
-            The topic has another type in this process.
-        """
+        """Return a publisher; a latched one repeats its last message to late subscribers."""
         topic = self._topic(name, message_type)
         return Publisher(topic, self._transport.advertise(name, message_type, latch), latch)
 
@@ -213,11 +176,6 @@ class Topics:
         """Have ``receiver(message)`` called for every message on a topic.
 
         Messages from outside come as ``outside_type``, a subclass of ``message_type``, if given.
-
-        Raises
-        ------
-        TypeError
-            The topic has another type in this process.
         """
         topic = self._topic(name, message_type)
         topic.receivers.append(receiver)

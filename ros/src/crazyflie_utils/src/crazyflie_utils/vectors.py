@@ -1,8 +1,6 @@
 """Messages to numpy vectors and back.
 
-Control and state messages hold nothing but float64 fields, and the order of
-their fields is the order of the vectors in every algorithm. So one pair of
-functions serves all of them, and a new message needs none.
+Control and state messages have float64 fields only, in the order of the vectors of algorithms.
 """
 
 import functools
@@ -20,15 +18,9 @@ M = TypeVar("M", bound=genpy.Message)
 
 
 def stamped(message_type: type[M], stamp: genpy.Time, frame_id: str = "", **fields: Any) -> M:
-    """Return a message with a header, several times quicker than the type itself makes it.
+    """Return a message with a header and all its other fields.
 
-    Parameters
-    ----------
-    message_type : type
-    stamp : genpy.Time
-    frame_id : str, optional
-    **fields
-        All its other fields.
+    Several times quicker than the type's own constructor.
     """
     header = object.__new__(Header)
     header.seq, header.stamp, header.frame_id = 0, stamp, frame_id
@@ -40,13 +32,7 @@ def stamped(message_type: type[M], stamp: genpy.Time, frame_id: str = "", **fiel
 
 
 def to_tuple(message: genpy.Message) -> tuple[float, ...]:
-    """Return the fields of a flat message, which has more than one, as they are.
-
-    Parameters
-    ----------
-    message : genpy.Message
-        All fields float64, such as crazyflie_msgs/Control.
-    """
+    """Return the fields of a flat message: more than one, all float64, such as a Control."""
     message_type: Any = type(message)
     return _getter(message_type)(message)
 
@@ -57,22 +43,9 @@ def _getter(message_type: Any) -> Callable[[genpy.Message], tuple[float, ...]]:
 
 
 def to_vector(message: genpy.Message) -> NDArray[np.float64]:
-    """Return the fields of a flat message as a vector.
+    """Return the fields of a flat message, shape (number of fields,), units as there.
 
-    Parameters
-    ----------
-    message : genpy.Message
-        All fields float64, such as crazyflie_msgs/Control.
-
-    Returns
-    -------
-    ndarray, shape (number of fields,)
-        In the order of the message definition; units as there.
-
-    Raises
-    ------
-    TypeError
-        A field is not a number but, say, a header.
+    TypeError if a field is not a number but, say, a header.
     """
     return np.array([getattr(message, field) for field in message.__slots__], dtype=float)
 
@@ -80,20 +53,7 @@ def to_vector(message: genpy.Message) -> NDArray[np.float64]:
 def from_vector(
     message_type: type[genpy.Message], vector: Sequence[float] | NDArray[np.float64]
 ) -> genpy.Message:
-    """Return a flat message with the entries of a vector.
-
-    Parameters
-    ----------
-    message_type : type
-        A message class whose fields are all float64.
-    vector : array_like, shape (number of fields,)
-        In the order of the message definition.
-
-    Raises
-    ------
-    ValueError
-        The vector's length is not the message's number of fields.
-    """
+    """Return a flat message with the entries of a vector; ValueError if their numbers differ."""
     fields = message_type.__slots__
     if len(vector) != len(fields):
         raise ValueError(

@@ -1,6 +1,5 @@
 """ROS interface of the sweep: takes off, flies the lanes, lands, and reports."""
 
-from std_msgs.msg import String
 from std_srvs.srv import Empty, EmptyRequest, Trigger, TriggerResponse
 from typing_extensions import override
 from visualization_msgs.msg import MarkerArray
@@ -17,7 +16,7 @@ from crazyflie_sweep.sweeper import Sweeper
 from crazyflie_sweep.velocity_source import VelocitySource
 from crazyflie_tutorial_msgs.msg import SweepReport, Vel
 from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtRequest
-from crazyflie_utils import Node, NodeHandle
+from crazyflie_utils import Node, NodeHandle, flight_status
 
 TIME_STEP = 0.02
 """Between two references, s."""
@@ -67,13 +66,12 @@ class SweepNode(Node):
         self._velocity = handle.publisher(parameters.velocity_topic, Vel)
         self._markers = handle.publisher(parameters.markers_topic, MarkerArray, latch=True)
         handle.advertise_service("~start", Trigger, self._on_start)
-        handle.subscribe(
+        flight_status.subscribe(
+            handle,
             parameters.flight_status_topic,
-            FlightStatus,
-            lambda message: self._set_flight_state(message.state, message.reason),
+            parameters.flight_state_topic,
+            self._on_flight_status,
         )
-        if parameters.flight_state_topic is not None:
-            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
         handle.subscribe(
             parameters.state_topic, PositionVelocityYawStateStamped, self._on_state, finite="state"
         )
@@ -173,13 +171,10 @@ class SweepNode(Node):
 
     # The flight.
 
-    def _on_flight_state(self, message):
-        self._set_flight_state(getattr(FlightStatus, message.data.upper(), FlightStatus.UNKNOWN))
-
-    def _set_flight_state(self, state, reason=""):
-        self._flight_state = state
-        if state != FlightStatus.FLYING and self._is_sweeping():
-            self._finish(f"the flight was ended: {reason or 'the vehicle is landed'}")
+    def _on_flight_status(self, status):
+        self._flight_state = status.state
+        if status.state != FlightStatus.FLYING and self._is_sweeping():
+            self._finish(f"the flight was ended: {status.reason or 'the vehicle is landed'}")
 
     def _on_state(self, message):
         state = message.state

@@ -11,16 +11,8 @@ P = TypeVar("P", bound=Parameters)
 def parse_arguments(parameters: type[P], arguments: list[str], program: str, description: str) -> P:
     """Return the parameters on a command line: ``init/x`` is the argument ``--init-x``.
 
-    Exits with status 2 and a message about all that is wrong.
-
-    Parameters
-    ----------
-    parameters : type
-        Subclass of `Parameters`.
-    arguments : list of str
-        Without the program's name.
-    program, description : str
-        For ``--help``.
+    ``program`` and ``description`` are for ``--help``. Exits with status 2 and a message about all
+    that is wrong.
     """
     parser = argparse.ArgumentParser(prog=program, description=description)
     declarations = {_option(d.name): d for d in parameters.declarations()}

@@ -22,13 +22,7 @@ _KEY = "declaration"
 
 
 class ParameterError(Exception):
-    """Parameters are missing or unusable; the text names each of them in full.
-
-    Parameters
-    ----------
-    complaints : str
-        One about each thing that is wrong.
-    """
+    """Parameters are missing or unusable; each complaint names one of them in full."""
 
     def __init__(self, *complaints: str):
         super().__init__("\n".join(complaints))
@@ -73,13 +67,7 @@ def parameter(
     name: str = "",
     live: bool = False,
 ) -> Any:
-    """Declare a field of a `Parameters` class; see `Declaration`.
-
-    Parameters
-    ----------
-    name : str
-        If it is not the field's.
-    """
+    """Declare a field of a `Parameters` class; an empty name is the field's. See `Declaration`."""
     declaration = Declaration(name, type, help, default, live)
     return dataclasses.field(default=default, metadata={_KEY: declaration})
 
@@ -145,14 +133,9 @@ class Parameters:
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any], prefix: str = "") -> Self:
-        """Return the parameters in a mapping of name to raw value.
+        """Return the parameters in a mapping; messages call each ``prefix`` and its name.
 
-        Messages call a parameter ``prefix`` and its name.
-
-        Raises
-        ------
-        ParameterError
-            See `read`; also about names that are not declared.
+        Raises `ParameterError`, see `read`; also about names that are not declared.
         """
         known = {declaration.name for declaration in cls.declarations()}
         unknown = [
@@ -180,13 +163,7 @@ class Parameters:
 def read_parameter(
     declaration: Declaration, get: Callable[[str], Any], full_name: Callable[[str], str] = str
 ) -> Any:
-    """Return one parameter, checked; see `Parameters.read`.
-
-    Raises
-    ------
-    ParameterError
-        It is required but not set, or not what is expected.
-    """
+    """Return one parameter, checked; see `Parameters.read`."""
     expected = declaration.type
     try:
         raw = get(declaration.name)

@@ -5,16 +5,9 @@ from typing import Any
 
 
 class PrivateParameters:
-    """The parameters below the name of a node, and those of others that are remapped to.
+    """The parameters below the absolute name of a node, and those of others that are remapped to.
 
-    Parameters
-    ----------
-    get_param : callable
-        See `Transport.get_param`.
-    node : str
-        Absolute name.
-    resolve : callable
-        See `NodeHandle.resolve`.
+    For ``get_param`` and ``resolve`` see `Transport` and `NodeHandle`.
     """
 
     def __init__(self, get_param: Callable[[str], Any], node: str, resolve: Callable[[str], str]):

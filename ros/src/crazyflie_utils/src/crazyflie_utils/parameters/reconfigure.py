@@ -1,14 +1,13 @@
 """Parameters that may be changed in flight, as dynamic_reconfigure and rqt_reconfigure do it.
 
-The library's own server uses rospy, in threads of rospy's; this one goes
-through the node handle, so that a change comes between two callbacks and works
-for many nodes in one process. What goes over the wire is encoded by the library.
+Through the node handle, so that a change comes between two callbacks; the library's own server has
+threads of rospy's.
 """
 
 import contextlib
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any
 
 from dynamic_reconfigure import encoding
 from dynamic_reconfigure.msg import Config, ConfigDescription
@@ -16,48 +15,18 @@ from dynamic_reconfigure.srv import Reconfigure, ReconfigureResponse
 
 from crazyflie_utils.parameters.declaration import REQUIRED, Declaration, ParameterError, Parameters
 from crazyflie_utils.parameters.types import Boolean, Integer, Number, Text
-from crazyflie_utils.topics import Publisher
 from crazyflie_utils.transport import ServiceError
 
 
-class ReconfiguredNode(Protocol):
-    """What is needed of a node's handle."""
-
-    name: str
-
-    def resolve(self, name: str) -> str:
-        """Return an absolute name."""
-
-    def publisher(self, topic: str, message_type: type, latch: bool = False) -> Publisher:
-        """Announce a topic."""
-
-    def advertise_service(
-        self, name: str, service_type: type, callback: Callable[[Any], Any]
-    ) -> None:
-        """Answer calls of a service."""
-
-    def set_param_later(self, name: str, value: Any) -> object:
-        """Set a parameter without waiting."""
-
-
 class Reconfiguration:
-    """Offer the live parameters of a node.
+    """Offers the live parameters of a node, which were read with ``get``; see `NodeHandle.load`.
 
-    Parameters
-    ----------
-    handle : ReconfiguredNode
-        Of the node.
-    parameters : Parameters
-        As they are now.
-    get : callable
-        Where they were read from; see `Parameters.read`.
-    on_change : callable
-        See `NodeHandle.load`.
+    The handle is a `NodeHandle`, whose module imports this one.
     """
 
     def __init__(
         self,
-        handle: ReconfiguredNode,
+        handle: Any,
         parameters: Parameters,
         get: Callable[[str], Any],
         on_change: Callable[[Any], None],

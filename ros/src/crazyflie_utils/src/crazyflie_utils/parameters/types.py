@@ -1,13 +1,10 @@
-"""Types of parameters: what a value may be, and what is expected in words.
-
-A parameter type is called with the raw value, as the parameter server or a
-command line has it, and returns the value that a node uses; or it raises
-`ValueError`, with a reason where ``str(type)``, what is expected, does not say it.
-"""
+"""Types of parameters: what a value may be, and in words (``str(type)``) what is expected."""
 
 import math
 from dataclasses import dataclass
 from typing import Any
+
+from typing_extensions import override
 
 from crazyflie_utils.text_input import number_from_text
 
@@ -30,12 +27,9 @@ class ParameterType:
     range: str = ""
 
     def __call__(self, value: Any) -> Any:
-        """Return the value that a raw value means.
+        """Return the value that a raw one, of the parameter server or a command line, means.
 
-        Raises
-        ------
-        ValueError
-            It means none.
+        Raises ValueError if it means none; with a reason where ``str(type)`` does not say it.
         """
         raise NotImplementedError
 
@@ -46,17 +40,7 @@ class ParameterType:
 
 @dataclass(frozen=True)
 class Number(ParameterType):
-    """A finite float.
-
-    Attributes
-    ----------
-    unit : str
-        For the message only.
-    above : float
-        The value must be greater than this.
-    minimum, maximum : float
-        The value must not be outside these.
-    """
+    """A finite float: greater than ``above``, not outside ``minimum`` and ``maximum``."""
 
     unit: str = ""
     above: float = -math.inf
@@ -78,22 +62,20 @@ class Number(ParameterType):
         """Return the number in a text."""
         return number_from_text(text)
 
+    @override
     def __call__(self, value: Any) -> float:
-        """Return the value as float."""
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             raise ValueError
         try:
             number = float(value)
         except OverflowError as error:
             raise ValueError(error) from None
-        if not math.isfinite(number) or not self.minimum <= number <= self.maximum:
-            raise ValueError
-        if number <= self.above:
+        is_in_range = self.minimum <= number <= self.maximum and number > self.above
+        if not math.isfinite(number) or not is_in_range:
             raise ValueError
         return number
 
     def __str__(self) -> str:
-        """Return what is expected."""
         unit = f"({self.unit})" if self.unit else ""
         return " ".join(filter(None, ["a finite number", self.range, unit]))
 
@@ -121,15 +103,14 @@ class Integer(ParameterType):
             raise ValueError
         return int(text, 0)
 
+    @override
     def __call__(self, value: Any) -> int:
-        """Return the value as int."""
         number = Number(minimum=self.minimum, maximum=self.maximum)(value)
         if number != int(number):
             raise ValueError
         return int(number)
 
     def __str__(self) -> str:
-        """Return what is expected."""
         if self.minimum == self.maximum:
             return f"the integer {self.minimum}"
         return f"an integer from {self.minimum} to {self.maximum}"
@@ -147,14 +128,13 @@ class Boolean(ParameterType):
             raise ValueError
         return text.lower() == "true"
 
+    @override
     def __call__(self, value: Any) -> bool:
-        """Return the value."""
         if not isinstance(value, bool):
             raise ValueError
         return value
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return "true or false"
 
 
@@ -171,16 +151,15 @@ class Text(ParameterType):
         """The choices."""
         return ", ".join(f"`{choice}`" for choice in self.choices)
 
+    @override
     def __call__(self, value: Any) -> str:
-        """Return the value."""
         if not isinstance(value, str) or not (value.strip() or self.may_be_empty):
             raise ValueError
-        if self.choices and value not in self.choices:
+        if value not in (self.choices or (value,)):
             raise ValueError
         return value
 
     def __str__(self) -> str:
-        """Return what is expected."""
         if self.choices:
             return "one of " + ", ".join(self.choices)
         return "a string" if self.may_be_empty else "a string that is not empty"
@@ -192,19 +171,16 @@ class GraphName(ParameterType):
 
     label = "string"
 
+    @override
     def __call__(self, value: Any) -> str:
-        """Return the value."""
-        if not isinstance(value, str) or not value:
-            raise ValueError
         # Here, since programs without ROS have no such names.
         from rosgraph.names import is_legal_name
 
-        if not is_legal_name(value):
+        if not isinstance(value, str) or not value or not is_legal_name(value):
             raise ValueError
         return value
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return "the name of a topic or service, such as /state"
 
 
@@ -214,27 +190,19 @@ class Frame(ParameterType):
 
     label = "string"
 
+    @override
     def __call__(self, value: Any) -> str:
-        """Return the frame's name as tf2 wants it."""
         if not isinstance(value, str) or not value.strip("/ "):
             raise ValueError
         return value.lstrip("/")
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return "the name of a tf frame, such as world"
 
 
 @dataclass(frozen=True)
 class ListOf(ParameterType):
-    """A list whose entries are all of one type; as a value, a tuple.
-
-    Attributes
-    ----------
-    entry : ParameterType
-    length : int or None
-        Number of entries; None for any.
-    """
+    """A list, of any length if that is None, with entries of one type; its value is a tuple."""
 
     entry: ParameterType
     length: int | None = None
@@ -254,14 +222,13 @@ class ListOf(ParameterType):
         """As the entry's."""
         return self.entry.range
 
+    @override
     def __call__(self, value: Any) -> tuple[Any, ...]:
-        """Return the entries."""
         if not isinstance(value, (list, tuple)) or self.length not in (None, len(value)):
             raise ValueError
         return tuple(map(self.entry, value))
 
     def __str__(self) -> str:
-        """Return what is expected."""
         count = "a list" if self.length is None else f"a list of {self.length}"
         return f"{count}, each entry {self.entry}"
 

@@ -9,15 +9,8 @@ from typing import Any
 class ParameterWriter:
     """Sets parameters in the order in which they changed, each to its latest value.
 
-    The thread lives while there is anything to set. A master that is frozen keeps nobody else
-    waiting, and what waits is at most one value for each parameter.
-
-    Parameters
-    ----------
-    write : callable
-        ``write(name, value)`` sets a parameter, however long that takes.
-    report : callable
-        ``report(text)`` is called when ``write`` has raised.
+    A thread calls ``write(name, value)``, however long that takes, and ``report(text)`` when it has
+    raised.
     """
 
     def __init__(self, write: Callable[[str, Any], None], report: Callable[[str], None]):

@@ -46,7 +46,7 @@ def load(path: str | Path) -> "Entry":
 
 @dataclass(frozen=True)
 class Entry:
-    """A value in a file, and where it stands.
+    """A value in a file, and its place. What it is not, raises `ParameterError` with the place.
 
     Attributes
     ----------
@@ -68,13 +68,7 @@ class Entry:
 
     @property
     def value(self) -> Any:
-        """The value as YAML means it.
-
-        Raises
-        ------
-        ParameterError
-            It means nothing, such as a date with a 13th month.
-        """
+        """The value as YAML means it; not all means anything, such as a 13th month."""
         loader = yaml.SafeLoader("")
         try:
             return loader.construct_document(self.node)
@@ -89,13 +83,7 @@ class Entry:
         return ParameterError(f"{self.file}:{self.line}: {self._title()} {text}")
 
     def entries(self) -> dict[str, "Entry"]:
-        """Return what it holds, by key.
-
-        Raises
-        ------
-        ParameterError
-            It is no mapping, a key is no string, or it is there twice.
-        """
+        """Return what it holds, by key, if it is a mapping whose keys are different strings."""
         if not isinstance(self.node, yaml.MappingNode):
             raise self.error(f"is {shown(self.value)}; expected a mapping")
         found: dict[str, Entry] = {}
@@ -112,13 +100,7 @@ class Entry:
         return found
 
     def elements(self) -> list["Entry"]:
-        """Return what it holds in order.
-
-        Raises
-        ------
-        ParameterError
-            It is no list.
-        """
+        """Return what it holds in order, if it is a list."""
         if not isinstance(self.node, yaml.SequenceNode):
             raise self.error(f"is {shown(self.value)}; expected a list")
         return [
@@ -127,17 +109,9 @@ class Entry:
         ]
 
     def __contains__(self, key: str) -> bool:
-        """Whether it holds something of that name."""
         return key in self.entries()
 
     def __getitem__(self, key: str) -> "Entry":
-        """Return what it holds of that name.
-
-        Raises
-        ------
-        ParameterError
-            It holds no such thing.
-        """
         entries = self.entries()
         if key not in entries:
             raise self.error(f"has no {key}; it has {shortened(', '.join(entries)) or 'nothing'}")
@@ -146,17 +120,8 @@ class Entry:
     def read(self, parameters: type[P], besides: tuple[str, ...] = ()) -> P:
         """Return the parameters that it holds; those of a group in a mapping of their own.
 
-        Parameters
-        ----------
-        parameters : type
-            Subclass of `Parameters`.
-        besides : tuple of str
-            Keys that it may hold besides them; somebody else reads these.
-
-        Raises
-        ------
-        ParameterError
-            About everything that is missing, unknown, or not what is expected.
+        Keys in ``besides`` are known, too, and read elsewhere. The error is about everything that
+        is missing, unknown, or not what is expected.
         """
         names = {declaration.name for declaration in parameters.declarations()}
         known: dict[str, Entry] = {}

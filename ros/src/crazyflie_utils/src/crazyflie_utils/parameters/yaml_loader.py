@@ -25,10 +25,8 @@ MAX_NODES = 50_000
 def compose(text: str) -> yaml.Node | None:
     """Return the node of a YAML text; None for one without content.
 
-    Raises
-    ------
-    TextFileError
-        It is no YAML, is beyond the limits above, or has an alias in what the alias stands for.
+    Raises `TextFileError` if it is no YAML, is beyond the limits above, or has an alias in what the
+    alias stands for.
     """
     try:
         loader = _Loader(text)

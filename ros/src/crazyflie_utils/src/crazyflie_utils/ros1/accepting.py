@@ -21,14 +21,7 @@ MAX_PENDING = 32
 
 
 class Acceptor:
-    """In the place of ``TCPROSServer._tcp_server_callback``, which reads one header at a time.
-
-    Parameters
-    ----------
-    server : rospy.impl.tcpros_base.TCPROSServer
-    report : callable
-        See `receiving.Report`.
-    """
+    """In the place of ``TCPROSServer._tcp_server_callback``, which reads one header at a time."""
 
     def __init__(self, server: Any, report: Report):
         self._server = server

@@ -25,11 +25,7 @@ a thread that nothing can end."""
 class ServiceCaller:
     """Calls services, each call in a thread of its own.
 
-    Attributes
-    ----------
-    own : dict of str to rospy.Service
-        Services of this process, which are called without a connection: a fleet's are a hundred at
-        once.
+    Those of this process, ``own``, are called without a connection: a fleet's are a hundred.
     """
 
     def __init__(self) -> None:
@@ -63,11 +59,7 @@ class ServiceCaller:
 def wait_for_answer(answer: Future[Any], name: str, time: Callable[[], float]) -> Any:
     """Return the outcome of ``answer``, for the caller of the service ``name``.
 
-    Raises
-    ------
-    ServiceError
-        The service's; or the process ends, or ``time()`` stands still, before there
-        is an outcome.
+    `ServiceError` is the service's; or the process ends, or ``time()`` stands still, before.
     """
     seen, seen_at = time(), monotonic()
     while not wait([answer], timeout=0.1).done:

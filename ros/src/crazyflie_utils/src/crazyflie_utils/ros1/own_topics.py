@@ -18,15 +18,8 @@ from crazyflie_utils.ros1.sending import NonBlockingConnection, serialized
 class OwnCallback:
     """A callback of a handle: not for messages that handles of this process publish.
 
-    Those are handed over. A message has come by a socket nevertheless where rospy subscribes to
-    the topic in this process, too, and without `skip_self_connections`.
-
-    Parameters
-    ----------
-    deliver : callable
-        ``deliver(message)``
-    is_handed_over : callable
-        Returns whether a handle of this process publishes the topic.
+    Those are handed over, if ``is_handed_over()``. They come by a socket as well where rospy
+    subscribes to the topic in this process, too, and without `skip_self_connections`.
     """
 
     def __init__(self, deliver: Callable[[Any], None], is_handed_over: Callable[[], bool]):
@@ -41,19 +34,9 @@ class OwnCallback:
 
 
 class OwnSubscription(rospy.topics._SubscriberImpl):
-    """rospy's part of a topic that handles subscribe to.
+    """rospy's part of a topic, by remapped name, that handles subscribe to, with these patches on.
 
-    Parameters
-    ----------
-    name : str
-        Absolute, remapped.
-    message_type : type
-    is_handed_over : callable
-        See `OwnCallback`.
-    report, limits_rate
-        See `receiving.harden`.
-    patches : frozenset of str
-        Which of its patches are on.
+    See `OwnCallback` and `receiving.harden`.
     """
 
     def __init__(

@@ -55,15 +55,7 @@ class RateLimiter:
 
 
 class Inbox:
-    """Cuts what a publisher sends into messages.
-
-    Parameters
-    ----------
-    connection : rospy.impl.tcpros_base.TCPROSTransport
-        Connected.
-    report : callable
-        See `Report`.
-    """
+    """Cuts what a publisher sends on a TCPROSTransport of rospy's into messages."""
 
     def __init__(self, connection: Any, report: Report):
         self.sock = connection.socket
@@ -80,10 +72,7 @@ class Inbox:
     def receive(self, limits_rate: bool) -> list[genpy.Message]:
         """Wait for data and return the messages that are complete; perhaps none.
 
-        Raises
-        ------
-        TransportTerminated
-            The publisher has hung up, or makes messages without end.
+        TransportTerminated if the publisher has hung up, or makes messages without end.
         """
         frames = self._take()
         if limits_rate and frames and self._limiter.is_flooded(len(frames)):

@@ -7,15 +7,9 @@ ROSOUT = "rosout"
 
 
 class Shielded(logging.Handler):
-    """Hands records on to another handler, and keeps its errors from who logs.
+    """Hands records on to another handler, and handles its errors as Python's own handlers do.
 
-    Python's own handlers do so; rospy's, which writes to the screen, does not. Under roslaunch the
-    "screen" of a node may be a file.
-
-    Parameters
-    ----------
-    handler : logging.Handler
-        The other one.
+    rospy's, which writes to the screen, does not. Under roslaunch the "screen" may be a file.
     """
 
     def __init__(self, handler: logging.Handler) -> None:

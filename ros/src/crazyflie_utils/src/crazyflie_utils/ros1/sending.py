@@ -55,13 +55,7 @@ class NonBlockingConnection:
         return getattr(self._connection, name)
 
     def write_data(self, data: bytes) -> None:
-        """Send a message, now or later.
-
-        Raises
-        ------
-        TransportTerminated
-            The subscriber has hung up.
-        """
+        """Send a message, now or later; TransportTerminated if the subscriber has hung up."""
         with self._lock:
             if self._rest:
                 self._waiting.append(data)

@@ -63,15 +63,8 @@ class _RosSubscriber(ExternalSubscriber):
 class RosTransport(Transport):
     """rospy, for a process that has called ``rospy.init_node``.
 
-    Attributes
-    ----------
-    refused : collections.Counter
-        How often peers did something wrong, by kind.
-
-    Parameters
-    ----------
-    limits_rate : bool, optional
-        Decode floods in part; not in simulated time, which may pass quickly.
+    It decodes floods in part if ``limits_rate``; not in simulated time, which may pass quickly.
+    ``refused`` counts what peers did wrong, by kind.
     """
 
     def __init__(self, limits_rate: bool = True) -> None:
@@ -166,13 +159,7 @@ class RosTransport(Transport):
         serve: Callable[[Any], Future[Any]],
         time: Callable[[], float],
     ) -> Callable[[], None]:
-        """Register a service with the master.
-
-        Raises
-        ------
-        ServiceError
-            This process offers one of that name already.
-        """
+        """Register a service; `ServiceError` if this process offers one of that name already."""
 
         def answer(request):
             try:

@@ -10,7 +10,7 @@ from typing import Any
 import genpy
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
+from crazyflie_utils.testing.fake_process import FakeProcess, FakeSubscriber, FakeTransport
 from crazyflie_utils.transport import (
     ExternalPublisher,
     ExternalSubscriber,
@@ -224,19 +224,6 @@ class _Publication(ExternalPublisher):
         self._transport.advertised.remove(self._topic)
 
 
-class _Subscription(ExternalSubscriber):
-    def __init__(self, transport: _GraphTransport, topic: str, deliver: Deliver):
-        self._transport = transport
-        self._topic = topic
-        self._deliver = deliver
-
-    def has_publishers(self) -> bool:
-        return self._transport.graph.publishes(self._topic, self._transport.name)
-
-    def close(self) -> None:
-        self._transport.subscribers[self._topic].remove(self._deliver)
-
-
 class _GraphTransport(FakeTransport):
     """The outside world of one process: the others."""
 
@@ -253,10 +240,13 @@ class _GraphTransport(FakeTransport):
         return _Publication(self, topic, latch)
 
     def subscribe(self, topic: str, message_type: type, deliver: Deliver) -> ExternalSubscriber:
-        self.subscribers.setdefault(topic, []).append(deliver)
+        subscribers = self.subscribers.setdefault(topic, [])
+        subscribers.append(deliver)
         for message in self.graph.latched(topic, self.name):
             deliver(message)
-        return _Subscription(self, topic, deliver)
+        return FakeSubscriber(
+            lambda: self.graph.publishes(topic, self.name), lambda: subscribers.remove(deliver)
+        )
 
     def call_service(
         self, name: str, service_type: type, request: Any, limit: float

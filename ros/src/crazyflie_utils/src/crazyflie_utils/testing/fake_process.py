@@ -7,6 +7,7 @@ from concurrent.futures import Future
 from typing import Any
 
 import genpy
+from typing_extensions import override
 
 from crazyflie_utils.clock import SimulatedClock
 from crazyflie_utils.node import Node
@@ -37,14 +38,18 @@ class _Record(ExternalPublisher):
         pass
 
 
-class _FakeSubscriber(ExternalSubscriber):
+class FakeSubscriber(ExternalSubscriber):
+    """A subscription that asks and closes by functions."""
+
     def __init__(self, is_published: Callable[[], bool], close: Callable[[], None]):
         self._is_published = is_published
         self._close = close
 
+    @override
     def has_publishers(self) -> bool:
         return self._is_published()
 
+    @override
     def close(self) -> None:
         self._close()
 
@@ -101,7 +106,7 @@ class FakeTransport(Transport):
         """Keep ``deliver`` for `FakeProcess.publish`."""
         subscribers = self.subscribers.setdefault(topic, [])
         subscribers.append(deliver)
-        return _FakeSubscriber(
+        return FakeSubscriber(
             lambda: topic not in self.unpublished, lambda: subscribers.remove(deliver)
         )
 
@@ -170,13 +175,7 @@ class FakeProcess(Process):
         self.executor.start()
 
     def launch(self, node: Node, name: str, parameters: dict[str, object] | None = None) -> bool:
-        """Initialize a node with private parameters, as roslaunch would.
-
-        Returns
-        -------
-        bool
-            What ``node.initialize`` returned.
-        """
+        """Initialize a node with private parameters; return what ``node.initialize`` returned."""
         for key, value in (parameters or {}).items():
             self.transport.parameters[f"{name}/{key}"] = value
         outcome: list[bool] = []
@@ -205,17 +204,9 @@ class FakeProcess(Process):
         return _named(self.transport.publishers, topic, "publisher of").messages
 
     def call(self, service: str, request: genpy.Message) -> genpy.Message | Future[genpy.Message]:
-        """Call a service from outside.
+        """Call a service from outside; `ServiceError` if it refuses.
 
-        Returns
-        -------
-        response or concurrent.futures.Future
-            A future when the service takes time: let it pass with `advance`.
-
-        Raises
-        ------
-        ServiceError
-            The service refused.
+        The response is a future when the service takes time: let it pass with `advance`.
         """
         answer = _named(self.transport.services, service, "service")(request)
         return answer.result() if answer.done() else answer

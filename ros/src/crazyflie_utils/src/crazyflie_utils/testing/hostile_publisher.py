@@ -37,15 +37,8 @@ _LIMIT = 10.0
 class HostilePublisher:
     """Announces a topic with the master, and sends its subscribers any bytes.
 
-    Parameters
-    ----------
-    topic : str
-    message_type : type
-        What it says it sends.
-    md5sum : str, optional
-        In the place of that of the type.
-    is_ready : bool, optional
-        Otherwise it says that it is no publisher, until the attribute is set.
+    An md5sum takes the place of that of the type. While it is not ready, its header says that it is
+    no publisher.
     """
 
     def __init__(

@@ -35,17 +35,8 @@ def complaints(log: Path) -> list[str]:
 def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen[Any]]:
     """Run roslaunch on a master of its own for the time of a with block.
 
-    Parameters
-    ----------
-    arguments : list of str
-        Package, launch file and its arguments.
-    log : Path
-        Receives what roslaunch and the nodes print.
-
-    Raises
-    ------
-    LaunchError
-        There is no master, because roslaunch refused its arguments for instance.
+    The arguments are package, launch file and its arguments; the log receives what roslaunch and
+    the nodes print. `LaunchError` if roslaunch ends before there is a master.
     """
     port = _set_master()
     command = ["roslaunch", "-p", port, *arguments]
@@ -59,13 +50,7 @@ def roslaunch(arguments: list[str], log: Path) -> Iterator[subprocess.Popen[Any]
 
 @contextlib.contextmanager
 def master(log: Path) -> Iterator[None]:
-    """Run a master, and nothing else, for the time of a with block.
-
-    Parameters
-    ----------
-    log : Path
-        Receives what it prints.
-    """
+    """Run a master, and nothing else, for the time of a with block; its output goes to a log."""
     command = ["rosmaster", "--core", "-p", _set_master()]
     with (
         log.open("w") as output,

@@ -21,13 +21,7 @@ class Received(queue.Queue[genpy.Message]):
     """The messages that have come on a topic, oldest first."""
 
     def next(self, accept: Callable[[genpy.Message], bool] = _anything) -> genpy.Message:
-        """Return the next message for which ``accept(message)``; those before it are gone.
-
-        Raises
-        ------
-        AssertionError
-            None has come within `LIMIT`.
-        """
+        """Return the next message for which ``accept(message)``; fail after `LIMIT`."""
         message = None
         end = time.monotonic() + LIMIT
         while (left := end - time.monotonic()) > 0.0:
@@ -65,15 +59,10 @@ def exchange(
     answer_type: type[genpy.Message],
     accept: Callable[[genpy.Message], bool] = _anything,
 ) -> genpy.Message:
-    """Publish messages, by topic, over and over until an answer is accepted; return it.
+    """Publish messages, by topic, again and again until an answer is accepted; return it.
 
-    The first ones may be lost, because connections take their time, and the node may
-    answer some of them before it has got all.
-
-    Raises
-    ------
-    AssertionError
-        There is no such answer within `LIMIT`.
+    Fails without one within `LIMIT`. The first messages may be lost before connections are made,
+    and the node may answer some of them before it has received all.
     """
     end = time.monotonic() + LIMIT
     for topic, message in messages.items():

@@ -21,19 +21,9 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
 
 @contextlib.contextmanager
 def running(*command: object, **options: Any) -> Iterator[subprocess.Popen[Any]]:
-    """Run a program; Ctrl-C is what ends it, and what it has started.
+    """Run a program, with options of `subprocess.Popen`; end it, and its children, by Ctrl-C.
 
-    Parameters
-    ----------
-    command
-        Program and arguments, of which the text counts.
-    options
-        Of `subprocess.Popen`.
-
-    Raises
-    ------
-    subprocess.TimeoutExpired
-        It did not end, and was killed.
+    If they do not end, they are killed and TimeoutExpired is raised.
     """
     process = subprocess.Popen(list(map(str, command)), start_new_session=True, **options)
     try:

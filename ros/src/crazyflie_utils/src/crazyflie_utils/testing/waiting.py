@@ -13,13 +13,7 @@ def wait_until(
     limit: float = LIMIT,
     period: float = 0.01,
 ) -> None:
-    """Wait until ``condition()`` is true; it is asked every ``period`` (s).
-
-    Raises
-    ------
-    AssertionError
-        It is not within ``limit`` seconds; the text names ``what`` was waited for.
-    """
+    """Wait until ``condition()``, checked every ``period`` (s); fail after ``limit`` (s)."""
     end = time.monotonic() + limit
     while not condition():
         assert time.monotonic() < end, f"waited {limit:g} s for {what}"

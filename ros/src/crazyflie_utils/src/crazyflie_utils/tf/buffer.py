@@ -46,12 +46,7 @@ class Buffer:
         self._buffer.clear()
 
     def lookup(self, target: str, source: str, stamp: int = 0) -> StampedPose:
-        """Return the pose of frame ``source`` in ``target`` at a ROS time (ns); 0: the latest.
-
-        Raises
-        ------
-        TransformError
-        """
+        """Return the pose of frame ``source`` in ``target`` at a ROS time (ns); 0: the latest."""
         moment = ros_time(stamp) if stamp else _LATEST
         found = self._buffer.lookup_transform_core(target, source, moment)
         pose = StampedPose.of(found)

@@ -20,14 +20,7 @@ MAX_FUTURE_STAMP_SIMULATED = 2.0
 
 
 class _Listener:
-    """A callback for new poses of a frame, at most once in a period.
-
-    Parameters
-    ----------
-    period : float
-        s, by the poses' stamps.
-    callback : callable
-    """
+    """A callback for new poses of a frame, at most once in a period (s, by their stamps)."""
 
     def __init__(self, period: float, callback: Callable[[], None]):
         self.callback = callback

@@ -20,7 +20,7 @@ from crazyflie_lqr import control_law
 from crazyflie_model import inner_loops
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector, functions, where
-from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
+from crazyflie_model.watchdog import watchdog_control
 
 NOISE_DIM = 7
 """Random numbers of a tick: noise of position (3) and attitude (3), of standard deviation 1; and
@@ -37,7 +37,6 @@ METRICS = ("largest_error", "squared_errors", "least_upright", "largest_speed")
 distances at the ticks after it has settled; of all ticks, the least cosine of the tilt and the
 largest speed, m/s."""
 
-_LEVEL_STEPS, _OFF_STEPS = round(LEVEL_AGE / STEP), round(OFF_AGE / STEP)
 
 Components = dict[str, Vector[Any]]
 
@@ -122,10 +121,7 @@ def effective_control(memory: Components) -> Vector[Any]:
     See `crazyflie_simulator.vehicle.SimulatedVehicle`.
     """
     (age,), (has_crashed,) = memory["age"], memory["has_crashed"]
-    *attitude, thrust = memory["u"]
-    level = [where(age < _LEVEL_STEPS, part, 0.0) for part in attitude]
-    is_off = (age >= _OFF_STEPS) | (has_crashed > 0.0)
-    return [where(is_off, 0.0, part) for part in [*level, thrust]]
+    return [where(has_crashed > 0.0, 0.0, part) for part in watchdog_control(memory["u"], age)]
 
 
 def measure(

@@ -7,10 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from crazyflie_model.dynamics import STEP, SevenDimensional
-from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
+from crazyflie_model.watchdog import watchdog_control
 
-_LEVEL_STEPS = round(LEVEL_AGE / STEP)
-_OFF_STEPS = round(OFF_AGE / STEP)
 _NEVER = np.iinfo(np.int64).max
 
 
@@ -54,7 +52,7 @@ class VectorizedVehicles:
     @property
     def tilts(self) -> NDArray[np.float64]:
         """Roll and pitch, rad, shape (n, 2)."""
-        return self._effective_control()[:2].T
+        return np.stack(self._effective_control()[:2], axis=1)
 
     def command(self, vehicle: int, u: Sequence[float], time: float) -> None:
         """Give one vehicle a control (4 numbers), which counts from ``time`` (s) on.
@@ -91,7 +89,7 @@ class VectorizedVehicles:
             self._next_since[due] = _NEVER
 
     def _step(self):
-        moved = self._dynamics.step(self._steps, self._x, list(self._effective_control()))
+        moved = self._dynamics.step(self._steps, self._x, self._effective_control())
         obeys = self._since != _NEVER
         # A vehicle stays put until its first control.
         self._x = (
@@ -100,11 +98,5 @@ class VectorizedVehicles:
         self._steps += 1
 
     def _effective_control(self):
-        # Without controls the vehicle does what the firmware does.
-        age = self._steps - self._since
-        is_old = (age >= _LEVEL_STEPS) & (self._since != _NEVER)
-        if not is_old.any():
-            return self._u
-        u = np.where(is_old, 0.0, self._u)
-        u[3] = np.where(age >= _OFF_STEPS, u[3], self._u[3])
-        return u
+        # `_NEVER` makes an age far below zero: that of a control that counts.
+        return watchdog_control([*self._u], self._steps - self._since)

@@ -9,14 +9,12 @@ from typing import TYPE_CHECKING
 from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector
-from crazyflie_model.limits import LEVEL_AGE, OFF_AGE
+from crazyflie_model.watchdog import watchdog_control
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-_LEVEL_STEPS = round(LEVEL_AGE / STEP)
-_OFF_STEPS = round(OFF_AGE / STEP)
 _OFF: Vector[float] = [0.0, 0.0, 0.0, 0.0]
 
 
@@ -24,8 +22,7 @@ class SimulatedVehicle:
     """One simulated vehicle, with the firmware's watchdog.
 
     It stays put until the first control. When controls stop coming it does what
-    the firmware does: after `LEVEL_AGE` it levels out with the thrust it has,
-    after `OFF_AGE` its motors stop.
+    the firmware does; see `watchdog_control`.
 
     Two vehicles that are given the same controls at the same times fly the
     same, to the last bit, however often `advance_to` is called.
@@ -121,12 +118,7 @@ class SimulatedVehicle:
             return _OFF
         if self._control_step is None:
             return self._u
-        age = self._steps - self._control_step
-        if age < _LEVEL_STEPS:
-            return self._u
-        if age < _OFF_STEPS:
-            return [0.0, 0.0, 0.0, self._u[3]]
-        return _OFF
+        return watchdog_control(self._u, self._steps - self._control_step)
 
 
 def _floats(vector: Sequence[float]) -> Vector[float]:

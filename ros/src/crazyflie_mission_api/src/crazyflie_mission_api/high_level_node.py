@@ -20,7 +20,7 @@ from crazyflie_msgs.msg import (
     FlightStatus,
     PositionVelocityYawStateStamped,
 )
-from crazyflie_utils import Node, NodeHandle, ServiceError
+from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status
 from crazyflie_utils.refusal import RefusalError
 
 MAX_STATE_AGE = 0.5
@@ -77,11 +77,12 @@ class HighLevelNode(Node):
             ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
         ):
             handle.advertise_service(f"~{name}", service_type, callback)
-        handle.subscribe(
-            parameters.flight_status_topic, FlightStatus, lambda m: self._set_flight_state(m.state)
+        flight_status.subscribe(
+            handle,
+            parameters.flight_status_topic,
+            parameters.flight_state_topic,
+            lambda status: self._set_flight_state(status.state),
         )
-        if parameters.flight_state_topic is not None:
-            handle.subscribe(parameters.flight_state_topic, String, self._on_flight_state)
         state_type = PositionVelocityYawStateStamped
         handle.subscribe(parameters.state_topic, state_type, self._on_state, finite="state")
         handle.subscribe(parameters.reference_topic, message_type, self._on_reference)
@@ -112,10 +113,6 @@ class HighLevelNode(Node):
         velocity = (s.x_dot, s.y_dot, s.z_dot)
         self._measured = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
         self._measured_at = self._handle.time()
-
-    def _on_flight_state(self, message):
-        state = getattr(FlightStatus, message.data.upper(), FlightStatus.UNKNOWN)
-        self._set_flight_state(state)
 
     def _set_flight_state(self, state):
         before, self._flight_state = self._flight_state, state

@@ -65,7 +65,7 @@ def _measure():
     print(f"{'':44}{'wall':>10}{'CPU':>10}")
     _report("announce a topic while nodes start", *_per_topic(process, handle))
     works = {
-        "publish, nobody listens": publish_to("/nobody", 0),
+        "publish without subscribers": publish_to("/unheard", 0),
         "publish, 1 subscriber in the process": publish_to("/one", 1),
         "publish, 10 subscribers in the process": publish_to("/ten", 10),
     }

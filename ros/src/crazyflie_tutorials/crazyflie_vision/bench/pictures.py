@@ -45,7 +45,7 @@ class Flight:
         self._lookup = self._process.handle("/pictures").listen_to_transforms()
 
     def advance(self, duration: float) -> None:
-        """Let time pass, s; images that nobody asks for any more are not kept."""
+        """Let time pass, s; images that are not needed any more are dropped."""
         for _ in range(round(duration / STEP)):
             self._process.advance(STEP)
             for topic, publisher in self._process.transport.publishers.items():

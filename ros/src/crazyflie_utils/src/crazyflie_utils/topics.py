@@ -1,6 +1,6 @@
 """Topics within a process: subscribers here are given the published object itself, by a call.
 
-They must therefore not change it. Messages are sent outside only when somebody subscribes there.
+They must therefore not change it. Messages are sent outside only when there are subscribers.
 """
 
 from collections.abc import Callable, Sequence

@@ -34,7 +34,7 @@ class Reconfiguration:
         self._handle = handle
         self._type = type(parameters)
         self._on_change = on_change
-        # All of them now: at a change, in flight, nobody may wait for the master.
+        # All of them now: at a change, in flight, no callback may wait for the master.
         self._values = _read(self._type.declarations(), get)
         self._live = {d.name: d for d in self._type.declarations() if d.live}
         descriptions = handle.publisher("~parameter_descriptions", ConfigDescription, latch=True)

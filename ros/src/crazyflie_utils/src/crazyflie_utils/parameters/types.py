@@ -98,7 +98,7 @@ class Integer(ParameterType):
 
     def from_text(self, text: str) -> int:
         """Return the integer in a text; 0x begins a hexadecimal one."""
-        # Python's own way to write large numbers is nobody else's.
+        # Only Python writes large numbers like this.
         if "_" in text:
             raise ValueError
         return int(text, 0)

@@ -1,4 +1,4 @@
-"""A full disk, or a screen that is gone, fails nobody who logs."""
+"""Logging raises nothing when the disk is full or the screen is gone."""
 
 import logging
 

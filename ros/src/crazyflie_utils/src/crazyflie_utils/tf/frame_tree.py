@@ -89,7 +89,7 @@ class FrameTree:
         self._frames: dict[str, _Frame] = {}
         self._static: dict[str, StampedPose] = {}
         self._names: set[str] = set()
-        # Those that are followed, as they may be on the wire; and names that nobody may use.
+        # Those that are followed, as they may be on the wire; and names that are not allowed.
         self._wanted = {b"", b"/"}
         self._unread: dict[bytes, bytes] = {}
         self._tf2: Buffer | None = None

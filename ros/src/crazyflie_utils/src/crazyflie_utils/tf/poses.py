@@ -1,7 +1,7 @@
 """Poses as tf has them, and their way into and out of serialized tf2_msgs/TFMessages.
 
 A pose is a tuple, which costs a fraction of a geometry_msgs/TransformStamped; one is made into
-a message where somebody asks for a message.
+a message where a message is asked for.
 """
 
 import struct

@@ -7,6 +7,7 @@ from std_msgs.msg import Header
 
 from crazyflie_demo.cmd_vel_teleop_node import CmdVelTeleopNode
 from crazyflie_demo.joy_axes import REPEATED
+from crazyflie_demo.quadrotor_teleop_node import QuadrotorTeleopNode
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
 
@@ -14,9 +15,17 @@ NAN = float("nan")
 PITCH, ROLL, YAW, THRUST = 4, 3, 0, 1
 
 
-def launch(**parameters):
+SDK = {
+    **{"x_axis": 5, "y_axis": 4, "z_axis": 2, "yaw_axis": 1},
+    **{"x_velocity_max": 30, "y_velocity_max": -30},
+    **{"z_velocity_max": 60000, "yaw_velocity_max": -200},
+}
+"""As xbox360.launch of the SDK sets them for quadrotor_teleop."""
+
+
+def launch(node_class=CmdVelTeleopNode, **parameters):
     process = FakeProcess()
-    assert process.launch(CmdVelTeleopNode(), "/cf/teleop", parameters)
+    assert process.launch(node_class(), "/cf/teleop", parameters)
     return process
 
 
@@ -57,8 +66,11 @@ def test_is_silent_without_a_joystick():
         ({"pitch": NAN}, (0.0, 0.0, 0.0, 0.0)),
     ],
 )
-def test_sticks_become_setpoints(sticks, setpoint):
-    process = launch()
+@pytest.mark.parametrize(
+    ("node_class", "parameters"), [(CmdVelTeleopNode, {}), (QuadrotorTeleopNode, SDK)]
+)
+def test_sticks_become_setpoints(node_class, parameters, sticks, setpoint):
+    process = launch(node_class, **parameters)
     tilt(process)
     tilt(process, **sticks)
     assert last(process) == pytest.approx(setpoint)
@@ -72,6 +84,13 @@ def test_axes_and_ranges_can_be_chosen():
     process.publish("/cf/joy", Joy(axes=[0.0, -1.0, 1.0]))
     process.advance(0.02)
     assert last(process) == (0.0, 0.0, 50000.0, 90.0)
+
+
+def test_a_negative_axis_is_inverted_and_axis_0_is_none():
+    process = launch(QuadrotorTeleopNode, **{**SDK, "x_axis": -5, "yaw_axis": 0, "z_axis": -2})
+    tilt(process)
+    tilt(process, pitch=1.0, roll=0.5, yaw=1.0, thrust=-0.5)
+    assert last(process) == pytest.approx((-30.0, -15.0, 30000.0, 0.0))
 
 
 def test_thrust_counts_after_its_stick_has_been_at_zero():

@@ -1,5 +1,7 @@
 """ROS interface of flight by hand: a joystick's axes to cmd_vel."""
 
+from typing import ClassVar
+
 from geometry_msgs.msg import Twist, Vector3
 from typing_extensions import override
 
@@ -10,10 +12,21 @@ from crazyflie_model.limits import FULL_PWM, MAX_SETPOINT_PWM
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import Number
 
+Sticks = tuple[tuple[int, float], ...]
+"""Four joystick axes, numbered from 0, and what they are multiplied by."""
+
 _TILT = Number("deg", above=0.0, maximum=60.0)
 
 
-class CmdVelTeleopParameters(JoyParameters, SetpointParameters):
+class TeleopParameters(JoyParameters, SetpointParameters):
+    """Of nodes that turn a joystick's axes into cmd_vel."""
+
+    def sticks(self) -> Sticks:
+        """Return what moves linear.x, linear.y, angular.z and linear.z of cmd_vel."""
+        raise NotImplementedError
+
+
+class CmdVelTeleopParameters(TeleopParameters):
     """Parameters of `CmdVelTeleopNode`."""
 
     pitch_axis: int = parameter(AXIS, "number of the axis that pitches", PITCH, "axes/pitch")
@@ -33,6 +46,16 @@ class CmdVelTeleopParameters(JoyParameters, SetpointParameters):
         live=True,
     )
 
+    @override
+    def sticks(self) -> Sticks:
+        """Return the sticks; axes are positive to the left, roll and yaw rate to the right."""
+        return (
+            (self.pitch_axis, self.max_pitch),
+            (self.roll_axis, -self.max_roll),
+            (self.yaw_rate_axis, -self.max_yaw_rate),
+            (self.thrust_axis, self.max_thrust),
+        )
+
 
 class CmdVelTeleopNode(Node):
     """Tilt, turn and lift a vehicle as the sticks are tilted.
@@ -41,12 +64,14 @@ class CmdVelTeleopNode(Node):
     node is silent, and the vehicle's watchdog does the rest.
     """
 
+    parameters_class: ClassVar[type[TeleopParameters]] = CmdVelTeleopParameters
+
     def __init__(self) -> None:
         self._is_locked = True
 
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
-        self._parameters = handle.load(CmdVelTeleopParameters, self._reconfigure)
+        self._parameters = handle.load(self.parameters_class, self._reconfigure)
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
@@ -64,15 +89,13 @@ class CmdVelTeleopNode(Node):
                 self._handle.warn(f"no joystick on {parameters.joy_topic}: sending no setpoints")
             self._is_locked = True
             return
-        pitch = self._axes.axis(parameters.pitch_axis) * parameters.max_pitch
-        roll = self._axes.axis(parameters.roll_axis) * parameters.max_roll
-        yaw_rate = self._axes.axis(parameters.yaw_rate_axis) * parameters.max_yaw_rate
-        thrust = self._axes.axis(parameters.thrust_axis) * parameters.max_thrust
+        x, y, yaw_rate, thrust = (
+            self._axes.axis(axis) * scale for axis, scale in parameters.sticks()
+        )
         if thrust <= 0.0:
             self._is_locked = False
         if self._is_locked:
             thrust = 0.0
-        # Axes are positive to the left, roll and yaw rate of cmd_vel to the right.
         self._publisher.publish(
-            Twist(Vector3(pitch, -roll, max(thrust, 0.0)), Vector3(0.0, 0.0, -yaw_rate))
+            Twist(Vector3(x, y, max(thrust, 0.0)), Vector3(0.0, 0.0, yaw_rate))
         )

@@ -64,12 +64,23 @@ def on_spiral(start, angle, radii, ascent, sideways, clockwise, s):
     """Return where a spiral is at a part of its way, as a complex number, height and yaw."""
     heading = np.exp(1j * start.yaw)
     sense = -1 if clockwise else 1
-    # From where it begins the axis is to the left, to the right, or ahead.
-    to_axis = heading * (1 if sideways else 1j * sense)
+    # From where it begins the axis is to the left or behind; clockwise to the right or ahead.
+    to_axis = heading * (-sense if sideways else 1j * sense)
     axis = complex(*start.position[:2]) + radii[0] * to_axis
     radius = (1 - s) * radii[0] + s * radii[1]
     place = axis - radius * to_axis * np.exp(1j * sense * angle * s)
     return place, start.position[2] + s * ascent, start.yaw + sense * angle * s
+
+
+@pytest.mark.parametrize(
+    ("sideways", "clockwise", "x", "y"),
+    # As the firmware's plan_spiral_from calculates.
+    [(0, 0, 0.5, 0.5), (0, 1, 0.5, -0.5), (1, 0, -0.5, 0.5), (1, 1, 0.5, 0.5)],
+)
+def test_where_a_quarter_of_a_turn_ends(sideways, clockwise, x, y):
+    start = Goal(ZERO, ZERO, ZERO, 0.0, 0.0)
+    piece = spiral_piece(start, math.pi / 2, (0.5, 0.5), 0.0, 3.0, sideways, clockwise)
+    assert piece.evaluate(3.0).position == pytest.approx((x, y, 0.0))
 
 
 @given(

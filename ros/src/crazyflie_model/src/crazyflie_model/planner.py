@@ -77,14 +77,14 @@ def spiral_piece(
     duration : float
         s, > 0.
     sideways : bool
-        With the axis ahead and not to the side.
+        With the axis ahead or behind, and not to the side.
     clockwise : bool
-        Seen from above; then the axis is to the right, otherwise to the left.
+        Seen from above; then the axis is to the right or ahead, otherwise to the left or behind.
     """
     sense = -1.0 if clockwise else 1.0
     rate = sense * angle / duration
     # From the axis to the vehicle.
-    direction = start.yaw + (math.pi if sideways else -sense * math.pi / 2.0)
+    direction = start.yaw - sense * math.pi / 2.0 + (math.pi / 2.0 if sideways else 0.0)
     growth = (radii[1] - radii[0]) / duration
     x, y, z = start.position
     center = (x - radii[0] * math.cos(direction), y - radii[0] * math.sin(direction))

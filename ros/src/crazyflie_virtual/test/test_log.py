@@ -7,7 +7,9 @@ import pytest
 from virtual_bench import Bench
 
 from crazyflie_virtual.link.crtp import Port
+from crazyflie_virtual.ports.log import packed
 from crazyflie_virtual.tables.log_table import log_variables
+from crazyflie_virtual.tables.number_types import FLOAT, I16, LOG_TYPES, U16
 
 TABLE, CONTROL, DATA = 0, 1, 2
 
@@ -113,6 +115,23 @@ def test_values_are_converted_to_the_type_that_is_asked_for(bench):
     bench.run(0.01)
     (value,) = struct.unpack("<e", data_packets(bench)[-1][4:])
     assert value == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("stored", "value", "code", "sent"),
+    [
+        # As the firmware: the low bytes of a whole number of 32 bits.
+        (U16, 526, 1, b"\x0e"),
+        (U16, 65535, 5, b"\xff\xff"),
+        (I16, -2, 3, b"\xfe\xff\xff\xff"),
+        (FLOAT, 300.9, 1, b"\x2c"),
+        (FLOAT, -1.5, 2, b"\xff\xff"),
+        (FLOAT, 1e12, 6, b"\xff\xff\xff\x7f"),
+        (U16, 526, 7, struct.pack("<f", 526.0)),
+    ],
+)
+def test_whole_numbers_keep_their_low_bytes(stored, value, code, sent):
+    assert packed(value, stored, LOG_TYPES[code]) == sent
 
 
 def test_errors(bench):

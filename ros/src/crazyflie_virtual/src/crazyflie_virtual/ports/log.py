@@ -2,12 +2,11 @@
 
 import errno
 import struct
-from collections.abc import Callable
 
 from crazyflie_virtual.firmware.firmware import Firmware
 from crazyflie_virtual.link.crtp import Packet, Port
-from crazyflie_virtual.tables.log_table import log_variables
-from crazyflie_virtual.tables.number_types import LOG_CODES, LOG_TYPES, NumberType
+from crazyflie_virtual.tables.log_table import LogVariable, log_variables
+from crazyflie_virtual.tables.number_types import I32, LOG_CODES, LOG_TYPES, NumberType
 from crazyflie_virtual.tables.toc import Table
 
 MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
@@ -20,15 +19,26 @@ _PERIOD_UNIT = 10
 """Of the period on the wire, ms."""
 
 
+def packed(value: float, stored: NumberType, sent: NumberType) -> bytes:
+    """Return a variable's bytes in the type that the client asked for.
+
+    The firmware's logRunBlock copies a whole number's low bytes, of 32 bits, without a limit.
+    """
+    if sent is stored or sent.is_float:
+        return sent.pack(value)
+    whole = int((I32 if stored.is_float else stored).convert(value))
+    return (whole & 0xFFFFFFFF).to_bytes(4, "little")[: sent.size]
+
+
 class _Block:
     def __init__(self) -> None:
-        self.variables: list[tuple[Callable[[Firmware], float], NumberType | None]] = []
+        self.variables: list[tuple[LogVariable, NumberType | None]] = []
         self.size = 0
         self.period = 0
         self.due: int | None = None
 
     def add(self, variable, number_type):
-        self.variables.append((variable.read, number_type))
+        self.variables.append((variable, number_type))
         self.size += number_type.size if number_type else 0
 
 
@@ -130,7 +140,9 @@ class LogPort:
     def _data_packet(self, block_id, block, now):
         firmware = self._firmware
         values = b"".join(
-            number_type.pack(read(firmware)) for read, number_type in block.variables if number_type
+            packed(variable.read(firmware), variable.number_type, number_type)
+            for variable, number_type in block.variables
+            if number_type
         )
         stamp = (now & 0xFFFFFF).to_bytes(3, "little")
         return Packet(Port.LOG, _DATA, bytes([block_id]) + stamp + values)

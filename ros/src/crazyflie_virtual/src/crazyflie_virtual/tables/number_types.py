@@ -21,6 +21,11 @@ class NumberType:
     format: str
 
     @property
+    def is_float(self) -> bool:
+        """Whether it has a fraction."""
+        return self.format in "fe"
+
+    @property
     def size(self) -> int:
         """Bytes on the wire."""
         return struct.calcsize("<" + self.format)
@@ -35,7 +40,7 @@ class NumberType:
 
     def convert(self, value: float) -> float:
         """Return the value that is packed: limited, and whole where the type is whole."""
-        if self.format in "fde":
+        if self.is_float:
             largest = _LARGEST.get(self.format, math.inf)
             return value if math.isnan(value) else max(-largest, min(largest, value))
         bits = 8 * self.size

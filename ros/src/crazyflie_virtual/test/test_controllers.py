@@ -9,7 +9,7 @@ from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
 from crazyflie_virtual.firmware.pid import FirmwarePid
 from crazyflie_virtual.firmware.position import PositionController
-from crazyflie_virtual.firmware.stabilizer import Stabilizer
+from crazyflie_virtual.firmware.stabilizer import MELLINGER, Stabilizer
 from crazyflie_virtual.firmware.states import ABSOLUTE, VELOCITY, Estimate, Modes, Setpoint
 
 
@@ -39,8 +39,8 @@ def test_wrapped_angles_point_the_same_way(angle):
     assert turns == pytest.approx(round(turns), abs=1e-6)
 
 
-def setpoint_at(**position):
-    return Setpoint(mode=Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE), **position)
+def setpoint_at(mode=Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE), **position):
+    return Setpoint(mode=mode, **position)
 
 
 def test_position_errors_tilt_the_vehicle_there():
@@ -113,6 +113,28 @@ def test_without_thrust_motors_are_off_and_heading_is_the_vehicles():
     )
     assert commands == (0.0,) * 4
     assert stabilizer.yaw == 33.0
+
+
+def test_mellinger_turns_the_vehicle_to_its_setpoint():
+    front_right, back_right, back_left, front_left = range(4)
+
+    def commands(**setpoint):
+        stabilizer = Stabilizer()
+        stabilizer.controller = MELLINGER
+        still = Sensors(noise=False)
+        return stabilizer.update(setpoint_at(**setpoint), Estimate(), still, False, True)
+
+    ahead = commands(x=0.1)
+    assert ahead[back_left] == ahead[back_right] > ahead[front_left] == ahead[front_right]
+    left = commands(y=0.1)
+    assert left[front_right] == left[back_right] > left[front_left] == left[back_left]
+    up, level = commands(z=0.1), commands()
+    assert min(up) > max(level) == pytest.approx(0.027 * 9.81 * 132000.0)
+    manual = Modes(roll=ABSOLUTE, pitch=ABSOLUTE, yaw=ABSOLUTE)
+    turned = commands(mode=manual, thrust=30000.0, yaw=5.0)
+    assert turned[back_right] == turned[front_left] > turned[front_right] == turned[back_left]
+    nose_up = commands(mode=manual, thrust=30000.0, pitch=5.0)
+    assert nose_up[front_left] == nose_up[front_right] > nose_up[back_left]
 
 
 def test_motors_set_by_parameter():

@@ -90,6 +90,28 @@ def test_go_to(bench):
     assert bench.physics.position[1] == pytest.approx(0.0, abs=0.06)
 
 
+def test_flight_by_mellingers_controller(bench):
+    for number, taken in ((7, 1), (2, 2)):
+        name_and_type = b"\0stabilizer\0controller\0\x08"
+        bench.ask_one(Port.PARAMETERS, 3, name_and_type + bytes([number]))
+        assert bench.firmware.stabilizer.controller == taken
+    bench.take_off()
+    command(bench, "go_to", 1.0, -0.5, 1.5, math.pi / 2, 3.0)
+    lag = 0.0
+    for _ in range(30):
+        bench.run(0.1)
+        lag = max(lag, abs(bench.firmware.setpoint.x - bench.firmware.estimate.x))
+    # With the PID controller it lags by 0.36 m.
+    assert lag < 0.1
+    bench.run(3.0)
+    assert bench.physics.position == pytest.approx((1.0, -0.5, 1.5), abs=0.06)
+    assert bench.firmware.estimate.yaw == pytest.approx(90.0, abs=2.0)
+    command(bench, "land", 0.0, 2.0)
+    bench.run(2.5)
+    assert bench.height == 0.0
+    assert not bench.motors_run
+
+
 @pytest.mark.parametrize("protocol", [7, 12])
 def test_trajectory_from_memory(bench, protocol):
     bench.take_off()

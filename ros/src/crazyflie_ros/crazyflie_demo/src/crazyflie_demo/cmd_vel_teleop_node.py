@@ -96,6 +96,4 @@ class CmdVelTeleopNode(Node):
             self._is_locked = False
         if self._is_locked:
             thrust = 0.0
-        self._publisher.publish(
-            Twist(Vector3(x, y, max(thrust, 0.0)), Vector3(0.0, 0.0, yaw_rate))
-        )
+        self._publisher.publish(Twist(Vector3(x, y, max(thrust, 0.0)), Vector3(0.0, 0.0, yaw_rate)))

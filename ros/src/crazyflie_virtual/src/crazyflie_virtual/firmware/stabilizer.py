@@ -8,6 +8,7 @@ from crazyflie_model.mixer import limit, mix
 from crazyflie_virtual.body.physics import OFF, MotorCommands
 from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.attitude import AttitudeController, wrap_degrees
+from crazyflie_virtual.firmware.mellinger import MellingerController
 from crazyflie_virtual.firmware.position import PositionController
 from crazyflie_virtual.firmware.states import (
     ABSOLUTE,
@@ -20,6 +21,10 @@ from crazyflie_virtual.firmware.states import (
 
 IDLE_THRUST = 7000
 """Of vehicles that the client arms, with brushless motors, PWM."""
+
+
+DEFAULT, PID, MELLINGER = 0, 1, 2
+"""Numbers of controllers; the default one is `PID`."""
 
 
 class MotorOverride:
@@ -54,8 +59,11 @@ class Stabilizer:
 
     Attributes
     ----------
+    controller : int
+        `DEFAULT`, `PID` or `MELLINGER`.
     attitude : AttitudeController
     position : PositionController
+    mellinger : MellingerController
     override : MotorOverride
     roll, pitch, yaw : float
         Desired attitude, deg.
@@ -70,8 +78,10 @@ class Stabilizer:
     """
 
     def __init__(self, idle_thrust: int = 0) -> None:
+        self.controller = PID
         self.attitude = AttitudeController()
         self.position = PositionController()
+        self.mellinger = MellingerController()
         self.override = MotorOverride()
         self.idle_thrust = idle_thrust
         self.roll = self.pitch = self.yaw = 0.0
@@ -80,6 +90,7 @@ class Stabilizer:
         self.requested = self.commands = OFF
         self._automatic = (0.0, 0.0, 0.0)
         self._mode = Modes()
+        self._last_controller = self.controller
 
     def update(
         self,
@@ -100,6 +111,26 @@ class Stabilizer:
         may_run : bool
             Whether the supervisor lets motors run.
         """
+        if self.controller != self._last_controller:
+            self._last_controller = self.controller
+            self._idle(estimate)
+        if self.controller == MELLINGER:
+            outputs = self.mellinger.update(setpoint, estimate, sensors)
+            self.thrust, self.command_roll, about_left, self.command_yaw = outputs
+            self.command_pitch = -about_left
+        else:
+            self._run_pid(setpoint, estimate, sensors, with_position)
+        # The mixer's pitch is positive nose down.
+        inputs = (self.thrust, self.command_roll, -self.command_pitch, self.command_yaw)
+        self.requested = MotorCommands(*mix(*inputs)) if self.thrust > 0.0 else OFF
+        override = self.override.commands()
+        if override is not None:
+            self.requested = override
+        idle = float(self.idle_thrust)
+        self.commands = MotorCommands(*limit(self.requested, idle)) if may_run else OFF
+        return self.commands
+
+    def _run_pid(self, setpoint, estimate, sensors, with_position):
         if setpoint.mode != self._mode:
             self._mode = setpoint.mode
             self._reset(estimate)
@@ -111,15 +142,6 @@ class Stabilizer:
             self._idle(estimate)
         else:
             self._control_attitude(setpoint, estimate, sensors)
-            # The mixer's pitch is positive nose down.
-            inputs = (self.thrust, self.command_roll, -self.command_pitch, self.command_yaw)
-            self.requested = MotorCommands(*mix(*inputs))
-        override = self.override.commands()
-        if override is not None:
-            self.requested = override
-        idle = float(self.idle_thrust)
-        self.commands = MotorCommands(*limit(self.requested, idle)) if may_run else OFF
-        return self.commands
 
     def _reset(self, estimate):
         self.attitude.reset()
@@ -166,6 +188,6 @@ class Stabilizer:
     def _idle(self, estimate):
         # Without thrust the controllers are reset, and the desired heading is the vehicle's.
         self._reset(estimate)
+        self.mellinger.reset()
         self.yaw = estimate.yaw
         self.command_roll = self.command_pitch = self.command_yaw = 0.0
-        self.requested = OFF

@@ -8,6 +8,7 @@ has no effect on the virtual vehicle.
 import math
 from typing import NamedTuple
 
+from crazyflie_virtual.firmware.stabilizer import DEFAULT, MELLINGER
 from crazyflie_virtual.tables.number_types import FLOAT, I8, U8, U16, U32, NumberType
 from crazyflie_virtual.tables.toc import pid_paths
 
@@ -59,7 +60,7 @@ def _read_only(number_type, **sources):
     return _rows(number_type, False, True, **sources)
 
 
-def _fault(number_type, low, high, **sources):
+def _limited(number_type, low, high, **sources):
     return _rows(number_type, False, False, (low, high), **sources)
 
 
@@ -70,9 +71,18 @@ def _gains(owner, suffixes, **pids):
 
 _ATTITUDE_GAINS = ("_kp", "_ki", "_kd", "_kff")
 
+_MELLINGER = (
+    *("kp_xy", "kd_xy", "ki_xy", "i_range_xy", "kp_z", "kd_z", "ki_z", "i_range_z", "mass"),
+    *("kR_xy", "kR_z", "kw_xy", "kw_z", "ki_m_xy", "ki_m_z", "kd_omega_rp"),
+    *("i_range_m_xy", "i_range_m_z"),
+)
+
 _GROUPS = {
     "stabilizer": [
-        *_rows(U8, estimator=2, controller=1, stop="supervisor.emergency_stop"),
+        *_rows(U8, estimator=2),
+        # Of the firmware's controllers, those that the virtual vehicle has.
+        *_limited(U8, DEFAULT, MELLINGER, controller="stabilizer.controller"),
+        *_rows(U8, stop="supervisor.emergency_stop"),
     ],
     "commander": _rows(U8, enHighLevel="commander.high_level_enabled"),
     "hlCommander": [
@@ -135,6 +145,10 @@ _GROUPS = {
     "velCtlPid": _gains(
         "stabilizer.position", ("Kp", "Ki", "Kd", "KFF"), vx="vx", vy="vy", vz="vz"
     ),
+    "ctrlMel": [
+        *_persistent(FLOAT, massThrust="stabilizer.mellinger.mass_thrust"),
+        *_persistent(FLOAT, **{name: f"stabilizer.mellinger.{name}" for name in _MELLINGER}),
+    ],
     "powerDist": _persistent(U32, idleThrust="stabilizer.idle_thrust"),
     "motorPowerSet": [
         *_rows(U8, enable="stabilizer.override.enable"),
@@ -233,11 +247,11 @@ _GROUPS = {
     "lighthouse": _rows(U8, method=1, systemType=2, bsCalibReset=0),
     "memTst": _rows(U8, resetW="memory_tester.reset_writes"),
     "virtual": [
-        *_fault(FLOAT, 0.0, 1.0, loss="faults.loss"),
-        *_fault(FLOAT, 0.0, 10.0, delay="faults.delay"),
-        *_fault(FLOAT, 0.0, 3600.0, silence="faults.silence"),
-        *_fault(U8, 0, 1, lowBattery="faults.low_battery"),
-        *_fault(U8, 0, 4, motorFailure="faults.motor_failure"),
+        *_limited(FLOAT, 0.0, 1.0, loss="faults.loss"),
+        *_limited(FLOAT, 0.0, 10.0, delay="faults.delay"),
+        *_limited(FLOAT, 0.0, 3600.0, silence="faults.silence"),
+        *_limited(U8, 0, 1, lowBattery="faults.low_battery"),
+        *_limited(U8, 0, 4, motorFailure="faults.motor_failure"),
     ],
 }
 """Group -> rows, as `ParameterSpec` without the group. The group "virtual" is not the

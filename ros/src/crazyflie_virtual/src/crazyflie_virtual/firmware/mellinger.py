@@ -1,0 +1,184 @@
+"""Mellinger's controller, 500 Hz: the firmware's ``stabilizer.controller`` 2.
+
+The desired force is mass times acceleration plus a PID of the position; its direction and the
+heading are the desired attitude, whose error, as a rotation matrix, sets the torques. From
+D. Mellinger, V. Kumar: Minimum snap trajectory generation and control for quadrotors, ICRA 2011,
+with the integrals, the derivative of the body rates and the gains of the firmware (2026).
+
+Angles are in rad here, axes are forward, left and up: positive pitch is nose down.
+"""
+
+import math
+
+from crazyflie_model.angles import Triple, quaternion_from_zyx, rotate, zyx_from_quaternion
+from crazyflie_model.inner_loops import PERIOD
+from crazyflie_model.units import GRAVITY
+from crazyflie_virtual.body.sensors import Sensors
+from crazyflie_virtual.firmware.pid import constrain
+from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Estimate, Setpoint
+
+TORQUE_LIMIT = 32000.0
+"""Largest output about an axis, PWM."""
+
+_AXES: tuple[Triple, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class MellingerController:
+    """From a setpoint and the estimate to the inputs of the mixer.
+
+    Attributes
+    ----------
+    mass : float
+        kg.
+    mass_thrust : float
+        PWM/N.
+    kp_xy, ki_xy, kd_xy, kp_z, ki_z, kd_z : float
+        Of the position, N/m, N/(m s) and N s/m.
+    i_range_xy, i_range_z : float
+        Limits of the position's integrals, m s.
+    kR_xy, kR_z, kw_xy, kw_z, ki_m_xy, ki_m_z, kd_omega_rp : float
+        Of attitude, body rates, integral of the attitude and body accelerations, PWM per rad,
+        rad/s, rad s and rad/s^2.
+    i_range_m_xy, i_range_m_z : float
+        Limits of the attitude's integrals, rad s.
+    """
+
+    def __init__(self) -> None:
+        self.mass, self.mass_thrust = 0.027, 132000.0
+        self.kp_xy, self.ki_xy, self.kd_xy, self.i_range_xy = 0.4, 0.05, 0.2, 2.0
+        self.kp_z, self.ki_z, self.kd_z, self.i_range_z = 1.25, 1.5, 0.4, 0.4
+        self.kR_xy, self.kw_xy, self.ki_m_xy, self.i_range_m_xy = 70000.0, 20000.0, 0.0, 1.0
+        self.kR_z, self.kw_z, self.ki_m_z, self.i_range_m_z = 60000.0, 12000.0, 500.0, 1500.0
+        self.kd_omega_rp = 200.0
+        self._last_slip: Triple | None = None
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the integrals."""
+        self._position_integral = self._attitude_integral = (0.0, 0.0, 0.0)
+
+    def update(self, setpoint: Setpoint, estimate: Estimate, sensors: Sensors) -> tuple[float, ...]:
+        """Return the thrust and the outputs about forward, left and up, PWM."""
+        body = tuple(rotate(estimate.quaternion, axis) for axis in _AXES)
+        force = self._force(setpoint, estimate)
+        mode = setpoint.mode
+        is_manual = mode.z == DISABLED and mode.roll == mode.pitch == ABSOLUTE
+        thrust = self.mass_thrust * _dot(force, body[2])
+        if mode.z == DISABLED:
+            thrust = setpoint.thrust
+        if mode.x == ABSOLUTE:
+            wanted = _axes_along(force, _heading(setpoint, estimate))
+        elif is_manual:
+            wanted = _manual_axes(setpoint, _heading(setpoint, estimate))
+        else:
+            wanted = _axes_along(force, math.radians(estimate.yaw))
+        outputs = self._torques(_attitude_error(body, wanted), setpoint, sensors)
+        if not thrust > 0.0:
+            self.reset()
+            return (0.0,) * 4
+        return (thrust, *outputs)
+
+    def _force(self, setpoint: Setpoint, estimate: Estimate) -> Triple:
+        # N, fixed frame. A setpoint without a position only holds its height.
+        place = (setpoint.x - estimate.x, setpoint.y - estimate.y, setpoint.z - estimate.z)
+        motion = (setpoint.vx - estimate.vx, setpoint.vy - estimate.vy, setpoint.vz - estimate.vz)
+        limits = (self.i_range_xy, self.i_range_xy, self.i_range_z)
+        self._position_integral = _integrated(self._position_integral, place, limits)
+        kp = (self.kp_xy, self.kp_xy, self.kp_z)
+        ki = (self.ki_xy, self.ki_xy, self.ki_z)
+        kd = (self.kd_xy, self.kd_xy, self.kd_z)
+        x, y, z = (
+            p * a + d * b + i * c
+            for p, a, d, b, i, c in zip(
+                kp, place, kd, motion, ki, self._position_integral, strict=True
+            )
+        )
+        if setpoint.mode.x != ABSOLUTE:
+            return 0.0, 0.0, self.mass * GRAVITY + z
+        mass = self.mass
+        return (
+            mass * setpoint.ax + x,
+            mass * setpoint.ay + y,
+            mass * (setpoint.az + GRAVITY) + z,
+        )
+
+    def _torques(self, error: Triple, setpoint: Setpoint, sensors: Sensors) -> tuple[float, ...]:
+        # PWM, about forward, left and up.
+        rates = (setpoint.roll_rate, setpoint.pitch_rate, setpoint.yaw_rate)
+        gyro = (sensors.gyro_x, sensors.gyro_y, sensors.gyro_z)
+        p, q, r = (math.radians(a - b) for a, b in zip(rates, gyro, strict=True))
+        slip = (p, q, r)
+        last, self._last_slip = self._last_slip or slip, slip
+        limits = (self.i_range_m_xy, self.i_range_m_xy, self.i_range_m_z)
+        against = (-error[0], -error[1], -error[2])
+        self._attitude_integral = _integrated(self._attitude_integral, against, limits)
+        gains = (
+            (self.kR_xy, self.kw_xy, self.ki_m_xy, self.kd_omega_rp),
+            (self.kR_xy, self.kw_xy, self.ki_m_xy, self.kd_omega_rp),
+            (self.kR_z, self.kw_z, self.ki_m_z, 0.0),
+        )
+        outputs = (
+            k_r * against[i]
+            + k_w * slip[i]
+            + k_i * self._attitude_integral[i]
+            + k_d * (slip[i] - last[i]) / PERIOD
+            for i, (k_r, k_w, k_i, k_d) in enumerate(gains)
+        )
+        return tuple(constrain(output, -TORQUE_LIMIT, TORQUE_LIMIT) for output in outputs)
+
+
+def _heading(setpoint: Setpoint, estimate: Estimate) -> float:
+    # rad.
+    if setpoint.mode.yaw == VELOCITY:
+        return math.radians(estimate.yaw + setpoint.yaw_rate * PERIOD)
+    if setpoint.mode.yaw == ABSOLUTE:
+        return math.radians(setpoint.yaw)
+    if setpoint.mode.quaternion == ABSOLUTE:
+        return zyx_from_quaternion(setpoint.quaternion)[2]
+    return 0.0
+
+
+def _manual_axes(setpoint: Setpoint, yaw: float) -> tuple[Triple, ...]:
+    roll, pitch = math.radians(setpoint.roll), -math.radians(setpoint.pitch)
+    attitude = quaternion_from_zyx(roll, pitch, yaw)
+    return tuple(rotate(attitude, axis) for axis in _AXES)
+
+
+def _axes_along(force: Triple, yaw: float) -> tuple[Triple, ...]:
+    # Up along the force, forward as near to the heading as that permits.
+    up = _unit(force)
+    left = _unit(_cross(up, (math.cos(yaw), math.sin(yaw), 0.0)))
+    return _cross(left, up), left, up
+
+
+def _attitude_error(body: tuple[Triple, ...], wanted: tuple[Triple, ...]) -> Triple:
+    # (Rd' R - R' Rd) as a vector, equation (10) of the paper without the half.
+    def part(i, j):
+        return _dot(wanted[i], body[j]) - _dot(body[i], wanted[j])
+
+    return part(2, 1), part(0, 2), part(1, 0)
+
+
+def _integrated(integral: Triple, error: Triple, limits: Triple) -> Triple:
+    x, y, z = (
+        constrain(i + e * PERIOD, -limit, limit)
+        for i, e, limit in zip(integral, error, limits, strict=True)
+    )
+    return x, y, z
+
+
+def _dot(a: Triple, b: Triple) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def _unit(a: Triple) -> Triple:
+    length = math.sqrt(_dot(a, a)) or 1.0
+    return a[0] / length, a[1] / length, a[2] / length

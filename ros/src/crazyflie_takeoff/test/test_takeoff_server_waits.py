@@ -8,6 +8,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import EmptyResponse
 from takeoff_helpers import SERVER, filter_status, state
 
+from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_takeoff.driver_connection import MAX_CONNECTION_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
 from crazyflie_utils.transport import ServiceError
@@ -229,6 +230,27 @@ def test_a_driver_that_has_died_is_not_connected():
     process.publish("/state", state(0.0))
     with pytest.raises(ServiceError, match=NOT_CONNECTED.format("nothing")):
         call(process, "/takeoff")
+
+
+@pytest.mark.parametrize(
+    ("status", "reason"),
+    [
+        ({"supervisor": VehicleStatus.LOCKED}, "cannot fly, its state is: locked; restart it"),
+        ({"supervisor": VehicleStatus.CRASHED}, "state is: crashed"),
+        ({"is_emergency": True}, "stopped by emergency; remove it, restart it"),
+    ],
+)
+def test_takeoff_of_a_vehicle_that_cannot_fly_is_refused_at_once(status, reason):
+    process = on_ground(DRIVEN)
+    process.publish("/cf1/connected", Bool(True))
+    process.publish("/cf1/vehicle_status", VehicleStatus(**status))
+    process.publish("/state", state(0.0))
+    with pytest.raises(ServiceError, match=reason):
+        call(process, "/takeoff")
+    process.publish("/cf1/vehicle_status", VehicleStatus(supervisor=VehicleStatus.CAN_FLY))
+    call(process, "/takeoff")
+    process.advance(0.02)
+    assert states(process)[-1] == "taking_off"
 
 
 def test_a_driver_is_asked_for_only_if_there_is_one():

@@ -39,7 +39,10 @@ def test_wrapped_angles_point_the_same_way(angle):
     assert turns == pytest.approx(round(turns), abs=1e-6)
 
 
-def setpoint_at(mode=Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE), **position):
+TO_POSITION = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE)
+
+
+def setpoint_at(mode=TO_POSITION, **position):
     return Setpoint(mode=mode, **position)
 
 

@@ -37,6 +37,11 @@ class SupervisorState(enum.IntFlag):
         reported = cls.HIGH_LEVEL_ACTIVE | cls.TRAJECTORY_FINISHED | cls.HIGH_LEVEL_DISABLED
         return bool(self & reported)
 
+    @property
+    def is_unable_to_fly(self) -> bool:
+        """Whether the vehicle cannot take off before it is put upright or restarted."""
+        return bool(self & (self.TUMBLED | self.LOCKED | self.CRASHED))
+
     def words(self) -> str:
         """Return the state in words, such as "armed, flying"."""
         names = [name for name, flag in SupervisorState.__members__.items() if flag in self]

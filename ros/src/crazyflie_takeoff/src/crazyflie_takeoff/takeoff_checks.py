@@ -52,6 +52,7 @@ class TakeoffChecks:
         return (
             hover_complaint(self.parameters.hover, self.box)
             or self._driver_refusal(now)
+            or self.driver.cannot_fly(now)
             or self._position_refusal(now)
             or self._controller_refusal()
             or self.battery_complaint(now)

@@ -7,6 +7,7 @@ from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import (
     Control,
     ControlStamped,
@@ -14,6 +15,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
+    VehicleStatus,
 )
 from crazyflie_takeoff import diagnostics
 from crazyflie_takeoff.battery import Charge
@@ -95,6 +97,8 @@ class TakeoffServerNode(Node):
             handle.subscribe(parameters.battery_topic, Float32, self._on_battery)
         if parameters.connected_topic is not None:
             handle.subscribe(parameters.connected_topic, Bool, self._on_connected)
+        if (topic := parameters.vehicle_status_topic) is not None:
+            handle.subscribe(topic, VehicleStatus, self._on_vehicle_status)
         if parameters.state_topic is not None:
             handle.subscribe(
                 parameters.state_topic,
@@ -201,6 +205,10 @@ class TakeoffServerNode(Node):
 
     def _on_connected(self, message):
         self._checks.driver.update(self._handle.time(), message.data)
+
+    def _on_vehicle_status(self, message):
+        state = SupervisorState(message.supervisor)
+        self._checks.driver.update_state(self._handle.time(), state, message.is_emergency)
 
     def _on_battery(self, message):
         if message.data == message.data:

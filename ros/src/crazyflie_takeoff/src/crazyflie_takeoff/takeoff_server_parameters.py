@@ -75,6 +75,13 @@ class TakeoffServerParameters(FlightTopicParameters):
         None,
         "topics/connected",
     )
+    own_vehicle_status_topic: str | None = parameter(
+        TOPIC,
+        "the vehicle's state; /takeoff of one that is locked, crashed or overturned is refused. "
+        "By default `vehicle_status` beside topics/connected",
+        None,
+        "topics/vehicle_status",
+    )
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
     hover_x: float = parameter(METRES, "hover point after takeoff", name="hover/x", live=True)
@@ -121,6 +128,14 @@ class TakeoffServerParameters(FlightTopicParameters):
     descent_topic = derived_topic("own_descent_topic", "reference_topic", "_descent")
     flight_state_topic = derived_topic("own_flight_state_topic", "in_flight_topic", "_state")
     status_topic = derived_topic("own_status_topic", "in_flight_topic", "_status")
+
+    @property
+    def vehicle_status_topic(self) -> str | None:
+        """The driver's status of the vehicle; None without a driver."""
+        if self.own_vehicle_status_topic is not None or self.connected_topic is None:
+            return self.own_vehicle_status_topic
+        namespace, slash, _ = self.connected_topic.rpartition("/")
+        return f"{namespace}{slash}vehicle_status"
 
     @override
     def complaints(self) -> Iterator[str]:

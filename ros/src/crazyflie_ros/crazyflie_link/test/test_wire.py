@@ -238,6 +238,27 @@ def test_trajectories_that_cannot_be_flown_are_not_only_packet(target, flying):
     assert target.packets(4, 2) == []
 
 
+def test_a_trajectory_whose_memory_is_overwritten_is_not_started(target, flying):
+    upload, start = flying.trajectories.upload, flying.high_level.start_trajectory
+    upload(1, 0, [piece(0), piece(1)])
+    upload(2, 2, [piece(2)])
+    start(1)
+    upload(3, 1, [piece(3)])
+    with pytest.raises(RefusedError, match="upload of 3 has overwritten 1 .*upload 1 again"):
+        start(1)
+    start(2)
+    upload(1, 0, [piece(0)])
+    start(1)
+
+    def abort():
+        raise RefusedError("no more")
+
+    with pytest.raises(RefusedError, match="no more"):
+        upload(2, 2, [piece(4)], abort)
+    with pytest.raises(RefusedError, match="upload of 2 has overwritten 2"):
+        start(2)
+
+
 def test_a_trajectory_that_is_refused_is_not_defined(target, flying):
     target.answers[4, 2, 1] = struct.pack("<BIB", 1, 0, 5)
     with pytest.raises(RefusedError, match="byte 0"):

@@ -15,6 +15,7 @@ from crazyflie_link.link import Link
 from crazyflie_link.request_reply import REPLY_LIMIT, Request
 from crazyflie_link.subsystem import Subsystem
 from crazyflie_link.supervisor import read_state
+from crazyflie_model.polynomials import PIECE_SIZE
 from crazyflie_model.supervisor import SupervisorState
 
 ALL_GROUPS = 0
@@ -30,9 +31,14 @@ _BUSY = 1
 
 @dataclass
 class _Knowledge:
-    """Trajectories that were defined, and groups (bits, None if unknown); both cannot be read."""
+    """Trajectories and groups (bits, None if unknown), which cannot be read.
 
-    defined: set[int] = field(default_factory=set)
+    Those that were defined have bytes of the memory; those that were overwritten, the trajectory
+    whose upload has done it.
+    """
+
+    defined: dict[int, range] = field(default_factory=dict)
+    overwritten: dict[int, int] = field(default_factory=dict)
     groups: int | None = None
 
 
@@ -156,6 +162,12 @@ class HighLevel(Subsystem):
                 f"the start of the trajectory: {trajectory_id} has not been uploaded since the "
                 f"vehicle was connected or restarted; known: {known}"
             )
+        writer = self._knowledge.overwritten.get(trajectory_id)
+        if writer is not None:
+            raise RefusedError(
+                f"the start of the trajectory: the upload of {writer} has overwritten "
+                f"{trajectory_id} in the vehicle's memory; upload {trajectory_id} again"
+            )
         self._command(
             "the start of the trajectory",
             HighLevelCommander.COMMAND_START_TRAJECTORY_2
@@ -180,7 +192,15 @@ class HighLevel(Subsystem):
             HighLevelCommander.COMMAND_DEFINE_TRAJECTORY,
             lambda c: c.define_trajectory(trajectory_id, offset, pieces),
         )
-        self._knowledge.defined.add(trajectory_id)
+        self._knowledge.overwritten.pop(trajectory_id, None)
+        self._knowledge.defined[trajectory_id] = range(offset, offset + pieces * PIECE_SIZE)
+
+    def begin_upload(self, trajectory_id: int, begin: int, end: int) -> None:
+        """Take note that bytes of the memory are written: what was defined there cannot fly."""
+        known = self._knowledge
+        for other, place in known.defined.items():
+            if place.start < end and begin < place.stop:
+                known.overwritten[other] = trajectory_id
 
     def _command(self, what, number, send, resend=True):
         link = self._current_link()

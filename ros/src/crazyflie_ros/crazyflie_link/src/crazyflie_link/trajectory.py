@@ -57,6 +57,7 @@ class Trajectories(Subsystem):
                 f"do not fit: the vehicle has room for {memory.size // PIECE_SIZE}"
             )
         data = b"".join(map(_packed, pieces))
+        self._high_level.begin_upload(trajectory_id, begin, end)
         for start in range(0, len(data), _CHUNK):
             check()
             _write(link, memory.id, begin + start, data[start : start + _CHUNK])

@@ -162,7 +162,7 @@ def test_a_vehicle_without_a_prefix(added, tmp_path):
     path = tmp_path / "add.launch"
     path.write_text(WITHOUT_PREFIX.format(uri=added))
     text = launch_file(path)
-    assert f"/crazyflie_add: added {added} as /\n" in text
+    assert f": added {added} as /\n" in text
     assert rospy.wait_for_message("/imu", Imu, LIMIT).header.frame_id == "base_link"
     assert "effect" in rospy.get_param("/ring")
     call("/notify_setpoints_stop", NotifySetpointsStop, 0, 0)

@@ -1,6 +1,10 @@
 """The node that has the server add a vehicle."""
 
+from concurrent.futures import Future
+from pathlib import Path
+
 import pytest
+from roslaunch.config import load_config_default
 
 from crazyflie_driver.add_node import CrazyflieAddNode
 from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieResponse
@@ -13,18 +17,19 @@ PARAMETERS = {"uri": "udp://127.0.0.1:19850", "tf_prefix": "cf1"}
 class Launch:
     """A server that keeps requests, and the node."""
 
-    def __init__(self, parameters, refusal=None):
+    def __init__(self, parameters, refusal=None, answer=None):
         self.requests = []
         self.process = FakeProcess()
 
-        def answer(request):
+        def serve(request):
             self.requests.append(request)
             if refusal is not None:
                 raise ServiceError(refusal)
-            return AddCrazyflieResponse()
+            return AddCrazyflieResponse() if answer is None else answer
 
-        self.process.handle("/server").advertise_service("/add_crazyflie", AddCrazyflie, answer)
-        self.has_begun = self.process.launch(CrazyflieAddNode(), "/add", parameters)
+        self.process.handle("/server").advertise_service("/add_crazyflie", AddCrazyflie, serve)
+        self.node = CrazyflieAddNode()
+        self.has_begun = self.process.launch(self.node, "/add", parameters)
 
 
 def test_defaults_are_those_of_the_cpp_driver():
@@ -77,6 +82,24 @@ def test_a_refusal_ends_the_process_with_status_1():
     (text,) = launch.process.logged("error")
     assert "nothing listens on this port" in text
     assert text.endswith("; to try again: rosrun crazyflie_driver crazyflie_add __name:=add")
+
+
+def test_a_process_that_ends_before_the_answer_says_so():
+    launch = Launch(PARAMETERS, answer=Future())
+    launch.process.shut_down({"/add": launch.node})
+    (text,) = launch.process.logged("error")
+    assert "ended before udp://127.0.0.1:19850 was added" in text
+    done = Launch(PARAMETERS)
+    done.process.shut_down({"/add": done.node})
+    assert done.process.logged("error") == []
+
+
+def test_two_launches_at_once_have_nodes_of_two_names():
+    path = str(Path(__file__).parents[1] / "launch" / "crazyflie_add.launch")
+    configs = [load_config_default([path], None, assign_machines=False) for _ in range(2)]
+    first, second = (node.name for config in configs for node in config.nodes)
+    assert first != second
+    assert first.startswith("crazyflie_add")
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """A node that has the server add one vehicle, and ends."""
 
+from concurrent.futures import Future
+
 from typing_extensions import override
 
 from crazyflie_driver.server_node import ADD
@@ -21,6 +23,9 @@ def command_again(handle: NodeHandle, package: str, executable: str) -> str:
 class CrazyflieAddNode(Node):
     """Ask for a vehicle; the process exits with status 1 if that fails."""
 
+    def __init__(self) -> None:
+        self._answer: Future[object] | None = None
+
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(CrazyflieAddParameters)
@@ -29,8 +34,14 @@ class CrazyflieAddNode(Node):
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
         handle.info(f"adding {parameters.uri} as {parameters.tf_prefix or '/'}")
-        answer = handle.call_service(ADD, AddCrazyflie, parameters.request(), _LIMIT)
-        answer.add_done_callback(self._on_answer)
+        self._answer = handle.call_service(ADD, AddCrazyflie, parameters.request(), _LIMIT)
+        self._answer.add_done_callback(self._on_answer)
+
+    @override
+    def shutdown(self) -> None:
+        """Log that the vehicle may not have been added, if the process ends before the answer."""
+        if self._answer is not None and not self._answer.done():
+            self._handle.error(f"ended before {self._parameters.uri} was added: is it connected?")
 
     def _on_answer(self, done):
         parameters = self._parameters

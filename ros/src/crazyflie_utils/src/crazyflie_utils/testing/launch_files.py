@@ -1,15 +1,22 @@
 """Expands launch files as roslaunch does, without a master."""
 
 from pathlib import Path
+from unittest.mock import patch
 
 from roslaunch.config import load_config_default
 from roslaunch.core import Node
 
 
 def expand(path: Path, **arguments: object) -> tuple[dict[str, Node], dict[str, object]]:
-    """Return the nodes by full name, and the values of parameters by full name."""
+    """Return the nodes by full name, and the values of parameters by full name.
+
+    Names of anonymous nodes are without what makes them unique.
+    """
     given = [f"{name}:={value}" for name, value in arguments.items()]
-    config = load_config_default([(str(path), given)], None, verbose=False, assign_machines=False)
+    with patch("rosgraph.names.anonymous_name", lambda name: name):
+        config = load_config_default(
+            [(str(path), given)], None, verbose=False, assign_machines=False
+        )
     nodes = {node.namespace.rstrip("/") + "/" + node.name: node for node in config.nodes}
     return nodes, {name: parameter.value for name, parameter in config.params.items()}
 

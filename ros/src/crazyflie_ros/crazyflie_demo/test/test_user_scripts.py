@@ -134,5 +134,9 @@ def test_a_script_far_away_imports_them(tmp_path):
         "from uav_trajectory import Polynomial, Polynomial4D, Trajectory, TrajectoryOutput\n"
         "assert crazyflie.Crazyflie is Crazyflie\n"
         "assert uav_trajectory.Trajectory is Trajectory\n"
+        # As execute_trajectory.py of the SDK does.
+        "import tf_conversions\n"
+        "x, y, z, w = tf_conversions.transformations.quaternion_from_euler(0, 0, 1.0)\n"
+        "assert (x, y) == (0.0, 0.0) and w > z > 0.0\n"
     )
     subprocess.run([sys.executable, script], cwd=tmp_path, check=True, timeout=120)

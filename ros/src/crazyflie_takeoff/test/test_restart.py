@@ -277,7 +277,7 @@ def test_both_at_once_are_a_fresh_launch(seeing):
     seeing.start_server()
     seeing.advance(2.0)
     assert seeing.last("/in_flight_state") == "on_ground"
-    assert set(thrusts(seeing, "/control/final", begun)) == {0.0}
+    assert set(thrusts(seeing, begun)) == {0.0}
 
 
 def test_on_a_table_at_launch_with_a_reference():

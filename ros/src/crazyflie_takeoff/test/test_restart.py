@@ -93,7 +93,7 @@ def test_server_in_flight(network):
     assert thrusts(network, 0.0)[-1] == 0.0
 
 
-@pytest.mark.parametrize("gap", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("gap", [0.3, 3.0])
 @pytest.mark.parametrize("moment", [0.02, 0.5, 0.99, 1.2, 3.0, 5.98])
 def test_server_during_takeoff_when_the_height_is_known(seeing, moment, gap):
     """What was begun ends on the ground, as softly as a landing."""
@@ -133,7 +133,7 @@ def test_server_during_takeoff_when_the_height_is_unknown(moment):
     assert len(network.on("/in_flight")) == 2
 
 
-@pytest.mark.parametrize("gap", [0.1, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("gap", [0.1, 3.0])
 @pytest.mark.parametrize("moment", [0.02, 1.0, 3.0, 3.25, 3.6, 4.1])
 def test_server_during_landing_when_the_height_is_known(seeing, moment, gap):
     seeing.take_off()

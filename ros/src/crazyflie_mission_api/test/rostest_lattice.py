@@ -61,7 +61,7 @@ def test_all_are_in_their_figure_at_the_same_time(flight, figure):
     assert min(cdist(goals, places).min(axis=1).max() for places in flight) < 0.15
 
 
-def test_nobody_meets_anybody(flight):
+def test_no_two_vehicles_meet(flight):
     assert min(pdist(places).min() for places in flight) > 0.5
 
 

@@ -45,14 +45,14 @@ class RigidBodyParameters(OutputParameters):
 
 
 @dataclass(frozen=True)
-class RigidBody:
-    """A rigid body that is to be published.
+class Body:
+    """A body that is to be published.
 
     Attributes
     ----------
     key : str
-        The body's entry in ``rigid_bodies``: its number in the stream, or its name.
-    parameters : RigidBodyParameters
+        Its entry in the dictionary.
+    parameters : OutputParameters
         Its topics and frames.
     """
 
@@ -61,10 +61,8 @@ class RigidBody:
 
     @property
     def name(self) -> str | None:
-        """Name on the server; None for a body that is found by its number."""
-        if self.parameters.name is None and not self.key.isdecimal():
-            return self.key
-        return self.parameters.name
+        """Name on the server; None for a body that has none, or is found by its number."""
+        return None
 
     @property
     def label(self) -> str:
@@ -78,18 +76,32 @@ class RigidBody:
 
 
 @dataclass(frozen=True)
-class RigidBodies:
-    """The rigid bodies that are to be published.
+class RigidBody(Body):
+    """A rigid body; its key is its number in the stream, or its name."""
+
+    parameters: RigidBodyParameters
+
+    @property
+    @override
+    def name(self) -> str | None:
+        if self.parameters.name is None and not self.key.isdecimal():
+            return self.key
+        return self.parameters.name
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """The bodies of one dictionary that are to be published.
 
     Attributes
     ----------
-    bodies : list of RigidBody
+    bodies : list of Body
         At least one.
     unknown : list of str
         Entries that have no meaning, such as "rigid_bodies/1/odom".
     """
 
-    bodies: list[RigidBody]
+    bodies: list[Body]
     unknown: list[str]
 
 
@@ -127,15 +139,10 @@ class SingleMarkerParameters(OutputParameters):
 
 
 @dataclass(frozen=True)
-class SingleMarker(RigidBody):
+class SingleMarker(Body):
     """A vehicle with one marker, which is to be published."""
 
     parameters: SingleMarkerParameters
-
-    @property
-    @override
-    def name(self) -> None:
-        return None
 
     @property
     @override
@@ -167,11 +174,11 @@ class RigidBodyDictionary(ParameterType):
     label = "dictionary"
     key = "rigid_bodies"
     entry_type: type[OutputParameters] = RigidBodyParameters
-    body_type: type[RigidBody] = RigidBody
-    outputs = ("pose", "pose2d", "child_frame_id")
+    body_type: type[Body] = RigidBody
+    outputs: tuple[str, ...] = ("pose", "pose2d", "child_frame_id")
 
     @override
-    def __call__(self, value: object) -> RigidBodies:
+    def __call__(self, value: object) -> Bodies:
         if not isinstance(value, dict) or not value:
             raise ValueError
         known = {declaration.name for declaration in self.entry_type.declarations()}
@@ -197,7 +204,7 @@ class RigidBodyDictionary(ParameterType):
         complaints += _shared("name", [(b, b.name) for b in bodies])
         if complaints:
             raise ValueError("; ".join(complaints))
-        return RigidBodies(bodies, unknown)
+        return Bodies(bodies, unknown)
 
     def __str__(self) -> str:
         """Return what is expected."""
@@ -216,10 +223,11 @@ class SingleMarkerDictionary(RigidBodyDictionary):
     outputs = ("position", *RigidBodyDictionary.outputs)
 
     @override
-    def __call__(self, value: object) -> RigidBodies:
+    def __call__(self, value: object) -> Bodies:
         markers = super().__call__(value)
         complaints = []
-        for first, second in itertools.combinations(markers.bodies, 2):
+        singles = [marker for marker in markers.bodies if isinstance(marker, SingleMarker)]
+        for first, second in itertools.combinations(singles, 2):
             a, b = (marker.parameters.initial_position for marker in (first, second))
             if math.dist(a, b) < SEPARATION:
                 complaints.append(
@@ -239,7 +247,7 @@ class SingleMarkerDictionary(RigidBodyDictionary):
         )
 
 
-def shared_outputs(bodies: Sequence[RigidBody]) -> Iterator[str]:
+def shared_outputs(bodies: Sequence[Body]) -> Iterator[str]:
     """Yield a text about each topic and frame that two bodies share."""
     topics = [
         (body, getattr(body.parameters, name, None))

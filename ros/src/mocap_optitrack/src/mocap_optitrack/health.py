@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
-from mocap_optitrack.bodies import RigidBody
+from mocap_optitrack.bodies import Body as ConfiguredBody
 from mocap_optitrack.frames import Body
 
 OK, WARN, ERROR = range(3)
@@ -58,7 +58,7 @@ class Health:
 
     Parameters
     ----------
-    bodies : sequence of RigidBody
+    bodies : sequence of bodies.Body
     stale_after : float
         Gaps longer than this are a fault, s.
     now : float
@@ -72,7 +72,7 @@ class Health:
 
     _longest_gap: float
 
-    def __init__(self, bodies: Sequence[RigidBody], stale_after: float, now: float):
+    def __init__(self, bodies: Sequence[ConfiguredBody], stale_after: float, now: float):
         self._bodies = {body.key: _BodyCount() for body in bodies}
         self._labels = {body.key: body.component for body in bodies}
         self.stale_after = stale_after
@@ -98,7 +98,7 @@ class Health:
         self._silence = "no frames"
         self._latencies.append(latency)
 
-    def body(self, body: RigidBody, now: float, is_tracked: bool, why: str = "") -> None:
+    def body(self, body: ConfiguredBody, now: float, is_tracked: bool, why: str = "") -> None:
         """Count a configured body in a good frame; ``why`` it is not tracked, if that is known."""
         count = self._bodies[body.key]
         count.why = why

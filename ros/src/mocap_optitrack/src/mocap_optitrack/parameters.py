@@ -17,8 +17,8 @@ from crazyflie_utils.parameters.types import (
 )
 from mocap_optitrack.axes import UP_AXES
 from mocap_optitrack.bodies import (
-    RigidBodies,
-    RigidBody,
+    Bodies,
+    Body,
     RigidBodyDictionary,
     SingleMarker,
     SingleMarkerDictionary,
@@ -127,12 +127,12 @@ class LibraryParameters(Parameters):
 class MocapParameters(Parameters):
     """Parameters of `MocapNode`."""
 
-    rigid_bodies: RigidBodies | None = parameter(
+    rigid_bodies: Bodies | None = parameter(
         RigidBodyDictionary(),
         "the bodies to publish, see below; required without `single_markers`",
         None,
     )
-    single_markers: RigidBodies | None = parameter(
+    single_markers: Bodies | None = parameter(
         SingleMarkerDictionary(),
         "the vehicles with one marker each, see [Single markers](#single-markers)",
         None,
@@ -157,7 +157,7 @@ class MocapParameters(Parameters):
     library: LibraryParameters = group(LibraryParameters, "motioncapture_config")
 
     @property
-    def bodies(self) -> list[RigidBody]:
+    def bodies(self) -> list[Body]:
         """All that is published."""
         return [body for group in self._groups for body in group.bodies]
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from mocap_optitrack.axes import normalized, to_z_up
-from mocap_optitrack.bodies import RigidBody, SingleMarker
+from mocap_optitrack.bodies import Body, SingleMarker
 from mocap_optitrack.clock_offset import ClockOffset, FrameOrder
 from mocap_optitrack.frames import Frame, Quaternion, Vector3
 from mocap_optitrack.health import Event, Health
@@ -32,7 +32,7 @@ class BodyPose(NamedTuple):
 
     Attributes
     ----------
-    body : RigidBody
+    body : Body
     time : float
         When, s of the local clock.
     position : Vector3
@@ -41,7 +41,7 @@ class BodyPose(NamedTuple):
         Of norm 1; None for a single marker.
     """
 
-    body: RigidBody
+    body: Body
     time: float
     position: Vector3
     quaternion: Quaternion | None
@@ -57,7 +57,7 @@ class Tracker:
 
     Parameters
     ----------
-    bodies : sequence of RigidBody
+    bodies : sequence of Body
     up_axis : str
         Of the stream; see `axes.UP_AXES`.
     stale_after : float
@@ -77,7 +77,7 @@ class Tracker:
 
     def __init__(
         self,
-        bodies: Sequence[RigidBody],
+        bodies: Sequence[Body],
         up_axis: str,
         stale_after: float,
         health: Health,

@@ -51,8 +51,9 @@ class MocapServer(Server):
         _check_address("multicast_address", settings.multicast_address)
         self.switches = settings.switches()
         noise = (settings.position_noise, settings.attitude_noise)
-        own = settings.seed, settings.single_markers, settings.rate
-        self._scene = Scene(self.switches, *noise, *own)
+        self._scene = Scene(
+            self.switches, *noise, settings.seed, settings.single_markers, settings.rate
+        )
         self._encoder = Encoder(settings.version)
         self._commands = open_socket(settings.host, settings.command_port)
         try:

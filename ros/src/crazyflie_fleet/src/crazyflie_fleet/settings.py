@@ -19,6 +19,12 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.text_input import number_from_text
 
+VENDOR, SINGLE_MARKER = "vendor", "single_marker"
+"""How motion capture knows a vehicle: its system does, or by the only marker of the vehicle."""
+
+_SINGLE_MARKERS = ("default_single_marker", SINGLE_MARKER)
+"""Marker configurations with one marker."""
+
 LOCAL = "local"
 """Default machine of vehicles."""
 
@@ -156,16 +162,34 @@ class Settings(Parameters):
         FRAME, "motion capture's frame; by default the vehicle's name", None, "motion_capture/frame"
     )
     mocap_tracking: str = parameter(
-        TEXT, "crazyswarm2's; has no effect here", "vendor", "motion_capture/tracking"
+        Text((VENDOR, SINGLE_MARKER, "librigidbodytracker")),
+        "on hardware: `vendor` is a rigid body of motion capture; `single_marker` one marker that "
+        "is tracked by fleet_mocap_node, and so is `librigidbodytracker` with the marker "
+        "`default_single_marker`, which is else taken as `vendor`",
+        VENDOR,
+        "motion_capture/tracking",
     )
     mocap_marker: str = parameter(
-        TEXT, "crazyswarm2's; has no effect here", "default", "motion_capture/marker"
+        TEXT,
+        "the arrangement of markers; see `motion_capture/tracking`",
+        "default",
+        "motion_capture/marker",
     )
     mocap_dynamics: str = parameter(
-        TEXT, "crazyswarm2's; has no effect here", "default", "motion_capture/dynamics"
+        TEXT,
+        "a single marker's limits of velocity; all are those of crazyswarm2's `default`",
+        "default",
+        "motion_capture/dynamics",
     )
     big_quad: bool = parameter(BOOLEAN, "crazyswarm2's; has no effect here", False)
     reference_frame: str = parameter(TEXT, "crazyswarm2's; has no effect here", "world")
+
+    @property
+    def has_single_marker(self) -> bool:
+        """Whether motion capture knows the vehicle by its only marker."""
+        if self.mocap_tracking == "librigidbodytracker":
+            return self.mocap_marker in _SINGLE_MARKERS
+        return self.mocap_tracking == SINGLE_MARKER
 
 
 class RobotSettings(Settings):

@@ -81,6 +81,11 @@ class DriverVehicle:
         """Whether the vehicle is being removed."""
         return self._connection.is_closing
 
+    @property
+    def is_ready(self) -> bool:
+        """Whether the vehicle has been connected, and its services are there."""
+        return self._connection.is_established and not self.is_closing
+
     def connect(self) -> Future[None]:
         """Connect and announce all topics and services; the result is None.
 

@@ -2,17 +2,19 @@
 
 import copy
 import os
+import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crtp.crtpstack import CRTPPort
 
+from crazyflie_link.broadcast import SharedCommand, recorded
 from crazyflie_link.checks import check_byte, check_finite, check_positive
-from crazyflie_link.errors import AlreadyLandingError, RefusedError
+from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError
 from crazyflie_link.link import Link
-from crazyflie_link.request_reply import REPLY_LIMIT, Request
+from crazyflie_link.request_reply import REPLY_LIMIT, RESEND_PERIOD, Request
 from crazyflie_link.subsystem import Subsystem
 from crazyflie_link.supervisor import read_state
 from crazyflie_model.supervisor import SupervisorState
@@ -26,6 +28,9 @@ _START_2_PROTOCOL = 10
 
 _BUSY = 1
 """Reply to a takeoff while the planner flies, and to a landing while it lands."""
+
+_REPORT_LAG = 0.1
+"""Time in which the supervisor, at 25 Hz, has taken note of a takeoff, s."""
 
 
 @dataclass
@@ -47,6 +52,7 @@ class HighLevel(Subsystem):
         super().__init__(current_link)
         self._knowledge = _Knowledge()
         self._is_dry = False
+        self._shared: SharedCommand | None = None
 
     def forget_trajectories(self) -> None:
         """Take note that the vehicle has restarted: no trajectory is defined, it has no group."""
@@ -59,6 +65,16 @@ class HighLevel(Subsystem):
         dry._is_dry = True
         dry._knowledge = copy.deepcopy(self._knowledge)
         return dry
+
+    def broadcast(self, shared: SharedCommand) -> Self:
+        """Return one whose next command is sent to several vehicles at once.
+
+        A broadcast is not acknowledged, but every vehicle that has received it answers as it does
+        to its own command. One that does not answer within 0.2 s is sent its own.
+        """
+        other = copy.copy(self)
+        other._shared = shared
+        return other
 
     def is_addressed(self, group_mask: int) -> bool | None:
         """Return whether the vehicle obeys commands to these groups; None if that is not known.
@@ -191,26 +207,49 @@ class HighLevel(Subsystem):
         def transmit():
             nonlocal sent
             sent += 1
-            send(link.cflib.high_level_commander)
+            if self._shared is not None and sent == 1:
+                self._shared.ready(recorded(link, send, HighLevelCommander))
+            else:
+                send(link.cflib.high_level_commander)
 
         request = Request(CRTPPort.SETPOINT_HL, 0, bytes([number]), what, resend)
-        answer = link.request(transmit, request)
+        if self._shared is None or resend:
+            answer = link.request(transmit, request)
+        else:
+            answer = self._request_after_broadcast(link, transmit, request)
         # The first three bytes of the request, then the firmware's errno.
         code = answer[3] if len(answer) > 3 else 0
-        if code and not (code == _BUSY and sent > 1 and self._is_carried_out(number)):
+        # A broadcast is repeated, too.
+        is_repeated = sent > 1 or self._shared is not None
+        if code and not (code == _BUSY and is_repeated and self._is_carried_out(number)):
             is_landing = code == _BUSY and number == HighLevelCommander.COMMAND_LAND_2
             error = AlreadyLandingError if is_landing else RefusedError
             raise error(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
+
+    def _request_after_broadcast(self, link, transmit, request):
+        # What must not be done twice: its own command only if the planner's last plan has ended,
+        # which it has not once this one is carried out.
+        try:
+            return link.request(transmit, replace(request, limit=RESEND_PERIOD))
+        except NoReplyError:
+            state = read_state(link)
+            if state is None or SupervisorState.TRAJECTORY_FINISHED not in state:
+                raise
+            return link.request(transmit, request)
 
     def _is_carried_out(self, number):
         # Whether the repetition of a command was refused because the first one, whose reply was
         # lost, is obeyed.
         if number != HighLevelCommander.COMMAND_TAKEOFF_2:
             return number == HighLevelCommander.COMMAND_LAND_2
-        state = read_state(self._current_link())
-        if state is None or not state.reports_planner:
-            return True
-        return SupervisorState.HIGH_LEVEL_ACTIVE in state
+        end = time.monotonic() + _REPORT_LAG
+        while True:
+            state = read_state(self._current_link())
+            if state is None or not state.reports_planner:
+                return True
+            if SupervisorState.HIGH_LEVEL_ACTIVE in state or time.monotonic() > end:
+                return SupervisorState.HIGH_LEVEL_ACTIVE in state
+            time.sleep(_REPORT_LAG / 4)
 
 
 def _check(what: str, duration: float, group_mask: int, *values: float) -> None:

@@ -28,6 +28,7 @@ class Channel:
     def add(self, vehicle: DriverVehicle) -> None:
         """Take a vehicle in."""
         self.vehicles.append(vehicle)
+        vehicle.status.broadcaster = self.broadcaster
         self._share_poses()
 
     def remove(self, vehicle: DriverVehicle) -> None:

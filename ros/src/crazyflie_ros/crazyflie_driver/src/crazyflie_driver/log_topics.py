@@ -27,8 +27,11 @@ STATUS_VARIABLES = (
     "stateEstimate.z",
     "stateEstimate.vz",
     "stateEstimate.yaw",
+    "pm.state",
+    "radio.numRxBc",
+    "radio.numRxUc",
 )
-"""What is in it, as far as the firmware has it: 19 of the 26 bytes of a packet."""
+"""What is in it, as far as the firmware has it: 24 of the 26 bytes of a packet."""
 
 _MOST_DATA = 30
 _LINK = 3 << 2
@@ -47,6 +50,10 @@ class LogTopics:
     ----------
     voltage, rssi : float or None
         Latest values of the battery (V) and the vehicle's reception (-dBm).
+    power_state : int or None
+        The firmware's pm.state.
+    received_broadcasts, received_unicasts : int
+        Packets that the vehicle has counted, modulo 2^16.
     height, vertical_speed, heading : float or None
         Latest estimate of the vehicle: z (m, fixed frame), its derivative (m/s), yaw (degrees).
     supervisor : SupervisorState or None
@@ -61,6 +68,9 @@ class LogTopics:
     _on_status: Callable[[], None]
     voltage: float | None = None
     rssi: float | None = None
+    power_state: int | None = None
+    received_broadcasts: int = 0
+    received_unicasts: int = 0
     height: float | None = None
     vertical_speed: float | None = None
     heading: float | None = None
@@ -139,6 +149,9 @@ class LogTopics:
 
     def _note_status(self, latest, rssi_publisher):
         self.voltage = latest.get("pm.vbat")
+        self.power_state = latest.get("pm.state")
+        self.received_broadcasts = latest.get("radio.numRxBc", 0)
+        self.received_unicasts = latest.get("radio.numRxUc", 0)
         self.height = latest.get("stateEstimate.z")
         self.vertical_speed = latest.get("stateEstimate.vz")
         self.heading = latest.get("stateEstimate.yaw")

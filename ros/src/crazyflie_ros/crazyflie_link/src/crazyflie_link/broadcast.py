@@ -28,6 +28,11 @@ _LINK_BITS = 3 << 2
 _log = logging.getLogger(__name__)
 
 
+def is_broadcast(sent: CRTPPacket) -> bool:
+    """Return whether a packet over UDP is a copy for all vehicles."""
+    return not sent.header & _LINK_BITS
+
+
 class Broadcaster:
     """Sends to all vehicles of a radio's channel; over UDP, a copy to each of the links.
 

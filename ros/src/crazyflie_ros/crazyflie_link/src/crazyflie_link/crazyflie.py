@@ -7,6 +7,7 @@ from collections.abc import Callable
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.address import Address
+from crazyflie_link.broadcast import is_broadcast
 from crazyflie_link.console import Console
 from crazyflie_link.emergency import EmergencyStop
 from crazyflie_link.errors import RefusedError, UnknownNameError, ValueRangeError
@@ -64,6 +65,8 @@ class Crazyflie:
         Parts of the firmware; see their classes.
     restarts : int
         How many times the vehicle's clock was seen to begin anew.
+    sent : int
+        Packets that were sent to this vehicle alone.
     rssi : float or None
         Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere.
     """
@@ -96,7 +99,7 @@ class Crazyflie:
         self.parameters = FirmwareParameters(link)
         self.log = Log(link)
         self.supervisor = Supervisor(link, self._emergency)
-        self.restarts = 0
+        self.restarts = self.sent = 0
         self._uptime = Uptime()
         self._on_packet = on_packet
         self._blocks: list[LogBlock] = []
@@ -175,6 +178,7 @@ class Crazyflie:
     def _make_link(self, cache, limits):
         folder = table_cache() if cache is None else cache
         link = Link(self.address, limits, folder, self._on_received)
+        link.cflib.packet_sent.add_callback(self._on_sent)
         link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._on_rssi)
         return link
 
@@ -202,6 +206,9 @@ class Crazyflie:
             self._console.receive(data)
         if self._on_packet is not None:
             self._on_packet(port, channel, data)
+
+    def _on_sent(self, sent):
+        self.sent += not is_broadcast(sent)
 
     def _on_rssi(self, rssi):
         self.rssi = rssi

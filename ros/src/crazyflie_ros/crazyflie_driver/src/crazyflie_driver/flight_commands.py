@@ -201,6 +201,8 @@ class FlightCommands:
         # Arms a vehicle that is not armed; blocks.
         if self._battery.charge >= Charge.LOW:
             raise ServiceError(f"no takeoff, {self._battery.words()}: charge or change it")
+        if problem := self._flight.estimator_problem():
+            raise ServiceError(f"no takeoff, the vehicle's estimate has not converged: {problem}")
         supervisor = self._crazyflie.supervisor.guarded(lambda: job.is_valid)
         state = self._state_once_armed(supervisor, job)
         if state is None:

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 import genpy
 from std_msgs.msg import Float32, Header
 
-from crazyflie_driver import telemetry
+from crazyflie_driver import telemetry, variances
 from crazyflie_driver.delivery import Delivery
 from crazyflie_driver.msg import GenericLogData, crtpPacket
+from crazyflie_driver.variances import Variances
 from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock
@@ -58,6 +59,8 @@ class LogTopics:
         Latest estimate of the vehicle: z (m, fixed frame), its derivative (m/s), yaw (degrees).
     supervisor : SupervisorState or None
         Latest state; None until it has come on the present link.
+    variances : Variances
+        Of the vehicle's Kalman filter, if it has one.
     """
 
     _handle: NodeHandle
@@ -75,6 +78,7 @@ class LogTopics:
     vertical_speed: float | None = None
     heading: float | None = None
     supervisor: SupervisorState | None = None
+    variances: Variances = field(default_factory=Variances)
     _packets: Publisher | None = None
     _logs_state: bool = False
     _states: int = 0
@@ -90,6 +94,7 @@ class LogTopics:
             self._packets = self._publisher("packets", crtpPacket)
         known = self._crazyflie.log.variables()
         self._start_status(known, self._publisher("rssi", Float32))
+        self._start_variances(known)
         selected = [topic for topic in telemetry.STANDARD if topic.name in parameters.topics]
         groups, missing = telemetry.packed(selected, known)
         for name, variables in missing.items():
@@ -138,6 +143,18 @@ class LogTopics:
             self._delivery.submit_data(self._note_status, latest, rssi_publisher)
 
         self._crazyflie.add_log_block(LogBlock("status", STATUS_PERIOD_MS, variables, deliver))
+
+    def _start_variances(self, known):
+        self.variances.is_logged = all(name in known for name in variances.VARIABLES)
+        if self.variances.is_logged:
+            self._crazyflie.add_log_block(
+                LogBlock(
+                    "variances",
+                    variances.PERIOD_MS,
+                    variances.VARIABLES,
+                    lambda _, values: self.variances.add(tuple(values)),
+                )
+            )
 
     def _note_state(self, latest):
         # In the link's thread: the state is waited for where no callback has its turn.

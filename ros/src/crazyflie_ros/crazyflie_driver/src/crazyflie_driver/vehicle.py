@@ -149,6 +149,7 @@ class DriverVehicle:
         if state is LinkState.LOST:
             # The state before the loss is not that of now.
             self._log.supervisor = None
+            self._log.variances.clear()
         self._connection.on_state(state, text, self._resume)
 
     def _on_packet(self, port, channel, data):

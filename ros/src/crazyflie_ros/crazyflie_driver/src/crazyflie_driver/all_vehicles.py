@@ -12,6 +12,8 @@ from crazyflie_driver.flight_commands import Need
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_utils import NodeHandle, ServiceError
 
+_GO_TO = ("go_to", "go_to_linear")
+
 LIMIT = 5.0
 """Time in which vehicles answer, s; their own limits are shorter."""
 
@@ -36,9 +38,9 @@ class AllVehicles:
             self._handle.advertise_service(f"~all/{name}", service_type, callback)
 
     def _on_command(self, name, response, request):
-        if name == "go_to" and not request.relative:
+        if name in _GO_TO and not request.relative:
             raise ServiceError(
-                "go_to of all vehicles: relative is False, and they cannot go to one place; "
+                f"{name} of all vehicles: relative is False, and they cannot go to one place; "
                 "expected True"
             )
         command = requested(name, request)

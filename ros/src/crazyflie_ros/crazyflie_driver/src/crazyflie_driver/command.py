@@ -17,6 +17,8 @@ SERVICE_TYPES = {
     "stop": srv.Stop,
     "go_to": srv.GoTo,
     "start_trajectory": srv.StartTrajectory,
+    "go_to_linear": srv.GoTo,
+    "spiral": srv.Spiral,
 }
 """High-level command -> type of its service."""
 
@@ -31,6 +33,23 @@ _SENDERS: dict[str, Callable[[HighLevel, Any], None]] = {
     ),
     "start_trajectory": lambda high_level, r: high_level.start_trajectory(
         r.trajectoryId, r.timescale, r.relative, r.reversed, r.groupMask
+    ),
+    "go_to_linear": lambda high_level, r: high_level.go_to(
+        (r.goal.x, r.goal.y, r.goal.z),
+        r.yaw,
+        r.duration.to_sec(),
+        r.relative,
+        r.groupMask,
+        linear=True,
+    ),
+    "spiral": lambda high_level, r: high_level.spiral(
+        r.angle,
+        (r.initialRadius, r.finalRadius),
+        r.ascent,
+        r.duration.to_sec(),
+        r.sideways,
+        r.clockwise,
+        r.groupMask,
     ),
 }
 """High-level command -> what sends a request of it."""

@@ -16,6 +16,7 @@ from crazyflie_driver.jobs import Jobs
 from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.service_names import ServiceNames
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
+from crazyflie_driver.setup_services import SetupServices
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError
 from crazyflie_model.polynomials import PolynomialPiece
@@ -41,6 +42,7 @@ class VehicleServices:
     _commands: FlightCommands
     _emergency: Emergency
     _mirror: ParameterMirror
+    _setup: SetupServices
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has."""
@@ -50,9 +52,14 @@ class VehicleServices:
             "update_params": (srv.UpdateParams, self._on_update_params),
             "set_group_mask": (srv.SetGroupMask, self._on_set_group_mask),
             "upload_trajectory": (srv.UploadTrajectory, self._on_upload_trajectory),
+            "upload_compressed_trajectory": (
+                srv.UploadCompressedTrajectory,
+                self._on_upload_compressed,
+            ),
             "notify_setpoints_stop": (srv.NotifySetpointsStop, self._on_notify_setpoints_stop),
             "send_packet": (srv.sendPacket, self._on_send_packet),
         }
+        offered.update(self._setup.services())
         for name, service_type in SERVICE_TYPES.items():
             offered[name] = service_type, partial(self._on_command, name, service_type)
         if self._crazyflie.address.is_radio:
@@ -145,6 +152,21 @@ class VehicleServices:
             return srv.UploadTrajectoryResponse()
 
         return self._jobs.submit("upload_trajectory", work, is_flight=True)
+
+    def _on_upload_compressed(self, request):
+        start = (request.start.x, request.start.y, request.start.z, request.startYaw)
+        segments = [
+            (each.duration.to_sec(), each.x, each.y, each.z, each.yaw) for each in request.segments
+        ]
+
+        def work(job):
+            trajectories = self._crazyflie.trajectories.guarded(lambda: job.is_valid)
+            trajectories.upload_compressed(
+                request.trajectoryId, request.offset, start, segments, job.check
+            )
+            return srv.UploadCompressedTrajectoryResponse()
+
+        return self._jobs.submit("upload_compressed_trajectory", work, is_flight=True)
 
     def _reboot(self):
         try:

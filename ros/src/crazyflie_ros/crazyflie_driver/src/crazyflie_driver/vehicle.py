@@ -16,6 +16,7 @@ from crazyflie_driver.service_names import ServiceNames
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_driver.setup_services import SetupServices
 from crazyflie_driver.shutdown import Shutdown
 from crazyflie_driver.status_publisher import StatusPublisher
 from crazyflie_driver.vehicle_parameters import VehicleParameters
@@ -70,7 +71,17 @@ class DriverVehicle:
         self._mirror = mirror = ParameterMirror(own, prefix, crazyflie)
         self._names = names = ServiceNames(own, prefix)
         self._services = VehicleServices(
-            own, name, names, crazyflie, jobs, gate, flight, self.commands, emergency, mirror
+            own,
+            name,
+            names,
+            crazyflie,
+            jobs,
+            gate,
+            flight,
+            self.commands,
+            emergency,
+            mirror,
+            SetupServices(crazyflie, jobs, flight, emergency, mirror),
         )
         duration = server.landing_duration
         self._shutdown = Shutdown(crazyflie, emergency, flight, setpoints, duration, self._warn)

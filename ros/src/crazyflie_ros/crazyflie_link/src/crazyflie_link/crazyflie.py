@@ -12,6 +12,7 @@ from crazyflie_link.console import Console
 from crazyflie_link.emergency import EmergencyStop
 from crazyflie_link.errors import RefusedError, UnknownNameError, ValueRangeError
 from crazyflie_link.high_level import HighLevel
+from crazyflie_link.lighthouse import Lighthouse
 from crazyflie_link.link import LOG_DATA, Link, OnPacket
 from crazyflie_link.link_monitor import Uptime
 from crazyflie_link.link_setup import Limits
@@ -61,7 +62,7 @@ class Crazyflie:
 
     Attributes
     ----------
-    setpoints, high_level, trajectories, localization, parameters, log, supervisor
+    setpoints, high_level, trajectories, localization, lighthouse, parameters, log, supervisor
         Parts of the firmware; see their classes.
     restarts : int
         How many times the vehicle's clock was seen to begin anew.
@@ -96,6 +97,7 @@ class Crazyflie:
         self.high_level = HighLevel(link)
         self.trajectories = Trajectories(link, self.high_level)
         self.localization = Localization(link)
+        self.lighthouse = Lighthouse(link)
         self.parameters = FirmwareParameters(link)
         self.log = Log(link)
         self.supervisor = Supervisor(link, self._emergency)

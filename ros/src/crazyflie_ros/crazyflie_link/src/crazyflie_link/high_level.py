@@ -1,10 +1,10 @@
 """Commands that the vehicle's own planner carries out."""
 
 import copy
+import math
 import os
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Self
 
 from cflib.crazyflie.high_level_commander import HighLevelCommander
@@ -12,12 +12,11 @@ from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.broadcast import SharedCommand, recorded
 from crazyflie_link.checks import check_byte, check_finite, check_positive
-from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError
+from crazyflie_link.errors import AlreadyLandingError, RefusedError, ValueRangeError
+from crazyflie_link.high_level_replies import is_carried_out, request_after_broadcast
 from crazyflie_link.link import Link
-from crazyflie_link.request_reply import REPLY_LIMIT, RESEND_PERIOD, Request
+from crazyflie_link.request_reply import REPLY_LIMIT, Request
 from crazyflie_link.subsystem import Subsystem
-from crazyflie_link.supervisor import read_state
-from crazyflie_model.supervisor import SupervisorState
 
 ALL_GROUPS = 0
 """Group mask that every vehicle obeys."""
@@ -28,9 +27,6 @@ _START_2_PROTOCOL = 10
 
 _BUSY = 1
 """Reply to a takeoff while the planner flies, and to a landing while it lands."""
-
-_REPORT_LAG = 0.1
-"""Time in which the supervisor, at 25 Hz, has taken note of a takeoff, s."""
 
 
 @dataclass
@@ -136,16 +132,52 @@ class HighLevel(Subsystem):
         duration: float,
         relative: bool = False,
         group_mask: int = ALL_GROUPS,
+        linear: bool = False,
     ) -> None:
-        """Fly to a position (x, y, z in m) and a yaw (rad) in a duration (s)."""
+        """Fly to a position (x, y, z in m) and a yaw (rad) in a duration (s).
+
+        A linear one has a constant velocity instead of a smooth beginning and end.
+        """
         x, y, z = position
         _check("go-to", duration, group_mask, x, y, z, yaw)
         is_new = self._current_link().protocol >= _GO_TO_2_PROTOCOL
+        if linear and not is_new:
+            raise RefusedError("the go-to command: this firmware has no linear one; update it")
         self._command(
             "the go-to command",
             HighLevelCommander.COMMAND_GO_TO_2 if is_new else HighLevelCommander.COMMAND_GO_TO,
-            lambda c: c.go_to(x, y, z, yaw, duration, relative=relative, group_mask=group_mask),
+            lambda c: c.go_to(
+                x, y, z, yaw, duration, relative=relative, linear=linear, group_mask=group_mask
+            ),
             resend=not relative,
+        )
+
+    def spiral(
+        self,
+        angle: float,
+        radii: tuple[float, float],
+        ascent: float,
+        duration: float,
+        is_sideways: bool = False,
+        is_clockwise: bool = False,
+        group_mask: int = ALL_GROUPS,
+    ) -> None:
+        """Fly along a spiral of an angle (rad), between two radii (m), rising by ``ascent`` (m)."""
+        _check("spiral", duration, group_mask, angle, *radii, ascent)
+        if abs(angle) > 2.0 * math.pi:
+            raise ValueRangeError(f"spiral: angle is {angle:g} rad; expected -2 pi to 2 pi")
+        for radius in radii:
+            if radius < 0.0:
+                raise ValueRangeError(f"spiral: radius is {radius:g} m; expected at least 0")
+        if self._current_link().protocol < _GO_TO_2_PROTOCOL:
+            raise RefusedError("the spiral command: this firmware has none; update it")
+        self._command(
+            "the spiral command",
+            HighLevelCommander.COMMAND_SPIRAL,
+            lambda c: c.spiral(
+                angle, *radii, ascent, duration, is_sideways, is_clockwise, group_mask
+            ),
+            resend=False,
         )
 
     def start_trajectory(
@@ -187,14 +219,19 @@ class HighLevel(Subsystem):
             resend=False,
         )
 
-    def define_trajectory(self, trajectory_id: int, offset: int, pieces: int) -> None:
+    def define_trajectory(
+        self, trajectory_id: int, offset: int, pieces: int, is_compressed: bool = False
+    ) -> None:
         """Define a trajectory: pieces in the trajectory memory, from an offset (bytes) on."""
         check_byte("trajectory number", trajectory_id)
         check_byte("number of pieces", pieces)
+        kind = HighLevelCommander.TRAJECTORY_TYPE_POLY4D
+        if is_compressed:
+            kind = HighLevelCommander.TRAJECTORY_TYPE_POLY4D_COMPRESSED
         self._command(
             "the definition of the trajectory",
             HighLevelCommander.COMMAND_DEFINE_TRAJECTORY,
-            lambda c: c.define_trajectory(trajectory_id, offset, pieces),
+            lambda c: c.define_trajectory(trajectory_id, offset, pieces, kind),
         )
         self._knowledge.defined.add(trajectory_id)
 
@@ -216,40 +253,15 @@ class HighLevel(Subsystem):
         if self._shared is None or resend:
             answer = link.request(transmit, request)
         else:
-            answer = self._request_after_broadcast(link, transmit, request)
+            answer = request_after_broadcast(link, transmit, request)
         # The first three bytes of the request, then the firmware's errno.
         code = answer[3] if len(answer) > 3 else 0
         # A broadcast is repeated, too.
         is_repeated = sent > 1 or self._shared is not None
-        if code and not (code == _BUSY and is_repeated and self._is_carried_out(number)):
+        if code and not (code == _BUSY and is_repeated and is_carried_out(link, number)):
             is_landing = code == _BUSY and number == HighLevelCommander.COMMAND_LAND_2
             error = AlreadyLandingError if is_landing else RefusedError
             raise error(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
-
-    def _request_after_broadcast(self, link, transmit, request):
-        # What must not be done twice: its own command only if the planner's last plan has ended,
-        # which it has not once this one is carried out.
-        try:
-            return link.request(transmit, replace(request, limit=RESEND_PERIOD))
-        except NoReplyError:
-            state = read_state(link)
-            if state is None or SupervisorState.TRAJECTORY_FINISHED not in state:
-                raise
-            return link.request(transmit, request)
-
-    def _is_carried_out(self, number):
-        # Whether the repetition of a command was refused because the first one, whose reply was
-        # lost, is obeyed.
-        if number != HighLevelCommander.COMMAND_TAKEOFF_2:
-            return number == HighLevelCommander.COMMAND_LAND_2
-        end = time.monotonic() + _REPORT_LAG
-        while True:
-            state = read_state(self._current_link())
-            if state is None or not state.reports_planner:
-                return True
-            if SupervisorState.HIGH_LEVEL_ACTIVE in state or time.monotonic() > end:
-                return SupervisorState.HIGH_LEVEL_ACTIVE in state
-            time.sleep(_REPORT_LAG / 4)
 
 
 def _check(what: str, duration: float, group_mask: int, *values: float) -> None:

@@ -4,11 +4,13 @@ import math
 
 import pytest
 from conftest import LOG, PARAMETERS
+from geometry_msgs.msg import Pose, PoseStamped, Quaternion
 from safety_helpers import TAKEOFF
 
 from crazyflie_driver.variances import FEWEST, WINDOW, Variances
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.waiting import wait_until
+from crazyflie_virtual.testing import virtual_vehicle
 
 NAMES = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")
 VARIANCES = {name: ("f", 1e-4) for name in NAMES}
@@ -73,3 +75,19 @@ def test_without_a_kalman_filter_nothing_is_refused(server, estimator, log):
         vehicle.log["kalman.varPX"] = ("f", math.nan)
     server.call("/cf1/takeoff", TAKEOFF)
     assert len(vehicle.packets(8, 0)) == 1
+
+
+def test_a_virtual_vehicle_without_poses(server):
+    with virtual_vehicle(positioning="none") as (_, uri):
+        server.add(uri)
+        with pytest.raises(ServiceError, match="not converged: kalman.varP. has changed by"):
+            server.call("/cf1/takeoff", TAKEOFF)
+        variances = server.node._vehicles[uri]._log.variances
+
+        def is_converged():
+            pose = Pose(orientation=Quaternion(w=1.0))
+            server.process.publish("/cf1/external_pose", PoseStamped(pose=pose))
+            return not variances.problem()
+
+        wait_until(is_converged)
+        server.call("/cf1/takeoff", TAKEOFF)

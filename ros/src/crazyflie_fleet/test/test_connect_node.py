@@ -5,7 +5,11 @@ from pathlib import Path
 
 import rospkg
 
-from crazyflie_driver.srv import AddCrazyflieResponse, UpdateParamsResponse
+from crazyflie_driver.srv import (
+    AddCrazyflieResponse,
+    UpdateParamsResponse,
+    WriteLighthouseResponse,
+)
 from crazyflie_fleet.connect_node import FleetConnectNode
 from crazyflie_utils import ServiceError
 from crazyflie_utils.testing import FakeProcess
@@ -127,3 +131,43 @@ def test_an_address_is_needed(tmp_path):
     assert not launched
     assert "no uri of a; expected one" in process.logged("error")[0]
     assert driver.added == {}
+
+
+def lighthouse_fleet(folder, file):
+    text = EXAMPLE.read_text(encoding="utf-8")
+    text = text.replace("\nall:\n", f"\nall:\n  lighthouse: {file}\n")
+    path = folder / "fleet.yaml"
+    path.write_text(text, encoding="utf-8")
+    return {"fleet/file": str(path)}
+
+
+def test_base_stations_are_written_before_the_parameters(tmp_path):
+    (tmp_path / "room.yaml").write_text("")
+    process = FakeProcess()
+    driver = Driver(process)
+    written = {}
+
+    def write(name, request):
+        assert name not in driver.updated
+        written[name] = request.file
+        answer = Future()
+        answer.set_result(WriteLighthouseResponse())
+        return answer
+
+    for name in ("cf1", "cf2"):
+        service = f"/{name}/write_lighthouse"
+        process.transport.services[service] = lambda r, name=name: write(name, r)
+    parameters = lighthouse_fleet(tmp_path, "room.yaml")
+    assert process.launch(FleetConnectNode(), "/fleet_add", parameters)
+    assert process.exit_status == 0
+    assert written == {name: str(tmp_path / "room.yaml") for name in ("cf1", "cf2")}
+    assert set(driver.updated) == {"cf1", "cf2"}
+
+
+def test_a_lighthouse_file_that_is_not_there(tmp_path):
+    process = FakeProcess()
+    assert not process.launch(
+        FleetConnectNode(), "/fleet_add", lighthouse_fleet(tmp_path, "no.yaml")
+    )
+    (error,) = process.logged("error") or process.logged("fatal")
+    assert "lighthouse of cf1 is 'no.yaml', and there is no file" in error

@@ -7,7 +7,8 @@ Run it in a shell that has sourced the workspace:
 
 The vehicles are stand-ins behind the radio's protocol, by UDP; between them and this script is the
 driver, in a process of its own. The script commands all of them as a mission does, and each notes
-when its packet comes: the time from the first to the last is the skew. Prints a line for each
+when its packet comes: the time from the first to the last is the skew. With `--broadcast` they are
+commanded by the driver's service for all, and their number is the largest. Prints a line for each
 number of vehicles, ms. A Crazyradio sends one packet after the other, which is not in it. Nothing
 is asserted.
 """
@@ -19,7 +20,9 @@ import socket
 import statistics
 import time
 
-from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest
+import genpy
+
+from crazyflie_driver.srv import AddCrazyflie, AddCrazyflieRequest, GoTo, GoToRequest
 from crazyflie_link.testing.fake_vehicle import FakeVehicle
 from crazyflie_mission_api.ros_vehicle import RosVehicle
 from crazyflie_utils.main import begin_script
@@ -28,6 +31,9 @@ from crazyflie_utils.testing.waiting import wait_until
 
 COMMANDS = (8, 0, b"\x0c")
 """Port, channel and first byte of a go_to."""
+
+ALL = "/crazyflie_server/all/go_to"
+_RELATIVE = GoToRequest(relative=True, duration=genpy.Duration(1))
 
 SERVICES = ("go_to", "emergency")
 PAUSE = 0.2
@@ -52,6 +58,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("n", nargs="+", type=int, help="of vehicles")
     parser.add_argument("--commands", type=int, default=100, help="to all of them (100)")
+    parser.add_argument("--broadcast", action="store_true", help="by the driver's service for all")
     options = parser.parse_args()
     most = max(options.n)
     port = free_port(socket.SOCK_STREAM)
@@ -73,16 +80,22 @@ def main() -> None:
             vehicles.append(RosVehicle(f"cf{k}", handle, services))
         print("  n  median    95 %     max", flush=True)
         for n in options.n:
-            skews = [_skew(vehicles[:n], stand_ins[:n]) for _ in range(options.commands)]
+
+            def command(n=n):
+                if options.broadcast:
+                    return [handle.call_service(ALL, GoTo, _RELATIVE, 60.0)]
+                return [vehicle.go_to((0.0, 0.0, 1.0), 0.0, 1.0) for vehicle in vehicles[:n]]
+
+            n = most if options.broadcast else n
+            skews = [_skew(command, stand_ins[:n]) for _ in range(options.commands)]
             figures = statistics.median(skews), statistics.quantiles(skews, n=20)[-1], max(skews)
             print(f"{n:3d}", *(f"{1e3 * figure:7.1f}" for figure in figures), flush=True)
 
 
-def _skew(vehicles, stand_ins):
+def _skew(command, stand_ins):
     for stand_in in stand_ins:
         stand_in.times.clear()
-    answers = [vehicle.go_to((0.0, 0.0, 1.0), 0.0, 1.0) for vehicle in vehicles]
-    for answer in answers:
+    for answer in command():
         answer.result(60.0)
     times = [stand_in.times[0] for stand_in in stand_ins]
     time.sleep(PAUSE)

@@ -1,11 +1,18 @@
 """Connects the vehicles of a fleet by the driver."""
 
 from functools import partial
+from pathlib import Path
 
 from typing_extensions import override
 
 from crazyflie_driver.add_node import command_again
-from crazyflie_driver.srv import AddCrazyflie, UpdateParams, UpdateParamsRequest
+from crazyflie_driver.srv import (
+    AddCrazyflie,
+    UpdateParams,
+    UpdateParamsRequest,
+    WriteLighthouse,
+    WriteLighthouseRequest,
+)
 from crazyflie_driver.vehicle_parameters import STANDARD_TOPICS, VehicleParameters
 from crazyflie_fleet.fleet_config import FleetConfig, VehicleConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters
@@ -55,7 +62,7 @@ class FleetConnectParameters(FleetParameters):
 
 
 class FleetConnectNode(Node):
-    """Connect vehicles and write their firmware parameters.
+    """Connect vehicles, write their base stations and their firmware parameters.
 
     The process ends with status 0 when all are connected, else with 1, and names the others.
     The driver itself writes the parameters again after a reconnection.
@@ -69,6 +76,11 @@ class FleetConnectNode(Node):
         missing = [vehicle.name for vehicle in self._vehicles if vehicle.uri is None]
         if missing:
             raise ParameterError(f"{parameters.file}: no uri of {', '.join(missing)}; expected one")
+        self._lighthouse_files = {
+            vehicle.name: _lighthouse_file(parameters.file, vehicle)
+            for vehicle in self._vehicles
+            if vehicle.settings.lighthouse
+        }
         self._connections = {vehicle.name: connection(vehicle) for vehicle in self._vehicles}
 
     @override
@@ -81,6 +93,15 @@ class FleetConnectNode(Node):
             answer.add_done_callback(partial(self._on_added, vehicle))
 
     def _on_added(self, vehicle, done):
+        file = self._lighthouse_files.get(vehicle.name)
+        if done.exception() is not None or file is None:
+            self._write_parameters(vehicle, done)
+            return
+        service, request = f"/{vehicle.name}/write_lighthouse", WriteLighthouseRequest(file)
+        answer = self._handle.call_service(service, WriteLighthouse, request, TIMEOUT)
+        answer.add_done_callback(partial(self._write_parameters, vehicle))
+
+    def _write_parameters(self, vehicle, done):
         error = done.exception()
         params = dict(vehicle.firmware_params)
         if vehicle.settings.has_single_marker:
@@ -125,3 +146,13 @@ class FleetConnectNode(Node):
                 f"_vehicles:='[{', '.join(missing)}]'"
             )
         self._handle.end(1 if self._failed else 0)
+
+
+def _lighthouse_file(fleet_file: str, vehicle: VehicleConfig) -> str:
+    file = Path(fleet_file).resolve().parent / vehicle.settings.lighthouse
+    if not file.is_file():
+        raise ParameterError(
+            f"{fleet_file}: lighthouse of {vehicle.name} is {vehicle.settings.lighthouse!r}, and "
+            f"there is no file {file}; expected one, relative to the fleet file"
+        )
+    return str(file)

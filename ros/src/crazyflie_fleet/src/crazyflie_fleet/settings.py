@@ -146,6 +146,12 @@ class Settings(Parameters):
     hover_height: float = parameter(
         Number("m", above=0.0), "where a takeoff ends, above the start point", 1.0
     )
+    lighthouse: str = parameter(
+        Text(may_be_empty=True),
+        "file with the geometry of base stations, as cfclient writes it, for the vehicle; relative "
+        "to this file; empty for none",
+        "",
+    )
     machine: str = parameter(
         TEXT, "computer that flies it, of `machines`; `local` is always one of them", LOCAL
     )

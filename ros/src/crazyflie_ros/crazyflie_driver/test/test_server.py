@@ -138,7 +138,8 @@ def test_a_vehicle_that_is_removed_leaves_nothing_and_can_come_again(server, veh
     services = set(transport.services)
     assert all(transport.subscribers.values())
     server.remove(vehicle.uri)
-    assert set(transport.services) == {"/add_crazyflie", "/remove_crazyflie"}
+    of_all = {name for name in transport.services if name.startswith("/crazyflie_server/all/")}
+    assert set(transport.services) - of_all == {"/add_crazyflie", "/remove_crazyflie"}
     heard = {topic for topic, listeners in transport.subscribers.items() if listeners}
     assert heard == {"/clock", "/all/emergency"}
     with pytest.raises(ServiceError, match="known: none"):

@@ -2,7 +2,9 @@
 
 import math
 
+from conftest import LOG
 from safety_helpers import FLYING, LOCKED, is_, position, said, wait_for_words
+from std_msgs.msg import Empty
 from std_srvs.srv import EmptyRequest
 
 from crazyflie_msgs.msg import VehicleStatus
@@ -67,3 +69,40 @@ def test_it_is_repeated_and_otherwise_published_when_it_changes(server, vehicle)
     assert texts == {said(server)}
     stamps = [message.header.stamp.to_sec() for message in published(server)[before:]]
     assert stamps == sorted(set(stamps))
+
+
+def test_the_fields_of_crazyswarm2(make_server):
+    server = make_server()
+    log = {**LOG, "pm.state": ("b", 3), "radio.numRxBc": ("H", 0), "radio.numRxUc": ("H", 65530)}
+    vehicle = server.make_vehicle(log=log)
+    server.add(vehicle.uri)
+    wait_for_words(server, "ready")
+    server.process.advance(1.0)
+    # The vehicle counts in 16 bits.
+    vehicle.log.update({"radio.numRxBc": ("H", 7), "radio.numRxUc": ("H", 4)})
+    driver = server.node._vehicles[vehicle.uri]
+    wait_until(lambda: server.process.advance(0.01) or driver._log.received_broadcasts == 7)
+    server.process.advance(1.0)
+    first = next(status for status in reversed(published(server)) if status.num_rx_broadcast)
+    assert (first.num_rx_broadcast, first.num_rx_unicast) == (7, 10)
+    assert (first.pm_state, first.rssi) == (VehicleStatus.PM_STATE_LOW_POWER, 47.0)
+    assert first.supervisor_info == first.supervisor
+    server.process.publish("/all/emergency", Empty())
+    wait_until(
+        lambda: server.process.advance(0.1) or published(server)[-1].num_tx_broadcast,
+        "broadcasts that were sent",
+    )
+    assert any(status.num_tx_unicast for status in published(server))
+    # A restart of the vehicle begins at 0.
+    vehicle.log.update({"radio.numRxBc": ("H", 0)})
+    wait_until(lambda: server.process.advance(0.01) or driver._log.received_broadcasts == 0)
+    server.process.advance(1.0)
+    assert published(server)[-1].num_rx_broadcast == 0
+
+
+def test_a_vehicle_without_these_variables(server, vehicle):
+    wait_for_words(server, "ready")
+    server.process.advance(1.0)
+    status = published(server)[-1]
+    assert status.pm_state == VehicleStatus.PM_STATE_UNKNOWN
+    assert (status.num_rx_broadcast, status.num_rx_unicast) == (0, 0)

@@ -3,6 +3,10 @@
 import queue
 
 import pytest
+import usb
+from cflib.crtp.radiodriver import RadioManager
+from cflib.drivers import crazyradio
+from fake_dongle import PLACES, Bus
 
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.testing.fake_vehicle import EXTENDED, READ_ONLY, FakeVehicle
@@ -120,3 +124,17 @@ class States:
 @pytest.fixture
 def states():
     return States()
+
+
+@pytest.fixture
+def bus(monkeypatch):
+    vehicles = {place: FakeVehicle() for place in PLACES}
+    bus = Bus(vehicles)
+    bus.vehicles = vehicles
+    bus.plug_in()
+    monkeypatch.setattr(crazyradio, "_find_devices", bus.devices)
+    monkeypatch.setattr(usb.util, "dispose_resources", lambda device: None)
+    monkeypatch.setattr(RadioManager, "_radios", [])
+    yield bus
+    for vehicle in vehicles.values():
+        vehicle.close()

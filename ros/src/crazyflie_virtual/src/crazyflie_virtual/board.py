@@ -71,10 +71,10 @@ class Board:
         if settings.protocol >= SUPERVISOR_PROTOCOL:
             self._handlers[Port.SUPERVISOR] = partial(supervisor.handle, firmware)
 
-    def receive(self, packet: Packet) -> Packet | None:
+    def receive(self, packet: Packet, is_broadcast: bool = False) -> Packet | None:
         """Return the answer to a packet, from the same port and channel; None for no answer."""
         statistics = self.firmware.link_statistics
-        statistics.count_received(self.firmware.time)
+        statistics.count_received(self.firmware.time, is_broadcast)
         if packet.port not in self._handlers:
             self.firmware.warn("port", f"CRTP: nothing listens on port {packet.port}")
             return None

@@ -82,7 +82,7 @@ class VirtualVehicle:
         if self.board is None:
             return []
         try:
-            answer = self.board.receive(packet)
+            answer = self.board.receive(packet, crtp.is_broadcast(datagram))
             return [] if answer is None else [answer.encode()]
         except FirmwareAssertionError as assertion:
             self._restart(str(assertion))

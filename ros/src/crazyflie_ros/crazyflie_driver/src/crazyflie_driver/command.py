@@ -1,12 +1,58 @@
 """A high-level command, as a service asks for it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
+from crazyflie_driver import srv
+from crazyflie_link.broadcast import SharedCommand
 from crazyflie_link.high_level import ALL_GROUPS, HighLevel
 
 TAKEOFF, LAND, STOP = "takeoff", "land", "stop"
 """Commands that are not as all others, which move a vehicle in the air."""
+
+SERVICE_TYPES = {
+    "takeoff": srv.Takeoff,
+    "land": srv.Land,
+    "stop": srv.Stop,
+    "go_to": srv.GoTo,
+    "start_trajectory": srv.StartTrajectory,
+    "go_to_linear": srv.GoTo,
+    "spiral": srv.Spiral,
+}
+"""High-level command -> type of its service."""
+
+_SENDERS: dict[str, Callable[[HighLevel, Any], None]] = {
+    "takeoff": lambda high_level, r: high_level.take_off(
+        r.height, r.duration.to_sec(), r.groupMask
+    ),
+    "land": lambda high_level, r: high_level.land(r.height, r.duration.to_sec(), r.groupMask),
+    "stop": lambda high_level, r: high_level.stop(r.groupMask),
+    "go_to": lambda high_level, r: high_level.go_to(
+        (r.goal.x, r.goal.y, r.goal.z), r.yaw, r.duration.to_sec(), r.relative, r.groupMask
+    ),
+    "start_trajectory": lambda high_level, r: high_level.start_trajectory(
+        r.trajectoryId, r.timescale, r.relative, r.reversed, r.groupMask
+    ),
+    "go_to_linear": lambda high_level, r: high_level.go_to(
+        (r.goal.x, r.goal.y, r.goal.z),
+        r.yaw,
+        r.duration.to_sec(),
+        r.relative,
+        r.groupMask,
+        linear=True,
+    ),
+    "spiral": lambda high_level, r: high_level.spiral(
+        r.angle,
+        (r.initialRadius, r.finalRadius),
+        r.ascent,
+        r.duration.to_sec(),
+        r.sideways,
+        r.clockwise,
+        r.groupMask,
+    ),
+}
+"""High-level command -> what sends a request of it."""
 
 
 @dataclass(frozen=True)
@@ -21,7 +67,22 @@ class Command:
     duration: float = 0.0
     group_mask: int = ALL_GROUPS
 
+    def by(self, shared: SharedCommand | None) -> "Command":
+        """Return the same command, sent together with those to other vehicles; None for alone."""
+        if shared is None:
+            return self
+        return replace(self, send=lambda high_level: self.send(high_level.broadcast(shared)))
+
     @property
     def ends_flight(self) -> bool:
         """Whether the vehicle is on the ground afterwards, and it goes before all others."""
         return self.name in (LAND, STOP)
+
+
+def requested(name: str, request: Any) -> Command:
+    """Return the command that a service with this name is asked for."""
+    duration = request.duration.to_sec() if hasattr(request, "duration") else 0.0
+    sender = _SENDERS[name]
+    return Command(
+        name, lambda high_level: sender(high_level, request), duration, request.groupMask
+    )

@@ -1,6 +1,7 @@
 """High-level commands to one vehicle, and what keeps them from dropping it."""
 
 import contextlib
+import enum
 import time
 from concurrent.futures import Future
 from dataclasses import dataclass, field
@@ -33,6 +34,18 @@ _WATCHDOG_PERIOD = 0.2
 _REARMING = 0.5
 """Time in which a vehicle arms itself, s. Firmware 2026.08 disarms and arms itself 3 s after a
 landing (0.16 s) and every 30 s on the ground (0.08 s)."""
+
+
+class Need(enum.Enum):
+    """What a vehicle needs for a command."""
+
+    COMMAND = enum.auto()
+    SETPOINTS_STOP = enum.auto()
+    """The notice that setpoints stop, right before the command."""
+    ON_GROUND = enum.auto()
+    """Nothing: it is to land, and the command would start its motors."""
+    NOT_ADDRESSED = enum.auto()
+    """Nothing: the command is for other groups."""
 
 
 @dataclass(eq=False)
@@ -81,16 +94,26 @@ class FlightCommands:
         """
 
         def work(job: Job) -> Result:
-            self._emergency.refuse()
-            high_level = self._crazyflie.high_level
-            command.send(high_level.dry_run())
-            if not self._is_addressed(command):
-                _send(command, high_level.guarded(lambda: job.is_valid))
-            elif self._is_ready(command, job):
+            need = self._check(command, job)
+            if need is Need.NOT_ADDRESSED:
+                _send(command, self._crazyflie.high_level.guarded(lambda: job.is_valid))
+            elif need is not Need.ON_GROUND:
                 self._execute(command, job)
             return response
 
         return self._jobs.submit(command.name, work, is_flight=True, urgent=command.ends_flight)
+
+    def check(self, command: Command) -> Future["Need"]:
+        """Do all that `send` does before it sends anything; a takeoff arms the vehicle.
+
+        The future fails where that of `send` would.
+        """
+
+        def work(job: Job) -> Need:
+            return self._check(command, job)
+
+        what = f"checking {command.name}"
+        return self._jobs.submit(what, work, is_flight=True, urgent=command.ends_flight)
 
     def land_with_retry(self, reason: str) -> None:
         """Land; called again for the same reason, it lands again if that has failed."""
@@ -134,6 +157,15 @@ class FlightCommands:
 
     # Checks before a command.
 
+    def _check(self, command, job):
+        self._emergency.refuse()
+        command.send(self._crazyflie.high_level.dry_run())
+        if not self._is_addressed(command):
+            return Need.NOT_ADDRESSED
+        if not self._is_ready(command, job):
+            return Need.ON_GROUND
+        return Need.SETPOINTS_STOP if self._setpoints.is_streaming else Need.COMMAND
+
     def _is_addressed(self, command):
         is_addressed = self._crazyflie.high_level.is_addressed(command.group_mask)
         if is_addressed is None and self._setpoints.runs_motors:
@@ -169,6 +201,8 @@ class FlightCommands:
         # Arms a vehicle that is not armed; blocks.
         if self._battery.charge >= Charge.LOW:
             raise ServiceError(f"no takeoff, {self._battery.words()}: charge or change it")
+        if problem := self._flight.estimator_problem():
+            raise ServiceError(f"no takeoff, the vehicle's estimate has not converged: {problem}")
         supervisor = self._crazyflie.supervisor.guarded(lambda: job.is_valid)
         state = self._state_once_armed(supervisor, job)
         if state is None:

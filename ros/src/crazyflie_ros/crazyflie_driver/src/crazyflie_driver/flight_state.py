@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_link.crazyflie import Crazyflie
-from crazyflie_link.errors import NoReplyError
+from crazyflie_link.errors import LinkLostError, NoReplyError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle
 
 NOT_FLYABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
 """States in which a vehicle cannot take off."""
+
+_ESTIMATOR, _KALMAN = "stabilizer.estimator", 2
+"""Parameter of the firmware, and its value for the extended Kalman filter."""
 
 _REPORT_LAG = 0.2
 """How old a state may be, s: the firmware's supervisor runs at 25 Hz, and is logged at 10 Hz."""
@@ -58,6 +61,14 @@ class FlightState:
         except NoReplyError:
             state = None
         return self._log.next_state(_LOGGED_STATE_LIMIT) if state is None else state
+
+    def estimator_problem(self) -> str:
+        """Return why the vehicle's Kalman filter has not converged; empty if unknown; blocks."""
+        try:
+            estimator = self._crazyflie.parameters.values().get(_ESTIMATOR)
+        except LinkLostError:
+            return ""
+        return self._log.variances.problem() if estimator == _KALMAN else ""
 
     def motion_sent(self) -> None:
         """Take note that the planner is commanded to move."""

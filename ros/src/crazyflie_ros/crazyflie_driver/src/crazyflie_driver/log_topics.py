@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import genpy
 from std_msgs.msg import Float32, Header
 
-from crazyflie_driver import telemetry
+from crazyflie_driver import telemetry, variances
 from crazyflie_driver.delivery import Delivery
 from crazyflie_driver.msg import GenericLogData, crtpPacket
+from crazyflie_driver.variances import Variances
 from crazyflie_driver.vehicle_parameters import VehicleParameters
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.log import PERIOD_STEP_MS, LogBlock
@@ -28,8 +29,11 @@ STATUS_VARIABLES = (
     "stateEstimate.z",
     "stateEstimate.vz",
     "stateEstimate.yaw",
+    "pm.state",
+    "radio.numRxBc",
+    "radio.numRxUc",
 )
-"""What is in it, as far as the firmware has it: 19 of the 26 bytes of a packet."""
+"""What is in it, as far as the firmware has it: 24 of the 26 bytes of a packet."""
 
 _MOST_DATA = 30
 _LINK = 3 << 2
@@ -48,10 +52,16 @@ class LogTopics:
     ----------
     voltage, rssi : float or None
         Latest values of the battery (V) and the vehicle's reception (-dBm).
+    power_state : int or None
+        The firmware's pm.state.
+    received_broadcasts, received_unicasts : int
+        Packets that the vehicle has counted, modulo 2^16.
     height, vertical_speed, heading : float or None
         Latest estimate of the vehicle: z (m, fixed frame), its derivative (m/s), yaw (degrees).
     supervisor : SupervisorState or None
         Latest state; None until it has come on the present link.
+    variances : Variances
+        Of the vehicle's Kalman filter, if it has one.
     """
 
     _handle: NodeHandle
@@ -62,10 +72,14 @@ class LogTopics:
     _on_status: Callable[[], None]
     voltage: float | None = None
     rssi: float | None = None
+    power_state: int | None = None
+    received_broadcasts: int = 0
+    received_unicasts: int = 0
     height: float | None = None
     vertical_speed: float | None = None
     heading: float | None = None
     supervisor: SupervisorState | None = None
+    variances: Variances = field(default_factory=Variances)
     _packets: Publisher | None = None
     _heading: Publisher = field(init=False)
     _logs_state: bool = False
@@ -83,6 +97,7 @@ class LogTopics:
         known = self._crazyflie.log.variables()
         self._heading = self._publisher("heading", Float32)
         self._start_status(known, self._publisher("rssi", Float32))
+        self._start_variances(known)
         selected = [topic for topic in telemetry.STANDARD if topic.name in parameters.topics]
         groups, missing = telemetry.packed(selected, known)
         for name, variables in missing.items():
@@ -132,6 +147,18 @@ class LogTopics:
 
         self._crazyflie.add_log_block(LogBlock("status", STATUS_PERIOD_MS, variables, deliver))
 
+    def _start_variances(self, known):
+        self.variances.is_logged = all(name in known for name in variances.VARIABLES)
+        if self.variances.is_logged:
+            self._crazyflie.add_log_block(
+                LogBlock(
+                    "variances",
+                    variances.PERIOD_MS,
+                    variances.VARIABLES,
+                    lambda _, values: self.variances.add(tuple(values)),
+                )
+            )
+
     def _note_state(self, latest):
         # In the link's thread: the state is waited for where no callback has its turn.
         if "supervisor.info" in latest:
@@ -142,6 +169,9 @@ class LogTopics:
 
     def _note_status(self, latest, rssi_publisher):
         self.voltage = latest.get("pm.vbat")
+        self.power_state = latest.get("pm.state")
+        self.received_broadcasts = latest.get("radio.numRxBc", 0)
+        self.received_unicasts = latest.get("radio.numRxUc", 0)
         self.height = latest.get("stateEstimate.z")
         self.vertical_speed = latest.get("stateEstimate.vz")
         self.heading = latest.get("stateEstimate.yaw")

@@ -69,14 +69,23 @@ class ParameterMirror:
             raise ServiceError("; ".join(problems))
 
     def _write(self, name):
-        group, _, parameter = name.strip("/").replace(".", "/").partition("/")
-        if not group or not parameter:
-            raise ParameterError(f"{name!r} is no firmware parameter; expected GROUP/NAME")
-        full_name = f"{self._prefix}/{group}/{parameter}"
-        value = self._handle.get_param(full_name, _FirmwareValue())
-        confirmed = self._crazyflie.parameters.write(f"{group}.{parameter}", value)
-        self._written[f"{group}.{parameter}"] = value
-        self._handle.set_param(full_name, _portable(confirmed))
+        firmware_name = parsed_name(name)
+        full_name = f"{self._prefix}/{firmware_name.replace('.', '/')}"
+        self.set(firmware_name, self._handle.get_param(full_name, _FirmwareValue()))
+
+    def set(self, name: str, value: int | float) -> None:
+        """Write a parameter, named GROUP.NAME; the ROS parameter is then what is confirmed."""
+        confirmed = self._crazyflie.parameters.write(name, value)
+        self._written[name] = value
+        self._handle.set_param(f"{self._prefix}/{name.replace('.', '/')}", _portable(confirmed))
+
+
+def parsed_name(name: str) -> str:
+    """Return GROUP.NAME of a firmware parameter that a caller names; or raise `ParameterError`."""
+    group, _, parameter = name.strip("/").replace(".", "/").partition("/")
+    if not group or not parameter:
+        raise ParameterError(f"{name!r} is no firmware parameter; expected GROUP/NAME")
+    return f"{group}.{parameter}"
 
 
 class _FirmwareValue(ParameterType):

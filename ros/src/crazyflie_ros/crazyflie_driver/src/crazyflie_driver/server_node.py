@@ -5,8 +5,11 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from std_msgs.msg import Empty, Header
+from std_srvs import srv as std_srvs
 from typing_extensions import override
 
+from crazyflie_driver.all_vehicles import AllVehicles
+from crazyflie_driver.channel import Channel
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
 from crazyflie_driver.srv import (
     AddCrazyflie,
@@ -17,6 +20,7 @@ from crazyflie_driver.srv import (
 from crazyflie_driver.status import diagnostics
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_driver.vehicle_parameters import VehicleParameters
+from crazyflie_link.emergency import BROADCAST_STOP
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_utils import Node, NodeHandle, ServiceError
 
@@ -38,6 +42,7 @@ class CrazyflieServerNode(Node):
     def __init__(self) -> None:
         # By URI.
         self._vehicles: dict[str, DriverVehicle] = {}
+        self._channels: dict[str, Channel] = {}
         self._in_flight = False
         self._is_shutting_down = False
 
@@ -50,6 +55,8 @@ class CrazyflieServerNode(Node):
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
         handle.advertise_service(ADD, AddCrazyflie, self._on_add)
         handle.advertise_service(REMOVE, RemoveCrazyflie, self._on_remove)
+        AllVehicles(handle, self._channels).advertise()
+        handle.advertise_service("~all/emergency", std_srvs.Empty, self._on_emergency)
         handle.subscribe(self._parameters.emergency_topic, Empty, self._on_emergency)
         self._inhibit_shutdown = handle.inhibit_shutdown()
         handle.timer(_DIAGNOSTICS_PERIOD, self._publish_diagnostics)
@@ -66,6 +73,8 @@ class CrazyflieServerNode(Node):
             [vehicle.remove(_LANDING_LIMIT) for vehicle in list(self._vehicles.values())],
             _SHUTDOWN_LIMIT,
         )
+        for channel in self._channels.values():
+            channel.close()
 
     def _follow_flights(self):
         # Flights on setpoints are ended by the node that sends these.
@@ -93,6 +102,11 @@ class CrazyflieServerNode(Node):
             self._handle.error(f"{requested.name}: {error}")
             raise ServiceError(str(error)) from None
         self._vehicles[requested.uri] = vehicle
+        address = vehicle.crazyflie.address
+        if address.channel not in self._channels:
+            least = self._parameters.broadcast_poses
+            self._channels[address.channel] = Channel(address, least)
+        self._channels[address.channel].add(vehicle)
         self._handle.info(f"{requested.name}: connecting to {requested.uri}")
         return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
 
@@ -119,6 +133,9 @@ class CrazyflieServerNode(Node):
         return RemoveCrazyflieResponse()
 
     def _on_emergency(self, _):
+        # To all at once, and then until each has obeyed.
+        for channel in self._channels.values():
+            channel.broadcaster.send(BROADCAST_STOP, urgent=True)
         for vehicle in self._vehicles.values():
             name = vehicle.parameters.name
             try:
@@ -127,10 +144,15 @@ class CrazyflieServerNode(Node):
                 self._handle.error(f"{name}: emergency stop, sent when there is a link: {error}")
             else:
                 self._handle.error(f"{name}: emergency stop of all vehicles")
+        return std_srvs.EmptyResponse()
 
     def _forget(self, vehicle: DriverVehicle) -> None:
         if self._vehicles.get(vehicle.parameters.uri) is vehicle:
             del self._vehicles[vehicle.parameters.uri]
+            name = vehicle.crazyflie.address.channel
+            self._channels[name].remove(vehicle)
+            if not self._channels[name].vehicles:
+                self._channels.pop(name).close()
 
     def _when_done(self, done, finish, vehicle):
         # ``finish`` runs in its turn with the other callbacks, before the answer goes out.

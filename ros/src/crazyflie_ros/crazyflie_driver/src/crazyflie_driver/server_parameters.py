@@ -1,7 +1,7 @@
 """Parameters of the driver."""
 
 from crazyflie_utils import Parameters, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC, Number
+from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC, Integer, Number
 
 _VOLTS = Number("V", minimum=0.0)
 _SECONDS = Number("s", minimum=0.0)
@@ -55,4 +55,11 @@ class CrazyflieServerParameters(SafetyParameters):
         "std_msgs/Empty, stops the motors of all vehicles, for good",
         "/all/emergency",
         "topics/emergency",
+    )
+    broadcast_poses: int = parameter(
+        Integer(0, 255),
+        "from so many vehicles on one radio channel on, their external positions and poses are "
+        "packed (to 1 mm and about 0.2 degrees) and broadcast; 0 for never",
+        5,
+        "broadcast/poses",
     )

@@ -2,12 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from std_srvs.srv import Empty, EmptyResponse, SetBool, SetBoolResponse
 
 from crazyflie_driver import srv
-from crazyflie_driver.command import Command
+from crazyflie_driver.command import SERVICE_TYPES, requested
 from crazyflie_driver.emergency import Emergency
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.flight_state import FlightState
@@ -15,37 +16,12 @@ from crazyflie_driver.jobs import Jobs
 from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.service_names import ServiceNames
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
+from crazyflie_driver.setup_services import SetupServices
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import CrazyflieError, LinkLostError
-from crazyflie_link.high_level import HighLevel
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle, ServiceError
-
-_COMMANDS: dict[str, tuple[type, Callable[[HighLevel, Any], None]]] = {
-    "takeoff": (
-        srv.Takeoff,
-        lambda high_level, r: high_level.take_off(r.height, r.duration.to_sec(), r.groupMask),
-    ),
-    "land": (
-        srv.Land,
-        lambda high_level, r: high_level.land(r.height, r.duration.to_sec(), r.groupMask),
-    ),
-    "stop": (srv.Stop, lambda high_level, r: high_level.stop(r.groupMask)),
-    "go_to": (
-        srv.GoTo,
-        lambda high_level, r: high_level.go_to(
-            (r.goal.x, r.goal.y, r.goal.z), r.yaw, r.duration.to_sec(), r.relative, r.groupMask
-        ),
-    ),
-    "start_trajectory": (
-        srv.StartTrajectory,
-        lambda high_level, r: high_level.start_trajectory(
-            r.trajectoryId, r.timescale, r.relative, r.reversed, r.groupMask
-        ),
-    ),
-}
-"""High-level command -> type of its service, and what sends it."""
 
 
 @dataclass(eq=False)
@@ -66,6 +42,7 @@ class VehicleServices:
     _commands: FlightCommands
     _emergency: Emergency
     _mirror: ParameterMirror
+    _setup: SetupServices
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has."""
@@ -75,11 +52,16 @@ class VehicleServices:
             "update_params": (srv.UpdateParams, self._on_update_params),
             "set_group_mask": (srv.SetGroupMask, self._on_set_group_mask),
             "upload_trajectory": (srv.UploadTrajectory, self._on_upload_trajectory),
+            "upload_compressed_trajectory": (
+                srv.UploadCompressedTrajectory,
+                self._on_upload_compressed,
+            ),
             "notify_setpoints_stop": (srv.NotifySetpointsStop, self._on_notify_setpoints_stop),
             "send_packet": (srv.sendPacket, self._on_send_packet),
         }
-        for name, (service_type, send) in _COMMANDS.items():
-            offered[name] = service_type, self._command_callback(name, service_type, send)
+        offered.update(self._setup.services())
+        for name, service_type in SERVICE_TYPES.items():
+            offered[name] = service_type, partial(self._on_command, name, service_type)
         if self._crazyflie.address.is_radio:
             offered["reboot"] = Empty, self._on_reboot
         names = self._names.free(offered)
@@ -122,15 +104,8 @@ class VehicleServices:
 
     # As jobs.
 
-    def _command_callback(self, name, service_type, send):
-        def callback(request):
-            duration = request.duration.to_sec() if hasattr(request, "duration") else 0.0
-            command = Command(
-                name, lambda high_level: send(high_level, request), duration, request.groupMask
-            )
-            return self._commands.send(command, service_type._response_class())
-
-        return callback
+    def _on_command(self, name, service_type, request):
+        return self._commands.send(requested(name, request), service_type._response_class())
 
     def _on_arm(self, request):
         def work(_):
@@ -177,6 +152,21 @@ class VehicleServices:
             return srv.UploadTrajectoryResponse()
 
         return self._jobs.submit("upload_trajectory", work, is_flight=True)
+
+    def _on_upload_compressed(self, request):
+        start = (request.start.x, request.start.y, request.start.z, request.startYaw)
+        segments = [
+            (each.duration.to_sec(), each.x, each.y, each.z, each.yaw) for each in request.segments
+        ]
+
+        def work(job):
+            trajectories = self._crazyflie.trajectories.guarded(lambda: job.is_valid)
+            trajectories.upload_compressed(
+                request.trajectoryId, request.offset, start, segments, job.check
+            )
+            return srv.UploadCompressedTrajectoryResponse()
+
+        return self._jobs.submit("upload_compressed_trajectory", work, is_flight=True)
 
     def _reboot(self):
         try:

@@ -16,6 +16,7 @@ from crazyflie_driver.vehicle_parameters import (
     STATUS_TOPIC,
     VEHICLE_STATUS_TOPIC,
 )
+from crazyflie_link.broadcast import Broadcaster
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import LinkLostError
 from crazyflie_msgs.msg import VehicleStatus
@@ -31,9 +32,19 @@ _STATES = ("text", "link", "supervisor", "has_supervisor", "is_emergency", "batt
 """Fields that are published when they change."""
 
 
+_MOST = 1 << 15
+"""Packets in a second. The vehicle counts in 16 bits; more is its restart."""
+
+
 @dataclass(eq=False)
 class StatusPublisher:
-    """Publish the status of a vehicle, in words and typed, and whether it is connected."""
+    """Publish the status of a vehicle, in words and typed, and whether it is connected.
+
+    Attributes
+    ----------
+    broadcaster : Broadcaster or None
+        Counts what is sent to all vehicles of its channel.
+    """
 
     _handle: NodeHandle
     _prefix: str
@@ -42,6 +53,10 @@ class StatusPublisher:
     _setpoints: SetpointTopics
     _battery: Battery
     _connection: Connection
+    broadcaster: Broadcaster | None = None
+    # Counts of received and sent broadcasts, received and sent unicasts; and in the last period.
+    _counts: tuple[int, ...] = (0, 0, 0, 0)
+    _in_period: tuple[int, ...] = (0, 0, 0, 0)
     _published: VehicleStatus | None = None
     _is_connected: bool = False
 
@@ -77,12 +92,21 @@ class StatusPublisher:
             setpoints_ignored=self._setpoints.ignored,
             are_setpoints_blocked=self._setpoints.gate.is_blocking(self._handle.time()),
             restarts=crazyflie.restarts,
+            pm_state=_power_state(self._log.power_state),
+            supervisor_info=int(state or 0),
         )
+        (
+            message.num_rx_broadcast,
+            message.num_tx_broadcast,
+            message.num_rx_unicast,
+            message.num_tx_unicast,
+        ) = self._in_period
         # Without a link there are no figures.
         with contextlib.suppress(LinkLostError):
             message.link_quality = crazyflie.quality()
             message.is_link_poor = crazyflie.is_poor()
             message.latency = crazyflie.latency()
+            message.latency_unicast = _milliseconds(message.latency)
             message.last_heard = crazyflie.age()
         message.text = status.words(message)
         return message
@@ -104,10 +128,27 @@ class StatusPublisher:
             self._is_connected = is_connected
             self._connected.publish(Bool(is_connected))
 
+    def _count_packets(self):
+        log, broadcaster = self._log, self.broadcaster
+        sent = 0 if broadcaster is None else broadcaster.sent
+        counts = (log.received_broadcasts, sent, log.received_unicasts, self._crazyflie.sent)
+        new = [(now - before) & 0xFFFF for now, before in zip(counts, self._counts, strict=True)]
+        self._counts = counts
+        self._in_period = tuple(count if count < _MOST else 0 for count in new)
+
     def _repeat(self):
+        self._count_packets()
         self._typed.publish(self.status())
         self._connected.publish(Bool(self._is_connected))
 
 
 def _or_nan(value):
     return math.nan if value is None else value
+
+
+def _power_state(state):
+    return VehicleStatus.PM_STATE_UNKNOWN if state is None else state & 0xFF
+
+
+def _milliseconds(latency):
+    return min(round(1000.0 * latency), 0xFFFF) if math.isfinite(latency) else 0

@@ -16,6 +16,7 @@ from crazyflie_driver.service_names import ServiceNames
 from crazyflie_driver.services import VehicleServices
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
+from crazyflie_driver.setup_services import SetupServices
 from crazyflie_driver.shutdown import Shutdown
 from crazyflie_driver.status_publisher import StatusPublisher
 from crazyflie_driver.vehicle_parameters import VehicleParameters
@@ -70,7 +71,17 @@ class DriverVehicle:
         self._mirror = mirror = ParameterMirror(own, prefix, crazyflie)
         self._names = names = ServiceNames(own, prefix)
         self._services = VehicleServices(
-            own, name, names, crazyflie, jobs, gate, flight, self.commands, emergency, mirror
+            own,
+            name,
+            names,
+            crazyflie,
+            jobs,
+            gate,
+            flight,
+            self.commands,
+            emergency,
+            mirror,
+            SetupServices(crazyflie, jobs, flight, emergency, mirror),
         )
         duration = server.landing_duration
         self._shutdown = Shutdown(crazyflie, emergency, flight, setpoints, duration, self._warn)
@@ -80,6 +91,11 @@ class DriverVehicle:
     def is_closing(self) -> bool:
         """Whether the vehicle is being removed."""
         return self._connection.is_closing
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the vehicle has been connected, and its services are there."""
+        return self._connection.is_established and not self.is_closing
 
     def connect(self) -> Future[None]:
         """Connect and announce all topics and services; the result is None.
@@ -144,6 +160,7 @@ class DriverVehicle:
         if state is LinkState.LOST:
             # The state before the loss is not that of now.
             self._log.supervisor = None
+            self._log.variances.clear()
         self._connection.on_state(state, text, self._resume)
 
     def _on_packet(self, port, channel, data):

@@ -22,6 +22,7 @@ _EXPECTED = (
 )
 
 _HIGHEST_CHANNEL = 125
+_DEFAULT_ID = 0xE7
 _HIGHEST_PORT = 65535
 
 
@@ -36,6 +37,24 @@ class Address:
     def is_radio(self) -> bool:
         """Whether a Crazyradio is between us and the vehicle."""
         return self.scheme == "radio"
+
+    @property
+    def channel(self) -> str:
+        """What vehicles share that a broadcast reaches: dongle, channel and rate of a radio.
+
+        Vehicles on UDP are on one channel; any other is alone on its own.
+        """
+        if self.is_radio:
+            return "/".join(self.uri.partition("?")[0].split("/")[:5])
+        return self.scheme if self.scheme == "udp" else self.uri
+
+    @property
+    def vehicle_id(self) -> int | None:
+        """Last byte of the radio's address, by which packed poses name it; None if unknown."""
+        if not self.is_radio:
+            return None
+        address = self.uri.partition("?")[0].split("/")[5:]
+        return int(address[0], 16) & 0xFF if address else _DEFAULT_ID
 
     @classmethod
     def parse(cls, uri: str) -> "Address":

@@ -7,12 +7,18 @@ again. An attempt to open a dongle that is absent leaves an entry that is never 
 
 import contextlib
 import importlib
+import queue
 import re
-from collections.abc import Iterable
+import time
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
+from cflib.crtp import radiodriver
 from cflib.crtp.crtpdriver import CRTPDriver
 from cflib.crtp.radiodriver import RadioDriver, RadioManager
+from cflib.drivers.crazyradio import Crazyradio
+from typing_extensions import override
 
 PRIVATE_NAMES = (
     "cflib.crazyflie:Crazyflie._link_error_cb",
@@ -24,13 +30,28 @@ PRIVATE_NAMES = (
     "cflib.crtp.radiodriver:RadioDriver._thread",
     "cflib.crtp.radiodriver:RadioManager._lock",
     "cflib.crtp.radiodriver:RadioManager._radios",
+    "cflib.crtp.radiodriver:_RadioCommands.SEND_PACKET",
     "cflib.crtp.radiodriver:_RadioDriverThread._sp",
+    # The name by which it makes its dongles.
+    "cflib.crtp.radiodriver:_SharedRadio.Crazyradio",
     "cflib.crtp.radiodriver:_SharedRadio._lock",
     "cflib.crtp.radiodriver:_SharedRadio._radio",
     "cflib.crtp.radiodriver:_SharedRadio._rsp_queues",
+    "cflib.crtp.radiodriver:_SharedRadioInstance._cmd_queue",
+    "cflib.crtp.radiodriver:_SharedRadioInstance._instance_id",
     "cflib.crtp.radiodriver:_SharedRadioInstance._rsp_queue",
 )
 """MODULE:CLASS.ATTRIBUTE; an attribute of the class, or one that its constructor sets."""
+
+BROADCAST_ADDRESS = (0xFF, 0xE7, 0xE7, 0xE7, 0xE7)
+"""Every vehicle listens to it, beside its own address (crazyflie2-nrf-firmware)."""
+
+PACKET_GAP = 0.0005
+"""Between two broadcast packets, s: a vehicle hands one on to its main processor at 1 Mbit/s, with
+37 bytes of 10 bits in 0.37 ms; crazyflie_cpp keeps the same distance."""
+
+_DONGLE_LIMIT = 2.0
+"""How long, in s, the dongle may take for a broadcast; cflib gives it 1 s for a packet."""
 
 
 def check_private_names(names: Iterable[str] = PRIVATE_NAMES) -> None:
@@ -89,4 +110,77 @@ def release(driver: CRTPDriver) -> None:
         radio._rsp_queue.put(None)
 
 
+class BroadcastingRadio(Crazyradio):
+    """cflib's dongle, which can send without acknowledgement to `BROADCAST_ADDRESS`.
+
+    Without acknowledgement the dongle gives no answer (its USB protocol), and cflib waits for one.
+    """
+
+    @override
+    def set_address(self, address: Sequence[int]) -> None:
+        is_broadcast = tuple(address) == BROADCAST_ADDRESS
+        if is_broadcast != self._is_broadcasting:
+            self.set_ack_enable(not is_broadcast)
+        super().set_address(address)
+
+    @override
+    def send_packet(self, dataOut: Any) -> Any:
+        """Send a packet, or to the broadcast address a sequence of them."""
+        if not self._is_broadcasting:
+            return super().send_packet(dataOut)
+        for data in dataOut:
+            # As cflib: the next unicast packet shows that the dongle is gone.
+            with contextlib.suppress(OSError):
+                self.handle.write(endpoint=1, data=data, timeout=1000)
+            time.sleep(PACKET_GAP)
+        return None
+
+    @property
+    def _is_broadcasting(self):
+        return self.current_address is not None and (
+            tuple(self.current_address) == BROADCAST_ADDRESS
+        )
+
+
+class RadioBroadcast:
+    """A user of a dongle that broadcasts on the channel of a vehicle's address (a URI)."""
+
+    def __init__(self, uri: str):
+        self._uri = uri
+        self._instance: radiodriver._SharedRadioInstance | None = None
+
+    def transmit(self, packets: Sequence[bytes]) -> None:
+        """Send packets, before all that waits for the dongle; blocks until they are sent.
+
+        Raises `OSError` if the dongle is not there, or does not react.
+        """
+        try:
+            if self._instance is None:
+                forget_dead_radios()
+                self._devid, self._channel, self._rate, *_ = RadioDriver.parse_uri(self._uri)
+                self._instance = RadioManager.open(self._devid)
+            instance, commands = self._instance, self._instance._cmd_queue
+            where = (self._channel, BROADCAST_ADDRESS, self._rate)
+            send = radiodriver._RadioCommands.SEND_PACKET
+            with commands.mutex:
+                commands.queue.appendleft((instance._instance_id, send, (*where, packets)))
+                commands.not_empty.notify()
+            instance._rsp_queue.get(timeout=_DONGLE_LIMIT)
+        except queue.Empty:
+            self.close()
+            raise OSError("the Crazyradio does not react") from None
+        except Exception as error:
+            # cflib raises bare exceptions.
+            self.close()
+            raise OSError(str(error)) from None
+
+    def close(self) -> None:
+        """Leave the dongle to its other users."""
+        instance, self._instance = self._instance, None
+        if instance is not None:
+            instance.close()
+
+
 check_private_names()
+# The threads that own the dongles make them by this name.
+radiodriver.Crazyradio = BroadcastingRadio

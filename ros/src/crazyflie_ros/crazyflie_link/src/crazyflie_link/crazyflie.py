@@ -7,10 +7,12 @@ from collections.abc import Callable
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.address import Address
+from crazyflie_link.broadcast import is_broadcast
 from crazyflie_link.console import Console
 from crazyflie_link.emergency import EmergencyStop
 from crazyflie_link.errors import RefusedError, UnknownNameError, ValueRangeError
 from crazyflie_link.high_level import HighLevel
+from crazyflie_link.lighthouse import Lighthouse
 from crazyflie_link.link import LOG_DATA, Link, OnPacket
 from crazyflie_link.link_monitor import Uptime
 from crazyflie_link.link_setup import Limits
@@ -60,10 +62,12 @@ class Crazyflie:
 
     Attributes
     ----------
-    setpoints, high_level, trajectories, localization, parameters, log, supervisor
+    setpoints, high_level, trajectories, localization, lighthouse, parameters, log, supervisor
         Parts of the firmware; see their classes.
     restarts : int
         How many times the vehicle's clock was seen to begin anew.
+    sent : int
+        Packets that were sent to this vehicle alone.
     rssi : float or None
         Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere.
     """
@@ -93,10 +97,11 @@ class Crazyflie:
         self.high_level = HighLevel(link)
         self.trajectories = Trajectories(link, self.high_level)
         self.localization = Localization(link)
+        self.lighthouse = Lighthouse(link)
         self.parameters = FirmwareParameters(link)
         self.log = Log(link)
         self.supervisor = Supervisor(link, self._emergency)
-        self.restarts = 0
+        self.restarts = self.sent = 0
         self._uptime = Uptime()
         self._on_packet = on_packet
         self._blocks: list[LogBlock] = []
@@ -175,6 +180,7 @@ class Crazyflie:
     def _make_link(self, cache, limits):
         folder = table_cache() if cache is None else cache
         link = Link(self.address, limits, folder, self._on_received)
+        link.cflib.packet_sent.add_callback(self._on_sent)
         link.cflib.link_statistics.uplink_rssi_updated.add_callback(self._on_rssi)
         return link
 
@@ -202,6 +208,9 @@ class Crazyflie:
             self._console.receive(data)
         if self._on_packet is not None:
             self._on_packet(port, channel, data)
+
+    def _on_sent(self, sent):
+        self.sent += not is_broadcast(sent)
 
     def _on_rssi(self, rssi):
         self.rssi = rssi

@@ -39,6 +39,9 @@ _OLD_STOP = packet(
 )
 _ASK_STATE = packet(CRTPPort.SUPERVISOR, SUPERVISOR_CH_INFO, bytes([CMD_GET_STATE_BITFIELD]))
 
+BROADCAST_STOP = (_STOP, _OLD_STOP, _STOP_SETPOINT)
+"""Stops the motors of vehicles with any firmware."""
+
 
 @dataclass(eq=False)
 class EmergencyStop:
@@ -126,14 +129,7 @@ class EmergencyStop:
     @staticmethod
     def _send(link: Link, urgent: bool) -> None:
         def send():
-            packets = [_STOP_SETPOINT]
-            if link.protocol < SUPERVISOR_PROTOCOL:
-                packets.insert(0, _OLD_STOP)
-            # A negative one is not known yet.
-            if not 0 <= link.protocol < SUPERVISOR_PROTOCOL:
-                packets.insert(0, _STOP)
-                packets.append(_ASK_STATE)
-            for each in packets:
+            for each in _packets(link.protocol):
                 link.cflib.send_packet(each)
 
         with contextlib.suppress(LinkLostError):
@@ -142,3 +138,14 @@ class EmergencyStop:
             else:
                 # One that could not be sent yet is replaced.
                 link.put_latest(_STREAM, send)
+
+
+def _packets(protocol):
+    packets = [_STOP_SETPOINT]
+    if protocol < SUPERVISOR_PROTOCOL:
+        packets.insert(0, _OLD_STOP)
+    # A negative one is not known yet.
+    if not 0 <= protocol < SUPERVISOR_PROTOCOL:
+        packets.insert(0, _STOP)
+        packets.append(_ASK_STATE)
+    return packets

@@ -1,6 +1,7 @@
 """Commands that the vehicle's own planner carries out."""
 
 import copy
+import math
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -9,14 +10,13 @@ from typing import Self
 from cflib.crazyflie.high_level_commander import HighLevelCommander
 from cflib.crtp.crtpstack import CRTPPort
 
+from crazyflie_link.broadcast import SharedCommand, recorded
 from crazyflie_link.checks import check_byte, check_finite, check_positive
-from crazyflie_link.errors import AlreadyLandingError, RefusedError
+from crazyflie_link.errors import AlreadyLandingError, RefusedError, ValueRangeError
+from crazyflie_link.high_level_replies import is_carried_out, request_after_broadcast
 from crazyflie_link.link import Link
 from crazyflie_link.request_reply import REPLY_LIMIT, Request
 from crazyflie_link.subsystem import Subsystem
-from crazyflie_link.supervisor import read_state
-from crazyflie_model.polynomials import PIECE_SIZE
-from crazyflie_model.supervisor import SupervisorState
 
 ALL_GROUPS = 0
 """Group mask that every vehicle obeys."""
@@ -53,6 +53,7 @@ class HighLevel(Subsystem):
         super().__init__(current_link)
         self._knowledge = _Knowledge()
         self._is_dry = False
+        self._shared: SharedCommand | None = None
 
     def forget_trajectories(self) -> None:
         """Take note that the vehicle has restarted: no trajectory is defined, it has no group."""
@@ -65,6 +66,16 @@ class HighLevel(Subsystem):
         dry._is_dry = True
         dry._knowledge = copy.deepcopy(self._knowledge)
         return dry
+
+    def broadcast(self, shared: SharedCommand) -> Self:
+        """Return one whose next command is sent to several vehicles at once.
+
+        A broadcast is not acknowledged, but every vehicle that has received it answers as it does
+        to its own command. One that does not answer within 0.2 s is sent its own.
+        """
+        other = copy.copy(self)
+        other._shared = shared
+        return other
 
     def is_addressed(self, group_mask: int) -> bool | None:
         """Return whether the vehicle obeys commands to these groups; None if that is not known.
@@ -126,16 +137,52 @@ class HighLevel(Subsystem):
         duration: float,
         relative: bool = False,
         group_mask: int = ALL_GROUPS,
+        linear: bool = False,
     ) -> None:
-        """Fly to a position (x, y, z in m) and a yaw (rad) in a duration (s)."""
+        """Fly to a position (x, y, z in m) and a yaw (rad) in a duration (s).
+
+        A linear one has a constant velocity instead of a smooth beginning and end.
+        """
         x, y, z = position
         _check("go-to", duration, group_mask, x, y, z, yaw)
         is_new = self._current_link().protocol >= _GO_TO_2_PROTOCOL
+        if linear and not is_new:
+            raise RefusedError("the go-to command: this firmware has no linear one; update it")
         self._command(
             "the go-to command",
             HighLevelCommander.COMMAND_GO_TO_2 if is_new else HighLevelCommander.COMMAND_GO_TO,
-            lambda c: c.go_to(x, y, z, yaw, duration, relative=relative, group_mask=group_mask),
+            lambda c: c.go_to(
+                x, y, z, yaw, duration, relative=relative, linear=linear, group_mask=group_mask
+            ),
             resend=not relative,
+        )
+
+    def spiral(
+        self,
+        angle: float,
+        radii: tuple[float, float],
+        ascent: float,
+        duration: float,
+        is_sideways: bool = False,
+        is_clockwise: bool = False,
+        group_mask: int = ALL_GROUPS,
+    ) -> None:
+        """Fly along a spiral of an angle (rad), between two radii (m), rising by ``ascent`` (m)."""
+        _check("spiral", duration, group_mask, angle, *radii, ascent)
+        if abs(angle) > 2.0 * math.pi:
+            raise ValueRangeError(f"spiral: angle is {angle:g} rad; expected -2 pi to 2 pi")
+        for radius in radii:
+            if radius < 0.0:
+                raise ValueRangeError(f"spiral: radius is {radius:g} m; expected at least 0")
+        if self._current_link().protocol < _GO_TO_2_PROTOCOL:
+            raise RefusedError("the spiral command: this firmware has none; update it")
+        self._command(
+            "the spiral command",
+            HighLevelCommander.COMMAND_SPIRAL,
+            lambda c: c.spiral(
+                angle, *radii, ascent, duration, is_sideways, is_clockwise, group_mask
+            ),
+            resend=False,
         )
 
     def start_trajectory(
@@ -183,23 +230,28 @@ class HighLevel(Subsystem):
             resend=False,
         )
 
-    def define_trajectory(self, trajectory_id: int, offset: int, pieces: int) -> None:
-        """Define a trajectory: pieces in the trajectory memory, from an offset (bytes) on."""
+    def define_trajectory(
+        self, trajectory_id: int, place: range, pieces: int, is_compressed: bool = False
+    ) -> None:
+        """Define a trajectory: pieces that are in these bytes of the trajectory memory."""
         check_byte("trajectory number", trajectory_id)
         check_byte("number of pieces", pieces)
+        kind = HighLevelCommander.TRAJECTORY_TYPE_POLY4D
+        if is_compressed:
+            kind = HighLevelCommander.TRAJECTORY_TYPE_POLY4D_COMPRESSED
         self._command(
             "the definition of the trajectory",
             HighLevelCommander.COMMAND_DEFINE_TRAJECTORY,
-            lambda c: c.define_trajectory(trajectory_id, offset, pieces),
+            lambda c: c.define_trajectory(trajectory_id, place.start, pieces, kind),
         )
         self._knowledge.overwritten.pop(trajectory_id, None)
-        self._knowledge.defined[trajectory_id] = range(offset, offset + pieces * PIECE_SIZE)
+        self._knowledge.defined[trajectory_id] = place
 
-    def begin_upload(self, trajectory_id: int, begin: int, end: int) -> None:
+    def begin_upload(self, trajectory_id: int, place: range) -> None:
         """Take note that bytes of the memory are written: what was defined there cannot fly."""
         known = self._knowledge
-        for other, place in known.defined.items():
-            if place.start < end and begin < place.stop:
+        for other, written in known.defined.items():
+            if written.start < place.stop and place.start < written.stop:
                 known.overwritten[other] = trajectory_id
 
     def _command(self, what, number, send, resend=True):
@@ -211,26 +263,24 @@ class HighLevel(Subsystem):
         def transmit():
             nonlocal sent
             sent += 1
-            send(link.cflib.high_level_commander)
+            if self._shared is not None and sent == 1:
+                self._shared.ready(recorded(link, send, HighLevelCommander))
+            else:
+                send(link.cflib.high_level_commander)
 
         request = Request(CRTPPort.SETPOINT_HL, 0, bytes([number]), what, resend)
-        answer = link.request(transmit, request)
+        if self._shared is None or resend:
+            answer = link.request(transmit, request)
+        else:
+            answer = request_after_broadcast(link, transmit, request)
         # The first three bytes of the request, then the firmware's errno.
         code = answer[3] if len(answer) > 3 else 0
-        if code and not (code == _BUSY and sent > 1 and self._is_carried_out(number)):
+        # A broadcast is repeated, too.
+        is_repeated = sent > 1 or self._shared is not None
+        if code and not (code == _BUSY and is_repeated and is_carried_out(link, number)):
             is_landing = code == _BUSY and number == HighLevelCommander.COMMAND_LAND_2
             error = AlreadyLandingError if is_landing else RefusedError
             raise error(f"{what}: the vehicle refuses it ({os.strerror(code)}, {code})")
-
-    def _is_carried_out(self, number):
-        # Whether the repetition of a command was refused because the first one, whose reply was
-        # lost, is obeyed.
-        if number != HighLevelCommander.COMMAND_TAKEOFF_2:
-            return number == HighLevelCommander.COMMAND_LAND_2
-        state = read_state(self._current_link())
-        if state is None or not state.reports_planner:
-            return True
-        return SupervisorState.HIGH_LEVEL_ACTIVE in state
 
 
 def _check(what: str, duration: float, group_mask: int, *values: float) -> None:

@@ -1,8 +1,18 @@
 """Parameters of the firmware: names, types, values."""
 
+import os
 import struct
 
-from cflib.crazyflie.param import READ_CHANNEL, WRITE_CHANNEL, ParamTocElement
+from cflib.crazyflie.param import (
+    MISC_CHANNEL,
+    MISC_PERSISTENT_CLEAR,
+    MISC_PERSISTENT_GET_STATE,
+    MISC_PERSISTENT_STORE,
+    READ_CHANNEL,
+    WRITE_CHANNEL,
+    ParamTocElement,
+    PersistentParamState,
+)
 from cflib.crtp.crtpstack import CRTPPort
 
 from crazyflie_link.errors import NoReplyError, RefusedError, ValueRangeError, unknown_name
@@ -64,6 +74,45 @@ class FirmwareParameters(Subsystem):
         if answer != data:
             raise _refusal(request, answer)
         return self._keep(link, element, answer[2:])
+
+    def store(self, name: str) -> None:
+        """Store the present value of a persistent parameter: it outlives a restart; blocks."""
+        self._persist(name, MISC_PERSISTENT_STORE, "storing")
+
+    def clear(self, name: str) -> None:
+        """Forget the stored value of a persistent parameter; blocks."""
+        self._persist(name, MISC_PERSISTENT_CLEAR, "clearing")
+
+    def stored(self, name: str) -> PersistentParamState:
+        """Return is_stored, default_value and stored_value (or None) of one; blocks."""
+        element, answer = self._ask_persistent(
+            name, MISC_PERSISTENT_GET_STATE, "reading the state of"
+        )
+        if answer[3] not in (0, 1) or len(answer) < 4 + struct.calcsize(element.pytype):
+            raise RefusedError(f"reading the state of {name}: the vehicle refuses it")
+        is_stored = answer[3] == 1
+        kind = element.pytype.lstrip("<")
+        default, *kept = struct.unpack(f"<{kind * (1 + is_stored)}", answer[4:])
+        return PersistentParamState(is_stored, default, kept[0] if kept else None)
+
+    def _persist(self, name, command, verb):
+        _, answer = self._ask_persistent(name, command, verb)
+        if answer[3]:
+            raise RefusedError(
+                f"{verb} {name}: the vehicle refuses it ({os.strerror(answer[3])}, {answer[3]})"
+            )
+
+    def _ask_persistent(self, name, command, verb):
+        link = self._current_link()
+        element = self._find(link, name)
+        if not element.is_persistent():
+            raise RefusedError(f"{verb} {name}: it is no persistent parameter")
+        data = struct.pack("<BH", command, element.ident)
+        request = Request(CRTPPort.PARAM, MISC_CHANNEL, data, f"{verb} {name}")
+        answer = link.request(data, request)
+        if len(answer) < 4:
+            raise RefusedError(f"{verb} {name}: the vehicle answers without a status")
+        return element, answer
 
     def _look_up(self, name: str, expected: bytes, error: NoReplyError) -> int | float:
         # Only the reply may have been lost; or the vehicle has kept another value.

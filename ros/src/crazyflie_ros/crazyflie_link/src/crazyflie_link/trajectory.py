@@ -1,22 +1,26 @@
 """Trajectories of polynomials, kept in the vehicle's memory and flown by its planner."""
 
-import struct
+import math
 from collections.abc import Callable, Sequence
 from typing import Self
 
-from cflib.crazyflie.mem import CHAN_WRITE, MemoryElement, _WriteRequest
-from cflib.crtp.crtpstack import CRTPPort
+from cflib.crazyflie.mem import CompressedSegment, CompressedStart, MemoryElement
 from typing_extensions import override
 
 from crazyflie_link.checks import check_finite, check_positive
-from crazyflie_link.errors import RefusedError, ValueRangeError
+from crazyflie_link.errors import ValueRangeError
 from crazyflie_link.high_level import HighLevel
 from crazyflie_link.link import Link
-from crazyflie_link.request_reply import Request
+from crazyflie_link.memory import find_memory, write_memory
 from crazyflie_link.subsystem import MaySend, Subsystem
 from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 
-_CHUNK = _WriteRequest.MAX_DATA_LENGTH
+Segment = tuple[float, Sequence[float], Sequence[float], Sequence[float], Sequence[float]]
+"""Duration (s), and control points of x, y, z (m) and yaw (rad)."""
+
+_POINTS = (0, 1, 3, 7)
+_MOST_METRES, _MOST_RADIANS = 32.767, math.radians(3276.7)
+_MOST_SECONDS = 65.535
 
 
 class Trajectories(Subsystem):
@@ -48,7 +52,7 @@ class Trajectories(Subsystem):
         if not pieces:
             raise ValueRangeError(f"trajectory {trajectory_id} has no pieces")
         link = self._current_link()
-        memory = _memory(link)
+        memory = find_memory(link, MemoryElement.TYPE_TRAJ, "trajectories")
         begin = piece_offset * PIECE_SIZE
         end = begin + len(pieces) * PIECE_SIZE
         if end > memory.size:
@@ -57,12 +61,46 @@ class Trajectories(Subsystem):
                 f"do not fit: the vehicle has room for {memory.size // PIECE_SIZE}"
             )
         data = b"".join(map(_packed, pieces))
-        self._high_level.begin_upload(trajectory_id, begin, end)
-        for start in range(0, len(data), _CHUNK):
-            check()
-            _write(link, memory.id, begin + start, data[start : start + _CHUNK])
+        place = range(begin, end)
+        self._high_level.begin_upload(trajectory_id, place)
+        write_memory(link, memory.id, begin, data, "the trajectory", check)
         check()
-        self._high_level.define_trajectory(trajectory_id, begin, len(pieces))
+        self._high_level.define_trajectory(trajectory_id, place, len(pieces))
+
+    def upload_compressed(
+        self,
+        trajectory_id: int,
+        offset: int,
+        start: Sequence[float],
+        segments: Sequence[Segment],
+        check: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Write a compressed trajectory from a byte of the memory on, and define it; blocks.
+
+        It begins at ``start`` (x, y, z in m, yaw in rad). A segment is its duration (s), and the
+        control points of a Bezier curve for x, y, z and yaw without the first: 0, 1, 3 or 7.
+        """
+        if not segments:
+            raise ValueRangeError(f"trajectory {trajectory_id} has no segments; expected one")
+        link = self._current_link()
+        memory = find_memory(link, MemoryElement.TYPE_TRAJ, "trajectories")
+        data = bytes(_packed_start(start))
+        for number, segment in enumerate(segments):
+            data += _packed_segment(number, *segment)
+        # The firmware flies segments until one has no duration.
+        data += bytes(CompressedSegment(0.0, [], [], [], []).pack())
+        if offset + len(data) > memory.size:
+            raise ValueRangeError(
+                f"trajectory {trajectory_id}: {len(data)} bytes from byte {offset} on do not fit; "
+                f"the vehicle has {memory.size}"
+            )
+        place = range(offset, offset + len(data))
+        self._high_level.begin_upload(trajectory_id, place)
+        write_memory(link, memory.id, offset, data, "the trajectory", check)
+        check()
+        self._high_level.define_trajectory(
+            trajectory_id, place, min(len(segments), 255), is_compressed=True
+        )
 
 
 def _packed(piece: PolynomialPiece) -> bytes:
@@ -77,18 +115,30 @@ def _packed(piece: PolynomialPiece) -> bytes:
     return piece.pack()
 
 
-def _memory(link):
-    memories = link.cflib.mem.get_mems(MemoryElement.TYPE_TRAJ)
-    if not memories:
-        raise RefusedError("the vehicle has no memory for trajectories: update its firmware")
-    return memories[0]
+def _packed_start(start: Sequence[float]) -> bytes:
+    for name, value in zip(("x", "y", "z", "yaw"), start, strict=True):
+        _check_points(f"start: {name}", name, [value])
+    return bytes(CompressedStart(*start).pack())
 
 
-def _write(link: Link, memory_id: int, address: int, data: bytes) -> None:
-    # cflib's own writer never ends when a reply comes twice.
-    where = struct.pack("<BI", memory_id, address)
-    what = f"writing the trajectory, byte {address}"
-    answer = link.request(where + data, Request(CRTPPort.MEM, CHAN_WRITE, where, what))
-    status = answer[5] if len(answer) > 5 else 0
-    if status:
-        raise RefusedError(f"{what}: the vehicle refuses it (error {status})")
+def _packed_segment(number: int, duration: float, *axes: Sequence[float]) -> bytes:
+    what = f"segment {number}"
+    if not 0.001 <= duration <= _MOST_SECONDS:
+        raise ValueRangeError(
+            f"{what}: its duration is {duration:g} s; expected 0.001 to {_MOST_SECONDS:g} s"
+        )
+    for name, points in zip(("x", "y", "z", "yaw"), axes, strict=True):
+        if len(points) not in _POINTS:
+            raise ValueRangeError(
+                f"{what}: {name} has {len(points)} control points; expected 0, 1, 3 or 7"
+            )
+        _check_points(f"{what}: {name}", name, points)
+    return bytes(CompressedSegment(duration, *axes).pack())
+
+
+def _check_points(what, name, points):
+    most, unit = (_MOST_RADIANS, "rad") if name == "yaw" else (_MOST_METRES, "m")
+    for value in points:
+        # One that is not a number is refused as well.
+        if not abs(value) <= most:
+            raise ValueRangeError(f"{what} is {value:g} {unit}; expected at most +-{most:.6g}")

@@ -27,7 +27,10 @@ _ACCELERATION_NOISE = 3.7e-4
 _RATE_NOISE = 1e-5
 """Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each."""
 
-_FIRST_VARIANCES = (100.0, 0.0, 1.0)
+_MOST_VARIANCE = 100.0
+"""Of position and velocity, m^2 and m^2/s^2 (MAX_COVARIANCE of kalman_core.c)."""
+
+_FIRST_VARIANCES = (_MOST_VARIANCE, 0.0, 1.0)
 """Of the position, with the velocity, of the velocity; m^2, m^2/s, m^2/s^2."""
 
 _FIRST_ATTITUDE_VARIANCE = 10.0
@@ -120,9 +123,10 @@ class Estimator:
         q = _ACCELERATION_NOISE
         p += 2.0 * dt * m + dt * dt * v + q * dt**3 / 3.0
         m += dt * v + q * dt * dt / 2.0
-        v += q * dt
-        if p > _FIRST_VARIANCES[0]:
-            p, m, v = _FIRST_VARIANCES
+        # As in the firmware, it grows for as long as nothing is measured.
+        v = min(v + q * dt, _MOST_VARIANCE)
+        if p > _MOST_VARIANCE:
+            p, m = _MOST_VARIANCE, 0.0
         self._covariance = (p, m, v)
         self.variance_attitude = min(
             self.variance_attitude + _RATE_NOISE * dt, _FIRST_ATTITUDE_VARIANCE

@@ -7,7 +7,7 @@ MAX_DATA = 30
 """Bytes that a packet holds beside its header."""
 
 _RESERVED = 3 << 2
-"""Bits of the header that are always set."""
+"""Bits of the header that are set, but in broadcast packets."""
 
 
 class Port(IntEnum):
@@ -59,3 +59,12 @@ def decode(datagram: bytes) -> Packet | None:
     if not 1 <= len(datagram) <= MAX_DATA + 1:
         return None
     return Packet(datagram[0] >> 4, datagram[0] & 3, datagram[1:])
+
+
+def is_broadcast(datagram: bytes) -> bool:
+    """Return whether a datagram is for all vehicles of a radio channel.
+
+    Over UDP each gets a copy, in whose header the bits of the link are cleared.
+    """
+    is_for_link = datagram[0] >> 4 == Port.LINK if datagram else True
+    return not is_for_link and not datagram[0] & _RESERVED

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing_extensions import override
 
 from crazyflie_virtual.link.channel import Channel
+from crazyflie_virtual.link.crtp import is_broadcast
 from crazyflie_virtual.observer import Observation
 from crazyflie_virtual.server import Address, Server, open_socket, received, send
 from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
@@ -104,10 +105,15 @@ class VehicleServer(Server):
             if self._client is not None:
                 self._down.push(now, (datagram, self._client))
         for datagram, sender in self._up.pop(now):
-            if datagram[:1] != _NULL:
+            receiver: Address | None = sender
+            if is_broadcast(datagram):
+                # As on a radio, what answers it goes to the client.
+                receiver = self._client
+            elif datagram[:1] != _NULL:
                 self._client = sender
             for answer in self.vehicle.receive(datagram):
-                self._down.push(now, (answer, sender))
+                if receiver is not None:
+                    self._down.push(now, (answer, receiver))
         for datagram, receiver in self._down.pop(now):
             send(self._socket, datagram, receiver)
         if self._observer[1] and now >= self._next_observation:

@@ -11,23 +11,26 @@ class LinkStatistics:
     ----------
     is_connected : bool
         Whether a packet came lately.
-    received : int
-        Packets since the start, modulo 2^16.
+    received, received_broadcasts : int
+        Packets since the start, to this vehicle and to all, modulo 2^16.
     received_rate, sent_rate : float
         Packets per second, over the last second.
     """
 
     def __init__(self) -> None:
         self.is_connected = False
-        self.received = 0
+        self.received = self.received_broadcasts = 0
         self.received_rate = self.sent_rate = 0.0
         self._last: float | None = None
         self._window = 0.0
         self._in = self._out = 0
 
-    def count_received(self, time: float) -> None:
+    def count_received(self, time: float, is_broadcast: bool) -> None:
         """Count a packet that came at ``time`` (s)."""
-        self.received = (self.received + 1) & 0xFFFF
+        if is_broadcast:
+            self.received_broadcasts = (self.received_broadcasts + 1) & 0xFFFF
+        else:
+            self.received = (self.received + 1) & 0xFFFF
         self._in += 1
         self._last = time
         self.is_connected = True

@@ -114,7 +114,11 @@ _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
     ],
     "radio": [
         *_rows(U8, rssi=40, isConnected="link_statistics.is_connected"),
-        *_rows(U16, numRxBc=0, numRxUc="link_statistics.received"),
+        *_rows(
+            U16,
+            numRxBc="link_statistics.received_broadcasts",
+            numRxUc="link_statistics.received",
+        ),
     ],
     "motor": [
         *_rows(U16, **{f"m{i}": f"stabilizer.commands.m{i}" for i in range(1, 5)}),

@@ -21,6 +21,7 @@ TRAJECTORY_MEMORY = (1, 0x12, 4096)
 
 _ATTITUDE = struct.Struct("<fffH")
 _EMERGENCY_STOP = 0x03
+_LINK_BITS = 3 << 2
 _NULL_PACKET = (15, 3)
 """Port and channel of the packet by which vehicles are searched."""
 
@@ -38,6 +39,10 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         supervisor.info if ``log`` has it.
     received : list of (port, channel, bytes)
         All packets, oldest first.
+    broadcasts : list of (port, channel, bytes)
+        Those that came as a broadcast.
+    hears_broadcasts : bool
+        Whether broadcasts arrive.
     deaf : set of (port, channel, bytes)
         Packets that begin like this get no answer.
     answers : dict
@@ -61,6 +66,8 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         self.parameters = parameters if parameters is not None else {"ring.effect": ("B", 1, 0)}
         self.protocol = protocol
         self.received: list[tuple[int, int, bytes]] = []
+        self.broadcasts: list[tuple[int, int, bytes]] = []
+        self.hears_broadcasts = True
         self.deaf: set[tuple[int, int, bytes]] = set()
         self.answers: dict[tuple[int, int, int | None], bytes] = {}
         self.lose: Callable[[int], bool] = lambda count: False
@@ -132,8 +139,13 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
                 continue
             self._peer = peer
             port, channel, data = datagram[0] >> 4, datagram[0] & 3, datagram[1:]
+            is_broadcast = not datagram[0] & _LINK_BITS
+            if is_broadcast and not self.hears_broadcasts:
+                continue
             with self._changed:
                 self.received.append((port, channel, data))
+                if is_broadcast:
+                    self.broadcasts.append((port, channel, data))
                 self._changed.notify_all()
             is_deaf = any(
                 (p, c) == (port, channel) and data.startswith(prefix) for p, c, prefix in self.deaf

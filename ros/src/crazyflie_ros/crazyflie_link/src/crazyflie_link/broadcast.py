@@ -1,0 +1,134 @@
+"""Packets to all vehicles of one radio channel at once; no vehicle acknowledges them."""
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+
+from cflib.crtp.crtpstack import CRTPPacket
+
+from crazyflie_link.address import Address
+from crazyflie_link.cflib_internals import RadioBroadcast
+from crazyflie_link.link import Link
+from crazyflie_link.safe_crazyflie import packet
+from crazyflie_link.transmit_queue import TransmitQueue
+
+REPEATS, REPEAT_PERIOD = 5, 0.001
+"""How often a command is sent, and how long after each other, s: a vehicle that receives only the
+last one begins 4 ms after the others."""
+
+READY_TIME = 0.15
+"""How long the first vehicle of a shared command waits for the last, s; after 0.2 s without an
+answer each is sent its own command."""
+
+_LINK_BITS = 3 << 2
+"""Bits of the header that belong to the link. Over UDP they are cleared in a broadcast packet."""
+
+_log = logging.getLogger(__name__)
+
+
+def is_broadcast(sent: CRTPPacket) -> bool:
+    """Return whether a packet over UDP is a copy for all vehicles."""
+    return not sent.header & _LINK_BITS
+
+
+class Broadcaster:
+    """Sends to all vehicles of a radio's channel; over UDP, a copy to each of the links.
+
+    The address is that of any vehicle of the channel; ``links()`` returns those of the vehicles
+    that are connected.
+
+    Attributes
+    ----------
+    sent : int
+        Packets that were broadcast.
+    """
+
+    def __init__(self, address: Address, links: Callable[[], Iterable[Link]]):
+        self._links = links
+        self._radio = RadioBroadcast(address.uri) if address.is_radio else None
+        self._queue = TransmitQueue()
+        self.sent = 0
+
+    def send(self, packets: Sequence[CRTPPacket], urgent: bool = False) -> None:
+        """Have packets sent `REPEATS` times; does not block.
+
+        Urgent ones go before all others. What cannot be sent is logged: every vehicle has to be
+        looked at afterwards in any case.
+        """
+        self._queue.put(partial(self._repeat, packets), urgent)
+
+    def put_latest(self, stream: str, make: Callable[[], Sequence[CRTPPacket]]) -> None:
+        """Have the packets that ``make()`` returns sent once; see `TransmitQueue.put_latest`."""
+        self._queue.put_latest(stream, lambda: self._transmit(make()))
+
+    def close(self) -> None:
+        """Send nothing any more."""
+        self._queue.close()
+        if self._radio is not None:
+            self._radio.close()
+
+    def _repeat(self, packets):
+        for number in range(REPEATS):
+            if number:
+                time.sleep(REPEAT_PERIOD)
+            self._transmit(packets)
+
+    def _transmit(self, packets):
+        if self._radio is not None:
+            try:
+                self._radio.transmit([bytes([each.header, *each.data]) for each in packets])
+            except OSError as error:
+                _log.warning("a broadcast could not be sent: %s", error)
+                return
+        else:
+            for each in packets:
+                marked = packet(each.port, each.channel, each.data)
+                marked.header &= ~_LINK_BITS
+                for link in self._links():
+                    link.cflib.send_packet(marked)
+        self.sent += len(packets)
+
+
+class SharedCommand:
+    """A command to several vehicles that is sent once, when each can receive its answer.
+
+    If one of them does not become ready, nothing is sent: each repeats its own command.
+    """
+
+    def __init__(self, broadcaster: Broadcaster, vehicles: int):
+        self._broadcaster = broadcaster
+        self._awaited = vehicles
+        self._end: float | None = None
+        self._lock = threading.Lock()
+
+    def ready(self, command: CRTPPacket) -> None:
+        """Take note that one more vehicle is ready for the command, the same for all."""
+        with self._lock:
+            now = time.monotonic()
+            if self._end is None:
+                self._end = now + READY_TIME
+            self._awaited -= 1
+            if self._awaited == 0 and now < self._end:
+                self._broadcaster.send([command])
+
+
+class CommandRecorder:
+    """Stands for cflib's Crazyflie: what is sent to it is the attribute `sent`."""
+
+    def __init__(self, link: Link):
+        self.platform = link.cflib.platform
+        self.sent: CRTPPacket | None = None
+
+    def send_packet(self, command: CRTPPacket) -> None:
+        """Keep a packet."""
+        self.sent = command
+
+
+def recorded(link: Link, send: Callable[..., None], sender: type) -> CRTPPacket:
+    """Return the packet that ``send(sender)`` would send over a link."""
+    recorder = CommandRecorder(link)
+    send(sender(recorder))
+    assert recorder.sent is not None
+    return recorder.sent

@@ -1,0 +1,108 @@
+"""A fake of the USB device below cflib's radio driver, and of the bus that it is plugged into."""
+
+import socket
+import time
+
+import usb
+from cflib.drivers import crazyradio
+
+from crazyflie_link.cflib_internals import BROADCAST_ADDRESS
+
+NULL = 0xF3
+LINK_BITS = 3 << 2
+
+PLACES = ((10, 0xE7), (20, 0xE7), (30, 0x01), (30, 0x02))
+"""Channel and last byte of the address of each vehicle."""
+
+
+class Dongle:
+    """A USB device that passes packets on to vehicles, by channel and last byte of the address.
+
+    As the real one it gives no answer, and sends to all of the channel, if acknowledgements are
+    off and the address is that of broadcasts.
+    """
+
+    bcdDevice = 0x0053  # noqa: N815
+
+    def __init__(self, vehicles):
+        self._peers = {place: vehicle.port for place, vehicle in vehicles.items()}
+        self._sockets = {}
+        self._channel, self._address, self._acknowledges = 2, (0xE7,) * 5, True
+        self._answer = None
+        self.is_broken = False
+
+    def set_configuration(self, number):
+        self._check()
+
+    def reset(self):
+        self._check()
+
+    def ctrl_transfer(self, kind, request, wValue, wIndex, timeout, data_or_wLength):  # noqa: N803
+        self._check()
+        if request == crazyradio.SET_RADIO_CHANNEL:
+            self._channel = wValue
+        elif request == crazyradio.SET_RADIO_ADDRESS:
+            self._address = tuple(data_or_wLength)
+        elif request == crazyradio.ACK_ENABLE:
+            self._acknowledges = bool(wValue)
+
+    def write(self, endpoint, data, timeout):
+        self._check()
+        if not self._acknowledges:
+            assert self._address == BROADCAST_ADDRESS
+            for place in self._peers:
+                if place[0] == self._channel:
+                    self._link(place).send(bytes([data[0] & ~LINK_BITS, *data[1:]]))
+            return
+        place = (self._channel, self._address[-1])
+        if place not in self._peers:
+            self._answer = b"\0"
+            return
+        link = self._link(place)
+        if data[0] & NULL != NULL:
+            # What cflib's numbering of packets clears.
+            link.send(bytes([data[0] | LINK_BITS, *data[1:]]))
+        try:
+            self._answer = b"\1" + link.recv(64)
+        except BlockingIOError:
+            self._answer = b"\1"
+            # A real one needs about so long.
+            time.sleep(0.001)
+
+    def _link(self, place):
+        if place not in self._sockets:
+            link = self._sockets[place] = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+            link.connect(("127.0.0.1", self._peers[place]))
+            link.setblocking(False)
+        return self._sockets[place]
+
+    def read(self, endpoint, size, timeout):
+        self._check()
+        answer, self._answer = self._answer, None
+        if answer is None:
+            raise usb.USBTimeoutError("nothing to read")
+        return answer
+
+    def _check(self):
+        if self.is_broken:
+            raise usb.USBError("No such device (it may have been disconnected)", errno=19)
+
+
+class Bus:
+    """A USB bus with one socket for a dongle."""
+
+    def __init__(self, vehicles):
+        self._vehicles = vehicles
+        self.dongle = None
+        self.failed_attempts = 0
+
+    def plug_in(self):
+        self.dongle = Dongle(self._vehicles)
+
+    def break_it(self):
+        """Have the dongle answer no request any more; it stays plugged in."""
+        self.dongle.is_broken = True
+
+    def devices(self, serial=None):
+        self.failed_attempts += self.dongle is None
+        return [self.dongle] if self.dongle is not None else []

@@ -1,0 +1,149 @@
+"""Model of a radio channel: how long a Crazyradio is busy with each packet.
+
+All vehicles of a channel share it. A packet to one vehicle is acknowledged, and the acknowledgement
+carries what the vehicle has to send; a broadcast is not.
+
+Sources: nRF24L01+ product specification 1.0 (format of a packet, times); for the dongle the
+measurements in bitcraze/crazyradio2-firmware, issues 9 (2.5 ms for the setup requests before a
+packet, three of them) and 23 (1370 acknowledged packets a second to several vehicles, when address
+and channel come with the packet); for the distance of two broadcasts the serial line in the
+vehicle (syslink, 1 Mbit/s).
+"""
+
+from dataclasses import dataclass
+
+BIT_RATE = 2e6
+"""bit/s on air, of radio://.../2M."""
+
+TURNAROUND = 130e-6
+"""Of a transceiver, from standby or reception to transmission, s."""
+
+ROUND_TRIP = 1.0 / 1370
+"""Of an acknowledged packet with its USB transfers, without setup requests, s."""
+
+SETUP_REQUEST = 2.5e-3 / 3
+"""A USB control transfer that changes address or acknowledgement, s."""
+
+BROADCAST_GAP = 0.5e-3
+"""From one broadcast to the next, s: 37 bytes of 10 bits on the vehicle's serial line."""
+
+_OVERHEAD_BITS = 8 * (1 + 5 + 2) + 9
+"""Preamble, address, check sum; packet control field."""
+
+
+def air_time(data: int) -> float:
+    """Return how long a packet with so many bytes (0 to 32) is on air, s."""
+    if not 0 <= data <= 32:
+        raise ValueError(f"a radio packet holds 0 to 32 bytes; got {data}")
+    return (_OVERHEAD_BITS + 8 * data) / BIT_RATE
+
+
+@dataclass
+class RadioChannel:
+    """The time that one dongle spends on its channel.
+
+    Attributes
+    ----------
+    has_setup_requests : bool
+        Whether each change of the address or of the acknowledgement is a USB request of its own,
+        as with the Crazyradio PA, and with cflib 0.1.34 for all. Otherwise they come with the
+        packet (the Crazyradio 2.0's inline mode).
+    free : float
+        When the dongle is free again, s.
+    busy : float
+        For how long it has been at work, s.
+    unicasts, broadcasts : int
+        Packets so far.
+    """
+
+    has_setup_requests: bool = True
+    free: float = 0.0
+    busy: float = 0.0
+    unicasts: int = 0
+    broadcasts: int = 0
+    _address: int | None = None
+
+    def unicast(self, time: float, address: int, data: int, answer: int) -> float:
+        """Send a packet of so many bytes from ``time`` (s) on; return when its answer is there, s.
+
+        The bytes of the answer come with the acknowledgement.
+        """
+        on_air = 2.0 * TURNAROUND + air_time(data) + air_time(answer)
+        self.unicasts += 1
+        return self._occupy(time, address, max(ROUND_TRIP, on_air))
+
+    def broadcast(self, time: float, data: int) -> float:
+        """Send a packet to all vehicles; return when they have it, s."""
+        self.broadcasts += 1
+        return self._occupy(time, None, max(BROADCAST_GAP, TURNAROUND + air_time(data)))
+
+    def _occupy(self, time, address, duration):
+        if self.has_setup_requests and address != self._address:
+            changes_acknowledgement = (address is None) != (self._address is None)
+            duration += SETUP_REQUEST * (1 + changes_acknowledgement)
+        self._address = address
+        self.free = max(self.free, time) + duration
+        self.busy += duration
+        return self.free
+
+
+@dataclass(frozen=True)
+class Load:
+    """What is sent on a channel.
+
+    Attributes
+    ----------
+    vehicles : int
+    pose_rate : float
+        Frames of the motion capture, Hz.
+    frame : tuple of int
+        Bytes of each broadcast packet of a frame.
+    polls : float
+        Packets with acknowledgement to each vehicle, Hz: each brings one of its packets.
+    poll_size : tuple of int
+        Bytes of the packet, and of the answer.
+    """
+
+    vehicles: int
+    pose_rate: float
+    frame: tuple[int, ...]
+    polls: float = 20.0
+    poll_size: tuple[int, int] = (1, 31)
+
+
+@dataclass(frozen=True)
+class Usage:
+    """How a load of a channel is carried.
+
+    Attributes
+    ----------
+    share : float
+        Of the time that the dongle is at work; more than 1 is too much.
+    frame_delay, poll_delay : float
+        Longest time from when a frame, or a packet to a vehicle, is due until it is there, s.
+    """
+
+    share: float
+    frame_delay: float
+    poll_delay: float
+
+
+def usage(load: Load, channel: RadioChannel, duration: float = 1.0) -> Usage:
+    """Send a load on a channel for a while (s); frames go before packets to single vehicles."""
+    frames = [i / load.pose_rate for i in range(round(duration * load.pose_rate))]
+    polls = [
+        (i / (load.polls * load.vehicles), i % load.vehicles)
+        for i in range(round(duration * load.polls * load.vehicles))
+    ]
+    frame_delay = poll_delay = 0.0
+    while frames or polls:
+        now = max(channel.free, min(frames[:1] + [due for due, _ in polls[:1]]))
+        if frames and frames[0] <= now:
+            due = frames.pop(0)
+            for size in load.frame:
+                done = channel.broadcast(now, size)
+            frame_delay = max(frame_delay, done - due)
+        else:
+            due, vehicle = polls.pop(0)
+            poll_delay = max(poll_delay, channel.unicast(now, vehicle, *load.poll_size) - due)
+    return Usage(channel.busy / duration, frame_delay, poll_delay)

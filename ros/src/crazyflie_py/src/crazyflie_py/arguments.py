@@ -43,9 +43,9 @@ def _number(value: Any) -> float:
     return float(value) if isinstance(value, numbers.Real) else math.nan
 
 
-def group_mask(where: str, value: Any) -> int:
-    """Return a mask of 8 groups."""
-    return integer(where, "groupMask", value, 0, 255)
+def byte(where: str, name: str, value: Any) -> int:
+    """Return an integer from 0 to 255, as ids and masks are."""
+    return integer(where, name, value, 0, 255)
 
 
 def triple(where: str, name: str, value: Any, low: float = -math.inf) -> Triple:

@@ -117,7 +117,8 @@ def parameters(where: str, values: Any) -> dict[str, float]:
     checked = {}
     for name, value in values.items():
         key = parameter_name(where, name)
-        checked[key] = value if isinstance(value, int) else number(where, key, value)
+        is_integer = isinstance(value, numbers.Integral)
+        checked[key] = int(value) if is_integer else number(where, key, value)
     return checked
 
 

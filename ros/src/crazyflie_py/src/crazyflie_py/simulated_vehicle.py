@@ -1,0 +1,232 @@
+"""One vehicle of --sim."""
+
+import logging
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from crazyflie_model.angles import Triple
+from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_py.backend import VehicleBackend, VehicleState
+from crazyflie_py.fleet import FleetVehicle
+from crazyflie_py.ideal_motion import IdealMotion, Motion, attitude
+from crazyflie_py.setpoints import Attitude, MotorsOff, Setpoint
+from crazyflie_py.simulated_parameters import SimulatedParameters
+from crazyflie_py.trajectory_memory import TrajectoryMemory
+from crazyflie_virtual.firmware.planner import ACTIVE, Planner
+from crazyflie_virtual.firmware.states import Estimate
+
+_log = logging.getLogger(__name__)
+
+_FALL_HEIGHT = 0.1
+"""Height above the start from which motors are not stopped without a warning, m."""
+
+_SETPOINT_TIMEOUT = 0.5
+"""Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE)."""
+
+
+class SimulatedVehicle:
+    """A vehicle of `crazyflie_py.backend.VehicleBackend`.
+
+    The firmware's planner flies it, or the last setpoint. Where an ideal vehicle does more than a
+    real one would, a warning says so, once.
+
+    Parameters
+    ----------
+    vehicle : FleetVehicle
+    time : callable
+        Returns the time of the simulation, s.
+    max_speed, disturbance : float
+        Options --maxvel and --disturbance, m/s.
+    """
+
+    def __init__(
+        self,
+        vehicle: FleetVehicle,
+        time: Callable[[], float],
+        max_speed: float,
+        disturbance: float,
+    ):
+        self.name, self.id, self.initial_position, _ = vehicle
+        self._time = time
+        self._motion = IdealMotion(self.initial_position, max_speed, disturbance)
+        self._planner = Planner()
+        self._memory = TrajectoryMemory(self.name, self._planner, self._warn)
+        self._parameters = SimulatedParameters(self.name, self._planner)
+        self._setpoint: Setpoint | None = None
+        self._sent = 0.0
+        self._expiry = math.inf
+        self._locked = False
+        self._armed = True
+        self._warned: set[str] = set()
+
+    # Commands.
+
+    def _may_plan(self, method: str, group_mask: int) -> bool:
+        """Prepare for a high-level command; return whether it concerns this vehicle."""
+        if self._locked or (group_mask and not group_mask & self._planner.groups):
+            return False
+        if self._setpoint is not None and math.isinf(self._expiry):
+            self._warn(
+                f"{self.name}.{method}: setpoints were not ended by notifySetpointsStop; "
+                "a real vehicle ignores the command"
+            )
+        self._setpoint = None
+        if self._planner.state not in ACTIVE:
+            self._planner.tell_state(self._estimate())
+        return True
+
+    def take_off(self, height: float, duration: float, group_mask: int) -> None:
+        if self._may_plan("takeoff", group_mask) and self._planner.take_off(
+            self._time(), height, None, duration
+        ):
+            self._warn(f"{self.name}.takeoff: it flies; a real vehicle ignores the command")
+
+    def land(self, height: float, duration: float, group_mask: int) -> None:
+        if self._may_plan("land", group_mask):
+            self._planner.land(self._time(), height, None, duration)
+
+    def stop(self, group_mask: int) -> None:
+        if self._may_plan("stop", group_mask):
+            self._stop_motors("stop")
+
+    def go_to(
+        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
+    ) -> None:
+        if self._may_plan("goTo", group_mask):
+            self._planner.go_to(self._time(), goal, yaw, duration, relative, linear=False)
+
+    def upload_trajectory(
+        self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
+    ) -> None:
+        self._memory.upload(trajectory_id, piece_offset, pieces)
+
+    def start_trajectory(
+        self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
+    ) -> None:
+        if self._may_plan("startTrajectory", group_mask):
+            slot = self._memory.slot(trajectory_id)
+            self._planner.start(self._time(), slot, time_scale, reverse, relative, False)
+
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
+        self._expiry = self._time() + remain_valid_ms / 1000.0
+
+    def emergency(self) -> None:
+        self._warn(f"{self.name}.emergency: it does not react to commands any more")
+        self._stop_motors("emergency")
+        self._locked = True
+
+    def arm(self, arm: bool) -> None:
+        self._armed = arm
+
+    def set_group_mask(self, group_mask: int) -> None:
+        self._planner.groups = group_mask
+
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        self._parameters.update(values)
+
+    def get_parameter(self, name: str) -> float:
+        return self._parameters[name]
+
+    def send(self, setpoint: Setpoint) -> None:
+        if self._locked:
+            return
+        # The firmware's commander makes the planner forget its plan (commander.c).
+        self._planner.stop()
+        self._setpoint, self._expiry, self._sent = setpoint, math.inf, self._time()
+        if isinstance(setpoint, MotorsOff):
+            self._stop_motors("cmdStop")
+        if isinstance(setpoint, Attitude):
+            self._warn(f"{self.name}.cmdVel: an ideal vehicle has no attitude; it stays in place")
+
+    def _stop_motors(self, method):
+        height = self.motion.position[2] - self.initial_position[2]
+        if height > _FALL_HEIGHT:
+            self._warn(
+                f"{self.name}.{method}: the motors stop {height:.2f} m above the start; a real "
+                "vehicle falls, this one stays in place"
+            )
+        self._planner.stop()
+        self._setpoint = None
+
+    def enable_avoidance(
+        self, others: Sequence[VehicleBackend], settings: AvoidanceSettings
+    ) -> None:
+        motions = [other._motion for other in others if isinstance(other, SimulatedVehicle)]
+        self._motion.avoid(motions, settings)
+
+    def disable_avoidance(self) -> None:
+        self._motion.avoid((), None)
+
+    # State.
+
+    @property
+    def motion(self) -> Motion:
+        """Where the vehicle is, and how it moves."""
+        return self._motion.now
+
+    @motion.setter
+    def motion(self, motion: Motion) -> None:
+        self._motion.now = motion
+
+    @property
+    def is_flying(self) -> bool:
+        """Whether motors would run."""
+        return self._setpoint is not None or self._planner.state in ACTIVE
+
+    @property
+    def led_color(self) -> Triple:
+        """Red, green and blue, 0 to 1."""
+        return self._parameters.led_color
+
+    def state(self) -> VehicleState:
+        *vectors, yaw = self.motion
+        (x, y, z), (vx, vy, vz), (ax, ay, az) = (vector.tolist() for vector in vectors)
+        rpy = attitude(self.motion.acceleration, yaw)
+        return VehicleState((x, y, z), (vx, vy, vz), (ax, ay, az), rpy)
+
+    def status(self) -> dict[str, Any]:
+        seconds = math.floor(self._time())
+        # Bits as supervisor.info of the firmware has them.
+        bits = 0b1001 | self._armed << 1 | self.is_flying << 4 | self._locked << 6
+        counts = ("num_rx_broadcast", "num_tx_broadcast", "num_rx_unicast", "num_tx_unicast")
+        return {
+            "id": self.name,
+            "timestamp_sec": seconds,
+            "timestamp_nsec": int((self._time() - seconds) * 1e9),
+            "supervisor": bits,
+            "battery": 4.2,
+            "pm_state": 0,
+            "rssi": 0,
+            "latency_unicast": 0,
+            **dict.fromkeys(counts, 0),
+        }
+
+    def next_motion(self, dt: float) -> Motion:
+        """Return where the vehicle is at the present time, ``dt`` (s) after `motion`."""
+        now = self._time()
+        if now > self._expiry:
+            self._setpoint = None
+        if self._setpoint is not None:
+            if math.isinf(self._expiry) and now > self._sent + _SETPOINT_TIMEOUT + dt:
+                self._warn(
+                    f"{self.name}: no setpoint for {_SETPOINT_TIMEOUT:g} s; a real vehicle levels "
+                    "out and stops its motors 2 s after the last one"
+                )
+            return self._motion.at_setpoint(self._setpoint, dt)
+        goal = self._planner.goal(now) if self._planner.state in ACTIVE else None
+        # Ends a landing.
+        self._planner.setpoint(now, self._estimate())
+        return self._motion.held() if goal is None else self._motion.tracked(goal, dt)
+
+    def _estimate(self) -> Estimate:
+        (x, y, z), (vx, vy, vz) = self.motion.position.tolist(), self.motion.velocity.tolist()
+        yaw = math.degrees(self.motion.yaw)
+        return Estimate(x=x, y=y, z=z, vx=vx, vy=vy, vz=vz, yaw=yaw)
+
+    def _warn(self, text: str) -> None:
+        # A loop must not flood the terminal.
+        if text not in self._warned:
+            self._warned.add(text)
+            _log.warning(text)

@@ -1,0 +1,129 @@
+"""The back-end of --sim: ideal vehicles and a clock that passes as fast as it goes."""
+
+import argparse
+import logging
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from crazyflie_fleet.fleet_config import close_pairs
+from crazyflie_py.csv_output import CsvOutput
+from crazyflie_py.fleet import FleetVehicle
+from crazyflie_py.simulated_vehicle import SimulatedVehicle
+from crazyflie_py.visualizer import visualizer_for
+
+_log = logging.getLogger(__name__)
+
+_ROUNDING = 1e-9
+"""Part of a step by which a sleep may be too short for it, due to rounding."""
+
+
+def _broadcast(name: str) -> Any:
+    """Return a method that calls that of each vehicle."""
+
+    def command(self: "Simulation", *arguments: Any) -> None:
+        for vehicle in self.vehicles:
+            getattr(vehicle, name)(*arguments)
+
+    return command
+
+
+class Simulation:
+    """A swarm of `crazyflie_py.backend.SwarmBackend` without ROS.
+
+    Parameters
+    ----------
+    fleet : sequence of FleetVehicle
+    options : argparse.Namespace
+        Of `crazyflie_py.crazyswarm_py.build_argparser`.
+    """
+
+    def __init__(self, fleet: Sequence[FleetVehicle], options: argparse.Namespace):
+        self.dt: float = options.dt
+        self._steps = 0
+        self._residual = 0.0
+        limits = (options.maxvel, options.disturbance)
+        self.vehicles = [SimulatedVehicle(vehicle, self.time, *limits) for vehicle in fleet]
+        self._buffers = [vehicle.buffer for vehicle in fleet]
+        self._close: set[tuple[int, int]] = set()
+        self.visualizer = visualizer_for(options.vis, has_video=options.video is not None)
+        if options.video is not None:
+            self.visualizer.startVideoOutput(options.video, self.dt)
+        self._output = CsvOutput() if options.writecsv else None
+
+    # The clock.
+
+    def time(self) -> float:
+        return self._steps * self.dt
+
+    def sleep(self, duration: float) -> None:
+        # Time passes in whole steps; what is left of a sleep counts for the next one.
+        total = max(0.0, duration) + self._residual
+        steps = math.floor(total / self.dt + _ROUNDING)
+        self._residual = max(0.0, total - steps * self.dt)
+        for _ in range(steps):
+            self._step()
+
+    def sleep_for_rate(self, rate: float) -> None:
+        self.sleep(1.0 / rate)
+
+    def is_shutdown(self) -> bool:
+        return False
+
+    def _step(self):
+        time = self.time()
+        self.visualizer.update(time, self.vehicles)
+        if self._output is not None:
+            self._output.update(time, self.vehicles)
+        self._steps += 1
+        # All from the same state, whatever their order.
+        motions = [vehicle.next_motion(self.dt) for vehicle in self.vehicles]
+        for vehicle, motion in zip(self.vehicles, motions, strict=True):
+            vehicle.motion = motion
+        self._report_collisions()
+
+    def _report_collisions(self):
+        """Warn when a pair comes too close, once until it is apart again."""
+        positions = np.array([vehicle.motion.position for vehicle in self.vehicles])
+        close = set()
+        for i, j, distance, allowed in close_pairs(positions, self._buffers):
+            one, two = self.vehicles[i], self.vehicles[j]
+            if (i, j) not in self._close and (one.is_flying or two.is_flying):
+                _log.warning(
+                    "%s and %s are %.2f m apart at %.2f s; expected at least %.2f m "
+                    "(a metre of height counts half)",
+                    one.name,
+                    two.name,
+                    distance,
+                    self.time(),
+                    allowed,
+                )
+            if (i, j) in self._close or one.is_flying or two.is_flying:
+                close.add((i, j))
+        self._close = close
+
+    # The ends.
+
+    def next_phase(self) -> None:
+        if self._output is not None:
+            self._output.next_phase()
+
+    def close(self) -> None:
+        self.visualizer.finishVideoOutput()
+        if self._output is not None:
+            self._output.close()
+
+    # Broadcasts.
+
+    take_off = _broadcast("take_off")
+    land = _broadcast("land")
+    stop = _broadcast("stop")
+    go_to = _broadcast("go_to")
+    start_trajectory = _broadcast("start_trajectory")
+    notify_setpoints_stop = _broadcast("notify_setpoints_stop")
+    emergency = _broadcast("emergency")
+    arm = _broadcast("arm")
+    set_parameters = _broadcast("set_parameters")
+    send = _broadcast("send")

@@ -77,7 +77,7 @@ def test_a_restart_takes_the_trajectories_along(vehicle, link):
     received = queue.Queue()
     link.add_log_block(LogBlock("test", 20, ("pm.vbat",), lambda *data: received.put(data)))
     received.get(timeout=LIMIT)
-    link.high_level.define_trajectory(3, 0, 1)
+    link.high_level.define_trajectory(3, range(132), 1)
     link.high_level.start_trajectory(3)
     with pytest.raises(RefusedError, match="4 has not been uploaded .*; known: 3"):
         link.high_level.start_trajectory(4)

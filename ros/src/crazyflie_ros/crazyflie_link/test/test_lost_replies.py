@@ -71,14 +71,14 @@ def test_a_landing_that_may_have_ended_is_not_repeated(flying):
 
 
 def test_a_dry_run_refuses_the_same_and_sends_nothing(vehicle, link):
-    link.high_level.define_trajectory(3, 0, 1)
+    link.high_level.define_trajectory(3, range(132), 1)
     vehicle.received.clear()
     dry = link.high_level.dry_run()
     dry.take_off(1.0, 2.0)
     dry.start_trajectory(3)
     with pytest.raises(RefusedError, match="4 has not been uploaded"):
         dry.start_trajectory(4)
-    dry.define_trajectory(4, 0, 1)
+    dry.define_trajectory(4, range(132), 1)
     with pytest.raises(RefusedError, match="4 has not been uploaded"):
         link.high_level.start_trajectory(4)
     assert vehicle.packets(8, 0) == []
@@ -98,7 +98,7 @@ def test_a_guarded_subsystem_sends_only_what_it_may(vehicle, link):
     allowed = [True]
     high_level = link.high_level.guarded(lambda: allowed[0])
     supervisor = link.supervisor.guarded(lambda: allowed[0])
-    high_level.define_trajectory(3, 0, 1)
+    high_level.define_trajectory(3, range(132), 1)
     supervisor.arm()
     # What is known is known to both.
     link.high_level.start_trajectory(3)

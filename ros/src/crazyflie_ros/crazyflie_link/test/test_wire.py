@@ -140,7 +140,7 @@ def test_high_level_commands(target, flying):
     high.take_off(1.5, 2.0, group_mask=1)
     high.land(0.25, 3.0)
     high.go_to((1.0, -2.0, 0.5), 0.75, 4.0, relative=True, group_mask=2)
-    high.define_trajectory(5, 264, 3)
+    high.define_trajectory(5, range(264, 660), 3)
     high.start_trajectory(5, 1.5, relative=True, is_reversed=True, group_mask=4)
     high.stop(7)
     assert target.packets(8, 0) == [
@@ -159,7 +159,7 @@ def test_high_level_commands_of_older_firmware(make_vehicle, make_link):
     link = make_link(target.uri)
     link.connect()
     link.high_level.go_to((1.0, -2.0, 0.5), 0.75, 4.0)
-    link.high_level.define_trajectory(5, 0, 1)
+    link.high_level.define_trajectory(5, range(132), 1)
     link.high_level.start_trajectory(5, 1.5)
     assert [data for data in target.packets(8, 0) if data[0] != 6] == [
         struct.pack("<3B5f", 4, 0, 0, 1.0, -2.0, 0.5, 0.75, 4.0),
@@ -181,7 +181,7 @@ IMPOSSIBLE_COMMANDS = [
     lambda h: h.go_to((0, 0, NAN), 0, 1),
     lambda h: h.start_trajectory(256),
     lambda h: h.start_trajectory(0, 0.0),
-    lambda h: h.define_trajectory(0, 0, 256),
+    lambda h: h.define_trajectory(0, range(0), 256),
     lambda h: h.take_off(1e39, 1.0),
     lambda h: h.land(0.0, 1e39),
     lambda h: h.land(0.0, 1e-50),

@@ -56,7 +56,7 @@ class FlightReport:
             touchdown = float("inf")
         return cls(
             time_to_hover=record.time_to_hover(point, HOVER_TOLERANCE),
-            overshoot=record.overshoot(point[2]),
+            overshoot=record.overshoot(point),
             hover_error_mean=mean,
             hover_error_max=largest,
             touchdown_speed=touchdown,

@@ -1,0 +1,200 @@
+"""Reports on the flights of bags: a page for a browser, tables as CSV and JSON."""
+
+import argparse
+import csv
+import json
+import math
+import sys
+import tempfile
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from crazyflie_reports import bag_log, report_page
+from crazyflie_reports.bag_events import concerning
+from crazyflie_reports.bag_file import BagError
+from crazyflie_reports.bag_flights import Flight, flights
+from crazyflie_reports.bag_topics import ROLES
+from crazyflie_reports.bag_vehicles import vehicle_namespaces, vehicles
+from crazyflie_reports.figures import Figure, figures
+
+PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
+
+
+class ReportError(Exception):
+    """There is nothing to report on, or nowhere to write it; the text says why."""
+
+
+def flights_of(log: bag_log.BagLog) -> Iterator[Flight]:
+    """Yield the flights of a recording; one vehicle's numbers are in memory at a time."""
+    names = set(vehicle_namespaces(log))
+    for vehicle in vehicles(log):
+        others = names - {vehicle.namespace, ""}
+        events = list(concerning(log.events.events, vehicle.namespace, others))
+        states = log.events.flight_states.get(vehicle.namespace, [])
+        yield from flights(vehicle, states, events, log.name, log.end)
+
+
+class Report:
+    """A report on recordings, which grows with each that is added.
+
+    Attributes
+    ----------
+    recordings : list of dict
+        As `report_page.page` takes them.
+    """
+
+    def __init__(self) -> None:
+        self.recordings: list[dict[str, Any]] = []
+        self._figures: list[tuple[list[Any], list[Figure]]] = []
+        self._events: list[list[Any]] = []
+
+    def add(self, log: bag_log.BagLog) -> None:
+        """Add the flights of a recording."""
+        points = report_page.points_of(len(vehicle_namespaces(log)))
+        data = []
+        for flight in flights_of(log):
+            key = [flight.recording, flight.vehicle, flight.number]
+            self._figures.append((key, figures(flight)))
+            self._events += [
+                [*key, f"{e.time - flight.start:.3f}", e.kind.value, e.text, e.count]
+                for e in flight.events
+            ]
+            data.append(report_page.flight_data(flight, points))
+        start = datetime.fromtimestamp(log.start, UTC)
+        self.recordings.append(
+            {
+                "name": log.name,
+                "start": f"{start:%Y-%m-%d %H:%M:%S} UTC",
+                "duration": round(log.end - log.start, 3),
+                "remarks": log.remarks if data else [*log.remarks, "It has no flight."],
+                "flights": data,
+            }
+        )
+
+    def write(self, folder: Path) -> None:
+        """Write page and tables into a folder, which is made if it is not there."""
+        names = [[f.name, f.unit] for f in self._figures[0][1]] if self._figures else []
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / PAGE).write_text(report_page.page(self.recordings, names))
+        flight = ["recording", "vehicle", "flight"]
+        _write_csv(
+            folder / FIGURES,
+            [*flight, "figure", "value", "unit", "normal", "is normal"],
+            ([*key, f.name, _number(f.value), f.unit, f.normal, f.is_normal]
+             for key, each in self._figures for f in each),
+        )  # fmt: skip
+        _write_csv(folder / EVENTS, [*flight, "time (s)", "kind", "text", "count"], self._events)
+        tables = [
+            {
+                **dict(zip(flight, key, strict=True)),
+                "figures": {
+                    f.name: {"value": _number(f.value), "unit": f.unit, "normal": f.normal}
+                    for f in each
+                },
+                "events": [e[3:] for e in self._events if e[:3] == key],
+            }
+            for key, each in self._figures
+        ]
+        (folder / DATA).write_text(json.dumps(tables, indent=1))
+
+    def table(self) -> str:
+        """Return a line for each flight, and one for each figure of it that is not normal."""
+        lines = []
+        for (recording, vehicle, number), each in self._figures:
+            lines.append(f"{recording}: {vehicle}, flight {number}")
+            lines += [
+                f"  {f.name} is {f.value:.4g} {f.unit}, normal: {f.normal}"
+                for f in each
+                if not f.is_normal
+            ]
+        return "\n".join(lines)
+
+
+def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -> list[str]:
+    """Write a report on recordings; return what went wrong with any of them.
+
+    Parameters
+    ----------
+    paths : list of Path
+        Bags, or folders of bags that follow each other.
+    folder : Path
+        Of the report.
+    names : dict, optional
+        As in `bag_log.read`.
+
+    Raises
+    ------
+    ReportError
+        None of the recordings can be read, or the folder cannot be written.
+    """
+    report, problems = Report(), []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        # Beside the report, since /tmp may be in memory.
+        with tempfile.TemporaryDirectory(dir=folder) as place:
+            for number, path in enumerate(paths):
+                try:
+                    size = sum(each.stat().st_size for each in bag_log.files_of(path))
+                    series = Path(place, str(number))
+                    series.mkdir()
+                    with tqdm(
+                        total=size, unit="B", unit_scale=True, desc=path.name, disable=None
+                    ) as bar:
+                        log = bag_log.read(path, series, names, bar.update)
+                    report.add(log)
+                except BagError as error:
+                    problems.append(str(error))
+                except FileNotFoundError:
+                    problems.append(f"{path} does not exist; expected a bag or a folder of bags")
+        if not report.recordings:
+            raise ReportError("\n".join(problems))
+        report.write(folder)
+    except OSError as error:
+        raise ReportError(f"the report cannot be written into {folder}: {error.strerror}") from None
+    print(report.table())
+    print(*(remark for each in report.recordings for remark in each["remarks"]), sep="\n")
+    print(f"report: {folder / PAGE}")
+    return problems
+
+
+def main() -> int:
+    """Make the report that the command line asks for; return the exit status."""
+    roles = sorted({each.name for each in ROLES})
+    parser = argparse.ArgumentParser(prog="flight_report", description=__doc__)
+    parser.add_argument(
+        "bags",
+        nargs="+",
+        type=Path,
+        metavar="BAG",
+        help="or a folder of bags that follow each other",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("flight_report"), help="folder of the report (%(default)s)"
+    )
+    parser.add_argument(
+        "--topic", action="append", default=[], metavar="ROLE=NAME",
+        help=f"a topic of another name, below the vehicle's namespace; roles: {', '.join(roles)}",
+    )  # fmt: skip
+    options = parser.parse_args()
+    names = dict(each.partition("=")[::2] for each in options.topic)
+    if unknown := [each for each in names if each not in roles or not names[each]]:
+        parser.error(f"--topic {unknown[0]}: expected ROLE=NAME with a role of {', '.join(roles)}")
+    try:
+        problems = make(options.bags, options.out, names)
+    except ReportError as error:
+        problems = [str(error)]
+    print(*problems, sep="\n", file=sys.stderr, end="\n" if problems else "")
+    return 1 if problems else 0
+
+
+def _number(value):
+    return value if math.isfinite(value) else None
+
+
+def _write_csv(path, header, rows):
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([header, *rows])

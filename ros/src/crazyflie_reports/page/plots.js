@@ -167,7 +167,8 @@ class Plot {
     context.fillText(`${this.data.title} (${this.data.unit})`, 4, 13);
     let left = 14 + context.measureText(`${this.data.title} (${this.data.unit})`).width;
     this.data.curves.forEach(({ name, t, v }, k) => {
-      const index = indexAt(t, time), text = `${name} ${index < 0 ? "–" : v[index].toFixed(3)}`;
+      const index = indexAt(t, time), value = index < 0 ? "–" : v[index].toFixed(2);
+      const text = name.includes(" ") ? `- - ${name}` : `${name} ${value}`;
       context.fillStyle = this.color(name, k);
       context.fillText(text, left, 13);
       left += context.measureText(text).width + 10;

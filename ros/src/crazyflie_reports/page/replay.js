@@ -1,7 +1,7 @@
 // The replay: vehicles, their paths and references in three dimensions; drag to turn, wheel to zoom.
 
 const ARM = 0.046, ROTOR = 0.023;  // Of a Crazyflie, m: half of its diagonal, radius of a propeller.
-const SMALLEST = 0.035;            // Smallest arm that is drawn, as a fraction of what is seen.
+const SMALLEST = 0.055;            // Smallest arm that is drawn, as a fraction of what is seen.
 
 // Return the pose of a path at a time, between two rows, as [x, y, z, roll, pitch, yaw, ...].
 function poseAt(path, time) {

@@ -157,3 +157,4 @@ added(document.getElementById("summary"), "div",
   + "Drag the scene to turn it; on plots: click to set the time, wheel to zoom, double click for all.", "quiet");
 for (const column of columns) if (column.recording.flights.length) column.choose(column.recording.flights[0]);
 begin();
+seek(Number(location.hash.slice(1)) || 0);  // report.html#7.5 begins at 7.5 s.

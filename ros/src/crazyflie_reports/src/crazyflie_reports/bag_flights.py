@@ -106,7 +106,8 @@ def flights(
         Of the recording, s.
     """
     known = _phases(states, end) if states else _guessed(vehicle)
-    for number, phases in enumerate(known, 1):
+    lasting = (phases for phases in known if phases[-1].end > phases[0].start)
+    for number, phases in enumerate(lasting, 1):
         first, last = phases[0].start - MARGIN, phases[-1].end + MARGIN
         yield Flight(
             recording,

@@ -102,15 +102,11 @@ class Report:
         (folder / DATA).write_text(json.dumps(tables, indent=1))
 
     def table(self) -> str:
-        """Return a line for each flight, and one for each figure of it that is not normal."""
+        """Return a line for each flight, with the figures that are not normal."""
         lines = []
         for (recording, vehicle, number), each in self._figures:
-            lines.append(f"{recording}: {vehicle}, flight {number}")
-            lines += [
-                f"  {f.name} is {f.value:.4g} {f.unit}, normal: {f.normal}"
-                for f in each
-                if not f.is_normal
-            ]
+            bad = [f"{f.name} {f.value:.4g} {f.unit} ({f.normal})" for f in each if not f.is_normal]
+            lines.append(f"{recording}: {vehicle}, flight {number}: {', '.join(bad) or 'normal'}")
         return "\n".join(lines)
 
 

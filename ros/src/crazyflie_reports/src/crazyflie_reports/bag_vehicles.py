@@ -73,7 +73,8 @@ def vehicle_namespaces(log: BagLog) -> list[str]:
     flown, driven = _having(log, "state", "final_control"), _having(log, "cmd_vel")
     if flown == {""} and len(driven) == 1:
         driven = set()  # See `_driver`.
-    return sorted(flown | driven or _having(log, "pose"))
+    # cf10 comes after cf9.
+    return sorted(flown | driven or _having(log, "pose"), key=lambda name: (len(name), name))
 
 
 def vehicles(log: BagLog) -> Iterator[Vehicle]:

@@ -130,15 +130,16 @@ def _motion(flight: Flight) -> Iterator[Figure]:
     state = record.state.between(flight.start, flight.end)
     speed = np.linalg.norm(state[:, 3:6], axis=1)
     control = _part(record.final_control, flight)
-    tilt = np.hypot(control[:, 1], control[:, 2])
+    tilt = np.abs(control[:, 1:3]).max(axis=1, initial=-math.inf)
     seconds = np.diff(control[:, 0])
     impulse = float(seconds @ control[:-1, 4]) / GRAVITY if len(control) > 1 else math.nan
     yield Figure("touchdown speed", "m/s", touchdown, maximum=TOUCHDOWN_LIMIT)
     yield Figure("duration", "s", flight.end - flight.start)
     yield Figure("height, maximum", "m", _max(state[:, 2]))
     yield Figure("speed, maximum", "m/s", _max(speed))
-    yield Figure("commanded tilt, maximum", "deg", math.degrees(_max(tilt)),
-                 maximum=round(math.degrees(MAX_TILT * math.sqrt(2.0)), 1))  # fmt: skip
+    # Of roll or pitch; a control that is limited has the limit itself.
+    degrees, limit = (round(math.degrees(each), 3) for each in (_max(tilt), MAX_TILT))
+    yield Figure("tilt commanded, maximum", "deg", degrees, maximum=limit)
     yield Figure("thrust used, as time of hover", "s", impulse)
     yield Figure("thrust, mean", "m/s²", impulse * GRAVITY / (flight.end - flight.start))
 

@@ -97,15 +97,21 @@ def _plots(flight, points):
             for name in names
         ]
 
-    xyz, degrees = ("x", "y", "z"), math.degrees(1.0)
+    def angles(name, times, values):
+        known = np.isfinite(values)
+        turns = np.degrees(np.unwrap(values[known]))
+        return _curve(name, times[known], turns, start, points)
+
+    xyz = ("x", "y", "z")
+    measured = flight.attitude
     attitude = [
-        _curve(name, flight.attitude[:, 0], degrees * flight.attitude[:, column], start, points)
+        angles(name, measured[:, 0], measured[:, column])
         for name, column in (("roll", 4), ("pitch", 5), ("yaw", 6))
     ]
-    if not len(flight.attitude):
-        attitude = curves(state, ["yaw"], degrees)
-    attitude += curves(control, ["roll", "pitch"], degrees, " commanded")
-    attitude += curves(reference, ["yaw"], degrees, " reference")
+    if not len(measured):
+        attitude = [angles("yaw", state.times, state.column("yaw"))]
+    attitude += curves(control, ["roll", "pitch"], math.degrees(1.0), " commanded")
+    attitude.append(angles("yaw reference", reference.times, reference.column("yaw")))
     times, distances = record.tracking_errors()
     error = _curve("distance", times, distances, start, points)
     battery = _curve("voltage", flight.battery[:, 0], flight.battery[:, 1], start, points)

@@ -5,8 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_lqr import design_command
 from crazyflie_lqr.gain_file import load_matrix
@@ -47,8 +45,7 @@ def control_at(parameters, x, **changes):
     process = FakeProcess()
     assert process.launch(MyControllerNode(), "/lqr_controller", parameters)
     if changes:
-        request = ReconfigureRequest(encode_config(changes))
-        process.call("/lqr_controller/set_parameters", request)
+        process.reconfigure("/lqr_controller", **changes)
     reference = PositionVelocityStateStamped(state=PositionVelocityState(z=1.0))
     process.publish("/ref", reference)
     state = PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=x, z=1.0))

@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_control_merger.no_yaw_merger_node import NoYawMergerNode
 from crazyflie_control_merger.regular_control_merger_node import RegularControlMergerNode
@@ -184,16 +182,11 @@ def test_priorities_out_of_range_are_clipped_with_a_warning(node_class, priority
     assert f"is {priority:g}; expected 0 ... 1" in warning
 
 
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    return process.call("/merger/set_parameters", ReconfigureRequest(encode_config(values)))
-
-
 def test_the_mode_may_be_changed_in_flight(node_class):
     process = launch(node_class)
     push(process, node_class, 0.25)
     for mode, weight in [("PRIORITIZED", 1.0), ("LQR", 0.0), ("MERGE", 0.25)]:
-        reconfigure(process, mode=mode)
+        process.reconfigure("/merger", mode=mode)
         np.testing.assert_allclose(answer(process), [expected(node_class, weight)])
 
 
@@ -201,5 +194,5 @@ def test_a_mode_that_there_is_not_is_refused(node_class):
     process = launch(node_class, "LQR")
     push(process, node_class, 1.0)
     with pytest.raises(ServiceError, match="/merger/mode is 'BOTH'; expected one of MERGE"):
-        reconfigure(process, mode="BOTH")
+        process.reconfigure("/merger", mode="BOTH")
     np.testing.assert_allclose(answer(process), [REGULAR])

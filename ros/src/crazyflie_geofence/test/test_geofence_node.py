@@ -6,8 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rospkg
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_control_merger.regular_control_merger_node import RegularControlMergerNode
 from crazyflie_geofence.geofence import Braking, Geofence
@@ -120,16 +118,11 @@ def test_a_wide_margin_needs_a_wide_box():
     assert "box/max/x is 2.0; expected at least 2.2 m" in fake.logged("error")[0]
 
 
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    return process.call("/geofence/set_parameters", ReconfigureRequest(encode_config(values)))
-
-
 def test_the_box_may_be_changed_in_flight(process):
     publish_regular(process, *REGULAR)
-    reconfigure(process, **{"box/min/x": -9.0, "box/max/x": 9.0, "margin": 0.25})
+    process.reconfigure("/geofence", **{"box/min/x": -9.0, "box/max/x": 9.0, "margin": 0.25})
     publish_state(process, *STATE)
-    reconfigure(process, **{"box/max/x": 1.5})
+    process.reconfigure("/geofence", **{"box/max/x": 1.5})
     publish_state(process, *STATE)
     priorities = [m.control.priority for m in process.published("/control/geofence")]
     assert priorities == [0.0, 1.0]
@@ -137,7 +130,7 @@ def test_the_box_may_be_changed_in_flight(process):
 
 def test_a_box_that_is_too_small_is_refused(process):
     with pytest.raises(ServiceError, match="box/max/z is 3.0; expected at least 3.5 m"):
-        reconfigure(process, **{"box/min/z": 2.5})
+        process.reconfigure("/geofence", **{"box/min/z": 2.5})
     publish_regular(process, *REGULAR)
     publish_state(process, *STATE)
     assert process.published("/control/geofence")[0].control.priority > 0.5

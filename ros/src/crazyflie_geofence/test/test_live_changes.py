@@ -6,7 +6,7 @@ import math
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_geofence_node import PARAMETERS, publish_regular, publish_state, reconfigure
+from test_geofence_node import PARAMETERS, publish_regular, publish_state
 
 from crazyflie_geofence.geofence_node import GeofenceNode, GeofenceParameters
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
@@ -28,7 +28,7 @@ def test_any_live_change_leaves_the_control_sound(changes, at_rest):
         for name, value in change.items():
             # A box without room for its margins is refused.
             with contextlib.suppress(ServiceError):
-                reconfigure(process, **{name: value})
+                process.reconfigure("/geofence", **{name: value})
         before = len(process.published("/control/geofence"))
         publish_state(process, *state)
         publish_state(process, *at_rest[:3], 0.0, 0.0, 0.0, 0.0)

@@ -2,9 +2,6 @@
 
 from pathlib import Path
 
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
-
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
 )
@@ -63,9 +60,3 @@ def answer(process, **values):
 def publish_flight_state(process, state):
     status = FlightStatus(state=getattr(FlightStatus, state.upper()))
     process.publish("/in_flight_flight_status", status)
-
-
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    request = ReconfigureRequest(encode_config(values))
-    return process.call("/lqr_controller/set_parameters", request)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from lift_controller import answer, launch, lifting, publish_flight_state, reconfigure, refer
+from lift_controller import answer, launch, lifting, publish_flight_state, refer
 from std_msgs.msg import String
 
 from crazyflie_msgs.msg import FlightStatus
@@ -82,18 +82,18 @@ def test_gains_may_be_changed_in_flight(process, tmp_path):
     gains = tmp_path / "K.txt"
     gains.write_text("0 0 0 0 0 0 0\n" * 3 + "0 0 -2 0 0 0 0\n")
     refer(process, z=1.0)
-    reconfigure(process, K_file=str(gains))
+    process.reconfigure("/lqr_controller", K_file=str(gains))
     [control] = answer(process, z=0.5)
     np.testing.assert_allclose(control, [0.0, 0.0, 0.0, 9.81 + 1.0])
 
 
 def test_a_change_of_the_integrator_keeps_its_integral(process):
-    reconfigure(process, **{"integrator/k/z": -1.0, "integrator/thresh/z": 1.0})
+    process.reconfigure("/lqr_controller", **{"integrator/k/z": -1.0, "integrator/thresh/z": 1.0})
     refer(process, z=1.0)
     for _ in range(6):
         [before] = answer(process, z=0.8)
         process.advance(0.1)
-    reconfigure(process, **{"integrator/k/x": -0.1})
+    process.reconfigure("/lqr_controller", **{"integrator/k/x": -0.1})
     [after] = answer(process, z=0.8)
     assert before[3] == pytest.approx(9.81 + 0.3 + 0.1)
     assert after[3] == pytest.approx(9.81 + 0.3 + 0.12)
@@ -105,6 +105,6 @@ def test_bad_gains_are_refused_and_the_old_ones_stay(process, tmp_path):
     refer(process, z=1.0)
     [before] = answer(process, z=0.5)
     with pytest.raises(ServiceError, match=r"line 1: 3 numbers, expected 4 rows of 7 numbers"):
-        reconfigure(process, K_file=str(gains))
+        process.reconfigure("/lqr_controller", K_file=str(gains))
     [after] = answer(process, z=0.5)
     np.testing.assert_array_equal(after, before)

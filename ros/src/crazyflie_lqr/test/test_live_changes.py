@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from lift_controller import answer, lifting, publish_flight_state, reconfigure, refer
+from lift_controller import answer, lifting, publish_flight_state, refer
 
 from crazyflie_lqr.linear_feedback import IntegralStateFeedback
 from crazyflie_lqr.reference import GuardedReference
@@ -69,7 +69,7 @@ def test_a_climb_goes_on_without_the_integrator_of_the_height():
     for k in range(10):
         process.advance(0.05)
         sound(answer(process, z=0.02 * k, z_dot=0.4)[0])
-    reconfigure(process, **{"integrator/k/z": 0.0})
+    process.reconfigure("/lqr_controller", **{"integrator/k/z": 0.0})
     for k in range(10, 60):
         process.advance(0.05)
         (control,) = answer(process, z=0.02 * k, z_dot=0.4)
@@ -96,7 +96,7 @@ def test_gains_that_overflow_are_refused(tmp_path):
     gains = tmp_path / "K.txt"
     gains.write_text("0 1e308 0 0 1e308 0 0\n" * 4)
     with pytest.raises(ServiceError, match=r"K_file has 1e\+308 among its numbers; expected"):
-        reconfigure(process, K_file=str(gains))
+        process.reconfigure("/lqr_controller", K_file=str(gains))
     sound(answer(process, y=9.0, y_dot=-9.0)[0])
 
 

@@ -5,7 +5,7 @@ import math
 import genpy
 import numpy as np
 import pytest
-from lift_controller import PARAMETERS, answer, launch, publish_flight_state, reconfigure, refer
+from lift_controller import PARAMETERS, answer, launch, publish_flight_state, refer
 
 from crazyflie_lqr.position_velocity_yaw_state_lift_lqr_node import (
     PositionVelocityYawStateLiftLqrNode,
@@ -237,11 +237,11 @@ def test_a_velocity_that_is_too_large_is_followed_at_the_limit_and_for_half_a_se
 
 
 def test_the_limit_of_velocities_may_be_changed_but_not_beyond_what_the_estimator_believes(process):
-    reconfigure(process, **{"reference/max_speed": 1.0})
+    process.reconfigure("/lqr_controller", **{"reference/max_speed": 1.0})
     refer(process, z_dot=5.0)
     assert answer(process)[0][3] == pytest.approx(9.81 + 1.0)
     with pytest.raises(ServiceError, match="reference/max_speed"):
-        reconfigure(process, **{"reference/max_speed": 5.1})
+        process.reconfigure("/lqr_controller", **{"reference/max_speed": 5.1})
 
 
 @pytest.mark.parametrize("stamp", [0.0, 12.000000345])

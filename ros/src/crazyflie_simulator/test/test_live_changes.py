@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulators import command, launch, transforms
-from test_simulator_node import reconfigure
 
 from crazyflie_simulator.quadrotor_simulator_node import (
     QuadrotorSimulatorNode,
@@ -28,7 +27,7 @@ def numbers(transform):
 def test_any_live_change_leaves_the_vehicle_and_its_poses_finite(changes):
     process = launch(QuadrotorSimulatorNode, **{"init/z": 2.0})
     for change in [*changes, {"mocap/latency": 0.0, "mocap/dropout": 0.0}]:
-        reconfigure(process, **change)
+        process.reconfigure("/simulator", **change)
         command(process, 9.81)
         process.advance(0.05)
     assert all(math.isfinite(number) for each in transforms(process) for number in numbers(each))

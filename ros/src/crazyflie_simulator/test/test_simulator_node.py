@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 from simulators import NODES, PARAMETERS, command, heights, launch, refusal, transforms
 from std_srvs.srv import EmptyRequest
 
@@ -191,20 +189,14 @@ def test_mass_and_thrust_errors_of_the_quadrotor():
 # Changes in flight.
 
 
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    request = ReconfigureRequest(encode_config(values))
-    return process.call("/simulator/set_parameters", request)
-
-
 @NODES
 def test_motion_capture_may_fail_in_flight(node_class):
     process = launch(node_class)
     process.advance(0.1)
-    reconfigure(process, **{"mocap/dropout": 1.0})
+    process.reconfigure("/simulator", **{"mocap/dropout": 1.0})
     process.advance(0.1)
     assert len(transforms(process)) == 10
-    reconfigure(process, **{"mocap/dropout": 0.0, "mocap/position_noise": 0.1})
+    process.reconfigure("/simulator", **{"mocap/dropout": 0.0, "mocap/position_noise": 0.1})
     process.advance(0.1)
     assert len(transforms(process)) == 20
     assert heights(process)[9] == 0.0 != heights(process)[10]
@@ -213,9 +205,9 @@ def test_motion_capture_may_fail_in_flight(node_class):
 def test_latency_may_change_in_flight():
     process = launch()
     process.advance(0.1)
-    reconfigure(process, **{"mocap/latency": 0.05})
+    process.reconfigure("/simulator", **{"mocap/latency": 0.05})
     process.advance(0.1)
-    reconfigure(process, **{"mocap/latency": 0.0})
+    process.reconfigure("/simulator", **{"mocap/latency": 0.0})
     process.advance(0.1)
     stamps = [transform.header.stamp.to_sec() for transform in transforms(process)]
     assert stamps == pytest.approx([100.0 + 0.01 * k for k in range(1, 31)])
@@ -226,7 +218,7 @@ def test_wind_may_rise_in_flight():
     command(process, 9.81)
     process.advance(0.4)
     assert transforms(process)[-1].transform.translation.y == 2.0
-    reconfigure(process, **{"wind/y": -3.0, "wind/gust": 0.1})
+    process.reconfigure("/simulator", **{"wind/y": -3.0, "wind/gust": 0.1})
     process.advance(0.4)
     assert transforms(process)[-1].transform.translation.y < 1.999
 
@@ -236,7 +228,7 @@ def test_mass_may_change_in_flight():
     command(process, 9.81)
     process.advance(0.4)
     assert heights(process)[-1] == pytest.approx(5.0, abs=1e-3)
-    reconfigure(process, mass_error=0.1)
+    process.reconfigure("/simulator", mass_error=0.1)
     process.advance(0.4)
     assert heights(process)[-1] < 4.99
 
@@ -245,7 +237,7 @@ def test_mass_may_change_in_flight():
 def test_bad_changes_are_refused(name, value):
     process = launch()
     with pytest.raises(ServiceError, match=name):
-        reconfigure(process, **{name: value})
+        process.reconfigure("/simulator", **{name: value})
     process.advance(0.1)
     assert len(transforms(process)) == 10
 

@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 from estimator_helpers import fly, launch, moving, transform
 from tf2_msgs.msg import TFMessage
 
@@ -85,17 +83,13 @@ def test_the_kalman_filter_begins_anew_when_time_is_reset():
 # Changes in flight.
 
 
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    request = ReconfigureRequest(encode_config(values))
-    return process.call("/state_estimator/set_parameters", request)
-
-
 def test_a_change_of_the_filter_keeps_what_it_knows():
     changed, unchanged = (launch(**{"filter/type": "kalman"}) for _ in range(2))
     for process in (changed, unchanged):
         fly(process, moving, 1.0)
-    reconfigure(changed, **{"filter/position_noise": 0.02, "filter/acceleration_walk": 0.5})
+    changed.reconfigure(
+        "/state_estimator", **{"filter/position_noise": 0.02, "filter/acceleration_walk": 0.5}
+    )
     for process in (changed, unchanged):
         fly(process, lambda elapsed: moving(1.0 + elapsed), 0.05)
         speeds = [message.state.x_dot for message in process.published("/state")[-5:]]
@@ -106,7 +100,7 @@ def test_a_changed_filter_smooths_more():
     def jump(**changes):
         process = launch(**{"filter/type": "kalman"})
         fly(process, moving, 1.0)
-        reconfigure(process, **changes)
+        process.reconfigure("/state_estimator", **changes)
         process.publish("/tf", TFMessage([transform(process, (2.02, -2.0, 0.5))]))
         process.advance(0.01)
         return process.published("/state")[-1].state.x_dot - 1.0
@@ -117,7 +111,7 @@ def test_a_changed_filter_smooths_more():
 @pytest.mark.parametrize(("changes", "walk"), [({}, 3.0), ({"topics/control": "/control"}, 1.0)])
 def test_the_walk_that_is_offered_depends_on_the_control(changes, walk):
     process = launch(**{"filter/type": "kalman"}, **changes)
-    response = reconfigure(process, **{"filter/angle_noise": 0.01})
+    response = process.reconfigure("/state_estimator", **{"filter/angle_noise": 0.01})
     doubles = {parameter.name: parameter.value for parameter in response.config.doubles}
     assert doubles["filter/acceleration_walk"] == walk
 
@@ -128,4 +122,4 @@ def test_the_walk_that_is_offered_depends_on_the_control(changes, walk):
 def test_bad_changes_are_refused(name, value):
     process = launch(**{"filter/type": "kalman"})
     with pytest.raises(ServiceError, match=name):
-        reconfigure(process, **{name: value})
+        process.reconfigure("/state_estimator", **{name: value})

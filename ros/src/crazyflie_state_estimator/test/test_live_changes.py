@@ -6,7 +6,6 @@ import pytest
 from estimator_helpers import fly, launch, moving
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_filtering_nodes import reconfigure
 
 from crazyflie_state_estimator.estimator_node import KalmanParameters
 from crazyflie_utils.testing.live_changes import live_changes
@@ -21,7 +20,7 @@ def test_any_live_change_leaves_the_state_finite(changes, poses):
     fly(process, moving, 0.01 * poses)
     for number, change in enumerate(changes):
         begin = 0.01 * poses + 0.2 * number
-        reconfigure(process, **change)
+        process.reconfigure("/state_estimator", **change)
         before = len(process.published("/state"))
         fly(process, lambda elapsed, begin=begin: moving(begin + elapsed), 0.2)
         states = [to_tuple(message.state) for message in process.published("/state")[before:]]

@@ -4,6 +4,7 @@ Every node is in a process of its own; messages that nobody hears are lost.
 """
 
 import pytest
+from flight_words import thrusts
 from takeoff_helpers import BARE, SERVER, HoverNetwork
 
 from crazyflie_msgs.msg import PositionVelocityStateStamped
@@ -36,10 +37,6 @@ def restart(network, name, gap=GAP):
     getattr(network, f"start_{name}")()
 
 
-def thrusts(network, topic, since):
-    return [message.control.thrust for _, message in network.on(topic, since)]
-
-
 def refusal(network, service):
     with pytest.raises(ServiceError) as error:
         network.call(service)
@@ -51,7 +48,7 @@ def test_server_on_the_ground(network):
     restart(network, "server")
     network.advance(1.2)
     assert network.last("/in_flight_state") == "on_ground"
-    assert set(thrusts(network, "/control/final", begun)) == {0.0}
+    assert set(thrusts(network, begun)) == {0.0}
     assert "on the ground" in refusal(network, "/land")
     network.take_off()
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
@@ -69,7 +66,7 @@ def test_server_on_the_ground_after_a_flight(network):
         network.advance(0.1)
         assert network.vehicle.z == 0.0
     assert len(network.on("/control/lqr", begun)) > 400
-    assert set(thrusts(network, "/control/final", begun)) == {0.0}
+    assert set(thrusts(network, begun)) == {0.0}
     network.start_server()
     network.advance(1.2)
     assert network.last("/in_flight_state") == "on_ground"
@@ -85,7 +82,7 @@ def test_server_in_flight(network):
         network.advance(0.1)
         assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
     assert network.last("/in_flight_state") == "flying"
-    assert thrusts(network, "/control/takeoff", begun) == []
+    assert thrusts(network, begun, "/control/takeoff") == []
     assert len(network.on("/in_flight")) == toggles
     assert network.on("/ref", begun) == []
     assert "in flight" in refusal(network, "/takeoff")
@@ -93,7 +90,7 @@ def test_server_in_flight(network):
     network.advance_until(land.done)
     network.advance(0.2)
     assert network.vehicle.z == 0.0
-    assert thrusts(network, "/control/final", 0.0)[-1] == 0.0
+    assert thrusts(network, 0.0)[-1] == 0.0
 
 
 @pytest.mark.parametrize("gap", [0.3, 1.0, 3.0])
@@ -126,7 +123,7 @@ def test_server_during_takeoff_when_the_height_is_unknown(moment):
     restart(network, "server")
     network.advance(6.0)
     assert network.last("/in_flight_state") == "flying"
-    assert thrusts(network, "/control/takeoff", begun) == []
+    assert thrusts(network, begun, "/control/takeoff") == []
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
     assert len(network.on("/in_flight")) == 1
     land = network.call("/land")
@@ -214,7 +211,7 @@ def test_server_during_the_ramp_when_the_height_is_unknown():
     restart(network, "server")
     network.advance(6.0)
     assert network.last("/in_flight_state") == "flying"
-    assert thrusts(network, "/control/takeoff", begun) == []
+    assert thrusts(network, begun, "/control/takeoff") == []
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
     land = network.call("/land")
     network.advance_until(land.done)
@@ -227,7 +224,7 @@ def test_filter_in_flight(network, gap):
     begun = network.time
     network.advance(0.05)
     # At once: the flight state is latched.
-    assert len(thrusts(network, "/control/final", begun)) >= 4
+    assert len(thrusts(network, begun)) >= 4
     network.advance(5.0)
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
     assert network.last("/in_flight_filter") == "flying"
@@ -248,7 +245,7 @@ def test_filter_on_the_ground(network):
     network.advance(3.0)
     # Not a single one of the controller's commands.
     assert len(network.on("/control/lqr", begun)) > 250
-    assert set(thrusts(network, "/control/final", begun)) == {0.0}
+    assert set(thrusts(network, begun)) == {0.0}
     network.take_off()
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
 
@@ -266,7 +263,7 @@ def test_filter_during_takeoff_and_landing(network):
         restart(network, "filter", 0.1)
     network.advance(1.0)
     assert network.vehicle.z == 0.0
-    assert thrusts(network, "/control/final", 0.0)[-1] == 0.0
+    assert thrusts(network, 0.0)[-1] == 0.0
 
 
 def test_both_at_once_are_a_fresh_launch(seeing):
@@ -280,7 +277,7 @@ def test_both_at_once_are_a_fresh_launch(seeing):
     seeing.start_server()
     seeing.advance(2.0)
     assert seeing.last("/in_flight_state") == "on_ground"
-    assert set(thrusts(seeing, "/control/final", begun)) == {0.0}
+    assert set(thrusts(seeing, begun)) == {0.0}
 
 
 def test_on_a_table_at_launch_with_a_reference():
@@ -293,4 +290,4 @@ def test_on_a_table_at_launch_with_a_reference():
     network.advance(5.0)
     assert network.last("/in_flight_state") == "on_ground"
     assert len(network.on("/control/lqr")) > 400
-    assert set(thrusts(network, "/control/final", 0.0)) == {0.0}
+    assert set(thrusts(network, 0.0)) == {0.0}

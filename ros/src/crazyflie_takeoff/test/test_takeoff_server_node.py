@@ -3,8 +3,6 @@
 import math
 
 import pytest
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 from lone_server import call, flying, launch, on_ground, states, thrusts, toggles
 from std_srvs.srv import EmptyResponse
 from takeoff_helpers import GRAVITY, SERVER, state
@@ -189,15 +187,9 @@ def test_reset_of_the_clock_in_the_middle_of_a_takeoff():
 # Changes in flight.
 
 
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    request = ReconfigureRequest(encode_config(values))
-    return process.call("/takeoff_server/set_parameters", request)
-
-
 def test_the_next_takeoff_goes_to_the_new_hover_point():
     process = on_ground(SERVER)
-    reconfigure(process, **{"hover/z": 1.5})
+    process.reconfigure("/takeoff_server", **{"hover/z": 1.5})
     call(process, "/takeoff")
     for _ in range(110):
         process.publish("/state", state(0.0))
@@ -210,4 +202,4 @@ def test_a_bad_change_is_refused():
     with pytest.raises(
         ServiceError, match="/takeoff_server/landing/descent_speed is -1.0; expected"
     ):
-        reconfigure(process, **{"landing/descent_speed": -1.0})
+        process.reconfigure("/takeoff_server", **{"landing/descent_speed": -1.0})

@@ -133,6 +133,19 @@ def test_arguments_without_a_meaning_are_told():
     assert "/unused_arguments" not in launch_files.expand(file, rviz="false")[0]
 
 
+def test_every_argument_of_every_launch_file_is_documented():
+    """Else `roslaunch --ros-args` prints "undocumented"."""
+    files = [path for path in TOP.glob("**/*.launch") if "test" not in path.parts]
+    assert len(files) > 50
+    missing = [
+        f"{path.relative_to(TOP)}: {argument.get('name')}"
+        for path in files
+        for argument in ElementTree.parse(path).getroot().iter("arg")
+        if "value" not in argument.attrib and not argument.get("doc")
+    ]
+    assert missing == []
+
+
 @pytest.mark.parametrize("file", ["documented_hover.launch", "documented_hw_hover.launch"])
 def test_launch_files_as_users_have_them(file):
     nodes, parameters = launch_files.expand(TEST / file)

@@ -60,8 +60,7 @@ def process():
 
 def change(process, **values):
     """Ask for changes; return the configuration that holds then."""
-    request = ReconfigureRequest(encoding.encode_config(values))
-    return encoding.decode_config(process.call("/limiter/set_parameters", request).config)
+    return encoding.decode_config(process.reconfigure("/limiter", **values).config)
 
 
 def updates(process):

@@ -4,8 +4,6 @@ import socket
 import struct
 
 import pytest
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
 
@@ -130,28 +128,22 @@ def test_a_bad_switch_is_named_and_changes_nothing(launch):
     assert node._server.switches.loss == 0.0
 
 
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    request = ReconfigureRequest(encode_config(values))
-    return process.call("/node/set_parameters", request)
-
-
 def test_switches_are_live(launch):
     node = VirtualCrazyflieNode()
     process = launch(node, QUIET)
     faults = node._server.switches
-    reconfigure(process, **{"fault/loss": 0.25, "fault/low_battery": True})
+    process.reconfigure("/node", **{"fault/loss": 0.25, "fault/low_battery": True})
     assert (faults.loss, faults.low_battery) == (0.25, True)
     process.transport.set_param("/node/fault/loss", 0.5)
     process.advance(1.0)
-    reconfigure(process, **{"fault/motor_failure": 3})
+    process.reconfigure("/node", **{"fault/motor_failure": 3})
     assert (faults.loss, faults.motor_failure) == (0.5, 3)
 
 
 def test_a_silence_that_is_set_once_is_not_prolonged(launch):
     node = VirtualCrazyflieNode()
     process = launch(node, QUIET)
-    reconfigure(process, **{"fault/silence": 1000.0})
+    process.reconfigure("/node", **{"fault/silence": 1000.0})
     node._server.switches.silence = 500.0
     process.advance(1.0)
     assert node._server.switches.silence <= 500.0
@@ -161,7 +153,7 @@ def test_a_bad_change_is_refused(launch):
     node = VirtualCrazyflieNode()
     process = launch(node, QUIET)
     with pytest.raises(ServiceError, match="/node/fault/motor_failure is 5; expected an integer"):
-        reconfigure(process, **{"fault/motor_failure": 5})
+        process.reconfigure("/node", **{"fault/motor_failure": 5})
     assert node._server.switches.motor_failure == 0
 
 
@@ -177,5 +169,5 @@ def test_mocap_answers(launch):
     process.advance(1.0)
     assert not node._server.switches.hides(3)
     assert node._server.switches.silent
-    reconfigure(process, **{"fault/invalid": "all"})
+    process.reconfigure("/node", **{"fault/invalid": "all"})
     assert node._server.switches.hides(3)

@@ -8,8 +8,6 @@ import genpy
 import pytest
 import yaml
 from diagnostic_msgs.msg import DiagnosticStatus
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import Point, Pose2D, Quaternion
 
 from crazyflie_utils import ServiceError
@@ -122,23 +120,17 @@ def test_stale_frames_are_dropped():
     assert len(process.published("/mocap_node/Robot_1/pose")) == 1
 
 
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    request = ReconfigureRequest(encode_config(values))
-    return process.call("/mocap_node/set_parameters", request)
-
-
 def test_the_largest_age_may_be_changed():
     process, node = launch()
     node.on_connected("a server")
-    reconfigure(process, stale_after=2.0)
+    process.reconfigure("/mocap_node", stale_after=2.0)
     for _ in range(3):
         show(process, node, body(1), body(5, "cf7"), body(9))
         process.advance(1.0)
     statuses = process.published("/diagnostics")[-1].status
     assert {status.level for status in statuses} == {DiagnosticStatus.OK}
     with pytest.raises(ServiceError, match="/mocap_node/stale_after is 0.0; expected"):
-        reconfigure(process, stale_after=0.0)
+        process.reconfigure("/mocap_node", stale_after=0.0)
 
 
 def test_diagnostics():

@@ -4,8 +4,6 @@ import math
 
 import pytest
 from closed_loop import control_from_cmd_vel, parameters
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import (
     Point,
     Pose,
@@ -193,19 +191,13 @@ def test_a_bad_parameter_is_named(changes, reason):
     assert reason in process.logged("error")[0]
 
 
-def reconfigure(process, **values):
-    """Change parameters as dynamic_reconfigure does."""
-    request = ReconfigureRequest(encode_config(values))
-    return process.call("/crazyflie/controller/set_parameters", request)
-
-
 def test_a_gain_may_be_changed_in_flight_without_a_jump_of_the_thrust():
     process = launch()
     process.publish("/crazyflie/goal", goal(0.1, 0.0, 0.1))
     fly(process)
     pitch, _, thrust, _ = last(process)
     assert pitch == pytest.approx(4.0)
-    reconfigure(process, **{"PIDs/X/kp": 20.0, "PIDs/Z/ki": 7000.0})
+    process.reconfigure("/crazyflie/controller", **{"PIDs/X/kp": 20.0, "PIDs/Z/ki": 7000.0})
     show(process, z=0.1)
     assert last(process)[0] == pytest.approx(2.0, abs=0.01)
     # The vehicle no longer climbs: what was taken off for that comes back.
@@ -217,9 +209,9 @@ def test_a_bad_change_is_refused():
     process.publish("/crazyflie/goal", goal(0.1, 0.0, 0.1))
     fly(process)
     with pytest.raises(ServiceError, match="PIDs/X/minOutput is 20; expected at most maxOutput"):
-        reconfigure(process, **{"PIDs/X/minOutput": 20.0})
+        process.reconfigure("/crazyflie/controller", **{"PIDs/X/minOutput": 20.0})
     with pytest.raises(ServiceError, match="frame cannot be changed"):
-        reconfigure(process, frame="other")
+        process.reconfigure("/crazyflie/controller", frame="other")
     show(process, z=0.1)
     assert last(process)[0] == pytest.approx(4.0, abs=0.01)
 

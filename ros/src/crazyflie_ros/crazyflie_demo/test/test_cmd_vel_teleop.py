@@ -1,7 +1,6 @@
 """Flight by hand: sticks to cmd_vel."""
 
 import pytest
-from live import reconfigure
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
 
@@ -148,7 +147,7 @@ def test_a_bad_parameter_is_named(parameters):
 def test_the_largest_tilt_may_be_changed_in_flight():
     process = launch()
     tilt(process)
-    reconfigure(process, "/cf/teleop", **{"max/pitch": 10.0})
+    process.reconfigure("/cf/teleop", **{"max/pitch": 10.0})
     tilt(process, pitch=1.0)
     assert last(process)[0] == 10.0
 
@@ -157,6 +156,6 @@ def test_a_bad_change_is_refused():
     process = launch()
     tilt(process)
     with pytest.raises(ServiceError, match="/cf/teleop/max/pitch is 90.0; expected"):
-        reconfigure(process, "/cf/teleop", **{"max/pitch": 90.0})
+        process.reconfigure("/cf/teleop", **{"max/pitch": 90.0})
     tilt(process, pitch=1.0)
     assert last(process)[0] == 30.0

@@ -4,7 +4,6 @@ import errno
 import os
 
 import pytest
-from live import reconfigure
 from sensor_msgs.msg import Joy
 from test_joystick import axis, button
 
@@ -126,9 +125,9 @@ def test_a_bad_parameter_is_named(changes):
 
 def test_the_dead_zone_may_be_changed(fifo):
     process = launch(fifo)
-    reconfigure(process, "/crazyflie/joy", deadzone=0.5)
+    process.reconfigure("/crazyflie/joy", deadzone=0.5)
     with pytest.raises(ServiceError, match="/crazyflie/joy/deadzone is 1.0; expected"):
-        reconfigure(process, "/crazyflie/joy", deadzone=1.0)
+        process.reconfigure("/crazyflie/joy", deadzone=1.0)
     with open(fifo, "wb", buffering=0) as stick:
         stick.write(axis(0, -15000))
         process.advance(0.05)

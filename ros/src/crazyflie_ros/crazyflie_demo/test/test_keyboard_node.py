@@ -5,7 +5,6 @@ import pty
 import termios
 
 import pytest
-from live import reconfigure
 
 from crazyflie_demo.gamepad import LAND, PITCH, TAKEOFF
 from crazyflie_demo.keyboard_node import KeyboardNode
@@ -93,9 +92,9 @@ def test_needs_a_terminal(monkeypatch):
 
 def test_the_deflection_may_be_changed(terminal):
     process = launch()
-    reconfigure(process, "/crazyflie/keyboard", deflection=0.2)
+    process.reconfigure("/crazyflie/keyboard", deflection=0.2)
     with pytest.raises(ServiceError, match="/crazyflie/keyboard/deflection is 2.0; expected"):
-        reconfigure(process, "/crazyflie/keyboard", deflection=2.0)
+        process.reconfigure("/crazyflie/keyboard", deflection=2.0)
     terminal.type("\x1b[A")
     process.advance(0.1)
     assert messages(process)[-1].axes[PITCH] == 0.2

@@ -4,7 +4,6 @@ import math
 
 import pytest
 from geometry_msgs.msg import Twist
-from live import reconfigure
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Header
 
@@ -121,18 +120,18 @@ def test_the_speeds_may_be_changed_in_flight():
     process = launch(PublishPoseTeleopNode())
     move(process, 1.0, x=1.0)
     before = last(process)
-    reconfigure(process, "/cf/pose", **{"speed/x": 0.0})
+    process.reconfigure("/cf/pose", **{"speed/x": 0.0})
     move(process, 1.0, x=1.0)
     assert last(process) == before
     with pytest.raises(ServiceError, match="/cf/pose/speed/x is -1.0; expected"):
-        reconfigure(process, "/cf/pose", **{"speed/x": -1.0})
+        process.reconfigure("/cf/pose", **{"speed/x": -1.0})
 
 
 def test_a_constant_thrust_may_be_changed():
     process = FakeProcess()
     assert process.launch(ConstThrustNode(), "/cf/const_thrust")
-    reconfigure(process, "/cf/const_thrust", thrust=20000.0)
+    process.reconfigure("/cf/const_thrust", thrust=20000.0)
     with pytest.raises(ServiceError, match="/cf/const_thrust/thrust is 60001.0; expected"):
-        reconfigure(process, "/cf/const_thrust", thrust=60001.0)
+        process.reconfigure("/cf/const_thrust", thrust=60001.0)
     process.advance(0.02)
     assert process.published("/cf/cmd_vel")[-1].linear.z == 20000.0

@@ -2,7 +2,6 @@
 
 import pytest
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
-from live import reconfigure
 from tf2_msgs.msg import TFMessage
 
 from crazyflie_demo.waypoint_node import Demo2Node, DemoNode
@@ -92,7 +91,7 @@ def test_the_tolerance_may_be_changed_in_flight():
     fly_to(process, 0.4, 0.0, 1.0, 0.0)
     assert goal(process)[0] == 0.0
     with pytest.raises(ServiceError, match="/cf/demo/tolerance/position is 0.0; expected"):
-        reconfigure(process, "/cf/demo", **{"tolerance/position": 0.0})
-    reconfigure(process, "/cf/demo", **{"tolerance/position": 0.5})
+        process.reconfigure("/cf/demo", **{"tolerance/position": 0.0})
+    process.reconfigure("/cf/demo", **{"tolerance/position": 0.5})
     fly_to(process, 0.4, 0.0, 1.0, 0.0)
     assert goal(process)[0] == 1.0

@@ -101,6 +101,20 @@ def test_what_was_told_and_what_is_measured_is_said(server, topic, message, told
     assert "did not lift off: pause the stream" in server.process.logged("warn")[-1]
 
 
+@pytest.mark.parametrize(("yaw", "is_warned"), [(30.0, True), (-5.0, False), (355.0, False)])
+def test_another_heading_than_that_on_the_ground_is_warned_of_at_once(server, yaw, is_warned):
+    stand(server, STANDING, READY)
+
+    def warnings():
+        return [each for each in server.process.logged("warn") if "may not lift off" in each]
+
+    server.process.publish("/cf1/cmd_position", Position(z=1.0, yaw=yaw))
+    assert len(warnings()) == is_warned
+    if is_warned:
+        assert f"cf1: cmd_position commands yaw {yaw:.0f} degrees" in warnings()[0]
+        assert "with yaw -10: " in warnings()[0]
+
+
 def test_without_an_estimate_it_is_only_said(server):
     vehicle = stand(server, {}, LOCKED)
     assert "locked" in stream_until_warned(server, "cmd_position", Position(z=1.0))

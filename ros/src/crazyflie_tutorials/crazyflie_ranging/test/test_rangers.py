@@ -5,8 +5,6 @@ from pathlib import Path
 
 import pytest
 import rospkg
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import Range
 from tf2_msgs.msg import TFMessage
@@ -104,8 +102,7 @@ def test_silent_while_nobody_says_where_the_box_is(simulated):
 def test_sensors_that_have_failed_are_silent(simulated):
     fly(simulated, 0.5)
     count = len(simulated.published("/range/front"))
-    request = ReconfigureRequest(encode_config({"enabled": False}))
-    simulated.call("/simulated_ranger/set_parameters", request)
+    simulated.reconfigure("/simulated_ranger", enabled=False)
     fly(simulated, 0.5)
     assert len(simulated.published("/range/front")) == count
 

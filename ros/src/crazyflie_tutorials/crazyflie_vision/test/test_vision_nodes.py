@@ -4,8 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from dynamic_reconfigure.encoding import encode_config
-from dynamic_reconfigure.srv import ReconfigureRequest
 from geometry_msgs.msg import Point, PointStamped, Quaternion, Transform, TransformStamped, Vector3
 from sensor_msgs.msg import CameraInfo, Image
 from test_camera import CONFIG
@@ -132,14 +130,9 @@ def test_bounds_of_the_colour_may_change(camera):
     assert camera.launch(tracker, "/tracker", {"hue_lower": 100, "hue_upper": 130})
     camera.advance(0.5)
     assert camera.published("/target") == []
-    reconfigure(camera, "/tracker", hue_lower=0, hue_upper=20)
+    camera.reconfigure("/tracker", hue_lower=0, hue_upper=20)
     camera.advance(0.5)
     assert len(camera.published("/target")) == 5
-
-
-def reconfigure(process, node, **values):
-    """Set live parameters, as rqt_reconfigure does."""
-    process.call(f"{node}/set_parameters", ReconfigureRequest(encode_config(values)))
 
 
 INFO = CameraInfo(K=[200.0, 0.0, 159.5, 0.0, 200.0, 119.5, 0.0, 0.0, 1.0])

@@ -18,6 +18,9 @@ MIN_CLIMB = 0.15
 MAX_RISE, MAX_SPEED = 0.05, 0.1
 """A vehicle on the ground estimates no more, m and m/s."""
 
+MAX_TURN = 10.0
+"""From the heading on the ground to the one that is commanded, degrees."""
+
 MAX_GAP = 0.5
 """Setpoints older than this are levelled out by the firmware, s."""
 
@@ -50,8 +53,8 @@ class LiftWatch:
         """Take note that there are no setpoints any more."""
         self._begin, self._latest, self._is_reported = None, None, False
 
-    def command(self, now: float, height: float | None) -> None:
-        """Take note of a setpoint that was sent.
+    def command(self, now: float, height: float | None) -> bool:
+        """Take note of a setpoint that was sent; return whether an attempt to lift off begins.
 
         Its height is in m, in the frame of the estimate; None if it asks for none.
         """
@@ -60,10 +63,12 @@ class LiftWatch:
         self._latest = now
         if height is None or not self._is_on_ground or height - (self._ground or 0.0) < MIN_CLIMB:
             self._begin = None
-            return
+            return False
         self._height = height
-        if self._begin is None:
+        begins = self._begin is None
+        if begins:
             self._begin = now
+        return begins
 
     def sample(
         self, now: float, is_flying: bool | None, height: float | None, speed: float | None

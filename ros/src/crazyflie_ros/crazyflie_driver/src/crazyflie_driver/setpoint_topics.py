@@ -10,7 +10,7 @@ from functools import partial
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Empty
 
-from crazyflie_driver.lift_watch import LIMIT, LiftWatch
+from crazyflie_driver.lift_watch import LIMIT, MAX_TURN, LiftWatch
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.setpoint_gate import Event, SetpointGate
 from crazyflie_driver.setpoint_messages import EXTERNAL, SETPOINTS, Sender
@@ -171,6 +171,17 @@ class SetpointTopics:
             f"within {LIMIT:g} s ({', '.join(words)}): {advice}"
         )
 
+    def _check_heading(self):
+        yaw, heading = self._commanded_yaw, self._log.heading
+        if yaw is None or heading is None or abs(math.remainder(yaw - heading, 360.0)) <= MAX_TURN:
+            return
+        self._warn(
+            f"{self._topic} commands yaw {yaw:.0f} degrees to a vehicle on the ground with yaw "
+            f"{heading:.0f}: it may not lift off, and leap when it turns; command its own yaw "
+            "until it flies",
+            key="heading",
+        )
+
     def high_level_until(self, moment: float) -> None:
         """Take note that a high-level command is carried out until a moment (s)."""
         self._high_level_end = moment
@@ -199,7 +210,8 @@ class SetpointTopics:
             self.ignored += 1
             return
         height, self._commanded_yaw = sender.height_and_yaw(message)
-        self._lift.command(now, height)
+        if self._lift.command(now, height):
+            self._check_heading()
         if self._high_level_end is not None and now < self._high_level_end:
             self._warn(f"{name} overrides the high-level command", key="override")
 

@@ -7,6 +7,8 @@ from concurrent.futures import Future
 from typing import Any
 
 import genpy
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.srv import ReconfigureRequest
 from typing_extensions import override
 
 from crazyflie_utils.clock import SimulatedClock
@@ -210,6 +212,10 @@ class FakeProcess(Process):
         """
         answer = _named(self.transport.services, service, "service")(request)
         return answer.result() if answer.done() else answer
+
+    def reconfigure(self, node: str, **values: object) -> genpy.Message | Future[genpy.Message]:
+        """Change parameters of a node as dynamic_reconfigure does; see `call`."""
+        return self.call(f"{node}/set_parameters", ReconfigureRequest(encode_config(values)))
 
     def logged(self, level: str) -> list[str]:
         """Return the texts logged at a level, oldest first."""

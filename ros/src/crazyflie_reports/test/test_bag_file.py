@@ -149,6 +149,13 @@ def test_a_spool_gives_back_what_it_has_put_on_disk(tmp_path):
     np.testing.assert_array_equal(rows[:, 3], np.arange(5000))
 
 
+def test_rows_are_in_the_order_of_their_times(tmp_path):
+    spool = Spool(tmp_path / "rows", ("x",))
+    for time in (2.0, 1.0, 3.0):
+        spool.append(time, 0.0, 0, (10.0 * time,))
+    np.testing.assert_array_equal(spool.rows()[:, [0, 3]], [[1, 10], [2, 20], [3, 30]])
+
+
 def test_decimation_keeps_peaks():
     moments = np.arange(100_000.0)
     values = np.zeros_like(moments)

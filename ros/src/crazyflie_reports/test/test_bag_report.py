@@ -147,8 +147,9 @@ def test_other_topics_and_other_names(run):
         for time in range(10):
             bag.write("/camera/image", String("no flight"), bags.stamp(time))
     assert run(run.folder / "a.bag")[2][0]["vehicle"] == "a/b"
-    with pytest.raises(SystemExit):
-        run(run.folder / "a.bag", "--topic", "height=/z")
+    for wrong in ("height=/z", "state", "state=(", "state="):
+        with pytest.raises(SystemExit):
+            run(run.folder / "a.bag", "--topic", wrong)
     status, output, flights = run(run.folder / "a.bag", "--topic", "state=estimate")
     assert status == 0
     assert values(flights[0])["state rate"] is None

@@ -105,7 +105,7 @@ def flights(
     end : float
         Of the recording, s.
     """
-    known = _phases(states, end) if states else _guessed(vehicle)
+    known = _phases(sorted(states), end) if states else _guessed(vehicle)
     lasting = (phases for phases in known if phases[-1].end > phases[0].start)
     for number, phases in enumerate(lasting, 1):
         first, last = phases[0].start - MARGIN, phases[-1].end + MARGIN

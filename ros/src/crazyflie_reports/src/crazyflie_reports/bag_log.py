@@ -64,10 +64,13 @@ class Spool:
             del self._buffer[:]
 
     def rows(self) -> NDArray[np.float64]:
-        """Return all rows, shape (count, 3 + len(fields))."""
+        """Return all rows in the order of their times, shape (count, 3 + len(fields))."""
         on_disk = np.fromfile(self._path) if self._path.exists() else np.empty(0)
         numbers = np.concatenate([on_disk, np.array(self._buffer)])
-        return numbers.reshape(-1, 3 + len(self.fields))
+        rows = numbers.reshape(-1, 3 + len(self.fields))
+        # Bags that were merged may be in another order.
+        is_sorted = (np.diff(rows[:, 0]) >= 0.0).all()
+        return rows if is_sorted else rows[np.argsort(rows[:, 0], kind="stable")]
 
 
 @dataclass

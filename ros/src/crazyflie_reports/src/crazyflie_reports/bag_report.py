@@ -4,6 +4,7 @@ import argparse
 import csv
 import json
 import math
+import re
 import sys
 import tempfile
 from collections.abc import Iterator
@@ -152,7 +153,8 @@ def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -
     except OSError as error:
         raise ReportError(f"the report cannot be written into {folder}: {error.strerror}") from None
     print(report.table())
-    print(*(remark for each in report.recordings for remark in each["remarks"]), sep="\n")
+    for recording in report.recordings:
+        print("".join(f"{remark}\n" for remark in recording["remarks"]), end="")
     print(f"report: {folder / PAGE}")
     return problems
 
@@ -179,6 +181,11 @@ def main() -> int:
     names = dict(each.partition("=")[::2] for each in options.topic)
     if unknown := [each for each in names if each not in roles or not names[each]]:
         parser.error(f"--topic {unknown[0]}: expected ROLE=NAME with a role of {', '.join(roles)}")
+    for role, name in names.items():
+        try:
+            re.compile(name)
+        except re.error as error:
+            parser.error(f"--topic {role}={name}: expected a regular expression; {error}")
     try:
         problems = make(options.bags, options.out, names)
     except ReportError as error:

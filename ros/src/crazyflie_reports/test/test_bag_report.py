@@ -85,6 +85,12 @@ def test_a_gap(run):
     assert "state gap, longest 200 ms (≤ 100 ms)" in output
 
 
+def test_states_that_stop_in_flight(run):
+    _, _, (flight,) = run(bags.flight_bag(run.folder / "a.bag", gap=(6.0, 99.0)))
+    assert values(flight)["state gap, longest"] == pytest.approx(7000.0, abs=20.0)
+    assert values(flight)["touchdown speed"] is None
+
+
 @pytest.mark.parametrize("has_pose", [True, False])
 def test_crazyflie_ros(run, has_pose):
     with bags.written(run.folder / "a.bag") as bag:
@@ -173,18 +179,20 @@ def test_no_flight(run):
     with bags.written(run.folder / "a.bag") as bag:
         for _, time in bags.steps():
             bag.write("/control/final", bags.ControlStamped(), bags.stamp(time))
+        bags.write_events(bag)
     status, output, flights = run(run.folder / "a.bag")
     assert (status, flights) == (0, [])
     assert "It has no flight." in output
+    assert "5.0 s: refusal: /node: /go refused: too far" in output
 
 
-def test_a_flight_that_never_hovers(run):
+@pytest.mark.parametrize(("x", "time"), [(5.0, None), (float("inf"), 1.98)])
+def test_references_that_are_far_or_infinite(run, x, time):
     with bags.written(run.folder / "a.bag") as bag:
         bags.write_flight(bag)
-        infinite = bags.PositionVelocityState(x=float("inf"))
-        far = bags.PositionVelocityStateStamped(bags.header(2.0), infinite)
-        bag.write("/ref", far, bags.stamp(2.0))
+        state = bags.PositionVelocityState(x=x)
+        bag.write("/ref", bags.PositionVelocityStateStamped(bags.header(2.0), state), bags.stamp(2))
     status, output, (flight,) = run(run.folder / "a.bag")
     assert status == 0
-    assert values(flight)["time to hover"] is None
-    assert "time to hover inf s (≤ 8 s)" in output
+    assert values(flight)["time to hover"] == (time and pytest.approx(time, abs=0.02))
+    assert ("time to hover inf s (≤ 8 s)" in output) == (time is None)

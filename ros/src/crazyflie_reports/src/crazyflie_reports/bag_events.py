@@ -111,7 +111,8 @@ class EventLog:
         if self._changes((topic, "state"), message.state):
             self.flight_states[namespace].append((time, message.state))
         if self._changes((topic, "reason"), message.reason) and message.reason:
-            yield namespace, Kind.HOLD, message.reason
+            is_hold = message.state == FlightStatus.FLYING
+            yield namespace, Kind.HOLD if is_hold else Kind.WARNING, message.reason
         if message.state == FlightStatus.ON_GROUND:
             refusal = message.takeoff_refusal
             if self._changes((topic, "refusal"), refusal) and refusal:

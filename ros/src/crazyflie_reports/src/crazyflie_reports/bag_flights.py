@@ -183,6 +183,8 @@ def _record(vehicle, phases, first, last):
 
 def _series(rows, fields, first, last):
     rows = _between(rows, first, last)
+    # Positions, or controls, that are no numbers, which every node rejects, too.
+    rows = rows[np.isfinite(rows[:, :4]).all(axis=1)]
     return Series.of(fields, rows[:, 0], rows[:, 1:])
 
 

@@ -59,19 +59,20 @@ class Report:
         data = []
         for flight in flights_of(log):
             key = [flight.recording, flight.vehicle, flight.number]
-            self._figures.append((key, figures(flight)))
+            found = figures(flight)
+            self._figures.append((key, found))
             self._events += [
                 [*key, f"{e.time - flight.start:.3f}", e.kind.value, e.text, e.count]
                 for e in flight.events
             ]
-            data.append(report_page.flight_data(flight, points))
+            data.append(report_page.flight_data(flight, found, points))
         start = datetime.fromtimestamp(log.start, UTC)
         self.recordings.append(
             {
                 "name": log.name,
                 "start": f"{start:%Y-%m-%d %H:%M:%S} UTC",
                 "duration": round(log.end - log.start, 3),
-                "remarks": log.remarks if data else [*log.remarks, "It has no flight."],
+                "remarks": log.remarks if data else [*log.remarks, *_why_there_is_no_flight(log)],
                 "flights": data,
             }
         )
@@ -192,6 +193,12 @@ def main() -> int:
         problems = [str(error)]
     print(*problems, sep="\n", file=sys.stderr, end="\n" if problems else "")
     return 1 if problems else 0
+
+
+def _why_there_is_no_flight(log):
+    yield "It has no flight."
+    for event in log.events.events[: report_page.MAX_EVENTS]:
+        yield f"{event.time - log.start:.1f} s: {event.kind.value}: {event.text}"
 
 
 def _number(value):

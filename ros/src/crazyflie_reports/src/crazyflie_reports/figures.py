@@ -151,9 +151,11 @@ def _loop(flight: Flight) -> Iterator[Figure]:
         delay = float(np.percentile(delays, share)) if len(delays) else math.nan
         yield Figure(f"delay pose to control, {name}", "ms", delay, maximum=limit)
     for name, series in (("state", flight.record.state), ("control", flight.record.final_control)):
-        steps = np.diff(_part(series, flight)[:, 0])
-        rate = 1.0 / steps.mean() if steps.any() else math.nan
-        yield Figure(f"{name} rate", "Hz", float(rate), minimum=LEAST_RATE)
+        times = _part(series, flight)[:, 0]
+        # From the first one to the end of the flight, whether it came until then or not.
+        steps = np.diff([*times, flight.end]) if len(times) else times
+        rate = 1.0 / float(steps.mean()) if steps.any() else math.nan
+        yield Figure(f"{name} rate", "Hz", rate, minimum=LEAST_RATE)
         yield Figure(f"{name} gap, longest", "ms", 1e3 * _max(steps), maximum=1e3 * GAP_LIMIT)
     lost = math.nan if flight.lost is None else float(flight.lost)
     yield Figure("states not recorded", "", lost, maximum=0.0)

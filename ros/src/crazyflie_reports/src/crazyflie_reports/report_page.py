@@ -10,7 +10,7 @@ import rospkg
 from numpy.typing import NDArray
 
 from crazyflie_reports.bag_flights import Flight
-from crazyflie_reports.figures import figures
+from crazyflie_reports.figures import Figure
 
 Array = NDArray[np.float64]
 
@@ -47,8 +47,8 @@ def decimated(times: Array, values: Array, points: int) -> tuple[Array, Array]:
     return times[kept], values[kept]
 
 
-def flight_data(flight: Flight, points: int) -> dict[str, Any]:
-    """Return what the page knows of a flight; times count from its start, s."""
+def flight_data(flight: Flight, found: list[Figure], points: int) -> dict[str, Any]:
+    """Return what the page knows of a flight with its figures; times count from its start, s."""
     events = flight.events[:MAX_EVENTS]
     return {
         "vehicle": flight.vehicle,
@@ -62,7 +62,7 @@ def flight_data(flight: Flight, points: int) -> dict[str, Any]:
         "more_events": len(flight.events) - len(events),
         "figures": [
             [float(f"{f.value:.4g}") if math.isfinite(f.value) else None, f.is_normal, f.normal]
-            for f in figures(flight)
+            for f in found
         ],
         "plots": _plots(flight, points),
         "path": _path(flight, points),

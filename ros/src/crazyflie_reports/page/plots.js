@@ -45,9 +45,13 @@ class Plot {
   constructor(canvas, data, flight, view, seek, redraw) {
     Object.assign(this, { canvas, data, flight, view, seek, redraw });
     canvas.addEventListener("wheel", (event) => this.zoom(event), { passive: false });
-    canvas.addEventListener("pointerdown", (event) => { this.grip = [event.offsetX, { ...view }]; });
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      this.grip = [event.offsetX, { ...view }];
+      this.moved = false;
+    });
     canvas.addEventListener("pointermove", (event) => this.move(event));
-    window.addEventListener("pointerup", () => { this.grip = null; });
+    canvas.addEventListener("pointerup", () => { this.grip = null; });
     canvas.addEventListener("click", (event) => { if (!this.moved) seek(this.timeAt(event.offsetX)); });
     canvas.addEventListener("dblclick", () => { Object.assign(view, view.all); redraw(); });
   }
@@ -66,7 +70,7 @@ class Plot {
   }
 
   move(event) {
-    if (!this.grip) { this.moved = false; return; }
+    if (!this.grip) return;
     const [x, old] = this.grip, { view } = this;
     this.moved = this.moved || Math.abs(event.offsetX - x) > 3;
     const span = old.to - old.from, shift = (x - event.offsetX) / this.width * span;

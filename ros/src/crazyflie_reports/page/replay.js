@@ -22,9 +22,12 @@ function rotated([x, y, z], roll, pitch, yaw) {
 class Replay {
   constructor(canvas, recording, redraw) {
     Object.assign(this, { canvas, recording, redraw, turn: -0.9, tilt: 0.45, zoom: 1 });
-    canvas.addEventListener("pointerdown", (event) => { this.grip = [event.clientX, event.clientY, this.turn, this.tilt]; });
-    window.addEventListener("pointerup", () => { this.grip = null; });
-    window.addEventListener("pointermove", (event) => this.drag(event));
+    canvas.addEventListener("pointerdown", (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      this.grip = [event.clientX, event.clientY, this.turn, this.tilt];
+    });
+    canvas.addEventListener("pointerup", () => { this.grip = null; });
+    canvas.addEventListener("pointermove", (event) => this.drag(event));
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       this.zoom = Math.min(20, Math.max(0.2, this.zoom * Math.exp(-event.deltaY * 0.001)));

@@ -116,7 +116,7 @@ def test_events_of_each_vehicle(run):
     assert status == 0
     assert [each["vehicle"] for each in flights] == ["cf1", "cf2"]
     assert flights[0]["events"] == []
-    events = [(float(time), kind, text) for time, kind, text, _ in flights[1]["events"]]
+    events = [(time, kind, text) for time, kind, text, _ in flights[1]["events"]]
     assert events == [
         (4.0, "refusal", "/cf2/node: /cf2/go refused: too far"),
         (5.1, "pose rejected", "a pose is too far away (/cf2/state_estimator: poses)"),
@@ -165,14 +165,17 @@ def test_recordings_side_by_side_of_which_one_is_bad(run):
     good = bags.flight_bag(run.folder / "good.bag")
     folder = run.folder / "split"
     folder.mkdir()
+    (run.folder / "good.d").mkdir()
+    same = bags.flight_bag(run.folder / "good.d" / "good.bag")
     for number, name in enumerate(("a", "b")):
         bags.flight_bag(folder / f"flight_{number}.bag", name=name)
-    status, output, flights = run(good, run.folder / "missing.bag", folder)
+    status, output, flights = run(good, run.folder / "missing.bag", folder, same)
     assert status == 1
     assert "missing.bag does not exist; expected a bag" in output
     assert [(each["recording"], each["vehicle"]) for each in flights] == [
-        ("good.bag", "vehicle"), ("split", "a"), ("split", "b"),
+        (str(good), "vehicle"), ("split", "a"), ("split", "b"), (str(same), "vehicle"),
     ]  # fmt: skip
+    assert [name for name, _, _ in flights[0]["phases"]] == ["taking off", "flying", "landing"]
 
 
 def test_no_flight(run):

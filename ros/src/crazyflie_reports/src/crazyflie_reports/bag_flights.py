@@ -174,9 +174,7 @@ def _record(vehicle, phases, first, last):
     return FlightRecord(
         state=_series(vehicle.state, STATE_FIELDS, first, last),
         final_control=_series(vehicle.control, CONTROL_FIELDS, first, last),
-        takeoff_control=_series(vehicle.takeoff_control, CONTROL_FIELDS, first, last),
         reference=_series(vehicle.reference, STATE_FIELDS, first, last),
-        toggles=_between(vehicle.toggles, first, last)[:, 0].tolist(),
         events=events,
     )
 

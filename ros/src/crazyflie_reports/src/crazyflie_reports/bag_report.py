@@ -50,22 +50,24 @@ class Report:
 
     def __init__(self) -> None:
         self.recordings: list[dict[str, Any]] = []
-        self._figures: list[tuple[list[Any], list[Figure]]] = []
-        self._events: list[list[Any]] = []
+        self._flights: list[tuple[dict[str, Any], list[Figure]]] = []
 
     def add(self, log: bag_log.BagLog) -> None:
         """Add the flights of a recording."""
         points = report_page.points_of(len(vehicle_namespaces(log)))
         data = []
         for flight in flights_of(log):
-            key = [flight.recording, flight.vehicle, flight.number]
             found = figures(flight)
-            self._figures.append((key, found))
-            self._events += [
-                [*key, f"{e.time - flight.start:.3f}", e.kind.value, e.text, e.count]
-                for e in flight.events
-            ]
             data.append(report_page.flight_data(flight, found, points))
+            entry = {
+                **{"recording": log.name, "vehicle": flight.vehicle, "flight": flight.number},
+                "phases": data[-1]["phases"],
+                "events": [
+                    [round(e.time - flight.start, 3), e.kind.value, e.text, e.count]
+                    for e in flight.events
+                ],
+            }
+            self._flights.append((entry, found))
         start = datetime.fromtimestamp(log.start, UTC)
         self.recordings.append(
             {
@@ -79,36 +81,46 @@ class Report:
 
     def write(self, folder: Path) -> None:
         """Write page and tables into a folder, which is made if it is not there."""
-        names = [[f.name, f.unit] for f in self._figures[0][1]] if self._figures else []
+        names = [[f.name, f.unit] for f in self._flights[0][1]] if self._flights else []
         folder.mkdir(parents=True, exist_ok=True)
         (folder / PAGE).write_text(report_page.page(self.recordings, names))
-        flight = ["recording", "vehicle", "flight"]
+        keys = ("recording", "vehicle", "flight")
+        rows = [([entry[key] for key in keys], entry, found) for entry, found in self._flights]
         _write_csv(
             folder / FIGURES,
-            [*flight, "figure", "value", "unit", "normal", "is normal"],
-            ([*key, f.name, _number(f.value), f.unit, f.normal, f.is_normal]
-             for key, each in self._figures for f in each),
-        )  # fmt: skip
-        _write_csv(folder / EVENTS, [*flight, "time (s)", "kind", "text", "count"], self._events)
+            [*keys, "figure", "value", "unit", "normal", "is normal"],
+            [
+                [*key, f.name, _number(f.value), f.unit, f.normal, f.is_normal]
+                for key, _, found in rows
+                for f in found
+            ],
+        )
+        _write_csv(
+            folder / EVENTS,
+            [*keys, "time (s)", "kind", "text", "count"],
+            [[*key, *event] for key, entry, _ in rows for event in entry["events"]],
+        )
         tables = [
-            {
-                **dict(zip(flight, key, strict=True)),
+            entry
+            | {
                 "figures": {
                     f.name: {"value": _number(f.value), "unit": f.unit, "normal": f.normal}
-                    for f in each
-                },
-                "events": [e[3:] for e in self._events if e[:3] == key],
+                    for f in found
+                }
             }
-            for key, each in self._figures
+            for entry, found in self._flights
         ]
         (folder / DATA).write_text(json.dumps(tables, indent=1))
 
     def table(self) -> str:
         """Return a line for each flight, with the figures that are not normal."""
         lines = []
-        for (recording, vehicle, number), each in self._figures:
-            bad = [f"{f.name} {f.value:.4g} {f.unit} ({f.normal})" for f in each if not f.is_normal]
-            lines.append(f"{recording}: {vehicle}, flight {number}: {', '.join(bad) or 'normal'}")
+        for entry, found in self._flights:
+            bad = [
+                f"{f.name} {f.value:.4g} {f.unit} ({f.normal})" for f in found if not f.is_normal
+            ]
+            flight = f"{entry['recording']}: {entry['vehicle']}, flight {entry['flight']}"
+            lines.append(f"{flight}: {', '.join(bad) or 'normal'}")
         return "\n".join(lines)
 
 
@@ -143,6 +155,9 @@ def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -
                         total=size, unit="B", unit_scale=True, desc=path.name, disable=None
                     ) as bar:
                         log = bag_log.read(path, series, names, bar.update)
+                    # Bags of several folders may have the same name.
+                    if [each.name for each in paths].count(path.name) > 1:
+                        log.name = str(path)
                     report.add(log)
                 except BagError as error:
                     problems.append(str(error))

@@ -103,7 +103,6 @@ ROLES = (
         },
     ),
     Role("final_control", "control/final", CONTROL_FIELDS, _CONTROLS),
-    Role("takeoff_control", "control/takeoff", CONTROL_FIELDS, _CONTROLS),
     Role("cmd_vel", "cmd_vel", CONTROL_FIELDS, {"geometry_msgs/Twist": _of_cmd_vel}),
     Role(
         "pose",

@@ -34,7 +34,7 @@ class Vehicle:
         A driver has sent its controls: it is no simulated one.
     state, reference : ndarray
         STATE_FIELDS; velocities and yaw may be NaN.
-    control, takeoff_control : ndarray
+    control : ndarray
         CONTROL_FIELDS.
     attitude : ndarray
         POSE_FIELDS.
@@ -56,7 +56,6 @@ class Vehicle:
     state: Rows
     reference: Rows
     control: Rows
-    takeoff_control: Rows
     attitude: Rows
     battery: Rows
     link: Rows
@@ -142,7 +141,6 @@ def _vehicle(namespace, sources, frame, frames, link):
         state=_without_header(state),
         reference=_without_header(rows("reference", len(STATE_FIELDS))),
         control=_without_header(control),
-        takeoff_control=_without_header(rows("takeoff_control", len(CONTROL_FIELDS))),
         attitude=_without_header(pose),
         battery=_without_header(rows("battery", 1)),
         link=link,

@@ -43,8 +43,8 @@ class Flight:
 
     Attributes
     ----------
-    recording, vehicle : str
-        Names.
+    vehicle : str
+        Its name.
     number : int
         Of the vehicle's flights in the recording, from 1.
     phases : list of Phase
@@ -59,7 +59,6 @@ class Flight:
     events : list of Event
     """
 
-    recording: str
     vehicle: str
     number: int
     phases: list[Phase]
@@ -87,7 +86,6 @@ def flights(
     vehicle: Vehicle,
     states: list[tuple[float, int]],
     events: list[Event],
-    recording: str,
     end: float,
 ) -> Iterator[Flight]:
     """Yield the flights of a vehicle.
@@ -100,8 +98,6 @@ def flights(
         are none, the phases follow from in_flight, thrust and height.
     events : list of Event
         That concern the vehicle.
-    recording : str
-        Its name.
     end : float
         Of the recording, s.
     """
@@ -110,7 +106,6 @@ def flights(
     for number, phases in enumerate(lasting, 1):
         first, last = phases[0].start - MARGIN, phases[-1].end + MARGIN
         yield Flight(
-            recording,
             vehicle.name,
             number,
             phases,

@@ -124,10 +124,12 @@ def files_of(path: Path) -> list[Path]:
     Raises
     ------
     BagError
-        There is no bag.
+        There is no such file or folder, or no bag in the folder.
     """
-    if not path.is_dir():
+    if path.is_file():
         return [path]
+    if not path.is_dir():
+        raise BagError(f"{path} does not exist; expected a bag or a folder of bags")
     # flight_10.bag comes after flight_9.bag.
     bags = sorted(
         (each for each in path.iterdir() if each.name.endswith((".bag", ".bag.active"))),

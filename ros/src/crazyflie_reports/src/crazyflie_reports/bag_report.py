@@ -36,7 +36,7 @@ def flights_of(log: bag_log.BagLog) -> Iterator[Flight]:
         others = names - {vehicle.namespace, ""}
         events = list(concerning(log.events.events, vehicle.namespace, others))
         states = log.events.flight_states.get(vehicle.namespace, [])
-        yield from flights(vehicle, states, events, log.name, log.end)
+        yield from flights(vehicle, states, events, log.end)
 
 
 class Report:
@@ -148,21 +148,14 @@ def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -
         with tempfile.TemporaryDirectory(dir=folder) as place:
             for number, path in enumerate(paths):
                 try:
-                    size = sum(each.stat().st_size for each in bag_log.files_of(path))
-                    series = Path(place, str(number))
-                    series.mkdir()
-                    with tqdm(
-                        total=size, unit="B", unit_scale=True, desc=path.name, disable=None
-                    ) as bar:
-                        log = bag_log.read(path, series, names, bar.update)
-                    # Bags of several folders may have the same name.
-                    if [each.name for each in paths].count(path.name) > 1:
-                        log.name = str(path)
-                    report.add(log)
+                    log = _read(path, Path(place, str(number)), names)
                 except BagError as error:
                     problems.append(str(error))
-                except FileNotFoundError:
-                    problems.append(f"{path} does not exist; expected a bag or a folder of bags")
+                    continue
+                # Bags of several folders may have the same name.
+                if [each.name for each in paths].count(path.name) > 1:
+                    log.name = str(path)
+                report.add(log)
         if not report.recordings:
             raise ReportError("\n".join(problems))
         report.write(folder)
@@ -208,6 +201,14 @@ def main() -> int:
         problems = [str(error)]
     print(*problems, sep="\n", file=sys.stderr, end="\n" if problems else "")
     return 1 if problems else 0
+
+
+def _read(path, folder, names):
+    """Read a recording with a progress bar; its series are kept in a new folder."""
+    folder.mkdir()
+    size = sum(each.stat().st_size for each in bag_log.files_of(path))
+    with tqdm(total=size, unit="B", unit_scale=True, desc=path.name, disable=None) as bar:
+        return bag_log.read(path, folder, names, bar.update)
 
 
 def _why_there_is_no_flight(log):

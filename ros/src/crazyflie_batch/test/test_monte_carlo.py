@@ -43,7 +43,7 @@ def command(tmp_path, monkeypatch, capsys):
 
 
 def free_port():
-    """Return a port that nobody listens at."""
+    """Return a port without a listener."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         return listener.getsockname()[1]

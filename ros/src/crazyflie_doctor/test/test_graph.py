@@ -86,8 +86,8 @@ def test_a_subscriber_that_is_not_connected():
 
 
 def test_topics_without_a_publisher():
-    nobody = but(publishers={"/control/lqr": {"/lqr"}})
-    assert found(graph.check_publishers(nobody)) == [
+    silent = but(publishers={"/control/lqr": {"/lqr"}})
+    assert found(graph.check_publishers(silent)) == [
         ("error", "/ref has no publisher, /lqr waits for it"),
         ("error", "no node publishes /tf"),
     ]
@@ -211,7 +211,7 @@ def test_no_tree(transforms, part):
     assert part in text
 
 
-def test_frames_that_nobody_publishes():
+def test_frames_that_silent_publishes():
     level, text = the_only(timing.check_frames(WELL, Recording(transforms=stream("crazyfly"))))
     assert level == "error"
     assert "the frame crazyflie that /state_estimator needs (did you mean crazyfly?)" in text

@@ -160,7 +160,7 @@ def test_radio():
     assert not found(installation.check_radio(fine, uris))
 
 
-def test_a_master_that_does_not_answer_keeps_nobody_waiting(monkeypatch):
+def test_a_master_that_does_not_answer_blocks_no_check(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as frozen:
         monkeypatch.setenv("ROS_MASTER_URI", f"http://127.0.0.1:{frozen.getsockname()[1]}")
         assert not running_graph.is_master_online()

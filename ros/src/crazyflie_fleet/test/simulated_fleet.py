@@ -35,11 +35,18 @@ class Swarm:
         self.process.advance(0.6)
 
     def call(self, service, request=None, seconds=4.1):
+        """Return the answer, which comes within some seconds."""
         answer = self.process.call(service, request or EmptyRequest())
         if isinstance(answer, Future):
-            self.process.advance(seconds)
+            self.advance_until(answer.done, seconds)
             answer = answer.result(0)
         return answer
+
+    def advance_until(self, is_so, seconds):
+        """Let time pass until a condition holds, for so long at most."""
+        end = self.process.clock.time() + seconds
+        while not is_so() and self.process.clock.time() < end:
+            self.process.advance(min(0.5, end - self.process.clock.time()))
 
     def position(self, name):
         state = self.process.published(f"/{name}/state")[-1].state

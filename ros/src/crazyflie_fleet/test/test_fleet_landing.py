@@ -20,16 +20,18 @@ class Tower(Swarm):
     def __init__(self, heights=(1.0, 2.0, 3.0)):
         super().__init__(fleet={"n": 4, "spacing": 1.0})
         self.call("/all/takeoff")
-        for name, z in zip(("cf1", "cf2", "cf3"), heights, strict=True):
-            self.go_to(name, (-0.5, -0.5, z))
+        goals = {f"cf{k}": (-0.5, -0.5, z) for k, z in enumerate(heights, 1)}
+        # First to their heights, then above each other.
+        self.go_to({name: (*self.position(name)[:2], goals[name][2]) for name in goals})
+        self.go_to(goals)
+        for name, goal in goals.items():
+            assert self.position(name) == pytest.approx(goal, abs=0.1)
 
-    def go_to(self, name, goal):
-        x, y, _ = self.position(name)
-        for place in ((x, y, goal[2]), goal):
+    def go_to(self, places):
+        for name, place in places.items():
             request = GoToRequest(0, False, Point(*place), 0.0, rospy.Duration(5.0))
             self.process.call(f"/{name}/go_to", request)
-            self.process.advance(6.0)
-        assert self.position(name) == pytest.approx(goal, abs=0.1)
+        self.process.advance(6.0)
 
     def nearest(self):
         """Return the least distance that a vehicle in the air had; heights count for half."""
@@ -53,7 +55,11 @@ class Tower(Swarm):
         self._begin = len(self.process.published("/cf1/state"))
 
     def lands(self, seconds):
+        """Return the flight states after some seconds."""
         self.process.advance(seconds)
+        return self.states()
+
+    def states(self):
         return [self.process.published(f"/cf{k}/in_flight_state")[-1].data for k in (1, 2, 3, 4)]
 
 
@@ -111,7 +117,7 @@ def test_references_of_others_do_not_disturb_a_landing():
         tower.process.publish("/cf3/ref", up)
 
     timer = tower.process.add_timer(0.05, insist)
-    tower.process.advance(60.0)
+    tower.advance_until(answer.done, 60.0)
     timer.stop()
     answer.result(0)
     assert tower.position("cf3")[2] == pytest.approx(0.0, abs=0.02)
@@ -134,7 +140,9 @@ def test_vehicles_of_a_mission_that_has_died_are_landed():
     tower.process.publish("/all/mission", String("m2 cf4"))
     tower.process.publish("/all/mission", String("m2"))
     assert tower.lands(4.0) == ["flying"] * 4
-    assert tower.lands(60.0) == ["on_ground"] * 3 + ["flying"]
+    down = ["on_ground"] * 3 + ["flying"]
+    tower.advance_until(lambda: tower.states() == down, 60.0)
+    assert tower.states() == down
     assert tower.nearest() > 0.3
     assert tower.process.logged("error") == [
         "/fleet: no message of the mission that flew cf1, cf2, cf3 for 5 s: it has ended; landing "

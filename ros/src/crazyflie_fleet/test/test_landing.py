@@ -1,4 +1,4 @@
-"""Which vehicles land next, and where: nobody comes down on another."""
+"""Which vehicles land next, and where: none comes down on another."""
 
 import numpy as np
 import pytest
@@ -96,7 +96,7 @@ def test_without_a_free_place_each_lands_where_it_is():
 
 @settings(max_examples=150, deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 14))
-def test_nobody_meets_anybody_from_any_positions(seed, n):
+def test_no_two_vehicles_meet_from_any_positions(seed, n):
     draw = np.random.default_rng(seed)
     places = np.empty((0, 3))
     while len(places) < n:
@@ -124,7 +124,7 @@ def test_buffers_may_differ():
 
 @settings(max_examples=100, deadline=None)
 @given(st.integers(0, 10**6))
-def test_ways_are_reachable_if_nobody_comes_near_on_them(seed):
+def test_moves_are_reachable_if_no_vehicle_comes_near(seed):
     draw = np.random.default_rng(seed)
     n, limit = 6, 0.3
     places = draw.uniform((-0.6, -0.6, 0.8), (0.6, 0.6, 1.2), (n, 3))

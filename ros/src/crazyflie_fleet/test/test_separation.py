@@ -70,7 +70,7 @@ PLACE = st.tuples(COORDINATE, COORDINATE, COORDINATE)
 
 
 @given(st.lists(st.tuples(PLACE, PLACE), min_size=2, max_size=8))
-def test_nobody_is_led_nearer_to_one_who_is_too_close(rows):
+def test_no_reference_leads_nearer_to_a_vehicle_that_is_too_close(rows):
     positions, goals = (np.array(part) for part in zip(*rows, strict=True))
     waits, _ = waiting(positions, np.zeros_like(positions), goals, [0.4] * len(rows))
     scale = np.array([1.0, 1.0, 0.5])

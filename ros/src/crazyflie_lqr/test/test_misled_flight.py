@@ -1,4 +1,4 @@
-"""Flights of models on references whose velocities are wrong: nobody leaves, nobody falls."""
+"""Flights of models on references whose velocities are wrong: none leaves, none falls."""
 
 import math
 from pathlib import Path

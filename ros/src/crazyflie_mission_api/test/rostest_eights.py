@@ -21,7 +21,7 @@ def tracks():
 
 
 @pytest.mark.parametrize("number", range(8))
-def test_everybody_flies_an_eight_and_lands(tracks, number):
+def test_every_vehicle_flies_an_eight_and_lands(tracks, number):
     track = np.array(tracks[NAMES[number]])
     x, y, _ = track[0]
     side = 1.0 if number % 2 == 0 else -1.0

@@ -140,7 +140,7 @@ def test_vehicles_that_do_not_begin_together_are_checked_as_if_each_were_late():
         late["cf1"].go_to((1.0, 0.0, 1.0))
 
 
-def test_a_formation_sends_everybody_to_the_place_that_suits(flying):
+def test_a_formation_sends_each_vehicle_to_the_place_that_suits(flying):
     gone = flying.formation([(1.0, 1.0, 1.0), (0.0, 1.0, 1.0)])
     assert gone == {"cf1": (0.0, 1.0, 1.0), "cf2": (1.0, 1.0, 1.0)}
 
@@ -211,7 +211,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("text", BAD)
-def test_bad_commands_are_named_and_move_nobody(flying, text):
+def test_bad_commands_are_named_and_move_no_vehicle(flying, text):
     before = [flying.position(name) for name in flying.names]
     with pytest.raises(MissionError, match=text):
         BAD[text](flying)

@@ -113,7 +113,7 @@ def test_a_vehicle_that_is_in_trouble_ends_the_mission(fleet, controlled, driven
     assert controlled.position[2] == 0.0
 
 
-def test_a_landing_that_nobody_here_has_wanted_is_noticed(fleet, controlled):
+def test_a_landing_that_was_not_commanded_is_noticed(fleet, controlled):
     with pytest.raises(MissionError, match="cf1: it does not fly any more"), fleet:
         fleet.takeoff(0.8)
         controlled.be("descending")
@@ -155,7 +155,7 @@ def test_who_is_not_tracked_any_more_does_not_arrive(process, controlled, frame)
     assert fleet.flying == []
 
 
-def test_a_landing_that_nobody_sees_is_told_by_the_supervisor(fleet, driven):
+def test_a_landing_is_seen_by_the_supervisor_alone(fleet, driven):
     with pytest.raises(MissionError, match="cf2: land: not on the ground 15 s after"), fleet:
         fleet.takeoff(1.0)
         driven.is_tracked = False

@@ -31,7 +31,7 @@ def test_places():
 
 @settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
-def test_nobody_meets_on_straight_ways_in_the_same_rhythm(seed):
+def test_no_two_vehicles_meet_on_simultaneous_straight_moves(seed):
     # CAPT: with starts and goals a apart, at least a / sqrt(2).
     draw = np.random.default_rng(seed)
     starts, goals = (draw.permutation(lattice((3, 3, 1), 1.0))[:6] for _ in range(2))

@@ -61,7 +61,7 @@ def test_vehicles_above_each_other_land_beside_each_other(tower):
     assert tower.flying == []
     assert places(tower)[:, 2] == pytest.approx(0.0)
     assert min(found) >= 0.3
-    # The lowest one, and who has nobody beneath it, come straight down.
+    # The lowest one, and one with no vehicle beneath it, come straight down.
     assert tower.position("cf0") == pytest.approx((0.0, 0.0, 0.0))
     assert tower.position("cf3") == pytest.approx((3.0, 0.0, 0.0))
 

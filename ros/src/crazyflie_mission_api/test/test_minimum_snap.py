@@ -41,7 +41,7 @@ def test_passes_its_waypoints_smoothly_and_rests_at_both_ends():
         np.testing.assert_allclose(piece.evaluate(piece.duration).position, end, atol=1e-9)
     for one, two in itertools.pairwise(pieces):
         for a, b in zip(one.axes, two.axes, strict=True):
-            # Six derivatives: more than anybody asks for, which is the sign of an optimum.
+            # Six derivatives: more than a user asks for, which is the sign of an optimum.
             for order in range(1, 7):
                 left = Polynomial(a).deriv(order)(one.duration)
                 assert left == pytest.approx(Polynomial(b).deriv(order)(0.0), abs=1e-5)

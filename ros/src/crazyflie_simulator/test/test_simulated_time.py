@@ -96,7 +96,7 @@ def test_every_tick_moves_the_clock_by_a_time_step():
 
 
 def test_a_pose_is_out_before_its_time():
-    # Whoever wakes at a time finds the pose of that time.
+    # A node that wakes at a time finds the pose of that time.
     process = clocked()
     poses_at = {}
     process.clock.on_change(lambda now, _: poses_at.update({now: len(transforms(process))}))

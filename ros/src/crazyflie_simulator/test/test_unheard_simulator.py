@@ -1,4 +1,4 @@
-"""A simulator whose poses nobody hears makes those that are looked up, and the same ones."""
+"""A simulator whose poses have no subscriber makes those that are looked up, and the same ones."""
 
 import pytest
 from simulators import NODES, command, launch, transforms
@@ -31,7 +31,7 @@ class Looker(Node):
 
 
 def hears(process, **topics):
-    """Say whether anybody outside hears what leaves a process."""
+    """Say whether another process subscribes to what a process publishes."""
     for topic, is_heard in topics.items():
         record = process.transport.publishers[f"/{topic}"]
         record.has_subscribers = lambda is_heard=is_heard: is_heard
@@ -66,7 +66,7 @@ def test_who_listens_to_the_clock_is_told_of_every_tick():
         assert ticks == [1_000_000 * k for k in range(1, 1001)]
 
 
-def test_where_nobody_hears_poses_time_stops_only_where_something_happens():
+def test_where_poses_have_no_subscriber_time_stops_only_where_something_happens():
     moments = []
     process = clocked(**{"time_step": 0.001, "clock/real_time_factor": 0})
     hears(process, tf=False, clock=True)

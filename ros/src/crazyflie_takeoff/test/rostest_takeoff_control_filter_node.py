@@ -53,7 +53,7 @@ def say_until_heard(say, topic, value, final):
 
 
 def test_passes_the_right_control(say, final):
-    # Nobody has said anything yet: the controller has the vehicle.
+    # There was no message yet: the controller has the vehicle.
     say_until_heard(say, "/control/lqr", 1.0, final)
     say_until_heard(say, "/control/takeoff", 2.0, final)
     # The takeoff control gets old.

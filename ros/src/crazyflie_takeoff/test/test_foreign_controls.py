@@ -73,7 +73,7 @@ def test_one_controller_that_lifts_for_ever_is_limited_and_then_not_obeyed(netwo
     assert network.vehicle.touchdown_speed < 0.6
 
 
-def test_nobody_climbs_above_the_highest_place(network):
+def test_no_vehicle_climbs_above_the_highest_place(network):
     network.kill("controller")
     vehicle = network.vehicle
 

@@ -1,6 +1,6 @@
 """Server or filter dies at any moment of a flight, and another one takes its place.
 
-Every node is in a process of its own; messages that nobody hears are lost.
+Every node is in a process of its own; messages without a subscriber are lost.
 """
 
 import pytest
@@ -93,7 +93,7 @@ def test_server_in_flight(network):
     assert thrusts(network, 0.0)[-1] == 0.0
 
 
-@pytest.mark.parametrize("gap", [0.3, 1.0, 3.0])
+@pytest.mark.parametrize("gap", [0.3, 3.0])
 @pytest.mark.parametrize("moment", [0.02, 0.5, 0.99, 1.2, 3.0, 5.98])
 def test_server_during_takeoff_when_the_height_is_known(seeing, moment, gap):
     """What was begun ends on the ground, as softly as a landing."""
@@ -114,7 +114,7 @@ def test_server_during_takeoff_when_the_height_is_known(seeing, moment, gap):
 
 @pytest.mark.parametrize("moment", [1.2, 3.0, 5.98])
 def test_server_during_takeoff_when_the_height_is_unknown(moment):
-    """The controller keeps the vehicle; nobody drops it."""
+    """The controller keeps the vehicle; no node drops it."""
     network = HoverNetwork(BARE)
     network.advance(1.5)
     network.call("/takeoff")
@@ -133,7 +133,7 @@ def test_server_during_takeoff_when_the_height_is_unknown(moment):
     assert len(network.on("/in_flight")) == 2
 
 
-@pytest.mark.parametrize("gap", [0.1, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("gap", [0.1, 3.0])
 @pytest.mark.parametrize("moment", [0.02, 1.0, 3.0, 3.25, 3.6, 4.1])
 def test_server_during_landing_when_the_height_is_known(seeing, moment, gap):
     seeing.take_off()
@@ -267,7 +267,7 @@ def test_filter_during_takeoff_and_landing(network):
 
 
 def test_both_at_once_are_a_fresh_launch(seeing):
-    """Nobody remembers the flight: a vehicle on a table must not take off because of its height."""
+    """No node remembers the flight: a vehicle on a table must not take off by its height."""
     seeing.take_off()
     begun = seeing.time
     seeing.kill("server")

@@ -82,7 +82,7 @@ def test_an_emergency_is_latched_until_it_is_reset():
     flight = Flight().run(1.0)
     with pytest.raises(RefusalError, match="no emergency"):
         flight.filter.reset()
-    flight.filter.stop("somebody called")
+    flight.filter.stop("it was called")
     assert flight.filter.tick(flight.time) == MOTORS_OFF
     with pytest.raises(RefusalError, match="less than 2 s ago"):
         flight.filter.reset()
@@ -99,7 +99,7 @@ def test_a_vehicle_on_the_ground_does_not_end_the_emergency_of_a_filter_that_has
     control_filter = SafeFilter(TIMEOUTS, LIMITS, sees=True)
     control_filter.choice.state = FLYING
     control_filter.tick(0.0)
-    control_filter.stop("somebody called")
+    control_filter.stop("it was called")
     control_filter.relay.measure(Motion((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     control_filter.commanded(0.0, "control", level(G))
     assert control_filter.state is FilterState.EMERGENCY

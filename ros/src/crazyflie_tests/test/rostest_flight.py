@@ -1,4 +1,4 @@
-"""A flight from takeoff to landing, whoever made the nodes that fly it."""
+"""A flight from takeoff to landing, by nodes of any maker."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,6 @@
 """Everything the workspace uses from the system or from PyPI is in its lists.
 
-A package that somebody installed by hand would hide a missing line from every other
+A package that was installed by hand would hide a missing line from every other
 test on that machine. So the lists are compared with what Debian says of its packages.
 """
 
@@ -152,7 +152,7 @@ def test_modules_that_are_imported_are_in_the_lists(module):
 def test_programs_are_in_the_list(program):
     path = shutil.which(program)
     assert path, f"{program} is not installed"
-    base = {"git"}  # Nobody has this repository without it.
+    base = {"git"}  # There is no clone without it.
     assert program in base or owner(Path(path).resolve()) in installed_by_the_list()
 
 

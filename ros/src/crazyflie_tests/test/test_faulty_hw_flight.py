@@ -14,7 +14,7 @@ AT_ONCE = 0.2
 that only hears no more levels out after 0.5 s, and runs its motors for 2 s."""
 
 TO_THE_GROUND = 15.0
-"""When nobody commands any more, s. Without poses: 0.5 s in which they may come back, then 5 s of
+"""Without commands, s. Without poses: 0.5 s in which they may come back, then 5 s of
 descent (`loss/return_limit`, `loss/descent_limit`). Without a driver: 2 s until the firmware stops
 the motors, and 0.7 s of fall from 2.5 m. The rest is for a machine that is too slow, on which the
 virtual vehicle loses time."""

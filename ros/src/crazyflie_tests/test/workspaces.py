@@ -37,7 +37,7 @@ def copy(folder: Path) -> Path:
 
 
 def clean_environment(home: Path) -> dict[str, str]:
-    """Return the environment of somebody who has sourced nothing and prefers another Python.
+    """Return the environment of a user who has sourced nothing and prefers another Python.
 
     The first python3 on the PATH is one that does not work; behind it is the PATH of
     this process without what this workspace has put there.

@@ -140,7 +140,7 @@ def test_processes_that_are_needed_in_flight_end_after_the_landing(flight):
 
 
 def test_second_interrupt_ends_at_once_and_safely(flight):
-    # The instrument is asked alone: nobody ends the flight, and so it says that it waits.
+    # The instrument is asked alone: no node ends the flight, and so it says that it waits.
     for process in reversed(flight):
         interrupt(process, "")
         wait_for_notice(process)

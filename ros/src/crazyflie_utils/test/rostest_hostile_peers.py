@@ -208,7 +208,7 @@ def test_transforms_may_come_in_pieces(handle):
         wait_until(lambda: is_at(4.0), "the last one")
 
 
-# Subscribers, and whoever else connects.
+# Subscribers, and any other client.
 
 
 def address(handle):
@@ -230,7 +230,7 @@ def header(topic, **changes):
     }
 
 
-def test_those_who_are_silent_or_talk_nonsense_keep_nobody_waiting(handle, warnings):
+def test_silent_and_nonsensical_clients_block_no_other(handle, warnings):
     handle.advertise_service("~alive", Trigger, lambda request: TriggerResponse(True, "yes"))
     strangers = [socket.create_connection(address(handle)) for _ in range(5)]
     for stranger in strangers[2:]:

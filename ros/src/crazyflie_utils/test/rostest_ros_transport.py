@@ -70,7 +70,7 @@ def test_messages_go_out_and_come_in(outlet):
         assert heard.get(timeout=LIMIT).data == number + 1000
 
 
-def test_nobody_listens_to_a_new_topic(handle):
+def test_a_new_topic_has_no_subscribers(handle):
     assert not handle.publisher("/nobody_listens", String)._external.has_subscribers()
 
 
@@ -176,7 +176,7 @@ def test_services_of_this_process_are_called_without_connections(handle, monkeyp
     assert [answer.result(LIMIT).message for answer in answers] == names
 
 
-def test_a_service_that_somebody_else_has_taken_over(handle, outsiders):
+def test_a_service_that_another_node_has_taken_over(handle, outsiders):
     called = []
     handle.advertise_service("~mine", Trigger, called.append)
     master = rosgraph.Master("/other")

@@ -1,4 +1,4 @@
-"""Timers by simulated time, whoever publishes /clock."""
+"""Timers by simulated time, with any publisher of /clock."""
 
 import pytest
 import rospy
@@ -22,7 +22,7 @@ def test_clock_from_outside_drives_timers():
             clock.publish(Clock(rospy.Time.from_sec(moment)))
 
         def first_tick(begin):
-            # Time moves until somebody notices; after a step back, too.
+            # Time moves until a node notices; after a step back, too.
             moments = iter(begin + count * PERIOD for count in range(10**6))
 
             def step():

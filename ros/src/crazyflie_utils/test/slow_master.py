@@ -19,7 +19,7 @@ def slow_master():
     str
         Its URI.
     threading.Event
-        Set when somebody registers.
+        Set when a node registers.
     threading.Event
         To be set, so that it is answered.
     """

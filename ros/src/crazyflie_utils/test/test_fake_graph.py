@@ -9,7 +9,7 @@ from crazyflie_utils.testing import FakeGraph
 
 
 class Talker(Node):
-    """Counts aloud, ten times a second, and greets whoever comes."""
+    """Counts aloud, ten times a second, and greets each newcomer."""
 
     def load_parameters(self, handle):
         self._count = 0

@@ -36,7 +36,7 @@ def test_flights_in_other_namespaces_do_not_matter(process, flights):
     assert flights.in_flight == []
 
 
-def test_a_flight_that_somebody_ends_needs_no_word_of_others(process, flights):
+def test_a_flight_that_a_node_ends_needs_no_word_of_others(process, flights):
     process.publish("/flights", String(f"{PILOT} in flight"))
     assert flights.unattended(5.0) == [PILOT]
     process.publish("/flights", String(f"{PILOT} in flight, to end"))

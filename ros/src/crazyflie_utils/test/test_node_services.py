@@ -6,6 +6,7 @@ import pytest
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, SetBoolRequest, SetBoolResponse, Trigger, TriggerResponse
 
+from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.transport import ServiceError
 
 LIMIT = 60.0
@@ -19,13 +20,19 @@ def test_service_answers(process, handle):
     assert (answer.success, answer.message) == (True, "done")
 
 
-def test_service_refuses_with_its_text(process, handle):
+@pytest.mark.parametrize("error", [ServiceError, RefusalError])
+def test_service_refuses_with_its_text(process, handle, error):
     def refuse(request):
-        raise ServiceError("already in flight")
+        raise error("already in flight")
 
     handle.advertise_service("go", Trigger, refuse)
     with pytest.raises(ServiceError, match="^already in flight$"):
         process.call("/ns/go", None)
+    late = Future()
+    late.set_exception(error("already in flight"))
+    handle.advertise_service("go_late", Trigger, lambda request: late)
+    with pytest.raises(ServiceError, match="^already in flight$"):
+        process.call("/ns/go_late", None)
     assert process.logged("error") == []
 
 

@@ -32,7 +32,7 @@ def master():
     return Master()
 
 
-def test_nobody_waits_for_a_frozen_master(master):
+def test_no_node_waits_for_a_frozen_master(master):
     writer = ParameterWriter(master.write, print)
     writer.set("/a", 0)
     assert master.is_asked.wait(20.0)

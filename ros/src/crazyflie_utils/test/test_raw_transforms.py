@@ -1,4 +1,4 @@
-"""tf from other processes: only what somebody looks up is decoded."""
+"""tf from other processes: only what is looked up is decoded."""
 
 import io
 import struct
@@ -41,7 +41,7 @@ def decoded(monkeypatch):
     return frames
 
 
-def test_raw_message_is_a_tf_message_for_everybody_else():
+def test_raw_message_is_a_tf_message_for_every_other_subscriber():
     message = raw(transform("world", "cf1", 100.0), transform("world", "cf2", 100.0))
     assert isinstance(message, TFMessage)
     assert [each.child_frame_id for each in message.transforms] == ["cf1", "cf2"]
@@ -89,7 +89,7 @@ def test_a_leading_slash_is_the_same_frame(process, lookup):
     assert x_of(lookup) == 2.0
 
 
-def test_frames_without_a_name_are_counted_though_nobody_looks(process, lookup, capfd):
+def test_frames_without_a_name_are_counted_without_a_lookup(process, lookup, capfd):
     for count in range(100):
         hear_raw(process, transform("", "", 100.0 + 0.01 * count))
     hear_raw(process, transform("world", "/", 100.0))

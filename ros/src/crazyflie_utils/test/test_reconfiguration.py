@@ -133,7 +133,7 @@ def test_a_bad_change_is_refused_whole(process, values, text):
         change(process, steps=9, **values)
     assert process.limiter.changes == []
     assert process.transport.parameters["/limiter/limit"] == 10
-    # Whoever shows the configuration is told what holds.
+    # Programs that show the configuration get what holds.
     assert updates(process)[-1] == updates(process)[0]
 
 

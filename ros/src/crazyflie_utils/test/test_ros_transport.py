@@ -52,7 +52,7 @@ def test_caller_is_not_left_waiting_by_a_clock_that_stands_still(monkeypatch):
         wait_for_answer(Future(), "/go", lambda: 7.0)
 
 
-def test_calls_that_nobody_answers_do_not_pile_up(monkeypatch):
+def test_unanswered_calls_do_not_pile_up(monkeypatch):
     answered = threading.Event()
 
     class SlowProxy:

@@ -31,7 +31,7 @@ def test_a_full_disk_fails_who_logs_without_a_shield(disk):
         logging.getLogger(ROSOUT).error("hello")
 
 
-def test_a_full_disk_fails_nobody_behind_a_shield(disk):
+def test_a_full_disk_fails_no_write_behind_a_shield(disk):
     shield_screen_log()
     shield_screen_log()
     logging.getLogger(ROSOUT).error("hello")

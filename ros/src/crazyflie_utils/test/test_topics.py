@@ -67,7 +67,7 @@ def topics(world):
     return Topics(world)
 
 
-def test_hands_over_the_very_object_once_to_everybody(topics):
+def test_hands_over_the_very_object_once_to_every_subscriber(topics):
     received = []
     topics.subscribe("/a", String, lambda message: received.append(("first", message)))
     publisher = topics.publisher("/a", String, latch=False)
@@ -91,7 +91,7 @@ def test_several_publishers_of_a_topic(topics):
 
 def test_leaves_the_process_only_for_listeners(topics, world):
     publisher = topics.publisher("/a", String, latch=False)
-    publisher.publish(String("nobody listens"))
+    publisher.publish(String("no subscriber"))
     world.wires[0].heard = True
     message = String("heard")
     publisher.publish(message)
@@ -171,7 +171,7 @@ def test_who_has_unsubscribed_is_told_no_more(topics, world):
     assert len(world.subscribed) == 1
 
 
-def test_unsubscribing_while_a_message_is_delivered_skips_nobody(topics):
+def test_unsubscribing_while_a_message_is_delivered_skips_no_other(topics):
     received = []
     ends = []
 

@@ -185,7 +185,7 @@ def test_poses_leave_the_process_as_messages_and_are_known_in_it(process):
     assert len(heard) == len(process.published("/tf")) == 1
 
 
-def test_of_poses_that_nobody_else_hears_no_message_is_made(process, monkeypatch):
+def test_of_poses_without_another_subscriber_no_message_is_made(process, monkeypatch):
     broadcast = process.handle("/simulator").broadcast_poses()
     lookup = process.handle("/estimator").listen_to_poses()
     monkeypatch.setattr(process.transport.publishers["/tf"], "has_subscribers", lambda: False)

@@ -37,14 +37,14 @@ def read(parser, message, number, version):
 
 
 def test_server_info(version):
-    message = Encoder(version).server_info("somebody", 1511, "239.255.42.99")
+    message = Encoder(version).server_info("an application", 1511, "239.255.42.99")
     info, rest = read(ServerInfo, message, natnet.SERVER_INFO, version)
-    assert info.application_name == "somebody"
+    assert info.application_name == "an application"
     assert str(info.nat_net_protocol_version) == f"{version}.0.0"
     assert rest == 15
     tail = struct.unpack("<QHB4B", message[-15:])
     assert tail == (natnet.CLOCK_FREQUENCY, 1511, 1, 239, 255, 42, 99)
-    unicast = Encoder(version).server_info("somebody", 1511, None)
+    unicast = Encoder(version).server_info("an application", 1511, None)
     assert unicast[-5:] == bytes(5)
 
 

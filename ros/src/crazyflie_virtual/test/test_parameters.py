@@ -112,9 +112,9 @@ def test_what_is_no_number_is_stored(bench):
 
 
 def test_errors(bench):
-    nobody = struct.pack("<H", 9999)
-    assert bench.ask_one(Port.PARAMETERS, READ, nobody) == nobody + bytes([errno.ENOENT])
-    assert bench.ask_one(Port.PARAMETERS, WRITE, nobody + b"\0") == nobody + bytes([errno.ENOENT])
+    unknown = struct.pack("<H", 9999)
+    assert bench.ask_one(Port.PARAMETERS, READ, unknown) == unknown + bytes([errno.ENOENT])
+    assert bench.ask_one(Port.PARAMETERS, WRITE, unknown + b"\0") == unknown + bytes([errno.ENOENT])
     for channel in (READ, WRITE, MISC):
         assert bench.ask(Port.PARAMETERS, channel, b"") == []
 

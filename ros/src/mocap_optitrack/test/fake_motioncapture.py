@@ -23,7 +23,7 @@ HANGING = "127.0.0.4"
 def connect(system, config):
     """Return a connection, or none, or never."""
     host = config["hostname"]
-    print("a message that nobody asked for", flush=True)
+    print("an unsolicited message", flush=True)
     if host == REFUSING:
         raise RuntimeError(f"{system} is not at home")
     if host == HANGING:

@@ -232,7 +232,7 @@ FAULTS = [
     Fault("references are not finite", nothing, 0.1, 5.0, again=_refer_to(math.nan, 0.0, 1.0)),
     Fault("references are far away", nothing, 0.1, 5.0, again=_refer_to(50.0, -50.0, 1.0)),
     Fault("references are old", nothing, 0.1, 5.0, again=_refer_to(0.5, 0.5, 0.3, age=30.0)),
-    Fault("somebody streams references", nothing, 3.0, 9.0, again=_refer_to(0.3, 0.2, 1.0)),
+    Fault("another node streams references", nothing, 3.0, 9.0, again=_refer_to(0.3, 0.2, 1.0)),
     Fault("services are hammered", nothing, 0.1, 3.0, again=_call_everything),
     Fault(EMERGENCY, _stop_motors, 0.2, 3.0, drops=True),
 ]

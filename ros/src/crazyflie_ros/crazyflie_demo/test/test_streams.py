@@ -49,7 +49,7 @@ def test_a_bad_file_ends_the_node():
     assert "/none.csv: cannot be read" in process.logged("error")[0]
 
 
-def test_begins_when_somebody_listens():
+def test_begins_with_the_first_subscriber():
     process = FakeProcess()
     node = TrajectoryStreamNode(str(FIGURE8))
     assert process.launch(node, "/flight")
@@ -122,7 +122,7 @@ def test_setpoints_go_on_until_the_landing_is_accepted():
     assert len(process.published("/cf/cmd_full_state")) == count
 
 
-def test_a_landing_that_nobody_carries_out_is_an_error():
+def test_a_landing_that_is_not_carried_out_is_an_error():
     process, _ = flown({"land": "no reply"})
     process.advance(9.0)
     assert process.exit_status is None

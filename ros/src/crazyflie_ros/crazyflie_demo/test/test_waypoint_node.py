@@ -55,7 +55,7 @@ def test_other_waypoints_can_be_given():
     assert goal(process) == pytest.approx((3.0, 2.0, 1.0, 0.0))
 
 
-def test_nobody_goes_on_by_a_pose_that_is_old():
+def test_an_old_pose_reaches_no_waypoint():
     process = launch(DemoNode(), waypoints=[[0, 0, 1, 0, 5.0], [1, 0, 1, 0, 0]])
     fly_to(process, 0.0, 0.0, 1.0, 0.0)
     process.advance(20.0)

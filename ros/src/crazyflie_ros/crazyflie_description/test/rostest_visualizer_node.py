@@ -7,7 +7,7 @@ from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamp
 from crazyflie_utils.testing.peer import LIMIT, listening
 
 
-def test_whoever_comes_late_sees_path_and_reference():
+def test_a_late_subscriber_sees_path_and_reference():
     reference = rospy.Publisher("/ref", PositionVelocityStateStamped, latch=True, queue_size=1)
     reference.publish(PositionVelocityStateStamped(state=PositionVelocityState(z=3.5)))
 

@@ -1,4 +1,4 @@
-"""The driver and crazyflie_controller in one namespace, on a real master, whoever comes first."""
+"""The driver and crazyflie_controller in one namespace, on a real master, in either order."""
 
 import contextlib
 import os

@@ -1,4 +1,4 @@
-"""Calls that end a flight badly, or have a vehicle fly that nobody meant."""
+"""Calls that end a flight badly, or have a vehicle fly unasked."""
 
 import pytest
 from genpy import Duration

@@ -89,7 +89,7 @@ def test_a_link_that_is_set_up_anew_sends_an_old_vehicle_in_the_air_nothing(serv
     vehicle.is_frozen = True
     crazyflie = server.node._vehicles[vehicle.uri].crazyflie
     wait_until(lambda: crazyflie._reconnector.opening is not None, "a new attempt to connect")
-    # Somebody else has it fly.
+    # Another node has it fly.
     is_(vehicle, FLYING)
     vehicle.received.clear()
     vehicle.is_frozen = False

@@ -32,7 +32,7 @@ def test_settings_are_written_again_and_commands_are_not():
     assert firmware.written == []
     mirror.write(["ring/effect", "kalman/resetEstimation"])
     firmware.written.clear()
-    # What somebody has set since, but not written, does not count.
+    # What was set since, but not written, does not count.
     process.transport.set_param("/cf1/ring/effect", 8)
     mirror.reapply_parameters()
     assert firmware.written == [("ring.effect", 7)]

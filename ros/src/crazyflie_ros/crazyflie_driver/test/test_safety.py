@@ -213,7 +213,7 @@ def test_the_emergency_watchdog_is_fed_from_the_first_command_on(make_server):
         assert vehicle.wait_for(lambda: vehicle.packets(9, 1).count(FEED) >= count)  # noqa: B023
 
 
-def test_nobody_else_has_a_watchdog(server, vehicle):
+def test_no_other_vehicle_has_a_watchdog(server, vehicle):
     server.call("/cf1/takeoff", TAKEOFF)
     server.process.advance(2.0)
     vehicle.wait_for_packets(15, 0, len(vehicle.packets(15, 0)) + 2)

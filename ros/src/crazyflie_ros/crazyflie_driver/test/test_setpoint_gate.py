@@ -27,7 +27,7 @@ def stream(gate, begin, end, period=0.02, is_zero=False):
 
 @pytest.fixture
 def lost():
-    """Return a gate whose link was lost and is back at 2 s, while somebody streams."""
+    """Return a gate whose link was lost and is back at 2 s, while a node streams."""
     gate = SetpointGate()
     assert stream(gate, 0.0, 1.0) == (0, "")
     gate.handle(Event.LINK_LOST)
@@ -52,7 +52,7 @@ def test_a_flight_that_goes_on_and_a_call_open_it(lost, event):
 
 @pytest.fixture
 def standing():
-    """Return a gate whose vehicle has not lifted off at 2 s, while somebody streams."""
+    """Return a gate whose vehicle has not lifted off at 2 s, while a node streams."""
     gate = SetpointGate()
     assert stream(gate, 0.0, 2.0) == (0, "")
     gate.handle(Event.NOT_LIFTED)

@@ -45,7 +45,7 @@ class Flight:
         return self.virtual.vehicle.time
 
     def wait(self, duration):
-        """Let the vehicle's time go by; nobody says anything."""
+        """Let the vehicle's time go by; no node sends anything."""
         end = self.time + duration
         wait_until(lambda: self.time >= end, f"{duration} s of the vehicle's time", period=0.002)
 

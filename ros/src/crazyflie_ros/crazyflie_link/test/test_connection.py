@@ -62,7 +62,7 @@ def test_every_eighth_reply_may_be_lost(make_vehicle, make_link):
     link.high_level.land(0.0, 1.0)
 
 
-def test_nobody_there(make_vehicle, make_link):
+def test_no_vehicle_there(make_vehicle, make_link):
     vehicle = make_vehicle()
     vehicle.close()
     with pytest.raises(NoAnswerError, match=f"{vehicle.uri}: nothing listens on this port"):
@@ -119,7 +119,7 @@ def test_firmware_that_is_too_old(make_vehicle, make_link):
         make_link(vehicle.uri).connect()
 
 
-def test_a_stuck_vehicle_stops_nobody_else(make_vehicle, make_link):
+def test_a_stuck_vehicle_stops_no_other(make_vehicle, make_link):
     stuck = make_vehicle()
     stuck.deaf.add((4, 0, b""))
     good = [make_vehicle() for _ in range(4)]

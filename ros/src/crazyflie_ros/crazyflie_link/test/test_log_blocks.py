@@ -26,7 +26,7 @@ def test_a_start_that_the_vehicle_refuses_is_none(vehicle, make_link, states):
     assert (link.state, link.connection_count) == (LinkState.CONNECTED, 1)
 
 
-def test_an_error_code_that_nobody_knows_is_a_refusal(vehicle, link):
+def test_an_unknown_error_code_is_a_refusal(vehicle, link):
     vehicle.answers[5, 1, 3] = b"\3\1\x63"
     with pytest.raises(RefusedError, match="'odd': the vehicle answers: error 99"):
         link.add_log_block(log_block("odd"))

@@ -36,7 +36,7 @@ def test_takeoff_and_landing_are_carried_out_once(flying):
 
 
 @pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWarning")
-def test_before_protocol_12_nobody_can_be_asked(make_vehicle, make_link):
+def test_before_protocol_12_the_state_cannot_be_read(make_vehicle, make_link):
     vehicle = make_vehicle(protocol=11)
     link = make_link(vehicle.uri)
     link.connect()

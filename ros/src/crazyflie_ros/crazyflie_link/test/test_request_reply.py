@@ -62,7 +62,7 @@ def test_what_must_not_be_done_twice_is_sent_once():
     assert len(sent) == 1
 
 
-def test_nobody_waits_for_an_answer_beyond_the_limit_or_the_end_of_the_link():
+def test_no_request_waits_for_an_answer_beyond_the_limit_or_the_end_of_the_link():
     requests = RequestReply()
     with pytest.raises(NoReplyError, match="a test: the vehicle has not replied within 0.05 s"):
         requests.request(lambda: None, Request(8, 0, b"", "a test", limit=0.05))
@@ -72,7 +72,7 @@ def test_nobody_waits_for_an_answer_beyond_the_limit_or_the_end_of_the_link():
         requests.request(lambda: None, Request(8, 0, b"", "a test", limit=30.0))
 
 
-def test_an_answer_that_nobody_waits_for_is_nothing():
+def test_an_answer_without_a_request_is_nothing():
     requests = RequestReply()
     requests.receive(8, 0, b"early")
     with pytest.raises(NoReplyError):

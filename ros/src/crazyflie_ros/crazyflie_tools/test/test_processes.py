@@ -17,7 +17,7 @@ LIMIT = 60.0
 SCANNED_HOST = "127.77.0.5"
 """An address of this machine whose ports nothing else uses."""
 
-NOBODY = "127.77.0.6"
+UNUSED = "127.77.0.6"
 
 
 def command(tool, *arguments):
@@ -57,8 +57,8 @@ def test_scan_finds_the_vehicle(uri):
     assert run("scan", SCAN_ADDRESS=SCANNED_HOST)[:2] == (0, uri + "\n")
 
 
-def test_scan_finds_nobody():
-    status, out, err = run("scan", SCAN_ADDRESS=NOBODY)
+def test_scan_finds_no_vehicle():
+    status, out, err = run("scan", SCAN_ADDRESS=UNUSED)
     assert (status, out) == (1, "")
     assert err.startswith("scan: no vehicle found by radio (address E7E7E7E7E7)")
 
@@ -110,7 +110,7 @@ def test_wrong_usage(uri):
 
 
 def test_a_closed_port_is_reported():
-    status, out, err = run("listParams", "--uri", f"udp://{NOBODY}:{FIRST_PORT}")
+    status, out, err = run("listParams", "--uri", f"udp://{UNUSED}:{FIRST_PORT}")
     assert (status, out) == (1, "")
     assert "nothing listens on this port" in err
 
@@ -170,7 +170,7 @@ def test_console_ends_when_the_vehicle_falls_silent(console):
     assert "has not been heard" in process.stderr.read()
 
 
-def test_it_is_no_error_when_nobody_reads_the_output(uri):
+def test_it_is_no_error_when_the_output_is_not_read(uri):
     # `true` is at its end long before the tool prints.
     pipe = 'set -o pipefail; "$@" | true'
     done = subprocess.run(

@@ -91,7 +91,7 @@ def test_silent_without_a_pose(simulated):
     assert "s old" in simulated.logged("warn")[-1]
 
 
-def test_silent_while_nobody_says_where_the_box_is(simulated):
+def test_silent_without_a_pose_of_the_box(simulated):
     for _ in range(20):
         simulated.publish("/tf", TFMessage([transform(simulated, "crazyflie", 0.0)]))
         simulated.advance(0.05)

@@ -174,7 +174,8 @@ class NodeHandle:
         """Answer calls of a service.
 
         ``callback(request)`` returns the response; or, for work that takes time, a
-        `concurrent.futures.Future` of it; or raises `ServiceError` with a text for the caller.
+        `concurrent.futures.Future` of it; or raises `ServiceError` or `RefusalError`
+        with a text for the caller.
         """
 
         def begin(request):

@@ -7,6 +7,7 @@ from typing import Any
 
 from typing_extensions import override
 
+from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.transport import ServiceError
 
 Handle = Any
@@ -28,6 +29,8 @@ def serve(
         response = callback(request)
     except ServiceError as error:
         answer.set_exception(error)
+    except RefusalError as reason:
+        answer.set_exception(ServiceError(str(reason)))
     except Exception as error:
         handle.report_fault(callback, error)
         answer.set_exception(ServiceError(f"{handle.name}: {error!r}"))
@@ -65,6 +68,8 @@ def forward(done: Future[Any], to: Future[Any], handle: Handle) -> None:
         to.set_result(done.result())
     elif isinstance(error, ServiceError):
         to.set_exception(error)
+    elif isinstance(error, RefusalError):
+        to.set_exception(ServiceError(str(error)))
     else:
         handle.error(f"a service failed\n{''.join(traceback.format_exception(error))}")
         to.set_exception(ServiceError(f"{handle.name}: {error!r}"))

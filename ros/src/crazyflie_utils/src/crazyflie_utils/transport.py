@@ -110,7 +110,7 @@ class Transport(ABC):
 
     @abstractmethod
     def service_nodes(self) -> dict[str, str]:
-        """Return every service that is offered by anybody -> the name of its node."""
+        """Return every service that any node offers -> the name of its node."""
 
     @abstractmethod
     def log(self, level: str, text: str) -> None:

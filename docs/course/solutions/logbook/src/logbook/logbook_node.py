@@ -3,8 +3,7 @@
 from typing_extensions import override
 
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
-from crazyflie_utils import Node, NodeHandle, ServiceError
-from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils import Node, NodeHandle
 from logbook.logbook import FlightEntry, Logbook
 from logbook.msg import Flight
 from logbook.srv import GetFlight, GetFlightResponse
@@ -35,10 +34,7 @@ class LogbookNode(Node):
         self._book.add((message.state.x, message.state.y, message.state.z))
 
     def _on_get_flight(self, request):
-        try:
-            return GetFlightResponse(_message(self._book.flight(request.number)))
-        except RefusalError as reason:
-            raise ServiceError(str(reason)) from None
+        return GetFlightResponse(_message(self._book.flight(request.number)))
 
 
 def _message(entry: FlightEntry) -> Flight:

@@ -3,8 +3,7 @@
 from typing_extensions import override
 
 from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtResponse
-from crazyflie_utils import Node, NodeHandle, ServiceError
-from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils import Node, NodeHandle
 from triangle_velocity.triangle_velocity import triangle_velocity
 
 
@@ -20,7 +19,4 @@ class TriangleVelocityNode(Node):
         handle.advertise_service("triangle", VelocityAt, self._on_call)
 
     def _on_call(self, request):
-        try:
-            return VelocityAtResponse(triangle_velocity(request.x))
-        except RefusalError as reason:
-            raise ServiceError(str(reason)) from None
+        return VelocityAtResponse(triangle_velocity(request.x))

@@ -17,7 +17,6 @@ from crazyflie_tutorial_msgs.srv import (
 )
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import FRAME, SERVICE, TEXT, TIME_STEP, Number, Text
-from crazyflie_utils.refusal import RefusalError
 
 PERIOD = 0.2
 """Between two checks of the vehicles, s of the machine's clock."""
@@ -98,10 +97,7 @@ class SpawnerNode(Node):
             vehicle.process.end()
 
     def _on_spawn(self, request):
-        try:
-            name = vehicle_name(request.name, self._vehicles)
-        except RefusalError as reason:
-            raise ServiceError(str(reason)) from None
+        name = vehicle_name(request.name, self._vehicles)
         if not (math.isfinite(request.x) and math.isfinite(request.y)):
             place = f"({request.x:g}, {request.y:g})"
             raise ServiceError(f"the place is {place}; expected finite numbers (m)")

@@ -6,9 +6,8 @@ from typing_extensions import override
 
 from crazyflie_sweep.velocities import oscillator_velocity, random_velocities
 from crazyflie_tutorial_msgs.srv import Velocity, VelocityAt, VelocityAtResponse, VelocityResponse
-from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
+from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import SERVICE, Integer
-from crazyflie_utils.refusal import RefusalError
 
 
 class VelocityServerParameters(Parameters):
@@ -40,13 +39,7 @@ class VelocityServerNode(Node):
         handle.advertise_service(parameters.oscillator_service, VelocityAt, self._on_oscillator)
 
     def _on_random(self, request):
-        try:
-            return VelocityResponse(*random_velocities(request.min, request.max, self._random))
-        except RefusalError as reason:
-            raise ServiceError(str(reason)) from None
+        return VelocityResponse(*random_velocities(request.min, request.max, self._random))
 
     def _on_oscillator(self, request):
-        try:
-            return VelocityAtResponse(oscillator_velocity(request.x))
-        except RefusalError as reason:
-            raise ServiceError(str(reason)) from None
+        return VelocityAtResponse(oscillator_velocity(request.x))

@@ -31,6 +31,7 @@ def run(tmp_path, monkeypatch, capsys):
         path.write_text(f"#!/bin/sh\n{program}\n")
         path.chmod(0o755)
         monkeypatch.setattr(recorder.roslib.packages, "find_node", lambda *names: [str(path)])
+        monkeypatch.setattr(recorder.rosgraph, "is_master_online", lambda: True)
         monkeypatch.setattr(rosparam, "dump_params", lambda path, name: open(path, "w").close())
         arguments = ["record_flight", f"--folder={tmp_path / folder}", "--topics=/x", "__name:=a"]
         monkeypatch.setattr("sys.argv", arguments)
@@ -54,6 +55,14 @@ def test_a_folder_that_cannot_be_made(run, tmp_path):
     status, output = run("exit 0", "file/flights")
     assert status == 1
     assert "nothing is recorded into" in output
+
+
+def test_without_a_master(monkeypatch, capsys, tmp_path):
+    monkeypatch.setenv("ROS_MASTER_URI", "http://127.0.0.1:1")
+    monkeypatch.setattr("sys.argv", ["record_flight", f"--folder={tmp_path / 'flights'}"])
+    assert recorder.main() == 1
+    assert "no ROS master at http://127.0.0.1:1" in capsys.readouterr().err
+    assert not (tmp_path / "flights").exists()
 
 
 def test_the_status_is_that_of_rosbag(run):

@@ -12,6 +12,7 @@ import sys
 from datetime import datetime
 from pathlib import Path
 
+import rosgraph
 import roslib.packages
 import rosparam
 import rospkg
@@ -67,6 +68,9 @@ def main() -> int:
     top = Path(options.folder or Path(rospkg.get_ros_home()) / "flights").expanduser()
     folder = top / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
     topics = f"{TOPICS}|{options.topics}" if options.topics else TOPICS
+    if not rosgraph.is_master_online():
+        print(f"nothing is recorded: no ROS master at {rosgraph.get_master_uri()}", file=sys.stderr)
+        return 1
     try:
         return record(folder, topics, ros_arguments)
     except OSError as error:

@@ -24,7 +24,7 @@ def test_hovers_within_3_cm_after_10_s(record):
 
 
 def test_does_not_overshoot(record):
-    assert record.overshoot(HOVER[2]) < OVERSHOOT_LIMIT
+    assert record.overshoot(HOVER) < OVERSHOOT_LIMIT
 
 
 def test_lands_softly(record):

@@ -36,8 +36,8 @@ def test_time_to_hover():
 
 
 def test_overshoot():
-    assert flight(overshoot=0.1).overshoot(1.0) == pytest.approx(0.1)
-    assert flight(hover_offset=-0.2).overshoot(1.0) == 0.0
+    assert flight(overshoot=0.1).overshoot(HOVER) == pytest.approx(0.1)
+    assert flight(hover_offset=-0.2).overshoot(HOVER) == 0.0
 
 
 def test_hover_error():

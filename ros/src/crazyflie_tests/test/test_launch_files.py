@@ -41,6 +41,12 @@ FILES = {
 }
 """What users' launch files find with ``$(find PACKAGE)/...``."""
 
+RECORDABLE = [
+    path
+    for path in sorted((TOP / "ros" / "src").glob("**/launch/*.launch"))
+    if 'name="record"' in path.read_text()
+]
+
 
 @functools.cache
 def path_of(entry):
@@ -89,6 +95,17 @@ def test_defaults(tmp_path, entry):
     for name, (default, *places) in arguments.items():
         for place in places:
             assert has(parameters[place], required.get(name, default)), f"{name}: {place}"
+
+
+@pytest.mark.parametrize("path", RECORDABLE, ids=lambda path: path.name)
+def test_a_flight_is_recorded_if_asked(path):
+    given = {
+        arg.get("name"): "given"
+        for arg in ElementTree.parse(path).getroot().findall("arg")
+        if not {"default", "value"} & set(arg.keys())
+    }
+    nodes, _ = launch_files.expand(path, **given, record="true")
+    assert [name for name in nodes if name.endswith("/recorder")] == ["/recorder"]
 
 
 @pytest.mark.parametrize("entry", DOCUMENTED)

@@ -3,50 +3,126 @@
 import argparse
 import os
 import sys
+import tempfile
+import time
 from pathlib import Path
 
-from crazyflie_reports import flight_plot, flight_report
+import rosgraph
+
+from crazyflie_demo import figure8
+from crazyflie_msgs.msg import PositionVelocityYawState, PositionVelocityYawStateStamped
+from crazyflie_reports import bag_log, bag_report
 from crazyflie_reports.flight_operator import FlightError, FlightOperator
+from crazyflie_reports.flight_report import FlightReport
 from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 HOVER = (0.0, 0.0, 1.0)
-HOVER_DURATION = 6.0
+HOVER_DURATION = 2.2
+HOVER_WINDOW = 2.0
+"""Until the figure eight begins; the hover error is taken from it, s."""
+
+EIGHT_DURATION = 6.0
+
+SETTLING = 0.5
+"""From the end of the figure eight to the landing, s."""
+
+LAUNCH_FILE = ("crazyflie_examples", "sw_controller.launch")
+ARGUMENTS = ("controller:=position_velocity_yaw", "dynamics:=coupled_7d", "record:=true")
+"""The controller of the examples that follows a yaw, and the model in which it matters."""
+
+REFERENCE, STATUS = "/ref/position_velocity_yaw", "/in_flight_flight_status"
+
 LIMIT = 30.0
 """The longest that a part of the flight may take, s; a takeoff takes six."""
+
+
+def eight(moment: float) -> PositionVelocityYawState:
+    """Return the reference of the figure eight, which turns once, at a time (s) since its begin."""
+    rate = figure8.DURATION / EIGHT_DURATION
+    x, y, turn = (
+        figure8.sine(figure8.WIDTH, 1, rate * moment),
+        figure8.sine(figure8.HEIGHT, 2, rate * moment),
+        figure8.phase(rate * moment),
+    )
+    return PositionVelocityYawState(
+        x=x[0], y=y[0], z=HOVER[2], x_dot=rate * x[1], y_dot=rate * y[1], yaw=turn[0]
+    )
+
+
+def fly_and_land() -> None:
+    """Fly on the master that runs."""
+    process = begin("demo")
+    handle = process.handle("/figure_eight")
+    references = handle.publisher(REFERENCE, PositionVelocityYawStateStamped)
+    operator = FlightOperator(process, limit=LIMIT)
+    operator.wait_until_ready()
+    print("rosservice call /takeoff", flush=True)
+    operator.takeoff()
+    print(f"hovering for {HOVER_DURATION:g} s", flush=True)
+    operator.hover(HOVER_DURATION)
+    print(f"a figure eight of {EIGHT_DURATION:g} s", flush=True)
+    start = operator.time
+    moment = 0.0
+    while moment < EIGHT_DURATION:
+        operator.hover(0.02)
+        moment = min(operator.time - start, EIGHT_DURATION)
+        message = PositionVelocityYawStateStamped(state=eight(moment))
+        message.header.stamp = handle.stamp()
+        references.publish(message)
+    operator.hover(SETTLING)
+    print("rosservice call /land", flush=True)
+    operator.land()
 
 
 def fly(folder: Path, launch_arguments: list[str]) -> int:
     """Fly, report and return the exit status: 0 for a good flight."""
     folder.mkdir(parents=True, exist_ok=True)
-    log = folder / "sw_hover.log"
+    log, recordings = folder / "sw_hover.log", folder / "recordings"
     rviz = "true" if os.environ.get("DISPLAY") else "false"
-    arguments = ["crazyflie_examples", "sw_hover.launch", f"rviz:={rviz}", *launch_arguments]
+    arguments = [
+        *LAUNCH_FILE, *ARGUMENTS, f"record_folder:={recordings}", f"rviz:={rviz}", *launch_arguments
+    ]  # fmt: skip
     print(f"launching {' '.join(arguments)}  (its output: {log})", flush=True)
+    before = _folders(recordings)
     with roslaunch(arguments, log):
         print(f"watch it with  export ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}", flush=True)
         try:
-            operator = FlightOperator(begin("demo"), limit=LIMIT)
-            operator.wait_until_ready()
-            print("rosservice call /takeoff", flush=True)
-            operator.takeoff()
-            print(f"hovering for {HOVER_DURATION:g} s", flush=True)
-            operator.hover(HOVER_DURATION)
-            print("rosservice call /land", flush=True)
-            operator.land()
+            wait_for_recording()
+            fly_and_land()
         except FlightError as error:
             print(f"the flight failed: {error}; see {log}", file=sys.stderr)
             print(*complaints(log), sep="\n", file=sys.stderr)
             return 1
-    record = operator.finish()
-    record.save_csv(folder / "sw_hover.csv")
-    flight_plot.save(record, HOVER, folder / "sw_hover.png")
-    report = flight_report.FlightReport.of(record, HOVER)
-    print(report.table())
-    print(f"plot: {folder / 'sw_hover.png'}\ndata: {folder / 'sw_hover.csv'}")
-    if not report.complaints():
+    (recording,) = _folders(recordings) - before
+    return report(recording, folder, log)
+
+
+def wait_for_recording() -> None:
+    """Wait until the recorder has subscribed to the state of the flight."""
+    deadline = time.monotonic() + LIMIT
+    graph = rosgraph.Master("/demo")
+    while "/recorder" not in dict(graph.getSystemState()[1]).get(STATUS, []):
+        if time.monotonic() > deadline:
+            raise FlightError(f"/recorder has not subscribed to {STATUS} for {LIMIT:g} s")
+        time.sleep(0.05)
+
+
+def report(recording: Path, folder: Path, log: Path) -> int:
+    """Print the table of a flight, write page and data; return the exit status."""
+    page = bag_report.Report()
+    with tempfile.TemporaryDirectory(dir=folder) as series:
+        recorded = bag_log.read(recording, Path(series))
+        page.add(recorded)
+        (flight,) = bag_report.flights_of(recorded)
+    page.write(folder)
+    flight.record.save_csv(folder / "sw_hover.csv")
+    hover = FlightReport.of(flight.record, HOVER, HOVER_WINDOW)
+    print(hover.table())
+    print(f"report: {folder / bag_report.PAGE}\ndata: {folder / 'sw_hover.csv'}")
+    if not hover.complaints():
         return 0
-    for complaint in report.complaints():
+    for complaint in hover.complaints():
         print(f"bad flight: {complaint}", file=sys.stderr)
     print(*complaints(log), sep="\n", file=sys.stderr)
     return 1
@@ -55,7 +131,9 @@ def fly(folder: Path, launch_arguments: list[str]) -> int:
 def main() -> int:
     """Fly as the command line asks; return the exit status."""
     parser = argparse.ArgumentParser(prog="run demo", description=__doc__)
-    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for plot, data, log")
+    parser.add_argument(
+        "--out", type=Path, default=Path("out"), help="folder for report, data, log"
+    )
     parser.add_argument("launch_arguments", nargs="*", help="such as composed:=true")
     options = parser.parse_args()
     try:
@@ -63,6 +141,10 @@ def main() -> int:
     except LaunchError as error:
         print(error, file=sys.stderr)
         return 1
+
+
+def _folders(recordings):
+    return set(recordings.glob("*/"))
 
 
 if __name__ == "__main__":

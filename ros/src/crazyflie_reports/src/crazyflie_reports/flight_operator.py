@@ -52,6 +52,11 @@ class FlightOperator:
         """Where the vehicle was last, m, shape (3,)."""
         return self._recorder.record.state.last[:3]
 
+    @property
+    def time(self) -> float:
+        """Of the latest state, s."""
+        return self._recorder.record.state.last_time
+
     def finish(self) -> FlightRecord:
         """Stop recording and return the record."""
         self._recorder.stop()

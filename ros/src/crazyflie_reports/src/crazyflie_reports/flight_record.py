@@ -13,6 +13,9 @@ CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
 GROUND_TOLERANCE = 0.01
 """A vehicle below this height stands on the ground, m."""
 
+AT_POINT = 0.001
+"""References closer to a point than this lead to it, m."""
+
 
 class Series:
     """Rows of numbers with the times they belong to, growing.
@@ -24,6 +27,13 @@ class Series:
         self.fields = fields
         self._times: list[float] = []
         self._rows: list[ArrayLike] = []
+
+    @classmethod
+    def of(cls, fields: tuple[str, ...], times: ArrayLike, values: ArrayLike) -> "Series":
+        """Return a series of times (s), shape (n,), and rows, shape (n, len(fields))."""
+        series = cls(fields)
+        series._times, series._rows = np.asarray(times).tolist(), np.asarray(values)  # type: ignore[assignment]
+        return series
 
     def append(self, time: float, row: ArrayLike) -> None:
         """Add a row, shape (len(fields),), at ``time`` (s)."""
@@ -90,33 +100,57 @@ class FlightRecord:
         """Return the distance of every recorded state from a point (m), shape (n,)."""
         return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
 
+    def hover_end(self, point: ArrayLike) -> float:
+        """Return when references led away from a point (m), at the latest when /land was called."""
+        times = self.reference.times
+        distances = np.linalg.norm(self.reference.values[:, :3] - np.asarray(point), axis=1)
+        arrived = (times >= self.events["takeoff"]) & (distances < AT_POINT)
+        if not arrived.any():
+            return self.events["land"]
+        left = times[(times > times[arrived][0]) & (distances > AT_POINT)]
+        return float(min([*left[:1], self.events["land"]]))
+
+    def tracking_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Return times (s) and distances (m) of states from the references of then, shape (n,).
+
+        Of the states for which a reference has come before.
+        """
+        times = self.state.times
+        newest = np.searchsorted(self.reference.times, times, side="right") - 1
+        known = newest >= 0
+        references = self.reference.values[newest[known], :3]
+        states = self.state.values[known, :3]
+        return times[known], np.linalg.norm(states - references, axis=1)
+
     def time_to_hover(self, point: ArrayLike, tolerance: float) -> float:
         """Return how long after the call of /takeoff the vehicle was at a point to stay, s.
 
-        From then on until /land is called it is within ``tolerance`` of the point, m; infinity when
-        it never stayed.
+        From then on until `hover_end` it is within ``tolerance`` of the point, m; infinity when it
+        never stayed.
         """
-        times, errors = self._until_landing(point)
+        times, errors = self._hover(point)
         outside = np.flatnonzero(errors > tolerance)
         first = outside[-1] + 1 if outside.size else 0
         if first >= times.size:
             return float("inf")
         return float(times[first] - self.events["takeoff"])
 
-    def overshoot(self, height: float) -> float:
-        """Return by how much the vehicle rose above the hover height (m), at least 0."""
-        return max(0.0, float(self.state.column("z").max()) - height)
+    def overshoot(self, point: ArrayLike) -> float:
+        """Return how far the vehicle rose above a hover point (m) until `hover_end`, at least 0."""
+        times, height = self.state.times, np.asarray(point)[2]
+        until = self.state.column("z")[times <= self.hover_end(point)]
+        return max(0.0, float(until.max(initial=height)) - float(height))
 
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
-        """Return mean and maximum distance (m) from a point for ``duration`` s until /land.
+        """Return mean and maximum distance (m) from a point for ``duration`` s until `hover_end`.
 
         Raises
         ------
         ValueError
             No state was recorded in that time.
         """
-        times, errors = self._until_landing(point)
-        errors = errors[times >= self.events["land"] - duration]
+        times, errors = self._hover(point)
+        errors = errors[times >= self.hover_end(point) - duration]
         if not errors.size:
             raise ValueError("no state was recorded during the hover")
         return float(errors.mean()), float(errors.max())
@@ -151,7 +185,7 @@ class FlightRecord:
                 control = controls[index] if index >= 0 else [np.nan] * len(CONTROL_FIELDS)
                 writer.writerow([f"{time - self.events['takeoff']:.3f}", *state, *control])
 
-    def _until_landing(self, point):
+    def _hover(self, point):
         times = self.state.times
-        flight = (times >= self.events["takeoff"]) & (times <= self.events["land"])
-        return times[flight], self.position_error(point)[flight]
+        hover = (times >= self.events["takeoff"]) & (times <= self.hover_end(point))
+        return times[hover], self.position_error(point)[hover]

@@ -9,7 +9,7 @@ HOVER_TOLERANCE = 0.01
 """Largest distance from the hover point of a good flight, m."""
 
 HOVER_WINDOW = 5.0
-"""Time before /land from which the hover error is taken, s."""
+"""Time before the end of the hover from which its error is taken, s."""
 
 OVERSHOOT_LIMIT = 0.1
 """How far a good flight may rise above the hover point, m."""
@@ -29,7 +29,7 @@ class FlightReport:
     overshoot : float
         Above the hover height, m.
     hover_error_mean, hover_error_max : float
-        Distance from the hover point in the last `HOVER_WINDOW` before /land, m.
+        Distance from the hover point at the end of the hover, m.
     touchdown_speed : float
         m/s.
     final_height : float
@@ -47,16 +47,21 @@ class FlightReport:
     final_thrust: float
 
     @classmethod
-    def of(cls, record: FlightRecord, point: Sequence[float]) -> "FlightReport":
-        """Return the report of a record with the hover point x, y, z, m."""
-        mean, largest = record.hover_error(point, HOVER_WINDOW)
+    def of(
+        cls, record: FlightRecord, point: Sequence[float], window: float = HOVER_WINDOW
+    ) -> "FlightReport":
+        """Return the report of a record with the hover point x, y, z, m.
+
+        The hover error is that of the last ``window`` s of the hover.
+        """
+        mean, largest = record.hover_error(point, window)
         try:
             touchdown = record.touchdown_speed()
         except ValueError:
             touchdown = float("inf")
         return cls(
             time_to_hover=record.time_to_hover(point, HOVER_TOLERANCE),
-            overshoot=record.overshoot(point[2]),
+            overshoot=record.overshoot(point),
             hover_error_mean=mean,
             hover_error_max=largest,
             touchdown_speed=touchdown,

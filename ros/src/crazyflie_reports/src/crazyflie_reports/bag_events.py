@@ -1,0 +1,221 @@
+"""Events of a flight in the messages of a bag: what went wrong, or was changed, and when."""
+
+import itertools
+import math
+import re
+from array import array
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
+
+MERGE_TIME = 1.0
+"""The same event within this time of the last counts as one, s."""
+
+MAX_EVENTS = 20_000
+"""Of a bag; more are only counted."""
+
+_WARN, _ERROR = 4, 8  # Levels of rosgraph_msgs/Log.
+
+
+class Kind(Enum):
+    """What an event is about."""
+
+    REFUSAL = "refusal"
+    REJECTED = "pose rejected"
+    HOLD = "hold"
+    EMERGENCY = "emergency"
+    LINK = "link"
+    BATTERY = "battery"
+    PARAMETER = "parameter"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass
+class Event:
+    """Something that happened.
+
+    Attributes
+    ----------
+    time : float
+        s, when it was recorded.
+    namespace : str
+        Of the node or topic that it comes from.
+    kind : Kind
+    text : str
+    count : int
+        How many times in succession.
+    """
+
+    time: float
+    namespace: str
+    kind: Kind
+    text: str
+    count: int = 1
+
+
+class EventLog:
+    """Events, collected from messages in the order of their times.
+
+    Attributes
+    ----------
+    events : list of Event
+    dropped : int
+        Those beyond `MAX_EVENTS`.
+    flight_states : dict
+        By namespace, times (s) and states of the flight (constants of FlightStatus).
+    links : dict
+        By namespace, one after the other: time (s), share of answered pings, and setpoints that
+        were not sent so far.
+    """
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+        self.dropped = 0
+        self.flight_states: dict[str, list[tuple[float, int]]] = defaultdict(list)
+        self.links: dict[str, array[float]] = defaultdict(lambda: array("d"))
+        self._last: dict[Any, Any] = {}
+        self._latest: dict[tuple[str, Kind, str], tuple[float, Event]] = {}
+
+    def add(self, time: float, topic: str, namespace: str, message: Any) -> None:
+        """Add the events in a message of one of `bag_topics.EVENT_TYPES` but tf's."""
+        for source, kind, text in self._READERS[message._type](
+            self, time, topic, namespace, message
+        ):
+            self._add(time, source, kind, text)
+
+    def _add(self, time, namespace, kind, text):
+        key = (namespace, kind, text)
+        last, event = self._latest.get(key, (-math.inf, None))
+        if event is not None and time - last <= MERGE_TIME:
+            event.count += 1
+        elif len(self.events) >= MAX_EVENTS:
+            self.dropped += 1
+            return
+        else:
+            event = Event(time, namespace, kind, text)
+            self.events.append(event)
+        self._latest[key] = time, event
+
+    def _changes(self, key, value):
+        """Tell whether a value is another one than the last of this key."""
+        changes = self._last.get(key) != value
+        self._last[key] = value
+        return changes
+
+    def _flight_status(self, time, topic, namespace, message):
+        if self._changes((topic, "state"), message.state):
+            self.flight_states[namespace].append((time, message.state))
+        if self._changes((topic, "reason"), message.reason) and message.reason:
+            is_hold = message.state == FlightStatus.FLYING
+            yield namespace, Kind.HOLD if is_hold else Kind.WARNING, message.reason
+        if message.state == FlightStatus.ON_GROUND:
+            refusal = message.takeoff_refusal
+            if self._changes((topic, "refusal"), refusal) and refusal:
+                yield namespace, Kind.REFUSAL, f"takeoff would be refused: {refusal}"
+
+    def _filter_status(self, time, topic, namespace, message):
+        if self._changes(topic, message.state) and message.state != FilterStatus.PASSING:
+            is_hold = message.state == FilterStatus.HOLDING
+            name = _constant(
+                FilterStatus, message.state, ("HOLDING", "SINKING", "DOWN", "EMERGENCY")
+            )
+            kind = Kind.HOLD if is_hold else Kind.EMERGENCY
+            yield namespace, kind, f"the filter is {name}: {message.reason}"
+
+    def _vehicle_status(self, time, topic, namespace, message):
+        quality, ignored = message.link_quality, message.setpoints_ignored
+        self.links[namespace].extend((time, quality, ignored))
+        if self._changes((topic, "link"), message.link) and message.link == VehicleStatus.LOST:
+            yield namespace, Kind.LINK, message.link_text
+        if self._changes((topic, "emergency"), message.is_emergency) and message.is_emergency:
+            yield namespace, Kind.EMERGENCY, message.text
+        is_low = message.battery in (VehicleStatus.BATTERY_LOW, VehicleStatus.BATTERY_CRITICAL)
+        if self._changes((topic, "battery"), message.battery) and is_low:
+            name = _constant(VehicleStatus, message.battery, ("BATTERY_LOW", "BATTERY_CRITICAL"))
+            yield namespace, Kind.BATTERY, f"{name}: {message.battery_voltage:.2f} V"
+
+    def _parameters(self, time, topic, namespace, message):
+        node = topic.rpartition("/")[0]
+        for each in itertools.chain(message.bools, message.ints, message.strs, message.doubles):
+            key = (topic, each.name)
+            is_known = key in self._last
+            if self._changes(key, each.value) and is_known:
+                yield namespace, Kind.PARAMETER, f"{node}/{each.name} is now {each.value}"
+
+    def _rosout(self, time, topic, namespace, message):
+        # The same message comes on /rosout and on /rosout_agg.
+        if not self._changes(("log", message.name, message.msg), message.header.stamp.to_nsec()):
+            return
+        own_name = re.match(r"(/\S+): ", message.msg)
+        node = own_name[1] if own_name else message.name
+        kind = None
+        if "refused" in message.msg:
+            kind = Kind.REFUSAL
+        elif "rejected" in message.msg:
+            kind = Kind.REJECTED
+        elif message.level >= _WARN:
+            kind = Kind.ERROR if message.level >= _ERROR else Kind.WARNING
+        if kind is not None:
+            text = message.msg if own_name else f"{node}: {message.msg}"
+            yield _parent(node), kind, text
+
+    def _diagnostics(self, time, topic, namespace, message):
+        for status in message.status:
+            source = _parent(status.name.partition(":")[0])
+            for each in status.values:
+                if each.key.startswith("rejected: "):
+                    yield from self._rejections(source, status.name, each)
+            if self._changes((topic, status.name), (status.level, status.message)) and status.level:
+                kind = Kind.ERROR if status.level > 1 else Kind.WARNING
+                yield source, kind, f"{status.name}: {status.message}"
+
+    def _rejections(self, source, name, each):
+        key = ("rejected", name, each.key)
+        before = self._last.get(key, 0)
+        count = int(each.value) if each.value.isdigit() else 0
+        self._last[key] = count
+        if count > before:
+            yield source, Kind.REJECTED, f"a pose {each.key.removeprefix('rejected: ')} ({name})"
+
+    _READERS = {
+        "crazyflie_msgs/FlightStatus": _flight_status,
+        "crazyflie_msgs/FilterStatus": _filter_status,
+        "crazyflie_msgs/VehicleStatus": _vehicle_status,
+        "dynamic_reconfigure/Config": _parameters,
+        "rosgraph_msgs/Log": _rosout,
+        "diagnostic_msgs/DiagnosticArray": _diagnostics,
+    }
+
+
+def concerning(events: list[Event], name: str, others: set[str]) -> Iterator[Event]:
+    """Yield the events of a vehicle, and those that are no other vehicle's.
+
+    Parameters
+    ----------
+    events : list of Event
+    name : str
+        The vehicle's namespace.
+    others : set of str
+        The namespaces of all other vehicles.
+    """
+    for event in events:
+        words = {
+            word.split("/")[0] for word in re.findall(r"[\w/]+", event.text.replace(" /", " "))
+        }
+        if event.namespace == name or not (event.namespace in others or words & others):
+            yield event
+
+
+def _constant(message_type, value, names):
+    return next(
+        (n.lower().replace("_", " ") for n in names if getattr(message_type, n) == value), "?"
+    )
+
+
+def _parent(node):
+    return node.strip("/").rpartition("/")[0]

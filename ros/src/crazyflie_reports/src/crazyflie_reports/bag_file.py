@@ -1,0 +1,218 @@
+"""Messages of a bag file in the order in which they were recorded.
+
+The file is read from its beginning to its end, without its index: a bag without one, or one that
+breaks off, is read as far as it goes, and memory holds one chunk (768 kB by default) at a time.
+Format: https://wiki.ros.org/Bags/Format/2.0.
+"""
+
+import bz2
+import os
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import roslz4
+
+MAGIC = b"#ROSBAG V2.0\n"
+
+_MESSAGE, _BAG_HEADER, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
+
+_LARGEST_HEADER = 1 << 20
+"""Longer headers of records, bytes, are no headers: the file is damaged."""
+
+_UINT32 = struct.Struct("<I")
+_UINT64 = struct.Struct("<Q")
+_TIME = struct.Struct("<II")
+
+
+class BagError(Exception):
+    """The file cannot be read at all; the text names it and says why."""
+
+
+class _BrokenOffError(Exception):
+    """The file ends, or is damaged, within a record."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A topic of one publisher.
+
+    Attributes
+    ----------
+    topic, datatype, md5sum, definition : str
+        As the publisher named them; the definition is the text of the message file.
+    """
+
+    topic: str
+    datatype: str
+    md5sum: str
+    definition: str
+
+
+class BagFile:
+    """A bag file that is read once, from its beginning.
+
+    Parameters
+    ----------
+    path : Path
+
+    Attributes
+    ----------
+    connections : list of Connection
+        Those that have been met so far.
+    interruption : str
+        Why reading has ended early; empty if it has not.
+
+    Raises
+    ------
+    BagError
+        There is no such file, or it is not a bag of format 2.0.
+    """
+
+    def __init__(self, path: Path):
+        self._path = path
+        self.connections: list[Connection] = []
+        self.interruption = ""
+        self._by_id: dict[bytes, Connection] = {}
+        try:
+            with path.open("rb") as file:
+                start = file.read(len(MAGIC))
+            self.size = path.stat().st_size
+        except OSError as error:
+            raise BagError(f"{path}: {error.strerror}") from None
+        if not start:
+            raise BagError(f"{path} is empty; expected a bag, as rosbag record writes")
+        if start.startswith(b"#ROSBAG V1"):
+            raise BagError(f"{path} has the format {start[1:].decode().strip()}; run rosbag fix")
+        if start != MAGIC:
+            raise BagError(f"{path} is not a bag: it begins with {start!r}, expected {MAGIC!r}")
+
+    def messages(
+        self,
+        is_wanted: Callable[[Connection], bool],
+        progress: Callable[[int], Any] = lambda size: None,
+    ) -> Iterator[tuple[Connection, float, bytes]]:
+        """Yield connection, time of recording (s) and serialized message.
+
+        ``progress`` is called with the number of bytes that have been read since its last call.
+        """
+        with self._path.open("rb") as file:
+            file.seek(len(MAGIC))
+            done = 0
+            try:
+                while file.tell() < self.size:
+                    yield from self._record(file, is_wanted)
+                    progress(file.tell() - done)
+                    done = file.tell()
+            except (_BrokenOffError, struct.error, KeyError, ValueError, EOFError) as error:
+                self.interruption = self._broken_off(file.tell(), error)
+
+    def _record(self, file, is_wanted):
+        fields = _fields(_read_sized(file, _LARGEST_HEADER))
+        op = fields[b"op"]
+        (size,) = _UINT32.unpack(_read(file, 4))
+        if op == _CHUNK:
+            # The size of a chunk that was not closed is 0: it is what remains.
+            is_open = size == 0
+            content = file.read() if is_open else _read(file, size)
+            yield from self._messages_of(_decompressed(content, fields[b"compression"]), is_wanted)
+            if is_open:
+                raise _BrokenOffError("its last chunk was not closed")
+            return
+        if op == _BAG_HEADER:
+            (index,) = _UINT64.unpack(fields[b"index_pos"])
+            if index == 0:
+                self.interruption = (
+                    f"{self._path} was not closed, as after a crash: the last second may be missing"
+                )
+            elif index > self.size:
+                self.interruption = self._broken_off(self.size, "its index is missing")
+        if size > self.size - file.tell():
+            raise _BrokenOffError("it ends within a record")
+        # Also indexes, and connections, which chunks have, too.
+        file.seek(size, os.SEEK_CUR)
+
+    def _broken_off(self, place, reason):
+        return (
+            f"{self._path} breaks off at {place / 1e6:.2f} of {self.size / 1e6:.2f} MB ({reason}), "
+            "as after a crash: the rest is missing here"
+        )
+
+    def _messages_of(self, chunk, is_wanted):
+        offset, end = 0, len(chunk)
+        wanted: dict[bytes, Connection | None] = {}
+        while offset < end:
+            header, offset = _sized(chunk, offset)
+            data, offset = _sized(chunk, offset)
+            fields = _fields(header)
+            op, key = fields[b"op"], fields[b"conn"]
+            if op == _CONNECTION:
+                self._connect(key, fields, data)
+            elif op == _MESSAGE:
+                if key not in wanted:
+                    wanted[key] = self._by_id[key] if is_wanted(self._by_id[key]) else None
+                if (connection := wanted[key]) is not None:
+                    seconds, nanoseconds = _TIME.unpack(fields[b"time"])
+                    yield connection, seconds + nanoseconds * 1e-9, data
+
+    def _connect(self, key, fields, data):
+        if key in self._by_id:
+            return
+        texts = {name: value.decode(errors="replace") for name, value in _fields(data).items()}
+        self._by_id[key] = Connection(
+            fields[b"topic"].decode(errors="replace"),
+            texts[b"type"],
+            texts[b"md5sum"],
+            texts[b"message_definition"],
+        )
+        self.connections.append(self._by_id[key])
+
+
+def _read(file: BinaryIO, size: int) -> bytes:
+    data = file.read(size)
+    if len(data) < size:
+        raise _BrokenOffError("it ends within a record")
+    return data
+
+
+def _read_sized(file, largest):
+    (size,) = _UINT32.unpack(_read(file, 4))
+    if size > largest:
+        raise _BrokenOffError("it is damaged")
+    return _read(file, size)
+
+
+def _sized(data, offset):
+    (size,) = _UINT32.unpack_from(data, offset)
+    end = offset + 4 + size
+    if end > len(data):
+        raise _BrokenOffError("it ends within a message")
+    return data[offset + 4 : end], end
+
+
+def _fields(header: bytes) -> dict[bytes, bytes]:
+    """Return name and value of each field of a record's header."""
+    fields = {}
+    offset, end = 0, len(header)
+    while offset < end:
+        (size,) = _UINT32.unpack_from(header, offset)
+        name, _, value = header[offset + 4 : offset + 4 + size].partition(b"=")
+        fields[name] = value
+        offset += 4 + size
+    return fields
+
+
+def _decompressed(data, compression):
+    if compression == b"none":
+        return data
+    if compression == b"lz4":
+        return roslz4.decompress(data)
+    if compression == b"bz2":
+        try:
+            # Of a chunk that breaks off, what there is.
+            return bz2.BZ2Decompressor().decompress(data)
+        except OSError as error:
+            raise _BrokenOffError(str(error)) from None
+    raise _BrokenOffError(f"its compression is {compression.decode(errors='replace')}")

@@ -1,0 +1,253 @@
+"""The messages of a recording, read once: numbers in files, events in memory."""
+
+from array import array
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crazyflie_reports.bag_events import EventLog
+from crazyflie_reports.bag_file import BagError, BagFile, Connection
+from crazyflie_reports.bag_topics import (
+    POSE_FIELDS,
+    Role,
+    Topic,
+    TopicError,
+    expected,
+    topic_of,
+    transform_row,
+)
+
+POSE_PERIOD = 0.009
+"""Of transforms, which may come at 1 kHz, one in this time is kept, s."""
+
+_BUFFER = 8192  # Numbers.
+
+
+class Spool:
+    """Rows of numbers, of which only the newest are in memory.
+
+    Each begins with the time of recording (s), the stamp (s; 0 without one) and the number in
+    sequence.
+
+    Parameters
+    ----------
+    path : Path
+        Of a file that is made when it is needed.
+    fields : tuple of str
+        What a row has behind these three.
+
+    Attributes
+    ----------
+    fields : tuple of str
+    count : int
+        Of rows.
+    """
+
+    def __init__(self, path: Path, fields: tuple[str, ...]):
+        self._path, self.fields = path, fields
+        self._buffer = array("d")
+        self.count = 0
+        self.last_time = float("-inf")
+
+    def append(self, time: float, stamp: float, number: int, row: Sequence[float]) -> None:
+        """Add a row of ``fields``."""
+        self._buffer.extend((time, stamp, number, *row))
+        self.count += 1
+        self.last_time = time
+        if len(self._buffer) >= _BUFFER:
+            with self._path.open("ab") as file:
+                self._buffer.tofile(file)
+            del self._buffer[:]
+
+    def rows(self) -> NDArray[np.float64]:
+        """Return all rows in the order of their times, shape (count, 3 + len(fields))."""
+        on_disk = np.fromfile(self._path) if self._path.exists() else np.empty(0)
+        numbers = np.concatenate([on_disk, np.array(self._buffer)])
+        rows = numbers.reshape(-1, 3 + len(self.fields))
+        # Bags that were merged may be in another order.
+        is_sorted = (np.diff(rows[:, 0]) >= 0.0).all()
+        return rows if is_sorted else rows[np.argsort(rows[:, 0], kind="stable")]
+
+
+@dataclass
+class Source:
+    """The series of a topic.
+
+    Attributes
+    ----------
+    topic, namespace : str
+    role : Role
+    spool : Spool
+    """
+
+    topic: str
+    namespace: str
+    role: Role
+    spool: Spool
+
+
+@dataclass
+class BagLog:
+    """What a recording has for a report.
+
+    Attributes
+    ----------
+    name : str
+        Of the recording.
+    sources : dict of str to Source
+        By topic.
+    frames : dict of str to Spool
+        `POSE_FIELDS` by child frame of /tf.
+    events : EventLog
+    start, end : float
+        Times of the first and the last message that was read, s.
+    remarks : list of str
+        What is missing, or could not be read.
+    """
+
+    name: str
+    sources: dict[str, Source] = field(default_factory=dict)
+    frames: dict[str, Spool] = field(default_factory=dict)
+    events: EventLog = field(default_factory=EventLog)
+    start: float = float("inf")
+    end: float = float("-inf")
+    remarks: list[str] = field(default_factory=list)
+
+
+def files_of(path: Path) -> list[Path]:
+    """Return the files of a recording: those of a folder in their order, or the file itself.
+
+    Raises
+    ------
+    BagError
+        There is no such file or folder, or no bag in the folder.
+    """
+    if path.is_file():
+        return [path]
+    if not path.is_dir():
+        raise BagError(f"{path} does not exist; expected a bag or a folder of bags")
+    # flight_10.bag comes after flight_9.bag.
+    bags = sorted(
+        (each for each in path.iterdir() if each.name.endswith((".bag", ".bag.active"))),
+        key=lambda each: (len(each.name.partition(".")[0]), each.name),
+    )
+    if not bags:
+        raise BagError(
+            f"{path} has no files *.bag or *.bag.active; expected the folder of a recording"
+        )
+    return bags
+
+
+def read(
+    path: Path,
+    folder: Path,
+    names: dict[str, str] | None = None,
+    progress: Callable[[int], Any] = lambda size: None,
+) -> BagLog:
+    """Read a recording.
+
+    Parameters
+    ----------
+    path : Path
+        Of a bag, or of a folder of bags that follow each other.
+    folder : Path
+        Where series that are too long for memory are kept as long as the log is used.
+    names : dict, optional
+        By role, a regular expression of topics in place of the documented ones.
+    progress : callable, optional
+        Called with numbers of bytes.
+
+    Raises
+    ------
+    BagError
+        It cannot be read, or has none of the topics.
+    """
+    log = BagLog(path.name)
+    reader = _Reader(log, folder, names or {})
+    files = [BagFile(each) for each in files_of(path)]
+    for file in files:
+        for connection, time, data in file.messages(reader.is_wanted, progress):
+            reader.add(connection, time, data)
+        if file.interruption:
+            log.remarks.append(file.interruption)
+    log.remarks += reader.remarks()
+    connections = [each for file in files for each in file.connections]
+    if not connections:
+        raise BagError(f"{path} has no messages; expected {expected()}")
+    if not log.sources and not log.frames:
+        there = sorted({f"{each.topic} ({each.datatype})" for each in connections})
+        raise BagError(
+            "\n".join(
+                [f"{path} has no topics of a flight; expected {expected()}, or /tf.",
+                 f"There are: {', '.join(there)}", *log.remarks]
+            )
+        )  # fmt: skip
+    return log
+
+
+class _Reader:
+    """Puts messages where they belong."""
+
+    def __init__(self, log: BagLog, folder: Path, names: dict[str, str]):
+        self._log, self._folder, self._names = log, folder, names
+        self._topics: dict[Connection, Topic] = {}
+        self._errors: dict[str, str] = {}
+        self._bad: dict[str, int] = {}
+
+    def is_wanted(self, connection):
+        if connection not in self._topics:
+            try:
+                topic = topic_of(connection, self._names)
+            except TopicError as error:
+                topic = None
+                self._errors[connection.topic] = str(error)
+            if topic is None:
+                return False
+            self._topics[connection] = topic
+        return True
+
+    def add(self, connection, time, data):
+        topic, log = self._topics[connection], self._log
+        log.start, log.end = min(log.start, time), max(log.end, time)
+        try:
+            stamp, number, content = topic.decode(data)
+            if topic.role is not None:
+                self._spool(connection.topic, topic).append(time, stamp, number, content)
+            elif connection.datatype.startswith("tf"):
+                self._add_transforms(time, content)
+            else:
+                log.events.add(time, connection.topic, topic.namespace, content)
+        except Exception as error:  # Whatever generated code or a bag's own fields raise.
+            self._errors.setdefault(connection.topic, f"{connection.topic}: {error}")
+            self._bad[connection.topic] = self._bad.get(connection.topic, 0) + 1
+
+    def remarks(self):
+        for topic, text in self._errors.items():
+            count = self._bad.get(topic)
+            yield f"{count} messages of {text}" if count else text
+        if self._log.events.dropped:
+            yield f"{self._log.events.dropped} more events are left out"
+
+    def _spool(self, name, topic):
+        if name not in self._log.sources:
+            spool = self._new_spool(topic.role.fields)
+            self._log.sources[name] = Source(name, topic.namespace, topic.role, spool)
+        return self._log.sources[name].spool
+
+    def _add_transforms(self, time, message):
+        for each in message.transforms:
+            frame = each.child_frame_id.strip("/")
+            if frame not in self._log.frames:
+                self._log.frames[frame] = self._new_spool(POSE_FIELDS)
+            spool = self._log.frames[frame]
+            if time - spool.last_time >= POSE_PERIOD:
+                row = transform_row(each.transform)
+                spool.append(time, each.header.stamp.to_sec(), 0, row)
+
+    def _new_spool(self, fields):
+        number = len(self._log.sources) + len(self._log.frames)
+        return Spool(self._folder / f"{number}.doubles", fields)

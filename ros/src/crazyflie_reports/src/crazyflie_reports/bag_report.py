@@ -1,0 +1,226 @@
+"""Reports on the flights of bags: a page for a browser, tables as CSV and JSON."""
+
+import argparse
+import csv
+import json
+import math
+import re
+import sys
+import tempfile
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from tqdm import tqdm
+
+from crazyflie_reports import bag_log, report_page
+from crazyflie_reports.bag_events import concerning
+from crazyflie_reports.bag_file import BagError
+from crazyflie_reports.bag_flights import Flight, flights
+from crazyflie_reports.bag_topics import ROLES
+from crazyflie_reports.bag_vehicles import vehicle_namespaces, vehicles
+from crazyflie_reports.figures import Figure, figures
+
+PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
+
+
+class ReportError(Exception):
+    """There is nothing to report on, or nowhere to write it; the text says why."""
+
+
+def flights_of(log: bag_log.BagLog) -> Iterator[Flight]:
+    """Yield the flights of a recording; one vehicle's numbers are in memory at a time."""
+    names = set(vehicle_namespaces(log))
+    for vehicle in vehicles(log):
+        others = names - {vehicle.namespace, ""}
+        events = list(concerning(log.events.events, vehicle.namespace, others))
+        states = log.events.flight_states.get(vehicle.namespace, [])
+        yield from flights(vehicle, states, events, log.end)
+
+
+class Report:
+    """A report on recordings, which grows with each that is added.
+
+    Attributes
+    ----------
+    recordings : list of dict
+        As `report_page.page` takes them.
+    """
+
+    def __init__(self) -> None:
+        self.recordings: list[dict[str, Any]] = []
+        self._flights: list[tuple[dict[str, Any], list[Figure]]] = []
+
+    def add(self, log: bag_log.BagLog) -> None:
+        """Add the flights of a recording."""
+        points = report_page.points_of(len(vehicle_namespaces(log)))
+        data = []
+        for flight in flights_of(log):
+            found = figures(flight)
+            data.append(report_page.flight_data(flight, found, points))
+            entry = {
+                **{"recording": log.name, "vehicle": flight.vehicle, "flight": flight.number},
+                "phases": data[-1]["phases"],
+                "events": [
+                    [round(e.time - flight.start, 3), e.kind.value, e.text, e.count]
+                    for e in flight.events
+                ],
+            }
+            self._flights.append((entry, found))
+        start = datetime.fromtimestamp(log.start, UTC)
+        self.recordings.append(
+            {
+                "name": log.name,
+                "start": f"{start:%Y-%m-%d %H:%M:%S} UTC",
+                "duration": round(log.end - log.start, 3),
+                "remarks": log.remarks if data else [*log.remarks, *_why_there_is_no_flight(log)],
+                "flights": data,
+            }
+        )
+
+    def write(self, folder: Path) -> None:
+        """Write page and tables into a folder, which is made if it is not there."""
+        names = [[f.name, f.unit] for f in self._flights[0][1]] if self._flights else []
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / PAGE).write_text(report_page.page(self.recordings, names))
+        keys = ("recording", "vehicle", "flight")
+        rows = [([entry[key] for key in keys], entry, found) for entry, found in self._flights]
+        _write_csv(
+            folder / FIGURES,
+            [*keys, "figure", "value", "unit", "normal", "is normal"],
+            [
+                [*key, f.name, _number(f.value), f.unit, f.normal, f.is_normal]
+                for key, _, found in rows
+                for f in found
+            ],
+        )
+        _write_csv(
+            folder / EVENTS,
+            [*keys, "time (s)", "kind", "text", "count"],
+            [[*key, *event] for key, entry, _ in rows for event in entry["events"]],
+        )
+        tables = [
+            entry
+            | {
+                "figures": {
+                    f.name: {"value": _number(f.value), "unit": f.unit, "normal": f.normal}
+                    for f in found
+                }
+            }
+            for entry, found in self._flights
+        ]
+        (folder / DATA).write_text(json.dumps(tables, indent=1))
+
+    def table(self) -> str:
+        """Return a line for each flight, with the figures that are not normal."""
+        lines = []
+        for entry, found in self._flights:
+            bad = [
+                f"{f.name} {f.value:.4g} {f.unit} ({f.normal})" for f in found if not f.is_normal
+            ]
+            flight = f"{entry['recording']}: {entry['vehicle']}, flight {entry['flight']}"
+            lines.append(f"{flight}: {', '.join(bad) or 'normal'}")
+        return "\n".join(lines)
+
+
+def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -> list[str]:
+    """Write a report on recordings; return what went wrong with any of them.
+
+    Parameters
+    ----------
+    paths : list of Path
+        Bags, or folders of bags that follow each other.
+    folder : Path
+        Of the report.
+    names : dict, optional
+        As in `bag_log.read`.
+
+    Raises
+    ------
+    ReportError
+        None of the recordings can be read, or the folder cannot be written.
+    """
+    report, problems = Report(), []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        # Beside the report, since /tmp may be in memory.
+        with tempfile.TemporaryDirectory(dir=folder) as place:
+            for number, path in enumerate(paths):
+                try:
+                    log = _read(path, Path(place, str(number)), names)
+                except BagError as error:
+                    problems.append(str(error))
+                    continue
+                # Bags of several folders may have the same name.
+                if [each.name for each in paths].count(path.name) > 1:
+                    log.name = str(path)
+                report.add(log)
+        if not report.recordings:
+            raise ReportError("\n".join(problems))
+        report.write(folder)
+    except OSError as error:
+        raise ReportError(f"the report cannot be written into {folder}: {error.strerror}") from None
+    print(report.table())
+    for recording in report.recordings:
+        print("".join(f"{remark}\n" for remark in recording["remarks"]), end="")
+    print(f"report: {folder / PAGE}")
+    return problems
+
+
+def main() -> int:
+    """Make the report that the command line asks for; return the exit status."""
+    roles = sorted({each.name for each in ROLES})
+    parser = argparse.ArgumentParser(prog="flight_report", description=__doc__)
+    parser.add_argument(
+        "bags",
+        nargs="+",
+        type=Path,
+        metavar="BAG",
+        help="or a folder of bags that follow each other",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("flight_report"), help="folder of the report (%(default)s)"
+    )
+    parser.add_argument(
+        "--topic", action="append", default=[], metavar="ROLE=NAME",
+        help=f"a topic of another name, below the vehicle's namespace; roles: {', '.join(roles)}",
+    )  # fmt: skip
+    options = parser.parse_args()
+    names = dict(each.partition("=")[::2] for each in options.topic)
+    if unknown := [each for each in names if each not in roles or not names[each]]:
+        parser.error(f"--topic {unknown[0]}: expected ROLE=NAME with a role of {', '.join(roles)}")
+    for role, name in names.items():
+        try:
+            re.compile(name)
+        except re.error as error:
+            parser.error(f"--topic {role}={name}: expected a regular expression; {error}")
+    try:
+        problems = make(options.bags, options.out, names)
+    except ReportError as error:
+        problems = [str(error)]
+    print(*problems, sep="\n", file=sys.stderr, end="\n" if problems else "")
+    return 1 if problems else 0
+
+
+def _read(path, folder, names):
+    """Read a recording with a progress bar; its series are kept in a new folder."""
+    folder.mkdir()
+    size = sum(each.stat().st_size for each in bag_log.files_of(path))
+    with tqdm(total=size, unit="B", unit_scale=True, desc=path.name, disable=None) as bar:
+        return bag_log.read(path, folder, names, bar.update)
+
+
+def _why_there_is_no_flight(log):
+    yield "It has no flight."
+    for event in log.events.events[: report_page.MAX_EVENTS]:
+        yield f"{event.time - log.start:.1f} s: {event.kind.value}: {event.text}"
+
+
+def _number(value):
+    return value if math.isfinite(value) else None
+
+
+def _write_csv(path, header, rows):
+    with path.open("w", newline="") as file:
+        csv.writer(file).writerows([header, *rows])

@@ -1,0 +1,236 @@
+"""What topics of a bag are: series of numbers of a vehicle, and messages that are events.
+
+The topics are those of the examples, of the C++ workspace and of crazyflie_ros.
+"""
+
+import math
+import re
+import struct
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import genpy.dynamic
+import roslib.message
+
+from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_model.units import thrust_from_pwm
+from crazyflie_reports.bag_file import Connection
+from crazyflie_reports.flight_record import CONTROL_FIELDS, STATE_FIELDS
+
+POSE_FIELDS = ("x", "y", "z", "roll", "pitch", "yaw")
+
+Row = Sequence[float]
+
+
+@dataclass(frozen=True)
+class Role:
+    """A series of numbers that topics of some names and types are for a vehicle.
+
+    Attributes
+    ----------
+    name : str
+    topics : str
+        Regular expression of the name below the vehicle's namespace.
+    fields : tuple of str
+        Of a row.
+    rows : dict
+        By type, what makes a row of a message.
+    """
+
+    name: str
+    topics: str
+    fields: tuple[str, ...]
+    rows: dict[str, Callable[[Any], Row]]
+
+
+def _of_pose(pose):
+    position, q = pose.position, pose.orientation
+    return (position.x, position.y, position.z, *rpy_from_quaternion(q.x, q.y, q.z, q.w))
+
+
+def transform_row(transform: Any) -> Row:
+    """Return `POSE_FIELDS` (m, rad) of a geometry_msgs/Transform."""
+    p, q = transform.translation, transform.rotation
+    return (p.x, p.y, p.z, *rpy_from_quaternion(q.x, q.y, q.z, q.w))
+
+
+def _of_cmd_vel(twist):
+    return (
+        math.radians(twist.linear.y),
+        math.radians(twist.linear.x),
+        -math.radians(twist.angular.z),
+        thrust_from_pwm(twist.linear.z),
+    )
+
+
+def _at_rest(x, y, z, yaw):
+    return (x, y, z, 0.0, 0.0, 0.0, yaw)
+
+
+def _of_full_state(message):
+    velocity = message.twist.linear
+    *position, _, _, yaw = _of_pose(message.pose)
+    return (*position, velocity.x, velocity.y, velocity.z, yaw)
+
+
+def _at_rest_at_pose(message):
+    x, y, z, _, _, yaw = _of_pose(message.pose)
+    return _at_rest(x, y, z, yaw)
+
+
+_STATES: dict[str, Callable[[Any], Row]] = {
+    "crazyflie_msgs/PositionVelocityYawStateStamped": tuple,
+    "crazyflie_msgs/PositionVelocityStateStamped": lambda numbers: (*numbers, math.nan),
+    "crazyflie_msgs/FullStateStamped": lambda numbers: (*numbers[:6], numbers[8]),
+}
+_CONTROLS: dict[str, Callable[[Any], Row]] = {"crazyflie_msgs/ControlStamped": tuple}
+
+ROLES = (
+    Role("state", "state", STATE_FIELDS, _STATES),
+    Role("reference", "ref|ref/position_velocity_yaw", STATE_FIELDS, _STATES),
+    Role(
+        "reference",
+        "goal|cmd_full_state|cmd_position",
+        STATE_FIELDS,
+        {
+            "geometry_msgs/PoseStamped": _at_rest_at_pose,
+            "crazyflie_driver/FullState": _of_full_state,
+            # The yaw is in degrees.
+            "crazyflie_driver/Position": lambda message: _at_rest(
+                message.x, message.y, message.z, math.radians(message.yaw)
+            ),
+        },
+    ),
+    Role("final_control", "control/final", CONTROL_FIELDS, _CONTROLS),
+    Role("cmd_vel", "cmd_vel", CONTROL_FIELDS, {"geometry_msgs/Twist": _of_cmd_vel}),
+    Role(
+        "pose",
+        "pose",
+        POSE_FIELDS,
+        {"geometry_msgs/PoseStamped": lambda message: _of_pose(message.pose)},
+    ),
+    Role("battery", "battery", ("voltage",), {"std_msgs/Float32": lambda m: (m.data,)}),
+    Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
+)
+
+EVENT_TYPES = {
+    "crazyflie_msgs/FlightStatus": r".*flight_status",
+    "crazyflie_msgs/FilterStatus": r".*filter_status",
+    "crazyflie_msgs/VehicleStatus": r"vehicle_status",
+    "dynamic_reconfigure/Config": r".+/parameter_updates",
+    "rosgraph_msgs/Log": r"rosout",
+    "diagnostic_msgs/DiagnosticArray": r"diagnostics",
+    "tf2_msgs/TFMessage": r"tf",
+    "tf/tfMessage": r"tf",
+}
+"""Types that are not series, with the names of their topics below a namespace."""
+
+FLOATS = {
+    "crazyflie_msgs/ControlStamped": 4,
+    "crazyflie_msgs/PositionVelocityStateStamped": 6,
+    "crazyflie_msgs/PositionVelocityYawStateStamped": 7,
+    "crazyflie_msgs/FullStateStamped": 12,
+}
+"""Numbers behind the header: these frequent messages are decoded without an object."""
+
+_HEADER = struct.Struct("<III")
+
+
+@dataclass(frozen=True)
+class Topic:
+    """How messages of a connection are read.
+
+    Attributes
+    ----------
+    namespace : str
+        Of the vehicle, without slashes at its ends.
+    role : Role or None
+        None for messages that are events.
+    decode : callable
+        ``decode(data)`` returns stamp (s, 0 without one), number in sequence, and a row or,
+        without a role, the message.
+    """
+
+    namespace: str
+    role: Role | None
+    decode: Callable[[bytes], tuple[float, int, Any]]
+
+
+class TopicError(Exception):
+    """A topic that cannot be read; the text names it and what was expected."""
+
+
+def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
+    """Return how a connection is read; None if a report does not need it.
+
+    Parameters
+    ----------
+    connection : Connection
+    names : dict
+        By role, a regular expression of names in place of the documented ones.
+
+    Raises
+    ------
+    TopicError
+        Its type has another definition here.
+    """
+    for role in ROLES:
+        namespace = _namespace(connection.topic, names.get(role.name, role.topics))
+        if namespace is not None and connection.datatype in role.rows:
+            row = role.rows[connection.datatype]
+            return Topic(namespace, role, _decoder(connection, row))
+    if connection.datatype in EVENT_TYPES:
+        namespace = _namespace(connection.topic, EVENT_TYPES[connection.datatype])
+        if namespace is not None:
+            return Topic(namespace, None, _decoder(connection, lambda message: message))
+    return None
+
+
+def expected() -> str:
+    """Return names and types of the topics of which a bag needs one for a flight."""
+    return "; ".join(
+        f"{role.topics.replace('|', ' or ')} ({' or '.join(role.rows)})"
+        for role in ROLES
+        if role.name in ("state", "final_control", "cmd_vel", "pose")
+    )
+
+
+def _namespace(topic, names):
+    match = re.fullmatch(rf"/?(?:(.*)/)?(?:{names.strip('/')})", topic)
+    return match and (match[1] or "").strip("/")
+
+
+def _decoder(connection, convert):
+    known = roslib.message.get_message_class(connection.datatype)
+    if known is not None and known._md5sum != connection.md5sum:
+        raise TopicError(
+            f"{connection.topic} is left out: its {connection.datatype} has the md5 sum "
+            f"{connection.md5sum}, expected {known._md5sum}"
+        )
+    if connection.datatype in FLOATS:
+        numbers = struct.Struct(f"<{FLOATS[connection.datatype]}d")
+        return lambda data: _decode_floats(data, numbers, convert)
+    try:
+        made = genpy.dynamic.generate_dynamic(connection.datatype, connection.definition)
+        message_type = made[connection.datatype]
+    except (genpy.MessageException, KeyError, SyntaxError) as error:
+        raise TopicError(f"{connection.topic} is left out: {error}") from None
+
+    def decode(data):
+        message = message_type()
+        message.deserialize(data)
+        header = getattr(message, "header", None)
+        stamp, number = (header.stamp.to_sec(), header.seq) if header else (0.0, 0)
+        return stamp, number, convert(message)
+
+    return decode
+
+
+def _decode_floats(data, numbers, convert):
+    number, seconds, nanoseconds = _HEADER.unpack_from(data)
+    return (
+        seconds + nanoseconds * 1e-9,
+        number,
+        convert(numbers.unpack_from(data, len(data) - numbers.size)),
+    )

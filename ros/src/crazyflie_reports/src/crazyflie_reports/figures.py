@@ -1,0 +1,185 @@
+"""Figures of a recorded flight, each with its unit and with what is normal."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crazyflie_model.limits import MAX_TILT
+from crazyflie_model.units import GRAVITY
+from crazyflie_reports.bag_flights import Flight
+from crazyflie_reports.flight_record import Series
+from crazyflie_reports.flight_report import (
+    HOVER_TOLERANCE,
+    HOVER_WINDOW,
+    OVERSHOOT_LIMIT,
+    TOUCHDOWN_LIMIT,
+)
+
+HARDWARE_TOLERANCE = 0.05
+"""Largest distance of a real or virtual vehicle from its hover point, m: motion capture, trim and
+propellers are not ideal."""
+
+HOVER_TIME_LIMIT = 8.0
+"""The takeoff server's 1 s of open loop and 5 s of hover, and 2 s more, s."""
+
+TRACKING_LIMIT = 0.2
+"""Largest distance from a moving reference, m."""
+
+DELAY_LIMIT = 0.02
+"""95 % of the controls follow the pose within this time, s."""
+
+LEAST_RATE = 50.0
+"""Of states and controls, Hz; at lower ones velocities are poor."""
+
+GAP_LIMIT = 0.1
+"""Without a new state for longer than this the vehicle is not controlled, s."""
+
+LEAST_VOLTAGE = 3.2
+"""Of one lithium polymer cell under load, V."""
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number that describes a flight.
+
+    Attributes
+    ----------
+    name, unit : str
+    value : float
+        NaN if it is not known.
+    minimum, maximum : float
+        What is normal, if that is limited.
+    """
+
+    name: str
+    unit: str
+    value: float
+    minimum: float = -math.inf
+    maximum: float = math.inf
+
+    @property
+    def is_normal(self) -> bool:
+        """Whether the value is normal, or not known."""
+        return math.isnan(self.value) or self.minimum <= self.value <= self.maximum
+
+    @property
+    def normal(self) -> str:
+        """What is normal, in words; empty if nothing is said about it."""
+        if math.isfinite(self.minimum):
+            return f"≥ {self.minimum:g} {self.unit}"
+        return f"≤ {self.maximum:g} {self.unit}".strip() if math.isfinite(self.maximum) else ""
+
+
+def hover_point(flight: Flight) -> tuple[float, float, float] | None:
+    """Return to where a takeoff has led (m): the reference with which it was flying."""
+    reference = flight.record.reference
+    before = reference.times <= flight.record.events["flying"] + 0.5
+    if not before.any() or flight.phases[0].name != "taking off":
+        return None
+    x, y, z = reference.values[before][-1, :3]
+    return float(x), float(y), float(z)
+
+
+def figures(flight: Flight) -> list[Figure]:
+    """Return the figures of a flight, always the same ones in the same order."""
+    return [*_hover(flight), *_tracking(flight), *_motion(flight), *_loop(flight), *_link(flight)]
+
+
+def _hover(flight: Flight) -> Iterator[Figure]:
+    record, point = flight.record, hover_point(flight)
+    tolerance = HARDWARE_TOLERANCE if flight.is_driven else HOVER_TOLERANCE
+    time = over = mean = largest = math.nan
+    if point is not None and len(record.state):
+        time = record.time_to_hover(point, tolerance)
+        over = record.overshoot(point)
+        try:
+            hover = record.hover_end(point) - record.events["flying"]
+            mean, largest = record.hover_error(point, min(HOVER_WINDOW, hover))
+        except ValueError:
+            pass  # The flight was too short.
+    yield Figure("time to hover", "s", time, maximum=HOVER_TIME_LIMIT)
+    yield Figure("overshoot", "mm", 1e3 * over, maximum=1e3 * OVERSHOOT_LIMIT)
+    yield Figure("hover error, mean", "mm", 1e3 * mean, maximum=1e3 * tolerance)
+    yield Figure("hover error, maximum", "mm", 1e3 * largest, maximum=1e3 * tolerance)
+
+
+def _tracking(flight: Flight) -> Iterator[Figure]:
+    times, errors = flight.record.tracking_errors()
+    # With the controller: takeoff and landing have other references, or none.
+    phases = [each for each in flight.phases if each.name == "flying"]
+    flown = np.any([(times >= p.start) & (times <= p.end) for p in phases], axis=0)
+    errors = 1e3 * errors[flown] if phases else errors[:0]
+    known = len(errors) > 0
+    rms = float(np.sqrt(np.mean(errors**2))) if known else math.nan
+    share = float(np.percentile(errors, 95)) if known else math.nan
+    largest = float(errors.max()) if known else math.nan
+    yield Figure("error in flight, rms", "mm", rms, maximum=500.0 * TRACKING_LIMIT)
+    yield Figure("error in flight, 95 %", "mm", share, maximum=1e3 * TRACKING_LIMIT)
+    yield Figure("error in flight, maximum", "mm", largest)
+
+
+def _motion(flight: Flight) -> Iterator[Figure]:
+    record = flight.record
+    try:
+        touchdown = record.touchdown_speed()
+    except ValueError:
+        touchdown = math.nan
+    state = record.state.between(flight.start, flight.end)
+    speed = np.linalg.norm(state[:, 3:6], axis=1)
+    control = _part(record.final_control, flight)
+    tilt = np.abs(control[:, 1:3]).max(axis=1, initial=-math.inf)
+    seconds = np.diff(control[:, 0])
+    impulse = float(seconds @ control[:-1, 4]) / GRAVITY if len(control) > 1 else math.nan
+    yield Figure("touchdown speed", "m/s", touchdown, maximum=TOUCHDOWN_LIMIT)
+    yield Figure("duration", "s", flight.end - flight.start)
+    yield Figure("height, maximum", "m", _max(state[:, 2]))
+    yield Figure("speed, maximum", "m/s", _max(speed))
+    # Of roll or pitch; a control that is limited has the limit itself.
+    degrees, limit = (round(math.degrees(each), 3) for each in (_max(tilt), MAX_TILT))
+    yield Figure("tilt commanded, maximum", "deg", degrees, maximum=limit)
+    yield Figure("thrust used, as time of hover", "s", impulse)
+    yield Figure("thrust, mean", "m/s²", impulse * GRAVITY / (flight.end - flight.start))
+
+
+def _loop(flight: Flight) -> Iterator[Figure]:
+    delays = 1e3 * flight.delays[:, 1]
+    for name, share, limit in (("median", 50, math.inf), ("95 %", 95, 1e3 * DELAY_LIMIT),
+                               ("maximum", 100, math.inf)):  # fmt: skip
+        delay = float(np.percentile(delays, share)) if len(delays) else math.nan
+        yield Figure(f"delay pose to control, {name}", "ms", delay, maximum=limit)
+    for name, series in (("state", flight.record.state), ("control", flight.record.final_control)):
+        times = _part(series, flight)[:, 0]
+        # From the first one to the end of the flight, whether it came until then or not.
+        steps = np.diff([*times, flight.end]) if len(times) else times
+        rate = 1.0 / float(steps.mean()) if steps.any() else math.nan
+        yield Figure(f"{name} rate", "Hz", rate, minimum=LEAST_RATE)
+        yield Figure(f"{name} gap, longest", "ms", 1e3 * _max(steps), maximum=1e3 * GAP_LIMIT)
+    lost = math.nan if flight.lost is None else float(flight.lost)
+    yield Figure("states not recorded", "", lost, maximum=0.0)
+
+
+def _link(flight: Flight) -> Iterator[Figure]:
+    link = flight.link[(flight.link[:, 0] >= flight.start) & (flight.link[:, 0] <= flight.end)]
+    quality = link[~np.isnan(link[:, 1]), 1]
+    unanswered = 100.0 * float(1.0 - quality.mean()) if len(quality) else math.nan
+    blocked = float(link[-1, 2] - link[0, 2]) if len(link) else math.nan
+    yield Figure("packets lost", "%", unanswered, maximum=5.0)
+    yield Figure("setpoints not sent", "", blocked, maximum=0.0)
+    inside = (flight.battery[:, 0] >= flight.start) & (flight.battery[:, 0] <= flight.end)
+    volts = flight.battery[inside, 1]
+    yield Figure("battery, lowest", "V", -_max(-volts), minimum=LEAST_VOLTAGE)
+    yield Figure("battery, drop", "V", float(volts[0] - volts[-1]) if len(volts) else math.nan)
+
+
+def _part(series: Series, flight: Flight) -> NDArray[np.float64]:
+    """Return times and rows of a series in a flight."""
+    rows = np.column_stack([series.times, series.values])
+    return rows[(rows[:, 0] >= flight.start) & (rows[:, 0] <= flight.end)]
+
+
+def _max(values):
+    values = values[~np.isnan(values)]
+    return float(values.max()) if len(values) else math.nan

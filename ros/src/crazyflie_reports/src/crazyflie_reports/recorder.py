@@ -1,0 +1,78 @@
+"""Records the topics of a flight, and all parameters, into a folder with the date as its name.
+
+rosbag does it, in a process of its own at low priority: what goes wrong with it, such as a full
+disk, leaves the flight alone.
+"""
+
+import argparse
+import os
+import signal
+import subprocess
+import sys
+from datetime import datetime
+from pathlib import Path
+
+import rosgraph
+import roslib.packages
+import rosparam
+import rospkg
+
+TOPICS = (
+    r"/tf(_static)?|/diagnostics|/rosout|/flights|(/.*)?/("
+    r"(full_)?state|state/full_state|ref(/.*)?|ref_descent|control/(lqr|takeoff|merged|final)|in_flight(_.*)?"
+    r"|pose|goal|cmd_[a-z_]+|external_(pose|position)|battery|rssi|imu|connected|status|vehicle_status"
+    r"|parameter_updates)"
+)
+"""Regular expression of what is recorded: what examples and drivers document, without images."""
+
+MAX_SIZE = 1024
+"""Of a bag, MB; then the next one begins."""
+
+PARAMETERS = "parameters.yaml"
+
+
+def record(folder: Path, topics: str, ros_arguments: list[str]) -> int:
+    """Record until the process is told to stop; say what there is then; return the exit status.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it is not there.
+    topics : str
+        Regular expression.
+    ros_arguments : list of str
+        For the recording node: its name, remappings.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    rosparam.dump_params(str(folder / PARAMETERS), "/")
+    (program,) = roslib.packages.find_node("rosbag", "record")[:1]
+    command = [program, "--split", f"--size={MAX_SIZE}", "--lz4", "--tcpnodelay", "--quiet"]
+    command += ["-e", topics, "-O", str(folder / "flight.bag")]
+    process = subprocess.Popen([*command, *ros_arguments], preexec_fn=lambda: os.nice(10))
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, lambda number, frame: process.send_signal(signal.SIGINT))
+    print(f"recording into {folder}", flush=True)
+    status = process.wait()
+    bags = [each for each in folder.iterdir() if each.name.endswith((".bag", ".bag.active"))]
+    size = sum(each.stat().st_size for each in bags)
+    print(f"recorded {size / 1e6:.1f} MB in {len(bags)} bags: {folder}", flush=True)
+    return status
+
+
+def main() -> int:
+    """Record as the command line asks; return the exit status."""
+    parser = argparse.ArgumentParser(prog="record_flight", description=__doc__)
+    parser.add_argument("--folder", default="", help="of all recordings (~/.ros/flights)")
+    parser.add_argument("--topics", default="", help="regular expression of more topics")
+    options, ros_arguments = parser.parse_known_args()
+    top = Path(options.folder or Path(rospkg.get_ros_home()) / "flights").expanduser()
+    folder = top / f"{datetime.now():%Y-%m-%d_%H-%M-%S}"
+    topics = f"{TOPICS}|{options.topics}" if options.topics else TOPICS
+    if not rosgraph.is_master_online():
+        print(f"nothing is recorded: no ROS master at {rosgraph.get_master_uri()}", file=sys.stderr)
+        return 1
+    try:
+        return record(folder, topics, ros_arguments)
+    except OSError as error:
+        print(f"nothing is recorded into {folder}: {error.strerror}", file=sys.stderr)
+        return 1

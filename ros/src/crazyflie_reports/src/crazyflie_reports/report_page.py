@@ -1,0 +1,167 @@
+"""The page of a report: one HTML file, with the flights' numbers and its own script in it."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rospkg
+from numpy.typing import NDArray
+
+from crazyflie_reports.bag_flights import Flight
+from crazyflie_reports.figures import Figure
+
+Array = NDArray[np.float64]
+
+MOST_POINTS, LEAST_POINTS, ALL_POINTS = 1000, 100, 40_000
+"""Of a curve at most, at least, and about what all flights share."""
+
+FRAME_PERIOD = 0.04
+"""From one pose of the replay to the next, where points are enough, s."""
+
+MAX_EVENTS = 300
+"""That a flight's list shows."""
+
+
+def points_of(vehicles: int) -> int:
+    """Return how many points a curve of a report on so many vehicles has."""
+    return int(np.clip(ALL_POINTS // max(1, vehicles), LEAST_POINTS, MOST_POINTS))
+
+
+def decimated(times: Array, values: Array, points: int) -> tuple[Array, Array]:
+    """Return times and values, shape (n,), with at most about ``points`` left.
+
+    Of each interval the smallest and the largest value are left, so that peaks are.
+    """
+    known = np.isfinite(values)
+    times, values = times[known], values[known]
+    if len(values) <= points:
+        return times, values
+    kept = [
+        begin + extreme
+        for part in np.array_split(np.arange(len(values)), points // 2)
+        for begin in part[:1]
+        for extreme in sorted({values[part].argmin(), values[part].argmax()})
+    ]
+    return times[kept], values[kept]
+
+
+def flight_data(flight: Flight, found: list[Figure], points: int) -> dict[str, Any]:
+    """Return what the page knows of a flight with its figures; times count from its start, s."""
+    events = flight.events[:MAX_EVENTS]
+    return {
+        "vehicle": flight.vehicle,
+        "number": flight.number,
+        "start": round(flight.start, 3),
+        "duration": round(flight.end - flight.start, 3),
+        "phases": [[p.name, *_rounded([p.start, p.end], flight.start)] for p in flight.phases],
+        "events": [
+            [round(e.time - flight.start, 3), e.kind.value, e.text, e.count] for e in events
+        ],
+        "more_events": len(flight.events) - len(events),
+        "figures": [
+            [float(f"{f.value:.4g}") if math.isfinite(f.value) else None, f.is_normal, f.normal]
+            for f in found
+        ],
+        "plots": _plots(flight, points),
+        "path": _path(flight, points),
+    }
+
+
+def page(recordings: list[dict[str, Any]], figure_names: list[list[str]]) -> str:
+    """Return the HTML of a report.
+
+    Parameters
+    ----------
+    recordings : list of dict
+        Each with name, start, duration, remarks, and flights as `flight_data` returns them.
+    figure_names : list of list
+        Name and unit of each figure.
+    """
+    folder = Path(rospkg.RosPack().get_path("crazyflie_reports")) / "page"
+    data = json.dumps({"recordings": recordings, "figures": figure_names}, allow_nan=False)
+    html = (folder / "report.html").read_text()
+    scripts = "".join((folder / f"{name}.js").read_text() for name in ("plots", "replay", "report"))
+    # Within a script element only "<" could end the element.
+    return html.replace("{{scripts}}", scripts).replace("{{data}}", data.replace("<", "\\u003c"))
+
+
+def _plots(flight, points):
+    record, start = flight.record, flight.start
+    state, reference, control = record.state, record.reference, record.final_control
+
+    def curves(series, names, scale=1.0, suffix=""):
+        return [
+            _curve(name + suffix, series.times, scale * series.column(name), start, points)
+            for name in names
+        ]
+
+    def angles(name, times, values):
+        known = np.isfinite(values)
+        turns = np.degrees(np.unwrap(values[known]))
+        return _curve(name, times[known], turns, start, points)
+
+    xyz = ("x", "y", "z")
+    measured = flight.attitude
+    attitude = [
+        angles(name, measured[:, 0], measured[:, column])
+        for name, column in (("roll", 4), ("pitch", 5), ("yaw", 6))
+    ]
+    if not len(measured):
+        attitude = [angles("yaw", state.times, state.column("yaw"))]
+    attitude += curves(control, ["roll", "pitch"], math.degrees(1.0), " commanded")
+    attitude.append(angles("yaw reference", reference.times, reference.column("yaw")))
+    times, distances = record.tracking_errors()
+    error = _curve("distance", times, distances, start, points)
+    battery = _curve("voltage", flight.battery[:, 0], flight.battery[:, 1], start, points)
+    plots = [
+        ("position", "m", curves(state, xyz) + curves(reference, xyz, 1.0, " reference")),
+        ("distance from the reference", "m", [error]),
+        ("velocity", "m/s", curves(state, ("x_dot", "y_dot", "z_dot"))),
+        ("attitude", "deg", attitude),
+        ("thrust", "m/s²", curves(control, ["thrust"])),
+        ("battery", "V", [battery]),
+    ]
+    return [
+        {"title": title, "unit": unit, "curves": [c for c in those if c["t"]]}
+        for title, unit, those in plots
+        if any(c["t"] for c in those)
+    ]
+
+
+def _curve(name, times, values, start, points):
+    times, values = decimated(times, values, points)
+    return {"name": name, "t": _rounded(times, start), "v": np.round(values, 4).tolist()}
+
+
+def _path(flight, points):
+    """Return poses at equal intervals: position, roll, pitch, yaw (m, rad), and the reference."""
+    state, reference = flight.record.state, flight.record.reference
+    if not len(state):
+        return None
+    times = state.times
+    period = max(FRAME_PERIOD, (times[-1] - times[0]) / points)
+    moments = np.arange(times[0], times[-1], period)
+    columns = [np.interp(moments, times, state.values[:, k]) for k in range(3)]
+    attitude = flight.attitude
+    if len(attitude):
+        angles = np.unwrap(attitude[:, 4:7], axis=0)
+        columns += [np.interp(moments, attitude[:, 0], angles[:, k]) for k in range(3)]
+    else:
+        yaw = np.unwrap(np.nan_to_num(state.column("yaw")))
+        flat = np.zeros_like(moments)
+        columns += [flat, flat, np.interp(moments, times, yaw)]
+    if len(reference):
+        newest = np.searchsorted(reference.times, moments, side="right") - 1
+        columns += list(reference.values[np.maximum(newest, 0), :3].T)
+    rows = np.nan_to_num(np.round(np.array(columns).T, 3), posinf=0.0, neginf=0.0)
+    return {
+        "start": round(float(times[0] - flight.start), 3),
+        "period": period,
+        "rows": rows.tolist(),
+    }
+
+
+def _rounded(times, start):
+    return np.round(np.asarray(times) - start, 3).tolist()

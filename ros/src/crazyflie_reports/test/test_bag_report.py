@@ -1,0 +1,201 @@
+"""Reports on bags of flights that are known in closed form."""
+
+import csv
+import json
+import re
+
+import bags
+import pytest
+from std_msgs.msg import String
+
+from crazyflie_reports.bag_report import main
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Return a function that runs the program: status, what it prints, the tables of flights."""
+
+    def run(*arguments):
+        out = tmp_path / "out"
+        monkeypatch.setattr("sys.argv", ["flight_report", *map(str, arguments), "--out", str(out)])
+        status = main()
+        data = out / "report.json"
+        return (
+            status,
+            "".join(capsys.readouterr()),
+            json.loads(data.read_text()) if data.exists() else [],
+        )
+
+    run.folder = tmp_path
+    return run
+
+
+def values(flight):
+    """Return the figures of a flight of report.json by name."""
+    return {name: each["value"] for name, each in flight["figures"].items()}
+
+
+def page(folder):
+    """Return the page and the data in it."""
+    html = (folder / "out" / "report.html").read_text()
+    return html, json.loads(re.search(r'application/json">(.*)</script>\n<script>', html)[1])
+
+
+EXPECTED = {
+    "time to hover": 1.98,
+    "overshoot": 1e3 * bags.OFFSET,
+    "hover error, maximum": 1e3 * bags.OFFSET,
+    "error in flight, rms": 1e3 * bags.OFFSET,
+    "error in flight, 95 %": 1e3 * bags.OFFSET,
+    "error in flight, maximum": 1e3 * bags.OFFSET,
+    "touchdown speed": bags.SINK,
+    "duration": bags.LANDED - bags.TAKEOFF,
+    "height, maximum": 1.0 + bags.OFFSET,
+    "speed, maximum": bags.SPEED,
+    # Constant thrust, until the last control in flight.
+    "thrust used, as time of hover": bags.LANDED - bags.TAKEOFF,
+    "delay pose to control, median": 1e3 * bags.DELAY,
+    "state rate": 100.0,
+    "control rate": 100.0,
+    "state gap, longest": 10.0,
+    "states not recorded": 0.0,
+}
+
+
+@pytest.mark.parametrize("compression", ["none", "bz2", "lz4"])
+@pytest.mark.parametrize("is_typed", [True, False])
+def test_figures(run, compression, is_typed):
+    bag = bags.flight_bag(run.folder / "a.bag", compression, is_typed=is_typed)
+    status, _, (flight,) = run(bag)
+    assert status == 0
+    found = values(flight)
+    for name, value in EXPECTED.items():
+        assert found[name] == pytest.approx(value, rel=0.01, abs=0.01), name
+    assert found["battery, lowest"] is None
+    phases = page(run.folder)[1]["recordings"][0]["flights"][0]["phases"]
+    assert [each[0] for each in phases] == ["taking off", "flying", "landing"]
+    assert phases[1][1] == pytest.approx(bags.FLYING - bags.TAKEOFF, abs=0.01)
+
+
+def test_a_gap(run):
+    status, output, (flight,) = run(bags.flight_bag(run.folder / "a.bag", gap=(6.0, 6.2)))
+    assert status == 0
+    assert values(flight)["state gap, longest"] == pytest.approx(200.0, abs=1.0)
+    assert values(flight)["states not recorded"] == 19
+    assert "state gap, longest 200 ms (≤ 100 ms)" in output
+
+
+def test_states_that_stop_in_flight(run):
+    _, _, (flight,) = run(bags.flight_bag(run.folder / "a.bag", gap=(6.0, 99.0)))
+    assert values(flight)["state gap, longest"] == pytest.approx(7000.0, abs=20.0)
+    assert values(flight)["touchdown speed"] is None
+
+
+@pytest.mark.parametrize("has_pose", [True, False])
+def test_crazyflie_ros(run, has_pose):
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_driven(bag, has_pose=has_pose)
+    status, _, (flight,) = run(run.folder / "a.bag")
+    assert status == 0
+    assert flight["vehicle"] == "cf1"
+    found = values(flight)
+    assert found["thrust, mean"] == pytest.approx(9.81, rel=0.01)
+    assert found["tilt commanded, maximum"] == pytest.approx(2.0)
+    assert found["error in flight, 95 %"] == pytest.approx(1000.0, rel=0.05)  # With the climb.
+    assert found["delay pose to control, median"] == pytest.approx(1e3 * bags.DELAY, abs=0.1)
+    assert found["battery, lowest"] == pytest.approx(3.9)
+    assert found["speed, maximum"] == pytest.approx(bags.SPEED, rel=0.01)
+
+
+def test_events_of_each_vehicle(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        for name in ("cf1", "cf2"):
+            bags.write_flight(bag, name)
+        bags.write_events(bag, "cf2")
+    status, _, flights = run(run.folder / "a.bag")
+    assert status == 0
+    assert [each["vehicle"] for each in flights] == ["cf1", "cf2"]
+    assert flights[0]["events"] == []
+    events = [(time, kind, text) for time, kind, text, _ in flights[1]["events"]]
+    assert events == [
+        (4.0, "refusal", "/cf2/node: /cf2/go refused: too far"),
+        (5.1, "pose rejected", "a pose is too far away (/cf2/state_estimator: poses)"),
+        (5.2, "parameter", "/cf2/lqr_controller/gain is now 2.0"),
+        (5.3, "hold", "the filter is holding: no control"),
+        (6.3, "emergency", "the filter is emergency: no control"),
+    ]
+    with (run.folder / "out" / "events.csv").open() as file:
+        assert [row["kind"] for row in csv.DictReader(file)] == [kind for _, kind, _ in events]
+
+
+def test_the_page_needs_nothing_else_and_shows_names_as_text(run):
+    name = "<script>alert(1)</script>"
+    status, _, _ = run(bags.flight_bag(run.folder / "a.bag", name=name))
+    assert status == 0
+    html, data = page(run.folder)
+    (flight,) = data["recordings"][0]["flights"]
+    assert flight["vehicle"] == name
+    assert name not in html
+    assert not re.search(r"https?:|\bsrc=|\bhref=|innerHTML|{{", html)
+    assert [each["title"] for each in flight["plots"]] == [
+        "position", "distance from the reference", "velocity", "attitude", "thrust",
+    ]  # fmt: skip
+    assert len(flight["figures"]) == len(data["figures"])
+    # The replay is where the vehicle was.
+    path = flight["path"]
+    row = path["rows"][round((5.0 - path["start"]) / path["period"])]
+    assert row[:3] == pytest.approx([0.0, 0.0, 1.0 + bags.OFFSET])
+
+
+def test_other_topics_and_other_names(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_flight(bag, "a/b")
+        for time in range(10):
+            bag.write("/camera/image", String("no flight"), bags.stamp(time))
+    assert run(run.folder / "a.bag")[2][0]["vehicle"] == "a/b"
+    for wrong in ("height=/z", "state", "state=(", "state="):
+        with pytest.raises(SystemExit):
+            run(run.folder / "a.bag", "--topic", wrong)
+    status, output, flights = run(run.folder / "a.bag", "--topic", "state=estimate")
+    assert status == 0
+    assert values(flights[0])["state rate"] is None
+
+
+def test_recordings_side_by_side_of_which_one_is_bad(run):
+    good = bags.flight_bag(run.folder / "good.bag")
+    folder = run.folder / "split"
+    folder.mkdir()
+    (run.folder / "good.d").mkdir()
+    same = bags.flight_bag(run.folder / "good.d" / "good.bag")
+    for number, name in enumerate(("a", "b")):
+        bags.flight_bag(folder / f"flight_{number}.bag", name=name)
+    status, output, flights = run(good, run.folder / "missing.bag", folder, same)
+    assert status == 1
+    assert "missing.bag does not exist; expected a bag" in output
+    assert [(each["recording"], each["vehicle"]) for each in flights] == [
+        (str(good), "vehicle"), ("split", "a"), ("split", "b"), (str(same), "vehicle"),
+    ]  # fmt: skip
+    assert [name for name, _, _ in flights[0]["phases"]] == ["taking off", "flying", "landing"]
+
+
+def test_no_flight(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        for _, time in bags.steps():
+            bag.write("/control/final", bags.ControlStamped(), bags.stamp(time))
+        bags.write_events(bag)
+    status, output, flights = run(run.folder / "a.bag")
+    assert (status, flights) == (0, [])
+    assert "It has no flight." in output
+    assert "5.0 s: refusal: /node: /go refused: too far" in output
+
+
+@pytest.mark.parametrize(("x", "time"), [(5.0, None), (float("inf"), 1.98)])
+def test_references_that_are_far_or_infinite(run, x, time):
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_flight(bag)
+        state = bags.PositionVelocityState(x=x)
+        bag.write("/ref", bags.PositionVelocityStateStamped(bags.header(2.0), state), bags.stamp(2))
+    status, output, (flight,) = run(run.folder / "a.bag")
+    assert status == 0
+    assert values(flight)["time to hover"] == (time and pytest.approx(time, abs=0.02))
+    assert ("time to hover inf s (≤ 8 s)" in output) == (time is None)

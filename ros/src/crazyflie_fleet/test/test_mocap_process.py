@@ -56,6 +56,36 @@ def write(path, robots):
     return path
 
 
+def told_of(path, **parameters):
+    """Return what mocap_node loads for a fleet file."""
+    handle = FakeProcess().handle("/mocap_node")
+    for name, value in {"fleet/file": str(path), **parameters}.items():
+        handle.set_param(f"/mocap_node/{name}", value)
+    make_nodes(handle)
+    return handle.load(MocapParameters)
+
+
+CONFIGURATIONS = {
+    "dynamics_configurations": {"slow": {"max_velocity": [1, 1, 0.5], "max_roll": 1.4}},
+    "marker_configurations": {"top": {"offset": [0, 0, -0.04], "points": {"p0": [0.01, 0, 0]}}},
+}
+
+
+def test_limits_and_offset_are_those_of_the_configurations(tmp_path):
+    own = "tracking: single_marker, dynamics: slow, marker: top"
+    path = write(tmp_path / "fleet.yaml", [own, "tracking: single_marker"])
+    first, second = (marker.parameters for marker in told_of(path, **CONFIGURATIONS).markers)
+    assert (first.max_velocity, first.offset) == ((1.0, 1.0, 0.5), (0.01, 0.0, -0.04))
+    assert (second.max_velocity, second.offset) == ((2.0, 2.0, 3.0), (0.0, 0.0, 0.0))
+
+
+def test_a_configuration_that_is_not_there_is_refused(tmp_path):
+    path = write(tmp_path / "fleet.yaml", ["tracking: single_marker, dynamics: fast"])
+    text = "cf1/motion_capture/dynamics is 'fast'; expected one of slow, default"
+    with pytest.raises(ParameterError, match=text):
+        told_of(path, **CONFIGURATIONS)
+
+
 def test_which_vehicles_have_one_marker(tmp_path):
     robots = (
         "tracking: single_marker",

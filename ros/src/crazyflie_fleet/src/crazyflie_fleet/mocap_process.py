@@ -1,18 +1,35 @@
 """Motion capture of a fleet: rigid bodies by their names, and vehicles with one marker."""
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters, NodeParameters
-from crazyflie_utils import Node, NodeHandle
+from crazyflie_utils import Node, NodeHandle, ParameterError
 from mocap_optitrack.mocap_node import MocapNode
 
+Configurations = Mapping[str, Mapping[str, Any]]
+"""Name to configuration, as crazyswarm2's motion_capture.yaml has them."""
 
-def bodies(fleet: FleetConfig, fixed_frame: str) -> dict[str, Any]:
+
+def bodies(
+    fleet: FleetConfig,
+    fixed_frame: str,
+    dynamics: Configurations = MappingProxyType({}),
+    markers: Configurations = MappingProxyType({}),
+) -> dict[str, Any]:
     """Return the parameters of mocap_node that say what it publishes.
 
     A vehicle with one marker gets its position, for its own estimator, by the driver's topic
     external_position, and its yaw on tf is that estimator's.
+
+    Parameters
+    ----------
+    fleet : FleetConfig
+    fixed_frame : str
+    dynamics, markers : dict of str to dict
+        ``dynamics_configurations`` and ``marker_configurations``.
     """
     result: dict[str, Any] = {}
     for vehicle in fleet.vehicles:
@@ -23,10 +40,41 @@ def bodies(fleet: FleetConfig, fixed_frame: str) -> dict[str, Any]:
                 "initial_position": list(vehicle.position),
                 "position": f"/{vehicle.name}/external_position",
                 "heading": f"/{vehicle.name}/heading",
+                **_limits(dynamics.get(vehicle.settings.mocap_dynamics, {})),
+                **_offset(markers.get(vehicle.settings.mocap_marker, {})),
             }
         else:
             result.setdefault("rigid_bodies", {})[vehicle.name] = frames
     return result
+
+
+def _limits(configuration):
+    names = ("max_velocity", "max_acceleration")
+    return {name: configuration[name] for name in names if name in configuration}
+
+
+def _offset(configuration):
+    points = list(configuration.get("points", {}).values())
+    if len(points) != 1:
+        return {}
+    # As in librigidbodytracker: both are added to the marker's position.
+    offset = configuration.get("offset", [0.0, 0.0, 0.0])
+    return {"offset": [a + b for a, b in zip(points[0], offset, strict=True)]}
+
+
+def _check_names(fleet, key, setting, configurations):
+    """Raise `ParameterError` about vehicles whose configuration is not there."""
+    known = [*configurations, "default"]
+    errors = [
+        f"robots/{vehicle.name}/motion_capture/{key} is {name!r}; expected one of "
+        f"{', '.join(dict.fromkeys(known))}: {key}_configurations of mocap_node"
+        for vehicle in fleet.vehicles
+        if vehicle.settings.has_single_marker
+        for name in [getattr(vehicle.settings, setting)]
+        if configurations and name not in known
+    ]
+    if errors:
+        raise ParameterError(*errors)
 
 
 def make_nodes(handle: NodeHandle) -> dict[str, Node]:
@@ -38,8 +86,13 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         A parameter, or the fleet file, is wrong.
     """
     config = handle.load(FleetParameters)
-    for key, entries in bodies(config.fleet(), config.fixed_frame).items():
-        configured = handle.get_param(f"~{key}", NodeParameters(), {})
+    fleet, kind = config.fleet(), NodeParameters()
+    dynamics = handle.get_param("~dynamics_configurations", kind, {})
+    markers = handle.get_param("~marker_configurations", kind, {})
+    _check_names(fleet, "dynamics", "mocap_dynamics", dynamics)
+    _check_names(fleet, "marker", "mocap_marker", markers)
+    for key, entries in bodies(fleet, config.fixed_frame, dynamics, markers).items():
+        configured = handle.get_param(f"~{key}", kind, {})
         frames = [entry.get("child_frame_id") for entry in configured.values()]
         own = {name: e for name, e in entries.items() if e["child_frame_id"] not in frames}
         handle.set_param(f"{handle.name}/{key}", {**own, **configured})

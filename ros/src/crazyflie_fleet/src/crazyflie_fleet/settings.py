@@ -177,13 +177,13 @@ class Settings(Parameters):
     )
     mocap_marker: str = parameter(
         TEXT,
-        "the arrangement of markers; see `motion_capture/tracking`",
+        "of mocap_node's `marker_configurations`; see `motion_capture/tracking`",
         "default",
         "motion_capture/marker",
     )
     mocap_dynamics: str = parameter(
         TEXT,
-        "a single marker's limits of velocity; all are those of crazyswarm2's `default`",
+        "a single marker's limits of velocity, of mocap_node's `dynamics_configurations`",
         "default",
         "motion_capture/dynamics",
     )

@@ -2,7 +2,7 @@
 
 from concurrent.futures import Future
 
-from std_msgs.msg import Bool, Empty, Float32
+from std_msgs.msg import Bool, Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
@@ -95,6 +95,8 @@ class TakeoffServerNode(Node):
             handle.subscribe(parameters.battery_topic, Float32, self._on_battery)
         if parameters.connected_topic is not None:
             handle.subscribe(parameters.connected_topic, Bool, self._on_connected)
+        if parameters.inhibition_topic is not None:
+            handle.subscribe(parameters.inhibition_topic, String, self._on_inhibition)
         if parameters.state_topic is not None:
             handle.subscribe(
                 parameters.state_topic,
@@ -201,6 +203,9 @@ class TakeoffServerNode(Node):
 
     def _on_connected(self, message):
         self._checks.driver.update(self._handle.time(), message.data)
+
+    def _on_inhibition(self, message):
+        self._checks.inhibition = message.data
 
     def _on_battery(self, message):
         if message.data == message.data:

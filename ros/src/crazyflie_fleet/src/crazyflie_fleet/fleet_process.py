@@ -1,12 +1,15 @@
 """The process that flies the vehicles of a fleet."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from crazyflie_fleet.battery_report_node import BatteryReportNode
 from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.fleet_services_node import FleetServicesNode
+from crazyflie_fleet.high_level_node import HighLevelNode
+from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
 from crazyflie_fleet.placement_node import PlacementNode
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_fleet.safe_descents_node import SafeDescentsNode
@@ -55,6 +58,8 @@ class _NodeFactory:
         references = ReferencesNode(
             vehicles, others, config.fixed_frame, vectorized, self._unplaced
         )
+        for number, vehicle in enumerate(vehicles):
+            self._add_high_level(vehicle, partial(references.states.goal, number))
         buffers = [vehicle.buffer for vehicle in (*vehicles, *others)]
         self.nodes[f"{handle.name}/references"] = references
         self.nodes[f"{handle.name}/descents"] = SafeDescentsNode(
@@ -117,6 +122,13 @@ class _NodeFactory:
         for name, node_class in classes.items():
             self._add(f"/{vehicle.name}/{name}", node_class(), tree[name])
         self._has_clock = True
+
+    def _add_high_level(self, vehicle, measured):
+        name = f"/{vehicle.name}/{HIGH_LEVEL}"
+        if name not in self.nodes:
+            own = self._common(vehicle.settings.model).get(HIGH_LEVEL, {})
+            frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
+            self._add(name, HighLevelNode(measured), merged(own, {"frames": frames}))
 
 
 def _paths(tree: Mapping[str, Any], prefix: str = "") -> list[str]:

@@ -14,11 +14,11 @@ from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
+from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC
 from crazyflie_fleet.vehicle_nodes import BUFFER
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.group_state import Rules
-from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
 from crazyflie_mission_api.ros_clock import RosClock
 from crazyflie_mission_api.ros_vehicle import RosVehicle, prefix

@@ -11,8 +11,8 @@ from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_mission_api.conversions import heading, to_message
-from crazyflie_mission_api.flight_words import WORDS
+from crazyflie_fleet.conversions import heading, to_message
+from crazyflie_fleet.flight_words import WORDS
 from crazyflie_mission_api.futures import done, in_turn
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.mission_vehicle import MissionVehicle
@@ -32,7 +32,7 @@ MEMORY = 31
 """Pieces that the memory of a vehicle holds."""
 
 MAX_POSITION_AGE = 0.5
-"""A position older than this is not known, s; as `high_level_node.MAX_STATE_AGE`."""
+"""A position older than this is not known, s; as `commanded_references.MAX_STATE_AGE`."""
 
 _LANDED_HEIGHT = 0.1
 """Above the start, m: a vehicle below has landed."""

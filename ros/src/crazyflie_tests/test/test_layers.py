@@ -48,7 +48,8 @@ LAYERS = [
     {"crazyflie_fleet"},
     {"crazyflie_demo", "crazyflie_examples", "crazyflie_ranging", "crazyflie_vision"},
     {"crazyflie_mission_api", "uav_trajectory"},
-    {"crazyflie", "crazyflie_dev"},
+    {"crazyflie", "crazyflie_dev", "crazyflie_py"},
+    {"pycrazyswarm"},
 ]
 """From the bottom: a package imports from lower layers only."""
 

@@ -87,14 +87,18 @@ class Planner:
         """Return whether the last plan has ended."""
         return self._trajectory is None or time >= self._begin + self._trajectory.duration
 
+    def goal(self, time: float) -> Goal[float] | None:
+        """Return where the last plan is at ``time`` (s), at rest from its end on; None without."""
+        return None if self._trajectory is None else self._trajectory.evaluate(time - self._begin)
+
     def setpoint(self, time: float, estimate: Estimate) -> Setpoint | None:
         """Return the setpoint for ``time`` (s); None when disabled."""
         if self.state is TrajectoryState.LANDING and self.is_finished(time):
             self.state = TrajectoryState.IDLE
-        if self._trajectory is None or self.state not in ACTIVE:
+        goal = self.goal(time)
+        if goal is None or self.state not in ACTIVE:
             self.tell_state(estimate)
             return Setpoint(time=time) if self.state is TrajectoryState.IDLE else None
-        goal = self._trajectory.evaluate(time - self._begin)
         if not all(map(math.isfinite, goal.position)):
             self.state = TrajectoryState.DISABLED
             return None

@@ -1,0 +1,119 @@
+"""Checks of the arguments of Crazyswarm's API.
+
+Each function returns the value as a plain type, or raises ValueError with the method, the argument,
+the value and what was expected.
+"""
+
+import math
+import numbers
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from crazyflie_model.angles import Triple
+from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
+from crazyflie_utils.messages import shown
+
+
+def number(
+    where: str, name: str, value: Any, low: float = -math.inf, high: float = math.inf
+) -> float:
+    """Return a finite number from ``low`` to ``high``."""
+    found = _number(value)
+    if math.isfinite(found) and low <= found <= high:
+        return found
+    limits = [f">= {low:g}" if low > -math.inf else "", f"<= {high:g}" if high < math.inf else ""]
+    expected = " and ".join(filter(None, limits))
+    raise _error(where, name, value, f"a finite number {expected}".strip())
+
+
+def integer(where: str, name: str, value: Any, low: int, high: int) -> int:
+    """Return an integer from ``low`` to ``high``."""
+    found = _number(value)
+    if found.is_integer() and low <= found <= high:
+        return int(found)
+    raise _error(where, name, value, f"an integer from {low} to {high}")
+
+
+def _number(value: Any) -> float:
+    """Return a number, also one in an array of size 1, as a float; NaN for anything else."""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.item()
+    return float(value) if isinstance(value, numbers.Real) else math.nan
+
+
+def group_mask(where: str, value: Any) -> int:
+    """Return a mask of 8 groups."""
+    return integer(where, "groupMask", value, 0, 255)
+
+
+def triple(where: str, name: str, value: Any, low: float = -math.inf) -> Triple:
+    """Return three finite numbers, each at least ``low``."""
+    parts = _triple(value)
+    if parts is None or not all(math.isfinite(part) and part >= low for part in parts):
+        expected = "three finite numbers" + (f" >= {low:g}" if low > -math.inf else "")
+        raise _error(where, name, value, expected)
+    return parts
+
+
+def corner(where: str, name: str, value: Any) -> Triple:
+    """Return three numbers, which may be infinite."""
+    parts = _triple(value)
+    if parts is None or any(map(math.isnan, parts)):
+        raise _error(where, name, value, "three numbers")
+    return parts
+
+
+def _triple(value):
+    try:
+        x, y, z = map(float, value)
+    except (TypeError, ValueError):
+        return None
+    return x, y, z
+
+
+def pieces(where: str, trajectory: Any) -> list[PolynomialPiece]:
+    """Return the pieces of a `uav_trajectory.Trajectory`."""
+    found = getattr(trajectory, "polynomials", None)
+    if not found:
+        raise _error(where, "trajectory", trajectory, "a uav_trajectory.Trajectory with pieces")
+    result = []
+    for index, piece in enumerate(found):
+        duration = number(where, f"duration of piece {index}", piece.duration, 0.0)
+        axes = [np.asarray(axis.p, dtype=float) for axis in _axes(piece)]
+        for name, axis in zip(("x", "y", "z", "yaw"), axes, strict=True):
+            if len(axis) > COEFFICIENTS or not np.all(np.isfinite(axis)):
+                expected = f"at most {COEFFICIENTS} finite coefficients"
+                raise _error(where, f"{name} of piece {index}", axis.tolist(), expected)
+        result.append(PolynomialPiece(duration, *(axis.tolist() for axis in axes)))
+    return result
+
+
+def _axes(piece):
+    return piece.px, piece.py, piece.pz, piece.pyaw
+
+
+def parameter_name(where: str, value: Any) -> str:
+    """Return "group.name" for the name of a firmware parameter, with a point or a slash."""
+    parts = str(value).replace("/", ".").split(".")
+    if isinstance(value, str) and len(parts) == 2 and all(parts):
+        return ".".join(parts)
+    raise _error(where, "name", value, "GROUP/NAME or GROUP.NAME")
+
+
+def parameters(where: str, values: Any) -> dict[str, float]:
+    """Return firmware parameters, "group.name" -> value."""
+    if not isinstance(values, Mapping):
+        raise _error(where, "params", values, "a dictionary: name -> value")
+    checked = {}
+    for name, value in values.items():
+        key = parameter_name(where, name)
+        checked[key] = value if isinstance(value, int) else number(where, key, value)
+    return checked
+
+
+def _error(where: str, name: str, value: Any, expected: str) -> ValueError:
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    value = list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
+    return ValueError(f"{where}: {name} is {shown(value)}; expected {expected}")

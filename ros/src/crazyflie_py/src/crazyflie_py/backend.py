@@ -1,0 +1,166 @@
+"""What a back-end of Crazyswarm's API provides.
+
+`crazyflie_py.crazyflie` holds the classes that scripts see. They check arguments and call one of
+two back-ends: `crazyflie_py.simulation` (--sim) and `crazyflie_py.ros_backend`.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Protocol
+
+from crazyflie_model.angles import Triple
+from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.polynomials import PolynomialPiece
+from crazyflie_py.setpoints import Setpoint
+
+
+class VehicleState(NamedTuple):
+    """Position (m), velocity (m/s), acceleration (m/s^2) and roll, pitch, yaw (rad).
+
+    In the world frame; ``R = Rz(yaw) Ry(pitch) Rx(roll)``, a positive pitch accelerates forward.
+    """
+
+    position: Triple
+    velocity: Triple
+    acceleration: Triple
+    rpy: Triple
+
+
+class Commands(Protocol):
+    """Commands to a vehicle, or to all vehicles of a swarm at the same moment.
+
+    Arguments are checked before. A command returns when it is sent, not when it is carried out. A
+    ``group_mask`` other than 0 restricts it to vehicles in one of these groups.
+    """
+
+    def take_off(self, height: float, duration: float, group_mask: int) -> None:
+        """Climb to a height (m, world frame) in a duration (s), keeping the heading."""
+
+    def land(self, height: float, duration: float, group_mask: int) -> None:
+        """Descend to a height (m, world frame) in a duration (s), then stop the motors."""
+
+    def stop(self, group_mask: int) -> None:
+        """Stop the motors; a later command starts them again."""
+
+    def go_to(
+        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
+    ) -> None:
+        """Fly to a position (m) and yaw (rad), or by them from the planned state."""
+
+    def start_trajectory(
+        self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
+    ) -> None:
+        """Fly along an uploaded trajectory; ``relative``: from the planned position."""
+
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
+        """Return to high-level commands when the last setpoint is this old (ms)."""
+
+    def emergency(self) -> None:
+        """Stop the motors at once; commands have no effect any more."""
+
+    def arm(self, arm: bool) -> None:
+        """Arm or disarm."""
+
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        """Set firmware parameters, "group.name" -> value; ValueError for unknown names."""
+
+    def send(self, setpoint: Setpoint) -> None:
+        """Send a low-level setpoint once."""
+
+
+class VehicleBackend(Commands, Protocol):
+    """One vehicle.
+
+    Attributes
+    ----------
+    name : str
+        "cf1".
+    id : int
+        Last byte of the radio address.
+    initial_position : tuple, 3 components
+        As the fleet file has it, m.
+    """
+
+    name: str
+    id: int
+    initial_position: Triple
+
+    def set_group_mask(self, group_mask: int) -> None:
+        """Make the vehicle a member of groups, a bit each."""
+
+    def upload_trajectory(
+        self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
+    ) -> None:
+        """Write pieces into the trajectory memory; returns when they are there."""
+
+    def get_parameter(self, name: str) -> float:
+        """Return a firmware parameter "group.name"; ValueError for an unknown name."""
+
+    def enable_avoidance(
+        self, others: Sequence["VehicleBackend"], settings: AvoidanceSettings
+    ) -> None:
+        """Avoid collisions; with hardware the firmware determines the others."""
+
+    def disable_avoidance(self) -> None:
+        """Do not avoid collisions any more."""
+
+    def state(self) -> VehicleState:
+        """Return the state; TimeoutError if none is received for 10 s."""
+
+    def status(self) -> dict[str, Any]:
+        """Return the status with the keys of crazyswarm2's Crazyflie.get_status."""
+
+
+class Visualizer(Protocol):
+    """What scripts call of ``timeHelper.visualizer``."""
+
+    def setGraph(self, edges: Sequence[tuple[int, int]]) -> None:
+        """Draw lines between vehicles, given by their numbers in ``crazyflies``."""
+
+    def showEllipsoids(self, radii: Sequence[float]) -> None:
+        """Draw an ellipsoid around each vehicle, radii in m."""
+
+    def startVideoOutput(self, path: str, dt: float) -> None:
+        """Write a video, a frame each ``dt`` (s)."""
+
+    def finishVideoOutput(self) -> None:
+        """End the video."""
+
+
+class SwarmBackend(Commands, Protocol):
+    """All vehicles and the clock.
+
+    Commands are broadcast; `Commands.go_to` is relative then.
+
+    Attributes
+    ----------
+    dt : float
+        Period of the clock's steps, s; of the real clock 0.
+    """
+
+    dt: float
+
+    @property
+    def vehicles(self) -> Sequence[VehicleBackend]:
+        """At least one; ids and names are different."""
+
+    @property
+    def visualizer(self) -> Visualizer:
+        """What --sim draws with; otherwise one that does nothing."""
+
+    def time(self) -> float:
+        """Return the time, s."""
+
+    def sleep(self, duration: float) -> None:
+        """Let a duration (s) pass."""
+
+    def sleep_for_rate(self, rate: float) -> None:
+        """Sleep until 1/rate (s) after the return of the last call with this rate (Hz)."""
+
+    def is_shutdown(self) -> bool:
+        """Return whether the script should end."""
+
+    def next_phase(self) -> None:
+        """Begin the next file of a record, if there is one."""
+
+    def close(self) -> None:
+        """End what is left to do, once, at the end of the script, also after an exception."""

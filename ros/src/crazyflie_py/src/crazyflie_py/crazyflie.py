@@ -1,0 +1,416 @@
+"""The vehicles, all of them, and their clock, as Crazyswarm's scripts see them.
+
+Names, arguments and defaults are Crazyswarm's. Angles are in rad unless a method says otherwise,
+lengths in m, times in s.
+"""
+
+from collections.abc import Mapping, Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from uav_trajectory import Trajectory
+
+from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_py import arguments as check
+from crazyflie_py.backend import Commands, SwarmBackend, VehicleBackend, Visualizer
+from crazyflie_py.setpoints import (
+    Attitude,
+    FullState,
+    Hover,
+    MotorsOff,
+    Position,
+    VelocityWorld,
+)
+
+Array = NDArray[np.float64]
+
+_MAX_ID = 255
+"""Largest id of a trajectory, and number of pieces, that fits into a byte."""
+
+
+class TimeHelper:
+    """The clock: of the simulation with --sim, otherwise ROS's.
+
+    Attributes
+    ----------
+    dt : float
+        Period of the simulation's steps, s; 0 without --sim.
+    visualizer : Visualizer
+        What --sim draws with; without --sim it does nothing.
+    crazyflies : list of Crazyflie
+    """
+
+    def __init__(self, backend: SwarmBackend):
+        self._backend = backend
+        self.visualizer: Visualizer = backend.visualizer
+        self.crazyflies: list[Crazyflie] = []
+
+    @property
+    def dt(self) -> float:
+        """Period of the simulation's steps, s."""
+        return self._backend.dt
+
+    def time(self) -> float:
+        """Return the time, s."""
+        return self._backend.time()
+
+    def sleep(self, duration: float) -> None:
+        """Wait for a duration, s."""
+        self._backend.sleep(check.number("timeHelper.sleep", "duration", duration))
+
+    def sleepForRate(self, rateHz: float) -> None:
+        """Wait, so that the calls of a loop are 1/rateHz apart."""
+        rate = check.number("timeHelper.sleepForRate", "rateHz", rateHz, 1e-3, 1e5)
+        self._backend.sleep_for_rate(rate)
+
+    def isShutdown(self) -> bool:
+        """Return whether the script should end, as after Ctrl-C."""
+        return self._backend.is_shutdown()
+
+    def nextPhase(self) -> None:
+        """Begin the next file of --writecsv."""
+        self._backend.next_phase()
+
+
+class _Commands:
+    """Commands with the same arguments for one vehicle and for all."""
+
+    def __init__(self, name: str, commands: Commands):
+        self._name = name
+        self._commands = commands
+
+    def _where(self, method: str) -> str:
+        return f"{self._name}.{method}"
+
+    def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
+        """Fly straight up to a height in a duration; returns at once.
+
+        Parameters
+        ----------
+        targetHeight : float
+            z in the world frame, m.
+        duration : float
+            s.
+        groupMask : int
+            0, or the groups that are meant; see `Crazyflie.setGroupMask`.
+        """
+        self._commands.take_off(*self._climb("takeoff", targetHeight, duration, groupMask))
+
+    def land(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
+        """Fly straight down to a height and stop the motors there; see `takeoff`."""
+        self._commands.land(*self._climb("land", targetHeight, duration, groupMask))
+
+    def _climb(self, method, height, duration, mask):
+        where = self._where(method)
+        return (
+            check.number(where, "targetHeight", height),
+            check.number(where, "duration", duration, 0.0),
+            check.group_mask(where, mask),
+        )
+
+    def stop(self, groupMask: int = 0) -> None:
+        """Stop the motors: after a landing, as a vehicle in the air falls."""
+        self._commands.stop(check.group_mask(self._where("stop"), groupMask))
+
+    def _go_to(self, goal, yaw, duration, relative, mask):
+        where = self._where("goTo")
+        self._commands.go_to(
+            check.triple(where, "goal", goal),
+            check.number(where, "yaw", yaw),
+            check.number(where, "duration", duration, 0.0),
+            bool(relative),
+            check.group_mask(where, mask),
+        )
+
+    def startTrajectory(
+        self,
+        trajectoryId: int,
+        timescale: float = 1.0,
+        reverse: bool = False,
+        relative: bool = True,
+        groupMask: int = 0,
+    ) -> None:
+        """Fly along an uploaded trajectory; returns at once.
+
+        Parameters
+        ----------
+        trajectoryId : int
+            As at `Crazyflie.uploadTrajectory`.
+        timescale : float
+            2 takes twice as long.
+        reverse : bool
+            From its end to its beginning.
+        relative : bool
+            Shifted, so that it begins at the planned position.
+        groupMask : int
+            See `Crazyflie.setGroupMask`.
+        """
+        where = self._where("startTrajectory")
+        self._commands.start_trajectory(
+            check.integer(where, "trajectoryId", trajectoryId, 0, _MAX_ID),
+            check.number(where, "timescale", timescale, 1e-3, 1e3),
+            bool(reverse),
+            bool(relative),
+            check.group_mask(where, groupMask),
+        )
+
+    def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:
+        """Return from setpoints (cmd...) to commands such as `land`.
+
+        Parameters
+        ----------
+        remainValidMillisecs : int
+            How long the last setpoint still counts, ms.
+        groupMask : int
+            See `Crazyflie.setGroupMask`.
+        """
+        where = self._where("notifySetpointsStop")
+        remain = check.integer(where, "remainValidMillisecs", remainValidMillisecs, 0, 2**31 - 1)
+        self._commands.notify_setpoints_stop(remain, check.group_mask(where, groupMask))
+
+    def emergency(self) -> None:
+        """Stop the motors at once; until a restart, nothing has an effect any more."""
+        self._commands.emergency()
+
+    def arm(self, arm: bool = True) -> None:
+        """Arm, or disarm."""
+        self._commands.arm(bool(arm))
+
+    def setParam(self, name: str, value: float) -> None:
+        """Set a firmware parameter, GROUP/NAME or GROUP.NAME."""
+        self._commands.set_parameters(check.parameters(self._where("setParam"), {name: value}))
+
+    def cmdFullState(
+        self, pos: ArrayLike, vel: ArrayLike, acc: ArrayLike, yaw: float, omega: ArrayLike
+    ) -> None:
+        """Send a setpoint: position, velocity, acceleration, yaw, body rates (rad/s)."""
+        where = self._where("cmdFullState")
+        position, velocity = check.triple(where, "pos", pos), check.triple(where, "vel", vel)
+        acceleration = check.triple(where, "acc", acc)
+        heading, rates = check.number(where, "yaw", yaw), check.triple(where, "omega", omega)
+        self._commands.send(FullState(position, velocity, acceleration, heading, rates))
+
+
+class Crazyflie(_Commands):
+    """One vehicle.
+
+    Attributes
+    ----------
+    id : int
+        Last byte of its radio address.
+    name, prefix : str
+        "cf1", "/cf1".
+    initialPosition : (3,) array
+        As the fleet file has it, m.
+    """
+
+    def __init__(self, vehicle: VehicleBackend):
+        super().__init__(vehicle.name, vehicle)
+        self._vehicle = vehicle
+        self.id = vehicle.id
+        self.name = vehicle.name
+        self.prefix = f"/{vehicle.name}"
+        self.initialPosition: Array = np.array(vehicle.initial_position)
+
+    def setGroupMask(self, groupMask: int) -> None:
+        """Make the vehicle a member of up to 8 groups, a bit each.
+
+        A command with a mask other than 0 concerns vehicles that have a bit in common with it.
+        """
+        self._vehicle.set_group_mask(check.group_mask(self._where("setGroupMask"), groupMask))
+
+    def goTo(
+        self,
+        goal: ArrayLike,
+        yaw: float,
+        duration: float,
+        relative: bool = False,
+        groupMask: int = 0,
+    ) -> None:
+        """Fly smoothly to a position and yaw and stay there; returns at once.
+
+        With ``relative`` both are added to those that are planned for now.
+        """
+        self._go_to(goal, yaw, duration, relative, groupMask)
+
+    def uploadTrajectory(self, trajectoryId: int, pieceOffset: int, trajectory: Trajectory) -> None:
+        """Write a trajectory into the vehicle's memory.
+
+        Parameters
+        ----------
+        trajectoryId : int
+            By which `startTrajectory` names it.
+        pieceOffset : int
+            Pieces of other trajectories before it in the memory, which has room for 31.
+        trajectory : uav_trajectory.Trajectory
+        """
+        where = self._where("uploadTrajectory")
+        self._vehicle.upload_trajectory(
+            check.integer(where, "trajectoryId", trajectoryId, 0, _MAX_ID),
+            check.integer(where, "pieceOffset", pieceOffset, 0, _MAX_ID),
+            check.pieces(where, trajectory),
+        )
+
+    # State.
+
+    def position(self) -> Array:
+        """Return the position, m, shape (3,)."""
+        return np.array(self._vehicle.state().position)
+
+    def velocity(self) -> Array:
+        """Return the velocity, m/s, shape (3,)."""
+        return np.array(self._vehicle.state().velocity)
+
+    def acceleration(self) -> Array:
+        """Return the acceleration, m/s^2, shape (3,)."""
+        return np.array(self._vehicle.state().acceleration)
+
+    def rpy(self) -> tuple[float, float, float]:
+        """Return roll, pitch and yaw, rad; a positive pitch accelerates forward."""
+        return self._vehicle.state().rpy
+
+    def yaw(self) -> float:
+        """Return the yaw, rad."""
+        return self._vehicle.state().rpy[2]
+
+    def get_position(self) -> list[float]:
+        """Return the position, m."""
+        return list(self._vehicle.state().position)
+
+    def get_pose(self) -> dict[str, Any]:
+        """Return "position" (x, y, z) and "orientation" (x, y, z, w), with these attributes."""
+        state = self._vehicle.state()
+        point = SimpleNamespace(**dict(zip("xyz", state.position, strict=True)))
+        quaternion = quaternion_from_rpy(*state.rpy)
+        orientation = SimpleNamespace(**dict(zip("xyzw", quaternion, strict=True)))
+        return {"position": point, "orientation": orientation}
+
+    def get_status(self) -> dict[str, Any]:
+        """Return battery voltage, supervisor bits and others, with crazyswarm2's keys."""
+        return self._vehicle.status()
+
+    # Parameters.
+
+    def getParam(self, name: str) -> float:
+        """Return a firmware parameter, GROUP/NAME or GROUP.NAME."""
+        return self._vehicle.get_parameter(check.parameter_name(self._where("getParam"), name))
+
+    def setParams(self, params: Mapping[str, float]) -> None:
+        """Set firmware parameters, name -> value."""
+        self._vehicle.set_parameters(check.parameters(self._where("setParams"), params))
+
+    def setLEDColor(self, r: float, g: float, b: float) -> None:
+        """Set the colour of the LED ring, 0 to 1 each; its parameter ring/effect must be 7."""
+        where = self._where("setLEDColor")
+        colors = {"solidRed": ("r", r), "solidGreen": ("g", g), "solidBlue": ("b", b)}
+        levels = {
+            f"ring.{name}": int(255.0 * check.number(where, *color, 0.0, 1.0))
+            for name, color in colors.items()
+        }
+        self._vehicle.set_parameters(levels)
+
+    # Setpoints. The firmware levels out 0.5 s after the last one and stops the motors after 2 s.
+
+    def cmdPosition(self, pos: ArrayLike, yaw: float = 0.0) -> None:
+        """Send a setpoint: position and yaw."""
+        where = self._where("cmdPosition")
+        position, heading = check.triple(where, "pos", pos), check.number(where, "yaw", yaw)
+        self._vehicle.send(Position(position, heading))
+
+    def cmdVelocityWorld(self, vel: ArrayLike, yawRate: float) -> None:
+        """Send a setpoint: velocity in the world frame, yaw rate (deg/s, counter-clockwise)."""
+        where = self._where("cmdVelocityWorld")
+        velocity = check.triple(where, "vel", vel)
+        self._vehicle.send(VelocityWorld(velocity, check.number(where, "yawRate", yawRate)))
+
+    def cmdHover(self, vx: float, vy: float, yawrate: float, zDistance: float) -> None:
+        """Send a setpoint: velocity ahead and to the left, yaw rate (deg/s), height."""
+        arguments = {"vx": vx, "vy": vy, "yawrate": yawrate, "zDistance": zDistance}
+        self._vehicle.send(Hover(*self._numbers("cmdHover", arguments)))
+
+    def cmdVel(self, roll: float, pitch: float, yawrate: float, thrust: float) -> None:
+        """Send a setpoint: roll, pitch (deg), yaw rate (deg/s), thrust (PWM, 0 to 65535)."""
+        arguments = {"roll": roll, "pitch": pitch, "yawrate": yawrate, "thrust": thrust}
+        self._vehicle.send(Attitude(*self._numbers("cmdVel", arguments)))
+
+    def cmdStop(self) -> None:
+        """Send a setpoint that stops the motors."""
+        self._vehicle.send(MotorsOff())
+
+    def _numbers(self, method, arguments):
+        where = self._where(method)
+        return [check.number(where, name, value) for name, value in arguments.items()]
+
+    # Collision avoidance.
+
+    def enableCollisionAvoidance(
+        self,
+        others: Sequence["Crazyflie"],
+        ellipsoidRadii: ArrayLike,
+        bboxMin: Sequence[float] = (-np.inf,) * 3,
+        bboxMax: Sequence[float] = (np.inf,) * 3,
+        horizonSecs: float = 1.0,
+        maxSpeed: float = 2.0,
+        sidestepThreshold: float = 0.25,
+        voronoiProjectionTolerance: float = 1e-5,
+        voronoiProjectionMaxIters: int = 100,
+    ) -> None:
+        """Avoid collisions by buffered Voronoi cells, on board.
+
+        Parameters
+        ----------
+        others : sequence of Crazyflie
+            Whom --sim avoids; with hardware all others on the same channel are avoided.
+        ellipsoidRadii : array_like, shape (3,)
+            Semi-axes of the ellipsoid that is kept free, m.
+        bboxMin, bboxMax : sequence of float, 3 each
+            Corners of the box that the vehicle stays in, m.
+        horizonSecs, maxSpeed : float
+            s, m/s.
+        sidestepThreshold : float
+            Distance from the wall of the cell at which a sidestep begins, m.
+        voronoiProjectionTolerance, voronoiProjectionMaxIters
+            See `crazyflie_model.collision_avoidance.AvoidanceSettings`.
+        """
+        where = self._where("enableCollisionAvoidance")
+        iterations = voronoiProjectionMaxIters
+        settings = AvoidanceSettings(
+            check.triple(where, "ellipsoidRadii", ellipsoidRadii, 1e-3),
+            check.corner(where, "bboxMin", bboxMin),
+            check.corner(where, "bboxMax", bboxMax),
+            check.number(where, "horizonSecs", horizonSecs, 1e-3),
+            check.number(where, "maxSpeed", maxSpeed, 0.0),
+            check.number(where, "sidestepThreshold", sidestepThreshold, 0.0),
+            check.number(where, "voronoiProjectionTolerance", voronoiProjectionTolerance, 0.0),
+            check.integer(where, "voronoiProjectionMaxIters", iterations, 1, 10**6),
+        )
+        vehicles = [other._vehicle for other in others if other is not self]
+        self._vehicle.enable_avoidance(vehicles, settings)
+
+    def disableCollisionAvoidance(self) -> None:
+        """Do not avoid collisions any more."""
+        self._vehicle.disable_avoidance()
+
+
+class CrazyflieServer(_Commands):
+    """All vehicles; its commands are broadcast and concern all at the same moment.
+
+    Attributes
+    ----------
+    crazyflies : list of Crazyflie
+        In the order of the fleet file.
+    crazyfliesById, crazyfliesByName : dict
+    """
+
+    def __init__(self, backend: SwarmBackend):
+        super().__init__("allcfs", backend)
+        self.crazyflies = [Crazyflie(vehicle) for vehicle in backend.vehicles]
+        self.crazyfliesById = {cf.id: cf for cf in self.crazyflies}
+        self.crazyfliesByName = {cf.name: cf for cf in self.crazyflies}
+
+    def goTo(self, goal: ArrayLike, yaw: float, duration: float, groupMask: int = 0) -> None:
+        """Fly by an offset (m) and an angle (rad); see `Crazyflie.goTo`."""
+        self._go_to(goal, yaw, duration, True, groupMask)

@@ -1,0 +1,88 @@
+"""Firmware parameters of an ideal vehicle: those of the virtual one, with its defaults."""
+
+import functools
+import logging
+from collections.abc import Mapping
+
+from crazyflie_model.angles import Triple
+from crazyflie_virtual.firmware.planner import Planner
+
+_log = logging.getLogger(__name__)
+
+_COLOR = ("ring.solidRed", "ring.solidGreen", "ring.solidBlue")
+
+_DEFAULT_COLOR = (0.5, 0.5, 1.0)
+"""Crazyswarm's, in pictures."""
+
+
+class SimulatedParameters:
+    """Parameters, "group.name" -> value.
+
+    Only the groups and the LED's colour have an effect.
+
+    Parameters
+    ----------
+    name : str
+        Of the vehicle.
+    planner : Planner
+        Has the groups.
+    """
+
+    def __init__(self, name: str, planner: Planner):
+        self._name = name
+        self._planner = planner
+        self._values: dict[str, float] = {}
+
+    def update(self, values: Mapping[str, float]) -> None:
+        """Set parameters; what the virtual vehicle does not know is kept, with a warning."""
+        for key, value in values.items():
+            if key == "hlCommander.groupmask":
+                self._planner.groups = int(value)
+            elif key not in self._values and key not in _defaults():
+                _log.warning(
+                    "%s.setParam: %s is no parameter that the simulation knows; it is kept, "
+                    "without effect",
+                    self._name,
+                    key,
+                )
+            self._values[key] = value
+
+    def __getitem__(self, key: str) -> float:
+        """Return a value; ValueError for a name that is not known and was not set."""
+        if key == "hlCommander.groupmask":
+            return self._planner.groups
+        if key in self._values:
+            return self._values[key]
+        if key in _defaults():
+            return _defaults()[key]
+        group = key.partition(".")[0]
+        known = [name for name in _defaults() if name.startswith(f"{group}.")]
+        expected = ", ".join(known) if known else f"no group {group}; there are {_groups()}"
+        raise ValueError(f"{self._name}.getParam: name is {key}; expected {expected}")
+
+    @property
+    def led_color(self) -> Triple:
+        """Red, green and blue, 0 to 1."""
+        if not any(key in self._values for key in _COLOR):
+            return _DEFAULT_COLOR
+        red, green, blue = (min(max(self[key] / 255.0, 0.0), 1.0) for key in _COLOR)
+        return red, green, blue
+
+
+@functools.cache
+def _defaults():
+    # Here, as they take as long to import as all else.
+    from crazyflie_virtual.body.physics import Physics
+    from crazyflie_virtual.faults import FaultSwitches
+    from crazyflie_virtual.firmware.firmware import Firmware
+    from crazyflie_virtual.ports.parameters import Parameter
+    from crazyflie_virtual.settings import VehicleSettings
+    from crazyflie_virtual.tables.parameter_table import parameter_specs
+
+    firmware = Firmware(Physics(), FaultSwitches(), VehicleSettings.from_mapping({}))
+    parameters = [Parameter(spec, firmware) for spec in parameter_specs()]
+    return {parameter.full_name: parameter.default for parameter in parameters}
+
+
+def _groups():
+    return ", ".join(dict.fromkeys(name.partition(".")[0] for name in _defaults()))

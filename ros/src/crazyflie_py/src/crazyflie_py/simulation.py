@@ -1,0 +1,153 @@
+"""The back-end of --sim: ideal vehicles and a clock that passes as fast as it goes."""
+
+import argparse
+import logging
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from crazyflie_fleet.fleet_config import close_pairs
+from crazyflie_model.angles import Triple
+from crazyflie_py.csv_output import CsvOutput
+from crazyflie_py.fleet import FleetVehicle
+from crazyflie_py.setpoints import Setpoint
+from crazyflie_py.simulated_vehicle import SimulatedVehicle
+from crazyflie_py.visualizer import visualizer_for
+
+_log = logging.getLogger(__name__)
+
+_ROUNDING = 1e-9
+"""Part of a step by which a sleep may be too short for it, due to rounding."""
+
+
+class Simulation:
+    """A swarm of `crazyflie_py.backend.SwarmBackend` without ROS.
+
+    Parameters
+    ----------
+    fleet : sequence of FleetVehicle
+    options : argparse.Namespace
+        Of `crazyflie_py.crazyswarm_py.build_argparser`.
+    """
+
+    def __init__(self, fleet: Sequence[FleetVehicle], options: argparse.Namespace):
+        self.dt: float = options.dt
+        self._steps = 0
+        self._residual = 0.0
+        limits = (options.maxvel, options.disturbance)
+        self.vehicles = [SimulatedVehicle(vehicle, self.time, *limits) for vehicle in fleet]
+        self._buffers = [vehicle.buffer for vehicle in fleet]
+        self._close: set[tuple[int, int]] = set()
+        self.visualizer = visualizer_for(options.vis, has_video=options.video is not None)
+        if options.video is not None:
+            self.visualizer.startVideoOutput(options.video, self.dt)
+        self._output = CsvOutput() if options.writecsv else None
+
+    # The clock.
+
+    def time(self) -> float:
+        return self._steps * self.dt
+
+    def sleep(self, duration: float) -> None:
+        # Time passes in whole steps; what is left of a sleep counts for the next one.
+        total = max(0.0, duration) + self._residual
+        steps = math.floor(total / self.dt + _ROUNDING)
+        self._residual = max(0.0, total - steps * self.dt)
+        for _ in range(steps):
+            self._step()
+
+    def sleep_for_rate(self, rate: float) -> None:
+        self.sleep(1.0 / rate)
+
+    def is_shutdown(self) -> bool:
+        return False
+
+    def _step(self):
+        time = self.time()
+        self.visualizer.update(time, self.vehicles)
+        if self._output is not None:
+            self._output.update(time, self.vehicles)
+        self._steps += 1
+        # All from the same state, whatever their order.
+        motions = [vehicle.next_motion(self.dt) for vehicle in self.vehicles]
+        for vehicle, motion in zip(self.vehicles, motions, strict=True):
+            vehicle.motion = motion
+        self._report_collisions()
+
+    def _report_collisions(self):
+        """Warn when a pair comes too close, once until it is apart again."""
+        positions = np.array([vehicle.motion.position for vehicle in self.vehicles])
+        close = set()
+        for i, j, distance, allowed in close_pairs(positions, self._buffers):
+            one, two = self.vehicles[i], self.vehicles[j]
+            if (i, j) not in self._close and (one.is_flying or two.is_flying):
+                _log.warning(
+                    "%s and %s are %.2f m apart at %.2f s; expected at least %.2f m "
+                    "(a metre of height counts half)",
+                    one.name,
+                    two.name,
+                    distance,
+                    self.time(),
+                    allowed,
+                )
+            if (i, j) in self._close or one.is_flying or two.is_flying:
+                close.add((i, j))
+        self._close = close
+
+    # The ends.
+
+    def next_phase(self) -> None:
+        if self._output is not None:
+            self._output.next_phase()
+
+    def close(self) -> None:
+        self.visualizer.finishVideoOutput()
+        if self._output is not None:
+            self._output.close()
+
+    # Broadcasts.
+
+    def take_off(self, height: float, duration: float, group_mask: int) -> None:
+        for vehicle in self.vehicles:
+            vehicle.take_off(height, duration, group_mask)
+
+    def land(self, height: float, duration: float, group_mask: int) -> None:
+        for vehicle in self.vehicles:
+            vehicle.land(height, duration, group_mask)
+
+    def stop(self, group_mask: int) -> None:
+        for vehicle in self.vehicles:
+            vehicle.stop(group_mask)
+
+    def go_to(
+        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
+    ) -> None:
+        for vehicle in self.vehicles:
+            vehicle.go_to(goal, yaw, duration, relative, group_mask)
+
+    def start_trajectory(
+        self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
+    ) -> None:
+        for vehicle in self.vehicles:
+            vehicle.start_trajectory(trajectory_id, time_scale, reverse, relative, group_mask)
+
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
+        for vehicle in self.vehicles:
+            vehicle.notify_setpoints_stop(remain_valid_ms, group_mask)
+
+    def emergency(self) -> None:
+        for vehicle in self.vehicles:
+            vehicle.emergency()
+
+    def arm(self, arm: bool) -> None:
+        for vehicle in self.vehicles:
+            vehicle.arm(arm)
+
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        for vehicle in self.vehicles:
+            vehicle.set_parameters(values)
+
+    def send(self, setpoint: Setpoint) -> None:
+        for vehicle in self.vehicles:
+            vehicle.send(setpoint)

@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from sim import hovering, positions, simulated
-
 from pycrazyswarm.util import check_ellipsoid_collisions, grid_yaml, poisson_disk_sample
+from sim import hovering, positions, simulated
 
 RADII = np.array([0.125, 0.125, 0.375])
 

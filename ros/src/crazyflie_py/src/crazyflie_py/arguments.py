@@ -6,7 +6,7 @@ the value and what was expected.
 
 import math
 import numbers
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -80,7 +80,7 @@ def pieces(where: str, trajectory: Any) -> list[PolynomialPiece]:
         raise _error(where, "trajectory", trajectory, "a uav_trajectory.Trajectory with pieces")
     result = []
     for index, piece in enumerate(found):
-        duration = number(where, f"duration of piece {index}", piece.duration, 0.0)
+        duration = number(where, f"duration of piece {index}", piece.duration, 1e-3)
         axes = [np.asarray(axis.p, dtype=float) for axis in _axes(piece)]
         for name, axis in zip(("x", "y", "z", "yaw"), axes, strict=True):
             if len(axis) > COEFFICIENTS or not np.all(np.isfinite(axis)):
@@ -92,6 +92,14 @@ def pieces(where: str, trajectory: Any) -> list[PolynomialPiece]:
 
 def _axes(piece):
     return piece.px, piece.py, piece.pz, piece.pyaw
+
+
+def instances(where: str, name: str, values: Any, expected: type) -> list[Any]:
+    """Return a list of objects of a class."""
+    found = list(values) if isinstance(values, Iterable) else None
+    if found is None or not all(isinstance(value, expected) for value in found):
+        raise _error(where, name, values, f"a list of {expected.__name__}")
+    return found
 
 
 def parameter_name(where: str, value: Any) -> str:

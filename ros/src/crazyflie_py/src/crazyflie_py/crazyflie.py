@@ -387,7 +387,8 @@ class Crazyflie(_Commands):
             check.number(where, "voronoiProjectionTolerance", voronoiProjectionTolerance, 0.0),
             check.integer(where, "voronoiProjectionMaxIters", iterations, 1, 10**6),
         )
-        vehicles = [other._vehicle for other in others if other is not self]
+        found = check.instances(where, "others", others, Crazyflie)
+        vehicles = [other._vehicle for other in found if other is not self]
         self._vehicle.enable_avoidance(vehicles, settings)
 
     def disableCollisionAvoidance(self) -> None:

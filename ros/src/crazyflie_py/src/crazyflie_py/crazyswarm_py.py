@@ -9,6 +9,7 @@ from pathlib import Path
 
 from crazyflie_py import fleet
 from crazyflie_py.backend import SwarmBackend
+from crazyflie_py.buttons import Input
 from crazyflie_py.crazyflie import CrazyflieServer, TimeHelper
 
 
@@ -71,7 +72,7 @@ class Crazyswarm:
     ----------
     allcfs : CrazyflieServer
     timeHelper : TimeHelper
-    input : Joystick
+    input : Input
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class Crazyswarm:
         self.allcfs = CrazyflieServer(backend)
         self.timeHelper = TimeHelper(backend)
         self.timeHelper.crazyflies = self.allcfs.crazyflies
+        self.input = Input(self.timeHelper, options.sim)
 
 
 def _backend(crazyflies_yaml: str | Path | None, options: argparse.Namespace) -> SwarmBackend:

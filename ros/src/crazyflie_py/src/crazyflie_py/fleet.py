@@ -77,8 +77,8 @@ def _vehicles(where: str, content: Any) -> list[FleetVehicle]:
     if isinstance(content, Mapping) and isinstance(content.get("crazyflies"), list):
         found = [_from_crazyswarm(where, entry) for entry in content["crazyflies"]]
     elif isinstance(content, Mapping) and isinstance(content.get("robots"), Mapping):
-        robots = content["robots"].items()
-        found = [_from_robot(where, *robot) for robot in robots if robot[1].get("enabled", True)]
+        robots = [_from_robot(where, *robot) for robot in content["robots"].items()]
+        found = [robot for robot in robots if robot is not None]
     else:
         raise ValueError(
             f"{where} is {shown(content)}; expected a list crazyflies of channel, id, "
@@ -100,6 +100,10 @@ def _from_crazyswarm(where, entry):
 
 
 def _from_robot(where, name, entry):
+    if not isinstance(entry, Mapping):
+        raise ValueError(f"{where}: {name} is {shown(entry)}; expected a mapping")
+    if not entry.get("enabled", True):
+        return None
     uri = str(entry.get("uri", ""))
     try:
         number = int(uri.split("?")[0][-2:], 16)

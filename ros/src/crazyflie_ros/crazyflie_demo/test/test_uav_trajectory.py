@@ -93,3 +93,30 @@ def test_is_not_in_progress_before_and_after(time):
 def test_a_bad_file_is_refused(tmp_path):
     with pytest.raises(TrajectoryError):
         Trajectory().loadcsv(tmp_path / "none.csv")
+
+
+def test_a_trajectory_is_saved_as_it_is(tmp_path):
+    trajectory = Trajectory()
+    trajectory.loadcsv(FIGURE8)
+    trajectory.polynomials[0].pyaw = Polynomial([0.0])
+    trajectory.savecsv(tmp_path / "saved.csv")
+    saved = Trajectory()
+    saved.loadcsv(str(tmp_path / "saved.csv"), skip_header=True)
+    assert saved.n_pieces() == trajectory.n_pieces() == len(trajectory.polynomials)
+    for time in np.linspace(0.0, trajectory.duration, 50):
+        np.testing.assert_allclose(saved.eval(time).pos, trajectory.eval(time).pos, atol=1e-6)
+
+
+def test_a_stretched_trajectory_has_the_same_path():
+    trajectory, stretched = Trajectory(), Trajectory()
+    trajectory.loadcsv(FIGURE8)
+    stretched.loadcsv(FIGURE8)
+    stretched.stretchtime(2.0)
+    assert stretched.duration == pytest.approx(2.0 * trajectory.duration)
+    for time in np.linspace(0.0, trajectory.duration, 50):
+        before, after = trajectory.eval(time), stretched.eval(2.0 * time)
+        np.testing.assert_allclose(after.pos, before.pos, atol=1e-9)
+        np.testing.assert_allclose(after.vel, before.vel / 2.0, atol=1e-9)
+        np.testing.assert_allclose(after.acc, before.acc / 4.0, atol=1e-9)
+    with pytest.raises(ValueError, match="factor is 0.0; expected a number > 0"):
+        stretched.stretchtime(0.0)

@@ -109,7 +109,7 @@ def save(path: str | Path, pieces: list[PolynomialPiece]) -> None:
     names = [f"{axis}^{power}" for axis in ("x", "y", "z", "yaw") for power in range(COEFFICIENTS)]
     lines = [",".join(["duration", *names])]
     for piece in pieces:
-        numbers = [piece.duration, *(c for axis in piece.axes for c in axis)]
+        numbers = [piece.duration, *(c for axis in piece.padded_axes for c in axis)]
         lines.append(",".join(f"{number:.9g}" for number in numbers))
     Path(path).write_text("\n".join(lines) + "\n")
 

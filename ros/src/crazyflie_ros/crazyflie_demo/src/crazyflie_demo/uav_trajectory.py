@@ -8,8 +8,8 @@ import numpy as np
 from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
-from crazyflie_demo.trajectory_file import load
-from crazyflie_model.polynomials import evaluate
+from crazyflie_demo.trajectory_file import load, save
+from crazyflie_model.polynomials import PolynomialPiece, evaluate
 from crazyflie_model.units import GRAVITY
 
 Array = NDArray[np.float64]
@@ -43,6 +43,10 @@ class Polynomial:
         """Return its derivative."""
         return Polynomial(polynomial.polyder(self.p))
 
+    def stretchtime(self, factor: float) -> None:
+        """Take the values of times t at times factor * t."""
+        self.p = self.p / float(factor) ** np.arange(len(self.p))
+
 
 class Polynomial4D:
     """A piece of a trajectory: polynomials for x, y, z (m) and yaw (rad) of the time (s) in it.
@@ -61,8 +65,16 @@ class Polynomial4D:
 
     def derivative(self) -> "Polynomial4D":
         """Return the piece's velocity, as another piece."""
-        axes = (self.px, self.py, self.pz, self.pyaw)
-        return Polynomial4D(self.duration, *(axis.derivative().p for axis in axes))
+        return Polynomial4D(self.duration, *(axis.derivative().p for axis in self._axes()))
+
+    def stretchtime(self, factor: float) -> None:
+        """Make the piece take ``factor`` times as long, on the same path."""
+        for axis in self._axes():
+            axis.stretchtime(factor)
+        self.duration *= factor
+
+    def _axes(self):
+        return self.px, self.py, self.pz, self.pyaw
 
     def eval(self, t: float) -> TrajectoryOutput:
         """Return the piece at a time ``t`` (s) from its beginning."""
@@ -80,10 +92,33 @@ class Trajectory:
         self.polynomials: list[Polynomial4D] = []
         self.duration = 0.0
 
-    def loadcsv(self, filename: str | Path) -> None:
-        """Load a file; raises `TrajectoryError`, see `crazyflie_demo.trajectory_file.load`."""
+    def n_pieces(self) -> int:
+        """Return the number of pieces."""
+        return len(self.polynomials)
+
+    def loadcsv(self, filename: str | Path, skip_header: bool = True) -> None:
+        """Load a file; raises `TrajectoryError`, see `crazyflie_demo.trajectory_file.load`.
+
+        A heading is a first line without numbers, whatever scripts say of ``skip_header``.
+        """
         self.polynomials = [Polynomial4D(piece.duration, *piece.axes) for piece in load(filename)]
         self.duration = sum(piece.duration for piece in self.polynomials)
+
+    def savecsv(self, filename: str | Path) -> None:
+        """Write a file that `loadcsv` reads."""
+        pieces = (
+            PolynomialPiece(piece.duration, *(axis.p.tolist() for axis in piece._axes()))
+            for piece in self.polynomials
+        )
+        save(filename, list(pieces))
+
+    def stretchtime(self, factor: float) -> None:
+        """Make the trajectory take ``factor`` times as long, on the same path."""
+        if not factor > 0.0:
+            raise ValueError(f"factor is {factor}; expected a number > 0")
+        for piece in self.polynomials:
+            piece.stretchtime(factor)
+        self.duration *= factor
 
     def eval(self, t: float) -> TrajectoryOutput:
         """Return the trajectory at a time ``t`` (s), 0 to `duration`; otherwise `ValueError`."""

@@ -1,0 +1,181 @@
+"""The button that scripts wait for: of a joystick, or any key."""
+
+import glob
+import logging
+import os
+import select
+import sys
+import termios
+import tty
+from collections.abc import Callable, Sequence
+from typing import Protocol
+
+from crazyflie_demo.joystick import EVENT, Joystick
+from crazyflie_py.crazyflie import TimeHelper
+
+_log = logging.getLogger(__name__)
+
+BUTTON = 5
+"""Number of Crazyswarm's button: right shoulder of a gamepad."""
+
+BUTTONS = (3, 4, 5)
+"""Any of these counts for `Input.checkIfAnyButtonIsPressed`."""
+
+UNATTENDED_DELAY = 3.0
+"""After this time (s) --sim presses the button itself, without a joystick and a terminal."""
+
+_POLL_PERIOD = 0.01
+"""s."""
+
+_KEY = [0] * BUTTON + [1]
+"""A key is the button."""
+
+
+class Device(Protocol):
+    """What has buttons."""
+
+    def poll(self) -> Sequence[int]:
+        """Return 1 for each button that is pressed, else 0; waits 0.01 s at most."""
+
+
+class JoystickDevice:
+    """A joystick of Linux, /dev/input/js0 or another."""
+
+    def __init__(self, path: str):
+        self._path = path
+        self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+        self._joystick = Joystick()
+
+    def poll(self) -> Sequence[int]:
+        """Return the buttons; RuntimeError when the joystick was pulled out."""
+        if select.select([self._file], [], [], _POLL_PERIOD)[0]:
+            try:
+                data = os.read(self._file, 64 * EVENT.size)
+            except OSError as error:
+                raise self._lost(error.strerror) from None
+            if not data:
+                raise self._lost("end of file")
+            self._joystick.feed(data)
+        return self._joystick.state()[1]
+
+    def _lost(self, reason):
+        return RuntimeError(f"swarm.input: the joystick {self._path} is gone ({reason})")
+
+
+class KeyboardDevice:
+    """The terminal."""
+
+    def poll(self) -> Sequence[int]:
+        """Return the button as pressed if a key was typed."""
+        file = sys.stdin.fileno()
+        settings = termios.tcgetattr(file)
+        tty.setcbreak(file, termios.TCSANOW)
+        try:
+            is_typed = bool(select.select([file], [], [], _POLL_PERIOD)[0])
+            return _KEY if is_typed and os.read(file, 1024) else []
+        finally:
+            termios.tcsetattr(file, termios.TCSANOW, settings)
+
+
+class UnattendedDevice:
+    """Nobody is there: the button is pressed for one poll, `UNATTENDED_DELAY` after the first."""
+
+    def __init__(self, time: Callable[[], float]):
+        self._time = time
+        self._begin: float | None = None
+
+    def poll(self) -> Sequence[int]:
+        """Return the button as pressed when the time has come."""
+        if self._begin is None:
+            self._begin = self._time()
+        if self._time() < self._begin + UNATTENDED_DELAY:
+            return []
+        self._begin = None
+        return _KEY
+
+
+class Input:
+    """``swarm.input``: a joystick, else the terminal's keys.
+
+    Parameters
+    ----------
+    time_helper : TimeHelper
+    is_simulated : bool
+        Whether the button is pressed in time where there is neither. Otherwise methods raise
+        RuntimeError, as a wait would never end.
+    devices : str
+        Pattern of joysticks; the first that can be read is taken.
+    """
+
+    def __init__(
+        self, time_helper: TimeHelper, is_simulated: bool, devices: str = "/dev/input/js*"
+    ):
+        self._time_helper = time_helper
+        self._is_simulated = is_simulated
+        self._pattern = devices
+        self._device: Device | None = None
+
+    def _poll(self) -> Sequence[int]:
+        # The device is looked for late: most scripts need none.
+        if self._device is None:
+            self._device = self._find()
+        return self._device.poll()
+
+    def _find(self) -> Device:
+        for path in sorted(glob.glob(self._pattern)):
+            try:
+                return JoystickDevice(path)
+            except OSError as error:
+                _log.warning("swarm.input: cannot open %s: %s", path, error.strerror)
+        if _has_terminal():
+            return KeyboardDevice()
+        if self._is_simulated:
+            _log.warning(
+                "swarm.input: there is neither a joystick nor a terminal; the button is pressed "
+                "%g s after it is waited for",
+                UNATTENDED_DELAY,
+            )
+            return UnattendedDevice(self._time_helper.time)
+        raise RuntimeError(
+            f"swarm.input: there is neither a joystick ({self._pattern}) nor a terminal to press "
+            "a button with; expected one"
+        )
+
+    def checkIfButtonIsPressed(self) -> bool:
+        """Return whether the button is pressed: number 5 of the joystick, or any key."""
+        buttons = self._poll()
+        return len(buttons) > BUTTON and buttons[BUTTON] == 1
+
+    def checkIfAnyButtonIsPressed(self) -> list[int] | None:
+        """Return all buttons if number 3, 4 or 5 is pressed, else None."""
+        buttons = list(self._poll())
+        return buttons if any(buttons[i] for i in BUTTONS if i < len(buttons)) else None
+
+    def waitUntilButtonPressed(self) -> None:
+        """Wait until the button is pressed and released."""
+        self._wait_until(self.checkIfButtonIsPressed)
+        self._wait_until(lambda: not self.checkIfButtonIsPressed())
+
+    def waitUntilAnyButtonPressed(self) -> list[int]:
+        """Wait until button 3, 4 or 5 is pressed and released; return all as they were."""
+        pressed = self._wait_until(self.checkIfAnyButtonIsPressed)
+        self.waitUntilAllButtonsReleased()
+        return pressed
+
+    def waitUntilAllButtonsReleased(self) -> None:
+        """Wait until none of the buttons 3, 4, 5 is pressed."""
+        self._wait_until(lambda: not self.checkIfAnyButtonIsPressed())
+
+    def _wait_until(self, condition):
+        while not (result := condition()) and not self._time_helper.isShutdown():
+            self._time_helper.sleep(_POLL_PERIOD)
+        return result
+
+
+def _has_terminal():
+    try:
+        file = sys.stdin.fileno()
+        # A process in the background would be stopped.
+        return os.isatty(file) and os.tcgetpgrp(file) == os.getpgrp()
+    except (AttributeError, OSError, ValueError):
+        return False

@@ -38,6 +38,9 @@ _SERVICES = (
     "stop",
     "emergency",
     "update_params",
+    "set_group_mask",
+    "notify_setpoints_stop",
+    "arm",
 )
 
 _POLL = 0.2
@@ -90,7 +93,7 @@ class Fleet(VehicleGroup):
         self._end: Callable[[], None] = lambda: None
         if process is None:
             process, self._end = begin_script("mission")
-            _catch_signals()
+            catch_signals()
         self._handle = process.handle("/mission")
         try:
             vehicles = _connect(process, self._handle, chosen, startup_timeout)
@@ -110,6 +113,13 @@ class Fleet(VehicleGroup):
         except BaseException:
             self._end()
             raise
+
+    def vehicle(self, name: str) -> RosVehicle:
+        """Return a vehicle."""
+        self._check_names([name])
+        vehicle = self._vehicles[name]
+        assert isinstance(vehicle, RosVehicle)
+        return vehicle
 
     def dry_run(self, mission: Callable[[VehicleGroup], Any]) -> float:
         """Check ``mission(fleet)`` by a dry run; return its duration, s.
@@ -247,8 +257,9 @@ def _below(top):
     return {service: f"{top}/{service}" for service in _SERVICES}
 
 
-def _catch_signals():
-    # What ends a script must end its with block, which lands; also where it is a node of rospy's.
+def catch_signals() -> None:
+    """Have SIGINT and SIGTERM raise, so that what lands at the end of a script is reached."""
+    # Also where the script is a node of rospy's.
     if threading.current_thread() is not threading.main_thread():
         return
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -121,6 +121,14 @@ class Fleet(VehicleGroup):
         assert isinstance(vehicle, RosVehicle)
         return vehicle
 
+    @override
+    def adopt(self, name: str) -> None:
+        """Note that a vehicle flies by other commands: it is landed at the end."""
+        is_new = name not in self.flying
+        super().adopt(name)
+        if is_new:
+            self._handle.submit(self._publish_flying)
+
     def dry_run(self, mission: Callable[[VehicleGroup], Any]) -> float:
         """Check ``mission(fleet)`` by a dry run; return its duration, s.
 

@@ -17,7 +17,8 @@ from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
-from crazyflie_msgs.msg import FlightStatus
+from crazyflie_msgs.msg import FlightStatus, VehicleStatus
+from crazyflie_py.avoidance_parameters import avoidance_parameters
 from crazyflie_py.backend import VehicleBackend, VehicleState
 from crazyflie_py.ros_connection import Connection
 from crazyflie_py.ros_setpoints import SetpointPublishers
@@ -33,8 +34,7 @@ _STATE_TIMEOUT = 10.0
 _VELOCITY_SPAN = 0.2
 """Longest time between two poses from which a velocity follows, s."""
 
-_FIRMWARE_INFINITY = 1e9
-"""In place of an infinite corner, m: the parameter server has no infinity."""
+_NOT_FLYING = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
 
 _UNKNOWN: Triple = (math.nan, math.nan, math.nan)
 
@@ -260,40 +260,23 @@ class RosVehicleBackend(VehicleBackend):
     @override
     def status(self) -> dict[str, Any]:
         status = self._vehicle.driver_status
+        supervisor, battery = status.supervisor, status.battery_voltage
+        if not self._vehicle.uses_driver:
+            is_flying = self._vehicle.flight_status.state not in _NOT_FLYING
+            ready = VehicleStatus.CAN_BE_ARMED | VehicleStatus.ARMED | VehicleStatus.CAN_FLY
+            supervisor, battery = ready | is_flying * VehicleStatus.FLYING, math.nan
         names = ("num_rx_broadcast", "num_tx_broadcast", "num_rx_unicast", "num_tx_unicast")
-        latency = 0.0 if math.isnan(status.latency) else status.latency
         return {
             "id": self.name,
             "timestamp_sec": status.header.stamp.secs,
             "timestamp_nsec": status.header.stamp.nsecs,
-            "supervisor": status.supervisor,
-            "battery": status.battery_voltage,
+            "supervisor": supervisor,
+            "battery": battery,
             "pm_state": getattr(status, "pm_state", 0),
             "rssi": status.rssi,
-            "latency_unicast": int(latency * 1e3),
+            "latency_unicast": round(1e3 * status.latency) if status.latency > 0.0 else 0,
             **{name: getattr(status, name, 0) for name in names},
         }
-
-
-def avoidance_parameters(settings: AvoidanceSettings) -> dict[str, float]:
-    """Return the firmware parameters of collision avoidance.
-
-    Names are those of bitcraze/crazyflie-firmware, collision_avoidance.c.
-    """
-    values: dict[str, float] = {
-        "colAv.horizon": settings.horizon,
-        "colAv.maxSpeed": settings.max_speed,
-        "colAv.sidestepThrsh": settings.sidestep_threshold,
-        "colAv.vorTol": settings.tolerance,
-        "colAv.vorIters": settings.max_iterations,
-    }
-    for axis, radius, low, high in zip(
-        "XYZ", settings.radii, settings.box_min, settings.box_max, strict=True
-    ):
-        values[f"colAv.ellipsoid{axis}"] = radius
-        values[f"colAv.bboxMin{axis}"] = max(low, -_FIRMWARE_INFINITY)
-        values[f"colAv.bboxMax{axis}"] = min(high, _FIRMWARE_INFINITY)
-    return values
 
 
 def seconds(duration: float) -> genpy.Duration:

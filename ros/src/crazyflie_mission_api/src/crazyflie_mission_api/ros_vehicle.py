@@ -93,7 +93,7 @@ class RosVehicle(MissionVehicle):
         self.services = services
         self._synchronized_start = synchronized_start
         self.uses_driver = uses_driver = synchronized_start is None
-        self._has_yaw = has_yaw
+        self.has_yaw = has_yaw
         self._pose: Pose | None = None
         self._seen_at = -math.inf
         self._ground = 0.0
@@ -125,7 +125,7 @@ class RosVehicle(MissionVehicle):
 
     @override
     def heading(self) -> float:
-        pose = self.pose() if self._has_yaw else None
+        pose = self.pose() if self.has_yaw else None
         return 0.0 if pose is None else heading(*pose.rotation)
 
     def pose(self) -> Pose | None:

@@ -1,7 +1,6 @@
 """Crazyswarm's API on vehicles that run: simulated, virtual or real ones, by ROS."""
 
 import argparse
-import logging
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -26,8 +25,6 @@ from crazyflie_py.setpoints import Setpoint
 from crazyflie_py.visualizer import NullVisualizer
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.process import Process
-
-_log = logging.getLogger(__name__)
 
 _FIND_LIMIT = 10.0
 """For the vehicles of a file, s of the machine's clock."""
@@ -70,12 +67,19 @@ class RosBackend(SwarmBackend):
         self._connection = Connection(handle, fleet, options.unchecked)
         ids = [v.id for v in vehicles] if vehicles else ids_of(names)
         places: list[Any] = [v.position for v in vehicles] if vehicles else [None] * len(names)
+        services = handle.service_nodes()
         self._vehicles = [
-            RosVehicleBackend(fleet.vehicle(name), number, place, self._connection)
+            RosVehicleBackend(
+                fleet.vehicle(name),
+                number,
+                place,
+                self._connection,
+                f"/{name}/update_params" in services,
+            )
             for name, number, place in zip(names, ids, places, strict=True)
         ]
-        self._top = _common_services(handle.service_nodes(), names)
-        handle.subscribe("/fleet/waiting", String, _log_held)
+        self._top = _common_services(services, names)
+        handle.subscribe("/fleet/waiting", String, self._on_held)
 
     @property
     @override
@@ -86,6 +90,11 @@ class RosBackend(SwarmBackend):
     @override
     def visualizer(self) -> Visualizer:
         return self._visualizer
+
+    def _on_held(self, message):
+        if message.data:
+            text = f"held by the fleet, since another vehicle is too near: {message.data}"
+            self._connection.handle.warn(text)
 
     # Commands to all.
 
@@ -112,6 +121,7 @@ class RosBackend(SwarmBackend):
     def go_to(
         self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
     ) -> None:
+        yaw = self._vehicles[0].checked_yaw(yaw)
         self._call("go_to", srv.GoTo, group_mask, relative, Point(*goal), yaw, seconds(duration))
 
     @override
@@ -191,7 +201,7 @@ class RosBackend(SwarmBackend):
         try:
             self._land()
         except MissionError as error:
-            _log.error("%s", error)
+            self._connection.handle.error(str(error))
         finally:
             self._end()
 
@@ -247,8 +257,3 @@ def _common_services(services: Mapping[str, str], names: list[str]) -> str | Non
         top = f"{nodes.pop()}/all"
         return top if f"{top}/go_to" in services else None
     return None
-
-
-def _log_held(message):
-    if message.data:
-        _log.warning("held by the fleet, as another vehicle is too near: %s", message.data)

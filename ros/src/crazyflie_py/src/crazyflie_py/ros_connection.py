@@ -1,6 +1,5 @@
 """The vehicles that run, for scripts of Crazyswarm's API."""
 
-import logging
 import math
 import re
 import time
@@ -12,8 +11,6 @@ from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.mission_vehicle import never
 from crazyflie_utils import NodeHandle
-
-_log = logging.getLogger(__name__)
 
 _SEARCH_LIMIT = 5.0
 """For vehicles, s of the machine's clock."""
@@ -44,7 +41,7 @@ class Connection:
         """Raise `CommandRefusedError`; with --unchecked warn."""
         if not self._is_unchecked:
             raise CommandRefusedError(f"{text}; with --unchecked this is a warning")
-        _log.warning(text)
+        self.handle.warn(text)
 
     def finish(
         self,

@@ -1,8 +1,7 @@
 """A vehicle of Crazyswarm's API by ROS: behind the driver, or under the workspace's controller."""
 
-import logging
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
@@ -13,8 +12,9 @@ from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.conversions import to_message
-from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle
-from crazyflie_model.angles import Triple, rpy_from_quaternion
+from crazyflie_fleet.settings import FirmwareNumber
+from crazyflie_mission_api.ros_vehicle import RosVehicle
+from crazyflie_model.angles import Triple
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_msgs.msg import FlightStatus, VehicleStatus
@@ -22,38 +22,34 @@ from crazyflie_py.avoidance_parameters import avoidance_parameters
 from crazyflie_py.backend import VehicleBackend, VehicleState
 from crazyflie_py.ros_connection import Connection
 from crazyflie_py.ros_setpoints import SetpointPublishers
+from crazyflie_py.ros_states import RosStates
 from crazyflie_py.setpoints import Setpoint
+from crazyflie_py.simulated_parameters import SimulatedParameters
 from crazyflie_utils import ParameterError
-from crazyflie_utils.parameters.types import FINITE
-
-_log = logging.getLogger(__name__)
-
-_STATE_TIMEOUT = 10.0
-"""For a state, s of the vehicles' time."""
-
-_VELOCITY_SPAN = 0.2
-"""Longest time between two poses from which a velocity follows, s."""
 
 _NOT_FLYING = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
-
-_UNKNOWN: Triple = (math.nan, math.nan, math.nan)
 
 
 class RosVehicleBackend(VehicleBackend):
     """One vehicle; see `crazyflie_py.backend.VehicleBackend`."""
 
     def __init__(
-        self, vehicle: RosVehicle, vehicle_id: int, position: Triple | None, connection: Connection
+        self,
+        vehicle: RosVehicle,
+        vehicle_id: int,
+        position: Triple | None,
+        connection: Connection,
+        has_firmware: bool,
     ):
         self.name = vehicle.name
         self.id = vehicle_id
         self._vehicle = vehicle
         self._connection = connection
         self._setpoints = SetpointPublishers(connection.handle, vehicle)
-        self._last_pose: Pose | None = None
-        self._velocity = _UNKNOWN
+        self._states = RosStates(vehicle, connection.fleet.clock)
         self._is_landing = False
         self._groups = 0
+        self._parameters = None if has_firmware else SimulatedParameters(self.name, self)
         if position is None:
             place = vehicle.position()
             position = (math.nan,) * 3 if place is None else place
@@ -89,6 +85,7 @@ class RosVehicleBackend(VehicleBackend):
         if not relative:
             self._check("goTo", goal)
         self.note_flight()
+        yaw = self.checked_yaw(yaw)
         arguments = (group_mask, relative, Point(*goal), yaw, seconds(duration))
         self._command("go_to", srv.GoTo, *arguments)
 
@@ -115,14 +112,26 @@ class RosVehicleBackend(VehicleBackend):
 
     @override
     def set_group_mask(self, group_mask: int) -> None:
-        self._command("set_group_mask", srv.SetGroupMask, group_mask)
-        self._groups = group_mask
+        self.groups = group_mask
+
+    @property
+    def groups(self) -> int:
+        """Mask of the groups that the script has made it a member of."""
+        return self._groups
+
+    @groups.setter
+    def groups(self, mask: int) -> None:
+        self._command("set_group_mask", srv.SetGroupMask, mask)
+        self._groups = mask
 
     @override
     def upload_trajectory(
         self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
     ) -> None:
         messages = [to_message(piece) for piece in pieces]
+        for message in messages:
+            if any(message.poly_yaw):
+                message.poly_yaw = [self.checked_yaw(value) for value in message.poly_yaw]
         arguments = (trajectory_id, piece_offset, messages)
         self._command("upload_trajectory", srv.UploadTrajectory, *arguments)
 
@@ -134,6 +143,15 @@ class RosVehicleBackend(VehicleBackend):
     def call(self, service: str, service_type: Any, *arguments: Any) -> "Future[Any]":
         """Call a service; return the future of the answer."""
         return self._vehicle.call(service, service_type, *arguments)
+
+    def checked_yaw(self, yaw: float) -> float:
+        """Return a yaw that the vehicle can have, rad; another is refused."""
+        if yaw == 0.0 or self._vehicle.has_yaw:
+            return yaw
+        self._connection.refuse(
+            f"{self.name}: a yaw of {yaw:.3g}: its controller keeps the heading 0; expected 0"
+        )
+        return 0.0
 
     def _command(self, service, service_type, *arguments):
         call = self.call(service, service_type, *arguments)
@@ -178,23 +196,25 @@ class RosVehicleBackend(VehicleBackend):
 
     @override
     def set_parameters(self, values: Mapping[str, float]) -> None:
+        for name in values:
+            self.get_parameter(name)
+        if self._parameters is not None:
+            self._parameters.update(values)
+            return
         paths = {key.replace(".", "/"): value for key, value in values.items()}
-        for path in paths:
-            self.get_parameter(path.replace("/", "."))
         for path, value in paths.items():
             self._connection.handle.set_param(f"/{self.name}/{path}", value)
-        self._command("update_params", srv.UpdateParams, list(paths))
+        service, request = f"/{self.name}/update_params", srv.UpdateParamsRequest([*paths])
+        call = self._connection.handle.call_service(service, srv.UpdateParams, request, 10.0)
+        self._connection.finish("update_params", {self.name: call})
 
     @override
     def get_parameter(self, name: str) -> float:
-        if not self._vehicle.uses_driver:
-            raise ValueError(
-                f"{self.name}: there is no firmware parameter {name}: a simulated vehicle has no "
-                "firmware; expected a virtual or real one, or --sim"
-            )
+        if self._parameters is not None:
+            return self._parameters[name]
         path = f"/{self.name}/{name.replace('.', '/')}"
         try:
-            value: float = self._connection.handle.get_param(path, FINITE)
+            value: float = self._connection.handle.get_param(path, FirmwareNumber())
         except ParameterError:
             raise ValueError(
                 f"{self.name}: the firmware has no parameter {name}, as the driver has not set "
@@ -207,10 +227,9 @@ class RosVehicleBackend(VehicleBackend):
         self, others: Sequence[VehicleBackend], settings: AvoidanceSettings
     ) -> None:
         if not self._vehicle.uses_driver:
-            _log.warning(
-                "%s: enableCollisionAvoidance: the fleet keeps simulated vehicles apart by their "
-                "buffers; the ellipsoid has no effect",
-                self.name,
+            self._connection.handle.warn(
+                f"{self.name}: enableCollisionAvoidance has no effect: the fleet keeps vehicles "
+                "that its controllers fly apart, by the buffers of the fleet file"
             )
             return
         self.set_parameters({**avoidance_parameters(settings), "colAv.enable": 1})
@@ -224,38 +243,7 @@ class RosVehicleBackend(VehicleBackend):
 
     @override
     def state(self) -> VehicleState:
-        pose = self._wait_for(lambda: True)
-        previous, self._last_pose = self._last_pose, pose
-        if previous is None or not 0.0 < pose.time - previous.time < _VELOCITY_SPAN:
-            if previous is None or pose.time != previous.time:
-                previous = pose
-                pose = self._wait_for(lambda: self._time() > previous.time)
-                self._last_pose = pose
-        if previous is not pose and pose.time > previous.time:
-            span = pose.time - previous.time
-            change = zip(pose.position, previous.position, strict=True)
-            vx, vy, vz = ((after - before) / span for after, before in change)
-            self._velocity = vx, vy, vz
-        rpy = rpy_from_quaternion(*pose.rotation)
-        return VehicleState(pose.position, self._velocity, _UNKNOWN, rpy)
-
-    def _time(self):
-        pose = self._vehicle.pose()
-        return -math.inf if pose is None else pose.time
-
-    def _wait_for(self, condition: Callable[[], bool]) -> Pose:
-        clock = self._connection.fleet.clock
-        if self._vehicle.pose() is None or not condition():
-            clock.wait_until(
-                lambda: self._vehicle.pose() is not None and condition(),
-                clock.time() + _STATE_TIMEOUT,
-            )
-        pose = self._vehicle.pose()
-        if pose is None:
-            raise TimeoutError(
-                f"{self.name}: no position for {_STATE_TIMEOUT:g} s; does motion capture track it?"
-            )
-        return pose
+        return self._states.state()
 
     @override
     def status(self) -> dict[str, Any]:

@@ -3,9 +3,9 @@
 import functools
 import logging
 from collections.abc import Mapping
+from typing import Protocol
 
 from crazyflie_model.angles import Triple
-from crazyflie_virtual.firmware.planner import Planner
 
 _log = logging.getLogger(__name__)
 
@@ -13,6 +13,12 @@ _COLOR = ("ring.solidRed", "ring.solidGreen", "ring.solidBlue")
 
 _DEFAULT_COLOR = (0.5, 0.5, 1.0)
 """Crazyswarm's, in pictures."""
+
+
+class HasGroups(Protocol):
+    """Has a mask of groups."""
+
+    groups: int
 
 
 class SimulatedParameters:
@@ -24,11 +30,11 @@ class SimulatedParameters:
     ----------
     name : str
         Of the vehicle.
-    planner : Planner
-        Has the groups.
+    planner : Planner or other object
+        Has the ``groups``.
     """
 
-    def __init__(self, name: str, planner: Planner):
+    def __init__(self, name: str, planner: HasGroups):
         self._name = name
         self._planner = planner
         self._values: dict[str, float] = {}

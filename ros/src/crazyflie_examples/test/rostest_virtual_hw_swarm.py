@@ -1,4 +1,7 @@
-"""Two virtual vehicles take off, go and land together, over the radio's protocol."""
+"""Virtual vehicles take off, go and land together, over the radio's protocol.
+
+Motion capture knows one of them as a rigid body and two by one marker each.
+"""
 
 import math
 
@@ -12,7 +15,7 @@ from crazyflie_driver.srv import GoTo
 from crazyflie_msgs.msg import PositionVelocityYawStateStamped
 from crazyflie_utils.testing import peer
 
-STARTS = {"cf1": (0.0, -0.5, 0.0), "cf2": (0.0, 0.5, 0.0)}
+STARTS = {"cf1": (0.0, -0.5, 0.0), "cf2": (0.0, 0.5, 0.0), "cf3": (0.0, 1.0, 0.0)}
 HOVER = 0.5
 TOLERANCE = 0.1
 

@@ -72,6 +72,17 @@ def test_frame(version):
         assert frame.suffix.stamp_transmit == 1_700_000_000
 
 
+def test_unlabelled_markers(version):
+    places = [(1.0, 2.0, 3.0), (-0.5, 0.25, 0.0)]
+    message = Encoder(version).frame(77, BODIES, 1.5, 1.6, 1.7, places)
+    frame, rest = read(DataFrame, message, natnet.FRAME, version)
+    assert rest == (12 if version == "4.1" else 4)
+    assert list(frame.unlabeled_marker_pos) == places
+    assert [marker.pos for marker in frame.labeled_markers] == places
+    assert all(marker.unlabeled and not marker.occluded for marker in frame.labeled_markers)
+    assert frame.suffix.timestamp == 1.5
+
+
 @pytest.mark.parametrize(
     ("version", "form", "stamps"),
     [
@@ -159,3 +170,25 @@ def test_noise_has_its_deviations():
     np.testing.assert_allclose(np.std(positions, axis=0), 0.002, rtol=0.1)
     np.testing.assert_allclose(np.std(angles, axis=0), 0.01, rtol=0.1)
     assert all(math.isclose(math.hypot(*b.quaternion), 1.0) for b in scene.bodies(19.99))
+
+
+def test_vehicles_with_one_marker_are_no_rigid_bodies():
+    scene = Scene(MocapSwitches(invalid="3"), single_markers="2, 3")
+    for number in (1, 2, 3):
+        scene.observe(observation(10.0, number, position=(float(number), 0.0, 1.0)))
+    assert [body.body_id for body in scene.bodies(10.0)] == [1]
+    assert scene.markers(10.0) == [(2.0, 0.0, 1.0)]
+
+
+def test_reflections_and_occlusions():
+    scene = Scene(MocapSwitches(ghosts=0.5, occlusions=1.0), single_markers="all")
+    shown = []
+    for k in range(2400):
+        scene.observe(observation(k / 120.0))
+        shown.append(scene.markers(k / 120.0))
+    place = shown[0][0] if len(shown[0]) == 1 else None
+    ghosts = sum(point != place for points in shown for point in points)
+    hidden = sum(place not in points for points in shown)
+    assert ghosts == pytest.approx(1200, rel=0.15)
+    # Once a second, for 0.15 s in the mean.
+    assert 0.05 < hidden / len(shown) < 0.25

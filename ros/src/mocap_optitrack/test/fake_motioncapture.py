@@ -13,11 +13,13 @@ SCRIPTS = {
     "127.0.0.1": [(1.0, 5.0), (2.0, 5.0), (3.0, 6.0)],
     "127.0.0.2": [(1.0, 5.0), (1.0, 5.0), (1.0, 5.0)],
     "127.0.0.6": [(float(number), 5.0) for number in range(20000)],
+    "127.0.0.7": [(1.0, 5.0), (1.0, 5.0), (2.0, 5.0)],
     "127.0.0.5": [(1.0, 5.0), (float("nan"), 6.0)],
 }
 
 REFUSING = "127.0.0.3"
 HANGING = "127.0.0.4"
+WITH_POINTS = "127.0.0.7"
 
 
 def connect(system, config):
@@ -28,7 +30,7 @@ def connect(system, config):
         raise RuntimeError(f"{system} is not at home")
     if host == HANGING:
         hang()
-    return _Connection(SCRIPTS[host])
+    return (_ConnectionWithPoints if host == WITH_POINTS else _Connection)(SCRIPTS[host])
 
 
 def hang():
@@ -54,3 +56,11 @@ class _Connection:
             )
             for name, x in zip(names, self._script.pop(0), strict=True)
         }
+
+
+class _ConnectionWithPoints(_Connection):
+    """Of a version that tells unlabelled markers, one beside cf1."""
+
+    @property
+    def pointCloud(self):  # noqa: N802
+        return [[self.rigidBodies["cf1"].position[0], 0.5, 1.0]]

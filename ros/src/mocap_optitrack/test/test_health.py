@@ -2,9 +2,9 @@
 
 import pytest
 
+from mocap_optitrack.bodies import RigidBodyDictionary
 from mocap_optitrack.frames import Body
 from mocap_optitrack.health import ERROR, OK, WARN, Event, Health
-from mocap_optitrack.parameters import RigidBodyDictionary
 
 BODIES = RigidBodyDictionary()({"1": {"pose": "one"}, "cf7": {"pose": "seven"}}).bodies
 ONE, SEVEN = BODIES

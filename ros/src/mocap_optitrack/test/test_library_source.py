@@ -26,9 +26,9 @@ def _fake_package(tmp_path, monkeypatch):
 
 
 @contextlib.contextmanager
-def connection(host, system="vicon"):
+def connection(host, system="vicon", **options):
     """Return an open connection."""
-    source = LibrarySource(system, host, time.monotonic)
+    source = LibrarySource(system, host, time.monotonic, **options)
     try:
         source.open()
         yield source
@@ -157,3 +157,17 @@ def test_the_real_package_has_these_systems():
     with pytest.raises(SourceError, match=text), connection("127.0.0.1", "qualisys"):
         pass
     assert set(module.SYSTEMS) == {"vicon", "qualisys", "vrpn"}
+
+
+@pytest.mark.usefixtures("_fake_package")
+def test_unlabelled_markers_are_told_when_they_are_new():
+    with connection("127.0.0.7", needs_points=True) as source:
+        received, _ = frames(source)
+    assert [frame.points for frame in received] == [((1.0, 0.5, 1.0),), ((2.0, 0.5, 1.0),)]
+
+
+@pytest.mark.usefixtures("_fake_package")
+def test_a_package_without_unlabelled_markers_is_refused_where_they_are_needed():
+    with pytest.raises(SourceError, match="tells no unlabelled markers of vicon"):
+        with connection("127.0.0.1", needs_points=True):
+            pass

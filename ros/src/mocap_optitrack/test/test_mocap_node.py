@@ -295,4 +295,4 @@ def test_bad_parameters_are_named(changes, name, reason):
 
 
 def test_the_bodies_are_required():
-    assert "parameter /mocap_node/rigid_bodies is not set" in refusal({})
+    assert "parameter rigid_bodies is not set; expected it, or single_markers" in refusal({})

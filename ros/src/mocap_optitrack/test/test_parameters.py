@@ -2,13 +2,8 @@
 
 import pytest
 
-from mocap_optitrack.parameters import (
-    Address,
-    RigidBody,
-    RigidBodyDictionary,
-    RigidBodyParameters,
-    StreamVersion,
-)
+from mocap_optitrack.bodies import RigidBody, RigidBodyDictionary, RigidBodyParameters
+from mocap_optitrack.parameters import Address, StreamVersion
 
 ROBOT = {
     "pose": "Robot_1/pose",
@@ -44,7 +39,7 @@ def test_a_number_without_quotes_is_a_number_too():
 
 def test_entries_without_a_meaning_are_named():
     value = {"1": {**ROBOT, "odom": "Robot_1/Odom", "tf": "tf"}}
-    assert RigidBodyDictionary()(value).unknown == ["1/odom", "1/tf"]
+    assert RigidBodyDictionary()(value).unknown == ["rigid_bodies/1/odom", "rigid_bodies/1/tf"]
 
 
 def test_all_that_is_wrong_is_named_at_once():

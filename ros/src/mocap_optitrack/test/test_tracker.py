@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import pytest
 
+from mocap_optitrack.bodies import RigidBodyDictionary
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.health import Health
-from mocap_optitrack.parameters import RigidBodyDictionary
 from mocap_optitrack.tracker import Tracker
 
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)

@@ -82,10 +82,14 @@ class FleetConnectNode(Node):
 
     def _on_added(self, vehicle, done):
         error = done.exception()
-        if error is not None or not vehicle.firmware_params:
+        params = dict(vehicle.firmware_params)
+        if vehicle.settings.has_single_marker:
+            # Only the Kalman filter takes external positions, and finds the yaw by them.
+            params.setdefault("stabilizer.estimator", 2)
+        if error is not None or not params:
             self._finish(vehicle, error)
             return
-        values = {name.replace(".", "/"): x for name, x in vehicle.firmware_params.items()}
+        values = {name.replace(".", "/"): x for name, x in params.items()}
         writes = [
             self._handle.set_param_later(f"/{vehicle.name}/{name}", value)
             for name, value in values.items()

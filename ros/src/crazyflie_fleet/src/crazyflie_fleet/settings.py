@@ -22,8 +22,11 @@ from crazyflie_utils.text_input import number_from_text
 WITHOUT_EFFECT = "crazyswarm2's; has no effect here"
 """Help of settings that are read, and of which a remark is made."""
 
-SINGLE_MARKER = "single_marker"
-"""Tracking of a vehicle by one reflecting marker."""
+VENDOR, SINGLE_MARKER = "vendor", "single_marker"
+"""How motion capture knows a vehicle: its system does, or by the only marker of the vehicle."""
+
+_SINGLE_MARKERS = ("default_single_marker", SINGLE_MARKER)
+"""Marker configurations with one marker."""
 
 LOCAL = "local"
 """Default machine of vehicles."""
@@ -168,11 +171,35 @@ class Settings(Parameters):
     mocap_frame: str | None = parameter(
         FRAME, "motion capture's frame; by default the vehicle's name", None, "motion_capture/frame"
     )
-    mocap_tracking: str = parameter(TEXT, WITHOUT_EFFECT, "vendor", "motion_capture/tracking")
-    mocap_marker: str = parameter(TEXT, WITHOUT_EFFECT, "default", "motion_capture/marker")
-    mocap_dynamics: str = parameter(TEXT, WITHOUT_EFFECT, "default", "motion_capture/dynamics")
+    mocap_tracking: str = parameter(
+        Text((VENDOR, SINGLE_MARKER, "librigidbodytracker")),
+        "on hardware: `vendor` is a rigid body of motion capture; `single_marker` one marker that "
+        "is tracked by fleet_mocap_node, and so is `librigidbodytracker` with the marker "
+        "`default_single_marker`, which is else taken as `vendor`",
+        VENDOR,
+        "motion_capture/tracking",
+    )
+    mocap_marker: str = parameter(
+        TEXT,
+        "the arrangement of markers; see `motion_capture/tracking`",
+        "default",
+        "motion_capture/marker",
+    )
+    mocap_dynamics: str = parameter(
+        TEXT,
+        "a single marker's limits of velocity; all are those of crazyswarm2's `default`",
+        "default",
+        "motion_capture/dynamics",
+    )
     big_quad: bool = parameter(BOOLEAN, WITHOUT_EFFECT, False)
     reference_frame: str = parameter(TEXT, WITHOUT_EFFECT, "world")
+
+    @property
+    def has_single_marker(self) -> bool:
+        """Whether motion capture knows the vehicle by its only marker."""
+        if self.mocap_tracking == "librigidbodytracker":
+            return self.mocap_marker in _SINGLE_MARKERS
+        return self.mocap_tracking == SINGLE_MARKER
 
 
 class PartialSettings(Settings):

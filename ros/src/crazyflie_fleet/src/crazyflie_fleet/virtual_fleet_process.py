@@ -1,6 +1,7 @@
 """A process of virtual vehicles, and of a motion capture system that sees them."""
 
 from crazyflie_fleet.fleet_parameters import FleetParameters
+from crazyflie_fleet.mocap_process import bodies
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import Integer, Number
 from crazyflie_virtual.mocap.mocap_node import VirtualMocapNode
@@ -35,8 +36,9 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     if not config.virtual_port:
         raise ParameterError(f"parameter {handle.name}/fleet/virtual_port is 0; expected a port")
     nodes: dict[str, Node] = {}
-    bodies = {}
-    for number, vehicle in enumerate(config.fleet().vehicles):
+    fleet = config.fleet()
+    single_markers = []
+    for number, vehicle in enumerate(fleet.vehicles):
         x, y, z = vehicle.position
         if z != 0.0:
             handle.warn(f"{vehicle.name} starts on the ground, and not at a height of {z:g} m")
@@ -57,20 +59,19 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
             },
         )
         nodes[name] = VirtualCrazyflieNode()
-        bodies[vehicle.name] = {
-            "parent_frame_id": config.fixed_frame,
-            "child_frame_id": vehicle.mocap_frame,
-        }
+        if vehicle.settings.has_single_marker:
+            single_markers.append(str(number + 1))
     ports = {"command_port": config.command_port, "data_port": config.data_port}
     noise = {"position": config.position_noise, "attitude": config.attitude_noise}
     own = {**ports, "observer": {"port": config.observer_port}, "noise": noise}
-    handle.set_param(f"{handle.name}/mocap", own)
+    seen_as = {"single_markers": ",".join(single_markers)}
+    handle.set_param(f"{handle.name}/mocap", {**own, **seen_as})
     nodes[f"{handle.name}/mocap"] = VirtualMocapNode()
     local = {"server_address": "127.0.0.1", "local_address": "127.0.0.1"}
     client = {
         "backend": "natnet",
         "up_axis": "z",
-        "rigid_bodies": bodies,
+        **bodies(fleet, config.fixed_frame),
         "optitrack_config": {**ports, **local},
     }
     handle.set_param("/mocap_node", client)

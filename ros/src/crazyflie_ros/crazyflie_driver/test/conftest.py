@@ -33,6 +33,7 @@ LOG = {
     "stateEstimate.x": ("f", 1.5),
     "stateEstimate.y": ("f", -2.5),
     "stateEstimate.z": ("f", 0.75),
+    "stateEstimate.yaw": ("f", 90.0),
     # w is the largest, x has the value (511 / 511) / sqrt(2): 90 degrees about x.
     "stateEstimateZ.quat": ("I", 3 << 30 | 511 << 20),
     "motor.m1": ("H", 4321),

@@ -44,6 +44,7 @@ def test_standard_topics_are_those_of_the_cpp_driver(server, logging):
     assert published(server, "/cf1/pressure")[0].data == 1013.25
     assert published(server, "/cf1/battery")[0].data == 3.75
     assert published(server, "/cf1/rssi")[0].data == 47.0
+    assert published(server, "/cf1/heading")[0].data == pytest.approx(1.5707963)
 
 
 def test_standard_topics_need_four_log_blocks(logging):
@@ -118,6 +119,7 @@ def test_without_logging_there_are_only_status_and_packets(server, log_block):
         "/diagnostics",
         "/flights",
         "/cf1/connected",
+        "/cf1/heading",
         "/cf1/rssi",
         "/cf1/status",
         "/cf1/vehicle_status",

@@ -35,7 +35,7 @@ class Body(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """All rigid bodies at one moment.
+    """All rigid bodies, and markers of none, at one moment.
 
     Attributes
     ----------
@@ -49,6 +49,8 @@ class Frame(NamedTuple):
     bodies : tuple of Body
     waited : float
         How long it had been on this machine by then, s; for streams without `exposure`.
+    points : tuple of Vector3
+        Markers that the system has not assigned to a body, m, in the server's coordinates.
     """
 
     exposure: float | None
@@ -56,3 +58,4 @@ class Frame(NamedTuple):
     arrival: float
     bodies: tuple[Body, ...]
     waited: float = 0.0
+    points: tuple[Vector3, ...] = ()

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
+from mocap_optitrack.bodies import Body as ConfiguredBody
 from mocap_optitrack.frames import Body
-from mocap_optitrack.parameters import RigidBody
 
 OK, WARN, ERROR = range(3)
 """Levels, as in diagnostic_msgs/DiagnosticStatus."""
@@ -58,7 +58,7 @@ class Health:
 
     Parameters
     ----------
-    bodies : sequence of RigidBody
+    bodies : sequence of bodies.Body
     stale_after : float
         Gaps longer than this are a fault, s.
     now : float
@@ -72,9 +72,9 @@ class Health:
 
     _longest_gap: float
 
-    def __init__(self, bodies: Sequence[RigidBody], stale_after: float, now: float):
+    def __init__(self, bodies: Sequence[ConfiguredBody], stale_after: float, now: float):
         self._bodies = {body.key: _BodyCount() for body in bodies}
-        self._labels = {body.key: body.label for body in bodies}
+        self._labels = {body.key: body.component for body in bodies}
         self.stale_after = stale_after
         self._server: str | None = None
         self._failure = "not connected so far"
@@ -98,9 +98,10 @@ class Health:
         self._silence = "no frames"
         self._latencies.append(latency)
 
-    def body(self, body: RigidBody, now: float, is_tracked: bool) -> None:
-        """Count a configured body in a good frame."""
+    def body(self, body: ConfiguredBody, now: float, is_tracked: bool, why: str = "") -> None:
+        """Count a configured body in a good frame; ``why`` it is not tracked, if that is known."""
         count = self._bodies[body.key]
+        count.why = why
         count.frames += 1
         if is_tracked:
             count.tracked += 1
@@ -195,11 +196,13 @@ class Health:
         if count.last is not None:
             values["last seen (s ago)"] = f"{now - count.last:.2f}"
         level, message = self._body_assessment(count, now)
-        return Status(f"rigid body {self._labels[key]}", level, message, values)
+        return Status(self._labels[key], level, message, values)
 
     def _body_assessment(self, count, now):
         if self._last_frame is None or now - self._last_frame > self.stale_after:
             return ERROR, "no frames"
+        if count.why and (count.last is None or now - count.last > self.stale_after):
+            return ERROR, count.why
         if count.last is None or count.last < self._stream_begin:
             is_early = now - self._stream_begin < _GRACE
             level = WARN if is_early else ERROR
@@ -222,6 +225,7 @@ class Health:
 class _BodyCount:
     def __init__(self) -> None:
         self.last: float | None = None
+        self.why = ""
         self.begin_period()
 
     def begin_period(self):

@@ -44,9 +44,15 @@ class LibrarySource(Source):
         Name or address of the server; for VRPN also with a port, ``vicon:3884``.
     clock : callable
         Returns the local time, s.
+    needs_points : bool
+        Whether a package that tells no unlabelled markers is of no use.
     """
 
-    def __init__(self, system: str, host: str, clock: Callable[[], float]):
+    def __init__(
+        self, system: str, host: str, clock: Callable[[], float], needs_points: bool = False
+    ):
+        self._needs_points = needs_points
+        self._points: list[list[float]] = []
         self._system = system
         self._host = host
         self._clock = clock
@@ -71,7 +77,11 @@ class LibrarySource(Source):
         line = self._read_line(library_worker.CONNECT_LIMIT + _MARGIN)
         if line is None:
             raise SourceError(self._no_answer())
-        self._parse(line)
+        if not self._parse(line) and self._needs_points:
+            raise SourceError(
+                "the motioncapture package that is installed tells no unlabelled markers of "
+                f"{self._system}, which single_markers need; use a version with pointCloud"
+            )
         return f"{self._system} at {self._host}, over the motioncapture package"
 
     @override
@@ -79,15 +89,19 @@ class LibrarySource(Source):
         line = self._read_line(limit)
         if line is None:
             return None
-        moment, entries = self._parse(line)
+        moment, entries, points = self._parse(line)
         waited, arrival = time.monotonic() - moment, self._clock()
         time_of_arrival = self._times.update(moment)
         bodies = [self._body(*entry) for entry in entries]
-        if time_of_arrival is None or not any(body.is_tracked for body in bodies):
+        are_new = points != self._points
+        self._points = points
+        if time_of_arrival is None or not (are_new or any(body.is_tracked for body in bodies)):
             # Some systems give frames whether they know anything new or not.
             return None
         waited += moment - time_of_arrival
-        return Frame(None, None, arrival, tuple(bodies), waited)
+        # What is repeated is not measured.
+        new = tuple((x, y, z) for x, y, z in points) if are_new else ()
+        return Frame(None, None, arrival, tuple(bodies), waited, new)
 
     @property
     @override

@@ -1,10 +1,11 @@
 """A process of its own for the motioncapture package.
 
 ``python -m mocap_optitrack.library_worker TYPE HOST`` writes JSON to its standard
-output, one value a line: first null, when it is connected, then for every frame
-[moment, bodies], where moment is when the package returned it, s of time.monotonic(), and
-bodies a list of [name, x, y, z, qx, qy, qz, qw]; m and z up, as the system has them. When
-the package fails it writes {"error": text} and ends. Frames for which the pipe has no room
+output, one value a line: first, when it is connected, whether the package tells unlabelled
+markers (not all versions do), then for every frame [moment, bodies, points], where moment is
+when the package returned it, s of time.monotonic(), bodies a list of [name, x, y, z, qx, qy, qz,
+qw] and points one of [x, y, z]; m and z up, as the system has them. When the package fails it
+writes {"error": text} and ends. Frames for which the pipe has no room
 are dropped: waiting for the reader would let frames grow old before they have a moment.
 
 Without a server the package may wait for ever, in C++ and with Python's interpreter
@@ -76,13 +77,14 @@ def _stream(system, host, lines):
     import motioncapture
 
     connection = motioncapture.connect(system, {"hostname": host})
-    lines.write(None)
+    lines.write(hasattr(type(connection), "pointCloud"))
     while True:
         signal.setitimer(signal.ITIMER_REAL, FRAME_LIMIT)
         connection.waitForNextFrame()
         moment = time.monotonic()
         bodies = connection.rigidBodies.items()
-        lines.write([moment, [[name, *pose(body)] for name, body in bodies]])
+        points = [[float(x) for x in point] for point in getattr(connection, "pointCloud", ())]
+        lines.write([moment, [[name, *pose(body)] for name, body in bodies], points])
 
 
 def pose(body: Any) -> list[float]:

@@ -1,11 +1,13 @@
 """ROS interface of a motion capture system."""
 
+import math
 from functools import partial
 
 import genpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import (
     Point,
+    PointStamped,
     Pose,
     Pose2D,
     PoseStamped,
@@ -14,7 +16,8 @@ from geometry_msgs.msg import (
     TransformStamped,
     Vector3,
 )
-from std_msgs.msg import Header
+from std_msgs.msg import Float32, Header
+from std_srvs.srv import Trigger, TriggerResponse
 from typing_extensions import override
 
 from crazyflie_utils import Node, NodeHandle
@@ -33,6 +36,10 @@ _REPORT_PERIOD = 1.0
 _REPEAT = 5.0
 """The same warning comes at most this often, s."""
 
+MAX_HEADING_AGE = 2.0
+"""How long a heading counts, s: a gyroscope drifts by some degrees a minute, and the driver's
+come every 0.1 s."""
+
 
 class MocapNode(Node):
     """Publish where the rigid bodies of a motion capture system are, as topics and on tf."""
@@ -42,17 +49,24 @@ class MocapNode(Node):
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         self._parameters = handle.load(MocapParameters, self._reconfigure)
-        for name in self._parameters.rigid_bodies.unknown:
-            handle.warn(f"parameter {handle.resolve('~rigid_bodies')}/{name} means nothing here")
+        for name in self._parameters.unknown:
+            handle.warn(f"parameter {handle.name}/{name} means nothing here")
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         parameters = self._parameters
-        bodies, stale_after = parameters.rigid_bodies.bodies, parameters.stale_after
+        bodies, stale_after = parameters.bodies, parameters.stale_after
         self._server = ""
         self._stamp = genpy.Time()
         self._health = Health(bodies, stale_after, handle.time())
-        self._tracker = Tracker(bodies, parameters.up_axis, stale_after, self._health)
+        self._tracker = Tracker(
+            bodies,
+            parameters.up_axis,
+            stale_after,
+            self._health,
+            parameters.hold_time,
+            handle.warn,
+        )
         self._poses = {
             body.key: handle.publisher(_private(body.parameters.pose), PoseStamped)
             for body in bodies
@@ -63,6 +77,19 @@ class MocapNode(Node):
             for body in bodies
             if body.parameters.pose2d is not None
         }
+        markers = parameters.markers
+        self._positions = {
+            marker.key: handle.publisher(_private(marker.parameters.position), PointStamped)
+            for marker in markers
+            if marker.parameters.position is not None
+        }
+        self._headings: dict[str, tuple[float, float]] = {}
+        for marker in markers:
+            if marker.parameters.heading is not None:
+                on_heading = partial(self._on_heading, marker.key)
+                handle.subscribe(_private(marker.parameters.heading), Float32, on_heading)
+        if markers:
+            handle.advertise_service("~reset_lost", Trigger, self._reset_lost)
         if any(body.parameters.child_frame_id for body in bodies):
             self._broadcast = handle.broadcast_transforms()
         self._diagnostics = handle.publisher("/diagnostics", DiagnosticArray)
@@ -124,22 +151,56 @@ class MocapNode(Node):
         for pose in poses:
             body = pose.body
             header = Header(stamp=stamp, frame_id=body.parameters.parent_frame_id)
+            if body.key in self._positions:
+                point = PointStamped(header, Point(*pose.position))
+                self._positions[body.key].publish(point)
+            quaternion = pose.quaternion or self._heading_quaternion(body)
+            if quaternion is None:
+                continue
+            oriented = pose._replace(quaternion=quaternion)
             if body.key in self._poses:
-                self._poses[body.key].publish(_pose(header, pose))
+                self._poses[body.key].publish(_pose(header, oriented))
             if body.key in self._poses2d:
                 x, y, _ = pose.position
-                self._poses2d[body.key].publish(Pose2D(x, y, heading(pose.quaternion)))
+                self._poses2d[body.key].publish(Pose2D(x, y, heading(quaternion)))
             if body.parameters.child_frame_id is not None:
-                transforms.append(_transform(header, pose))
+                transforms.append(_transform(header, oriented))
         if transforms:
             self._broadcast(transforms)
+
+    def _on_heading(self, key, message):
+        if math.isfinite(message.data):
+            self._headings[key] = (self._handle.time(), message.data)
+
+    def _heading_quaternion(self, body):
+        """Return the attitude of a vehicle with one marker, taken as level; None if unknown."""
+        if body.parameters.heading is None:
+            return None
+        now = self._handle.time()
+        time, yaw = self._headings.get(body.key, (-math.inf, 0.0))
+        if now - time > MAX_HEADING_AGE:
+            self._handle.warn(
+                f"{body.key}: no heading on {body.parameters.heading} for {MAX_HEADING_AGE:g} s: "
+                "its pose is not published; is the driver connected to it?",
+                throttle=_REPEAT,
+                key=f"heading {body.key}",
+            )
+            return None
+        return 0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)
+
+    def _reset_lost(self, _):
+        names = ", ".join(self._tracker.reset_lost())
+        text = f"expected at their start points: {names}" if names else "no vehicle is lost"
+        self._handle.info(text)
+        return TriggerResponse(True, text)
 
     def _make_source(self, handle):
         parameters = self._parameters
         if parameters.backend != NATNET:
             hostname = parameters.library.hostname
             assert hostname is not None, "MocapParameters.complaints sees to it"
-            return LibrarySource(parameters.backend, hostname, handle.time)
+            needs_points = bool(parameters.markers)
+            return LibrarySource(parameters.backend, hostname, handle.time, needs_points)
         return NatNetSource(
             parameters.natnet,
             handle.time,

@@ -147,7 +147,16 @@ def read_frame(
         Body(body.id_num, names.get(body.id_num), body.pos, body.rot, _is_tracked(body))
         for body in frame.rigid_bodies
     )
-    return Frame(exposure, sent, arrival, bodies)
+    return Frame(exposure, sent, arrival, bodies, points=_unlabelled(frame))
+
+
+def _unlabelled(frame):
+    # Motive sends them twice: without numbers, and flagged among the labelled ones. Others send
+    # only the second.
+    if frame.unlabeled_marker_pos:
+        return frame.unlabeled_marker_pos
+    labelled = frame.labeled_markers or ()
+    return tuple(marker.pos for marker in labelled if marker.param and marker.unlabeled)
 
 
 def _is_tracked(body):

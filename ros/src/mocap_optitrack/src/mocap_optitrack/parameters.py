@@ -6,138 +6,30 @@ from dataclasses import dataclass
 
 from typing_extensions import override
 
-from crazyflie_utils.messages import shortened, shown
-from crazyflie_utils.parameters.declaration import ParameterError, Parameters, group, parameter
+from crazyflie_utils.parameters.declaration import Parameters, group, parameter
 from crazyflie_utils.parameters.types import (
-    FRAME,
+    DURATION,
     TEXT,
     TIME_STEP,
-    TOPIC,
     Integer,
     ParameterType,
     Text,
 )
 from mocap_optitrack.axes import UP_AXES
+from mocap_optitrack.bodies import (
+    Bodies,
+    Body,
+    RigidBodyDictionary,
+    SingleMarker,
+    SingleMarkerDictionary,
+    shared_outputs,
+)
 from mocap_optitrack.library_source import SYSTEMS
 
 NATNET = "natnet"
 """Backend of OptiTrack; the others are `library_source.SYSTEMS`."""
 
 _PORT = Integer(1, 65535)
-
-
-class RigidBodyParameters(Parameters):
-    """An entry of ``rigid_bodies``: how a rigid body is published."""
-
-    pose: str | None = parameter(
-        TOPIC, "topic; a relative name is below the node's: `/mocap_node/Robot_1/pose`", None
-    )
-    pose2d: str | None = parameter(TOPIC, "topic, likewise", None)
-    child_frame_id: str | None = parameter(FRAME, "tf frame of the body", None)
-    parent_frame_id: str = parameter(FRAME, "tf frame of the coordinates", "world")
-    name: str | None = parameter(
-        TEXT,
-        "name on the server, if it is not the key; without it a number is a streaming ID",
-        None,
-    )
-
-
-@dataclass(frozen=True)
-class RigidBody:
-    """A rigid body that is to be published.
-
-    Attributes
-    ----------
-    key : str
-        The body's entry in ``rigid_bodies``: its number in the stream, or its name.
-    parameters : RigidBodyParameters
-        Its topics and frames.
-    """
-
-    key: str
-    parameters: RigidBodyParameters
-
-    @property
-    def name(self) -> str | None:
-        """Name on the server; None for a body that is found by its number."""
-        if self.parameters.name is None and not self.key.isdecimal():
-            return self.key
-        return self.parameters.name
-
-    @property
-    def label(self) -> str:
-        """What the body is called in messages."""
-        return self.key if self.name in (None, self.key) else f"{self.key} ({self.name})"
-
-
-@dataclass(frozen=True)
-class RigidBodies:
-    """The rigid bodies that are to be published.
-
-    Attributes
-    ----------
-    bodies : list of RigidBody
-        At least one.
-    unknown : list of str
-        Entries that have no meaning, such as "1/odom".
-    """
-
-    bodies: list[RigidBody]
-    unknown: list[str]
-
-
-class RigidBodyDictionary(ParameterType):
-    """The dictionary ``rigid_bodies``; a refusal names all that is wrong with it."""
-
-    label = "dictionary"
-
-    @override
-    def __call__(self, value: object) -> RigidBodies:
-        if not isinstance(value, dict) or not value:
-            raise ValueError
-        known = {declaration.name for declaration in RigidBodyParameters.declarations()}
-        bodies, unknown, complaints = [], [], []
-        for key, entry in value.items():
-            label = shortened(str(key))
-            if not isinstance(entry, dict):
-                complaints.append(f"{label} is {shown(entry)}; expected a dictionary")
-                continue
-            unknown += [f"{label}/{shortened(str(name))}" for name in entry if name not in known]
-            values = {name: entry[name] for name in entry if name in known}
-            try:
-                parameters = RigidBodyParameters.from_mapping(values, f"{label}/")
-            except ParameterError as error:
-                complaints += error.complaints
-                continue
-            bodies.append(RigidBody(str(key), parameters))
-            if not (parameters.pose or parameters.pose2d or parameters.child_frame_id):
-                complaints.append(f"{label} has neither pose nor pose2d nor child_frame_id")
-        complaints += _shared("topic", [(b, t) for b in bodies for t in _topics(b)])
-        complaints += _shared("child_frame_id", [(b, b.parameters.child_frame_id) for b in bodies])
-        complaints += _shared("name", [(b, b.name) for b in bodies])
-        if complaints:
-            raise ValueError("; ".join(complaints))
-        return RigidBodies(bodies, unknown)
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return (
-            "a dictionary of number or name of a body: {pose, pose2d, child_frame_id, "
-            "parent_frame_id}"
-        )
-
-
-def _topics(body):
-    return body.parameters.pose, body.parameters.pose2d
-
-
-def _shared(what, owned):
-    owners: dict[str, str] = {}
-    for body, value in owned:
-        if value in owners:
-            yield f"{owners[value]} and {body.key} share {what} {shown(value)}"
-        elif value is not None:
-            owners[value] = body.key
 
 
 @dataclass(frozen=True)
@@ -235,7 +127,22 @@ class LibraryParameters(Parameters):
 class MocapParameters(Parameters):
     """Parameters of `MocapNode`."""
 
-    rigid_bodies: RigidBodies = parameter(RigidBodyDictionary(), "the bodies to publish, see below")
+    rigid_bodies: Bodies | None = parameter(
+        RigidBodyDictionary(),
+        "the bodies to publish, see below; required without `single_markers`",
+        None,
+    )
+    single_markers: Bodies | None = parameter(
+        SingleMarkerDictionary(),
+        "the vehicles with one marker each, see [Single markers](#single-markers)",
+        None,
+    )
+    hold_time: float = parameter(
+        DURATION,
+        "a vehicle with one marker that is unseen in flight for longer is lost until it rests on "
+        "the ground",
+        0.5,
+    )
     backend: str = parameter(Text((NATNET, *SYSTEMS)), "the system", NATNET)
     up_axis: str = parameter(
         Text(UP_AXES), "the axis that points up in the system's stream, see [Frames](#frames)", "z"
@@ -249,8 +156,33 @@ class MocapParameters(Parameters):
     natnet: NatNetParameters = group(NatNetParameters, "optitrack_config")
     library: LibraryParameters = group(LibraryParameters, "motioncapture_config")
 
+    @property
+    def bodies(self) -> list[Body]:
+        """All that is published."""
+        return [body for group in self._groups for body in group.bodies]
+
+    @property
+    def markers(self) -> list[SingleMarker]:
+        """Those of `bodies` that have one marker."""
+        return [body for body in self.bodies if isinstance(body, SingleMarker)]
+
+    @property
+    def unknown(self) -> list[str]:
+        """Entries without a meaning."""
+        return [name for group in self._groups for name in group.unknown]
+
+    @property
+    def _groups(self):
+        return [group for group in (self.rigid_bodies, self.single_markers) if group is not None]
+
     @override
     def complaints(self) -> Iterator[str]:
+        if not self.bodies:
+            yield "parameter rigid_bodies is not set; expected it, or single_markers"
+        keys = [body.key for body in self.bodies]
+        for key in dict.fromkeys(key for key in keys if keys.count(key) > 1):
+            yield f"parameters rigid_bodies/{key} and single_markers/{key}; expected one of them"
+        yield from shared_outputs(self.bodies)
         if self.backend != NATNET and self.library.hostname is None:
             yield (
                 "parameter motioncapture_config/hostname is not set; expected the host name or "

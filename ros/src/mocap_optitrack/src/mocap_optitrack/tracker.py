@@ -1,14 +1,15 @@
 """From a system's frames to the poses that are published."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from mocap_optitrack.axes import normalized, to_z_up
+from mocap_optitrack.bodies import Body, SingleMarker
 from mocap_optitrack.clock_offset import ClockOffset, FrameOrder
 from mocap_optitrack.frames import Frame, Quaternion, Vector3
 from mocap_optitrack.health import Event, Health
-from mocap_optitrack.parameters import RigidBody
+from mocap_optitrack.marker_tracker import MarkerTracker
 
 _LEAD = 0.005
 """By how much a stamp may be ahead of its arrival, s: the offset of the server's clock is
@@ -20,28 +21,30 @@ _EVENTS = {
     FrameOrder.RESTART: Event.CLOCK_SET,
 }
 
+_UPRIGHT = (0.0, 0.0, 0.0, 1.0)
+
 _RESET = 1.0
 """By how much local time steps back when a simulation is reset, at least, s."""
 
 
 class BodyPose(NamedTuple):
-    """A rigid body where the cameras saw it.
+    """A body where the cameras saw it.
 
     Attributes
     ----------
-    body : RigidBody
+    body : Body
     time : float
         When, s of the local clock.
     position : Vector3
         m, z up.
-    quaternion : Quaternion
-        Of norm 1.
+    quaternion : Quaternion or None
+        Of norm 1; None for a single marker.
     """
 
-    body: RigidBody
+    body: Body
     time: float
     position: Vector3
-    quaternion: Quaternion
+    quaternion: Quaternion | None
 
 
 class Tracker:
@@ -54,13 +57,17 @@ class Tracker:
 
     Parameters
     ----------
-    bodies : sequence of RigidBody
+    bodies : sequence of Body
     up_axis : str
         Of the stream; see `axes.UP_AXES`.
     stale_after : float
         s.
     health : Health
         Counts what happens.
+    hold_time : float
+        Of a `MarkerTracker` of single markers, s.
+    log : callable
+        Likewise.
 
     Attributes
     ----------
@@ -69,8 +76,18 @@ class Tracker:
     """
 
     def __init__(
-        self, bodies: Sequence[RigidBody], up_axis: str, stale_after: float, health: Health
+        self,
+        bodies: Sequence[Body],
+        up_axis: str,
+        stale_after: float,
+        health: Health,
+        hold_time: float = 0.5,
+        log: Callable[[str], None] = lambda text: None,
     ):
+        self._markers = [body for body in bodies if isinstance(body, SingleMarker)]
+        vehicles = [marker.vehicle for marker in self._markers]
+        self._marker_tracker = MarkerTracker(vehicles, hold_time, log) if vehicles else None
+        bodies = [body for body in bodies if not isinstance(body, SingleMarker)]
         self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
         self._by_name = {body.name: body for body in bodies if body.name is not None}
         self._up_axis = up_axis
@@ -82,6 +99,10 @@ class Tracker:
     def restart(self) -> None:
         """Learn the clock of another server."""
         self._clock = ClockOffset()
+
+    def reset_lost(self) -> list[str]:
+        """Expect lost vehicles with one marker at their start points; return their keys."""
+        return self._marker_tracker.reset_lost() if self._marker_tracker else []
 
     def process(self, frame: Frame) -> list[BodyPose]:
         """Return the poses of a frame, all of one time that is later than the last frame's.
@@ -113,6 +134,21 @@ class Tracker:
             self._health.body(configured, frame.arrival, pose is not None)
             if pose is not None:
                 poses.append(BodyPose(configured, time, *pose))
+        return poses + self._marker_poses(frame, time)
+
+    def _marker_poses(self, frame, time):
+        if self._marker_tracker is None:
+            return []
+        points = [to_z_up(self._up_axis, point, _UPRIGHT)[0] for point in frame.points]
+        found = self._marker_tracker.update(time, points)
+        poses = []
+        for marker in self._markers:
+            position = found.get(marker.key)
+            why = self._marker_tracker.explain(marker.key)
+            self._health.body(marker, frame.arrival, position is not None, why)
+            if position is not None:
+                x, y, z = (a + b for a, b in zip(position, marker.parameters.offset, strict=True))
+                poses.append(BodyPose(marker, time, (x, y, z), None))
         return poses
 
     def _fault(self, time, age):

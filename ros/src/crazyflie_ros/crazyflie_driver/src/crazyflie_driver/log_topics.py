@@ -1,5 +1,6 @@
 """Log data and application packets of a vehicle, as topics."""
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -66,6 +67,7 @@ class LogTopics:
     heading: float | None = None
     supervisor: SupervisorState | None = None
     _packets: Publisher | None = None
+    _heading: Publisher = field(init=False)
     _logs_state: bool = False
     _states: int = 0
     _state_came: threading.Condition = field(default_factory=threading.Condition)
@@ -79,6 +81,7 @@ class LogTopics:
         if "packets" in parameters.topics:
             self._packets = self._publisher("packets", crtpPacket)
         known = self._crazyflie.log.variables()
+        self._heading = self._publisher("heading", Float32)
         self._start_status(known, self._publisher("rssi", Float32))
         selected = [topic for topic in telemetry.STANDARD if topic.name in parameters.topics]
         groups, missing = telemetry.packed(selected, known)
@@ -142,6 +145,8 @@ class LogTopics:
         self.height = latest.get("stateEstimate.z")
         self.vertical_speed = latest.get("stateEstimate.vz")
         self.heading = latest.get("stateEstimate.yaw")
+        if self.heading is not None:
+            self._heading.publish(Float32(math.radians(self.heading)))
         # The Crazyradio's figure is the same, and comes without the firmware's help.
         self.rssi = self._crazyflie.rssi
         if self.rssi is None:

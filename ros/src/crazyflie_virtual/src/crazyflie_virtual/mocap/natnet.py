@@ -25,6 +25,9 @@ CLOCK_FREQUENCY = 1_000_000_000
 _RIGID_BODY = 1
 _TRACKED = 1
 _NO_PARENT = -1
+_POINT_CLOUD_SOLVED, _UNLABELLED = 0x02, 0x10
+_MARKER_SIZE = 0.0095
+"""Diameter of a marker, m."""
 _HEADER = struct.Struct("<HH")
 
 
@@ -109,6 +112,7 @@ class Encoder:
         exposure: float,
         received: float,
         sent: float,
+        markers: Sequence[Triple] = (),
     ) -> bytes:
         """Return a frame.
 
@@ -120,13 +124,19 @@ class Encoder:
         exposure, received, sent : float
             Middle of the cameras' exposure, arrival of their data, dispatch of the frame; s
             of the server's clock.
+        markers : sequence of tuple
+            Markers of no rigid body, m. Motive sends them twice: as other markers, and flagged
+            as unlabelled among the labelled ones.
         """
         rigid_bodies = b"".join(self._rigid_body(body) for body in bodies)
-        # Behind the rigid bodies skeletons, assets from 4.1 on, labelled markers, force plates,
-        # and devices from 2.11 on.
+        others = b"".join(struct.pack("<3f", *marker) for marker in markers)
+        flagged = b"".join(self._unlabelled(*each) for each in enumerate(markers, 1))
+        # Marker sets, other markers, rigid bodies, skeletons, assets from 4.1 on, labelled
+        # markers, force plates, and devices from 2.11 on.
         empty = (0, b"")
-        behind = 3 + (self._parts >= (2, 11)) + (self._parts >= (4, 1))
-        sections = [empty, empty, (len(bodies), rigid_bodies), *[empty] * behind]
+        sections = [empty, (len(markers), others), (len(bodies), rigid_bodies), empty]
+        sections += [empty] * (self._parts >= (4, 1)) + [(len(markers), flagged), empty]
+        sections += [empty] * (self._parts >= (2, 11))
         payload = struct.pack("<i", number)
         for count, content in sections:
             payload += struct.pack("<i", count)
@@ -141,6 +151,12 @@ class Encoder:
             # Precision time stamp, in seconds and their fraction: zeros without PTP.
             payload += struct.pack("<II", 0, 0)
         return _message(FRAME, payload + struct.pack("<hI", 0, 0))
+
+    def _unlabelled(self, number, position):
+        flags = _POINT_CLOUD_SOLVED | _UNLABELLED
+        data = struct.pack("<i4fH", number, *position, _MARKER_SIZE, flags)
+        # The residual.
+        return data + (struct.pack("<f", 0.0) if self._parts >= (3, 0) else b"")
 
     def _rigid_body(self, body):
         data = struct.pack("<i7f", body.body_id, *body.position, *body.quaternion)

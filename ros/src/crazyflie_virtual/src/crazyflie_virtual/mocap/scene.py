@@ -9,6 +9,12 @@ from crazyflie_virtual.mocap.natnet import BodyPose
 from crazyflie_virtual.observer import Observation
 from crazyflie_virtual.quaternions import turned
 
+OCCLUSION = 0.3
+"""Longest time for which a vehicle is hidden, s."""
+
+_GHOST_MARGIN = 0.3
+"""How far from the vehicles reflections may be, m."""
+
 _STALE = 0.5
 """How long after the last observation a body counts as gone, s."""
 
@@ -25,16 +31,27 @@ class MocapSwitches:
         Numbers of bodies that are not tracked, separated by commas; or "all".
     silent : bool
         Whether frames are held back.
+    ghosts : float
+        Mean number of markers in a frame that are none: reflections, anywhere between the vehicles.
+    occlusions : float
+        How often a vehicle begins to be hidden, 1/s; each time for up to `OCCLUSION` s.
     """
 
     dropout: float = 0.0
     invalid: str = ""
     silent: bool = False
+    ghosts: float = 0.0
+    occlusions: float = 0.0
 
     def hides(self, body_id: int) -> bool:
         """Return whether a body is one of those that are not tracked."""
-        names = [part.strip() for part in self.invalid.split(",")]
-        return "all" in names or str(body_id) in names
+        return is_listed(body_id, self.invalid)
+
+
+def is_listed(body_id: int, text: str) -> bool:
+    """Return whether a body is named by a text: numbers with commas, or "all"."""
+    names = [part.strip() for part in text.split(",")]
+    return "all" in names or str(body_id) in names
 
 
 class Scene:
@@ -46,6 +63,11 @@ class Scene:
     position_noise, attitude_noise : float
         Standard deviations along and about each axis, m and rad.
     seed : int
+    single_markers : str
+        Numbers of the vehicles with one marker, separated by commas; or "all". They are no rigid
+        bodies.
+    rate : float
+        Frames per second.
     """
 
     def __init__(
@@ -54,6 +76,8 @@ class Scene:
         position_noise: float = 0.0,
         attitude_noise: float = 0.0,
         seed: int = 0,
+        single_markers: str = "",
+        rate: float = 120.0,
     ):
         self._switches = switches
         self._noise = (position_noise, attitude_noise)
@@ -62,6 +86,9 @@ class Scene:
         self._observations: dict[int, Observation] = {}
         self._cameras: dict[int, MotionCapture] = {}
         self._seen: dict[int, tuple[Triple, Quaternion]] = {}
+        self._single_markers = single_markers
+        self._hidden_until: dict[int, float] = {}
+        self._frame_period = 1.0 / rate
 
     def observe(self, observation: Observation) -> None:
         """Take in an `Observation`."""
@@ -71,11 +98,47 @@ class Scene:
         self._observations[body_id] = observation
 
     def bodies(self, time: float) -> list[BodyPose]:
-        """Return every body as it is seen at ``time`` (s), in the order of their numbers.
+        """Return every rigid body as it is seen at ``time`` (s), in the order of their numbers.
 
         A body that is not tracked has the pose it was seen at last.
         """
-        return [self._see(self._observations[i], time) for i in sorted(self._observations)]
+        return [
+            self._see(self._observations[number], time)
+            for number in sorted(self._observations)
+            if not is_listed(number, self._single_markers)
+        ]
+
+    def markers(self, time: float) -> list[Triple]:
+        """Return the markers of vehicles that have one, and reflections, in any order, m.
+
+        A marker that is not seen is not there.
+        """
+        found = [
+            self._see(self._observations[number], time)
+            for number in sorted(self._observations)
+            if is_listed(number, self._single_markers)
+        ]
+        points = [body.position for body in found if body.is_tracked]
+        if found and self._switches.ghosts:
+            ranges = [
+                (min(axis) - _GHOST_MARGIN, max(axis) + _GHOST_MARGIN)
+                for axis in zip(*(body.position for body in found), strict=True)
+            ]
+            ghosts = int(self._switches.ghosts + self._random.random())
+            points += [
+                tuple(self._random.uniform(*limits) for limits in ranges) for _ in range(ghosts)
+            ]
+        self._random.shuffle(points)
+        return points
+
+    def _is_hidden(self, body_id, time):
+        rate = self._switches.occlusions
+        if time < self._hidden_until.get(body_id, 0.0):
+            return True
+        if not rate or self._random.random() >= rate * self._frame_period:
+            return False
+        self._hidden_until[body_id] = time + self._random.uniform(0.0, OCCLUSION)
+        return True
 
     def _see(self, observation, time):
         body_id, name = observation.body_id, observation.name
@@ -83,6 +146,7 @@ class Scene:
             time - observation.time > _STALE
             or self._switches.hides(body_id)
             or self._random.random() < self._switches.dropout
+            or self._is_hidden(body_id, time)
         )
         if not lost:
             camera = self._cameras[body_id]

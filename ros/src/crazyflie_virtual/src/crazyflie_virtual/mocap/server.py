@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 from typing_extensions import override
 
+from crazyflie_model.angles import Triple
 from crazyflie_virtual.mocap import natnet
 from crazyflie_virtual.mocap.natnet import BodyPose, Encoder
 from crazyflie_virtual.mocap.scene import Scene
@@ -50,7 +51,9 @@ class MocapServer(Server):
         _check_address("multicast_address", settings.multicast_address)
         self.switches = settings.switches()
         noise = (settings.position_noise, settings.attitude_noise)
-        self._scene = Scene(self.switches, *noise, settings.seed)
+        self._scene = Scene(
+            self.switches, *noise, settings.seed, settings.single_markers, settings.rate
+        )
         self._encoder = Encoder(settings.version)
         self._commands = open_socket(settings.host, settings.command_port)
         try:
@@ -68,7 +71,7 @@ class MocapServer(Server):
         self._period = 1.0 / settings.rate
         self._begin = time.monotonic()
         self._frames = 0
-        self._pending: deque[tuple[float, float, int, list[BodyPose]]] = deque()
+        self._pending: deque[tuple[float, float, int, list[BodyPose], list[Triple]]] = deque()
 
     @property
     @override
@@ -131,13 +134,13 @@ class MocapServer(Server):
         exposure = self._begin + frame * self._period
         if self.switches.silent:
             return
-        bodies = self._scene.bodies(exposure)
-        self._pending.append((exposure + self._settings.latency, exposure, frame, bodies))
+        seen = self._scene.bodies(exposure), self._scene.markers(exposure)
+        self._pending.append((exposure + self._settings.latency, exposure, frame, *seen))
 
     def _dispatch(self, now):
         while self._pending and self._pending[0][0] <= now:
-            _, exposure, frame, bodies = self._pending.popleft()
-            message = self._encoder.frame(frame, bodies, exposure, exposure, now)
+            _, exposure, frame, bodies, markers = self._pending.popleft()
+            message = self._encoder.frame(frame, bodies, exposure, exposure, now, markers)
             for receiver in self._receivers(now):
                 send(self._commands, message, receiver)
 

@@ -3,7 +3,7 @@
 from crazyflie_utils.parameters.declaration import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, TEXT, Integer, Number, Text
 from crazyflie_virtual.mocap.natnet import VERSIONS
-from crazyflie_virtual.mocap.scene import MocapSwitches
+from crazyflie_virtual.mocap.scene import OCCLUSION, MocapSwitches
 from crazyflie_virtual.observer import DEFAULT_PORT
 
 
@@ -59,7 +59,26 @@ class MocapSettings(Parameters):
         live=True,
     )
     silent: bool = parameter(BOOLEAN, "no frames are sent", False, "fault/silent", live=True)
+    ghosts: float = parameter(
+        Number(minimum=0.0, maximum=100.0),
+        "mean number of reflections in a frame, markers of no vehicle",
+        0.0,
+        "fault/ghosts",
+        live=True,
+    )
+    occlusions: float = parameter(
+        Number("1/s", minimum=0.0, maximum=100.0),
+        f"how often each vehicle begins to be hidden, for up to {OCCLUSION:g} s",
+        0.0,
+        "fault/occlusions",
+        live=True,
+    )
+    single_markers: str = parameter(
+        Text(may_be_empty=True),
+        "vehicles that have one marker and are no rigid bodies: numbers with commas, or all",
+        "",
+    )
 
     def switches(self) -> MocapSwitches:
         """Return the switches as they are at the beginning."""
-        return MocapSwitches(self.dropout, self.invalid, self.silent)
+        return MocapSwitches(self.dropout, self.invalid, self.silent, self.ghosts, self.occlusions)

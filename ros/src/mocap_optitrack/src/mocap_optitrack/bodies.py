@@ -1,0 +1,267 @@
+"""Bodies that are published: entries of ``rigid_bodies`` and ``single_markers``."""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from typing_extensions import override
+
+from crazyflie_utils.messages import shortened, shown
+from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
+from crazyflie_utils.parameters.types import (
+    FRAME,
+    POSITION,
+    TEXT,
+    TOPIC,
+    ListOf,
+    Number,
+    ParameterType,
+)
+from mocap_optitrack.frames import Vector3
+from mocap_optitrack.marker_motion import MotionLimits
+from mocap_optitrack.marker_vehicle import SEPARATION, MarkerVehicle
+
+
+class OutputParameters(Parameters):
+    """How a body is published."""
+
+    pose: str | None = parameter(
+        TOPIC, "topic; a relative name is below the node's: `/mocap_node/Robot_1/pose`", None
+    )
+    pose2d: str | None = parameter(TOPIC, "topic, likewise", None)
+    child_frame_id: str | None = parameter(FRAME, "tf frame of the body", None)
+    parent_frame_id: str = parameter(FRAME, "tf frame of the coordinates", "world")
+
+
+class RigidBodyParameters(OutputParameters):
+    """An entry of ``rigid_bodies``: how a rigid body is published."""
+
+    name: str | None = parameter(
+        TEXT,
+        "name on the server, if it is not the key; without it a number is a streaming ID",
+        None,
+    )
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body that is to be published.
+
+    Attributes
+    ----------
+    key : str
+        Its entry in the dictionary.
+    parameters : OutputParameters
+        Its topics and frames.
+    """
+
+    key: str
+    parameters: OutputParameters
+
+    @property
+    def name(self) -> str | None:
+        """Name on the server; None for a body that has none, or is found by its number."""
+        return None
+
+    @property
+    def label(self) -> str:
+        """What the body is called in messages."""
+        return self.key if self.name in (None, self.key) else f"{self.key} ({self.name})"
+
+    @property
+    def component(self) -> str:
+        """What the body is called in the diagnostics."""
+        return f"rigid body {self.label}"
+
+
+@dataclass(frozen=True)
+class RigidBody(Body):
+    """A rigid body; its key is its number in the stream, or its name."""
+
+    parameters: RigidBodyParameters
+
+    @property
+    @override
+    def name(self) -> str | None:
+        if self.parameters.name is None and not self.key.isdecimal():
+            return self.key
+        return self.parameters.name
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """The bodies of one dictionary that are to be published.
+
+    Attributes
+    ----------
+    bodies : list of Body
+        At least one.
+    unknown : list of str
+        Entries that have no meaning, such as "rigid_bodies/1/odom".
+    """
+
+    bodies: list[Body]
+    unknown: list[str]
+
+
+class SingleMarkerParameters(OutputParameters):
+    """An entry of ``single_markers``: a vehicle with one marker, and how it is published."""
+
+    initial_position: Vector3 = parameter(
+        POSITION, "of the vehicle, in the frame of the coordinates, when the node starts"
+    )
+    position: str | None = parameter(
+        TOPIC, "topic of its position, such as the driver's `/cf1/external_position`", None
+    )
+    heading: str | None = parameter(
+        TOPIC,
+        "read: the vehicle's own estimate of its yaw, such as the driver's `/cf1/heading`; poses "
+        "and tf need it",
+        None,
+    )
+    offset: Vector3 = parameter(
+        POSITION, "from the marker to the vehicle, along the axes of the coordinates", (0.0,) * 3
+    )
+    max_velocity: Vector3 = parameter(
+        ListOf(Number("m/s", above=0.0), 3), "along x, y and z", MotionLimits().max_velocity
+    )
+    max_acceleration: float = parameter(
+        Number("m/s^2", above=0.0),
+        "that it keeps; with less a marker is told apart from others for longer while it is unseen",
+        MotionLimits().max_acceleration,
+    )
+
+    @override
+    def complaints(self) -> Iterator[str]:
+        if self.heading is None and (self.pose or self.pose2d or self.child_frame_id):
+            yield "heading is not set; expected a topic, since one marker does not tell the yaw"
+
+
+@dataclass(frozen=True)
+class SingleMarker(Body):
+    """A vehicle with one marker, which is to be published."""
+
+    parameters: SingleMarkerParameters
+
+    @property
+    @override
+    def component(self) -> str:
+        return f"single marker {self.key}"
+
+    @property
+    def vehicle(self) -> MarkerVehicle:
+        """What the tracker has to know of it; its marker is at the start point less `offset`."""
+        p = self.parameters
+        x, y, z = (a - b for a, b in zip(p.initial_position, p.offset, strict=True))
+        limits = MotionLimits(p.max_velocity, p.max_acceleration)
+        return MarkerVehicle(self.key, (x, y, z), limits)
+
+
+class RigidBodyDictionary(ParameterType):
+    """The dictionary ``rigid_bodies``; a refusal names all that is wrong with it.
+
+    Attributes
+    ----------
+    key : str
+        The dictionary's name.
+    entry_type, body_type : type
+        Of an entry's parameters, and of what it becomes.
+    outputs : tuple of str
+        An entry has one of these parameters at least.
+    """
+
+    label = "dictionary"
+    key = "rigid_bodies"
+    entry_type: type[OutputParameters] = RigidBodyParameters
+    body_type: type[Body] = RigidBody
+    outputs: tuple[str, ...] = ("pose", "pose2d", "child_frame_id")
+
+    @override
+    def __call__(self, value: object) -> Bodies:
+        if not isinstance(value, dict) or not value:
+            raise ValueError
+        known = {declaration.name for declaration in self.entry_type.declarations()}
+        bodies, unknown, complaints = [], [], []
+        for key, entry in value.items():
+            label = shortened(str(key))
+            if not isinstance(entry, dict):
+                complaints.append(f"{label} is {shown(entry)}; expected a dictionary")
+                continue
+            unknown += [
+                f"{self.key}/{label}/{shortened(str(name))}" for name in entry if name not in known
+            ]
+            values = {name: entry[name] for name in entry if name in known}
+            try:
+                parameters = self.entry_type.from_mapping(values, f"{label}/")
+            except ParameterError as error:
+                complaints += error.complaints
+                continue
+            bodies.append(self.body_type(str(key), parameters))
+            if not any(getattr(parameters, name) for name in self.outputs):
+                complaints.append(f"{label} has neither {' nor '.join(self.outputs)}")
+        complaints += shared_outputs(bodies)
+        complaints += _shared("name", [(b, b.name) for b in bodies])
+        if complaints:
+            raise ValueError("; ".join(complaints))
+        return Bodies(bodies, unknown)
+
+    def __str__(self) -> str:
+        """Return what is expected."""
+        return (
+            "a dictionary of number or name of a body: {pose, pose2d, child_frame_id, "
+            "parent_frame_id}"
+        )
+
+
+class SingleMarkerDictionary(RigidBodyDictionary):
+    """The dictionary ``single_markers``."""
+
+    key = "single_markers"
+    entry_type = SingleMarkerParameters
+    body_type = SingleMarker
+    outputs = ("position", *RigidBodyDictionary.outputs)
+
+    @override
+    def __call__(self, value: object) -> Bodies:
+        markers = super().__call__(value)
+        complaints = []
+        singles = [marker for marker in markers.bodies if isinstance(marker, SingleMarker)]
+        for first, second in itertools.combinations(singles, 2):
+            a, b = (marker.parameters.initial_position for marker in (first, second))
+            if math.dist(a, b) < SEPARATION:
+                complaints.append(
+                    f"{second.key}/initial_position is {math.dist(a, b):.3g} m from that of "
+                    f"{first.key}; expected at least {SEPARATION:g} m, since markers are told "
+                    "apart by their places"
+                )
+        if complaints:
+            raise ValueError("; ".join(complaints))
+        return markers
+
+    @override
+    def __str__(self) -> str:
+        return (
+            "a dictionary of name of a vehicle: {initial_position, position, heading, "
+            "child_frame_id, parent_frame_id}"
+        )
+
+
+def shared_outputs(bodies: Sequence[Body]) -> Iterator[str]:
+    """Yield a text about each topic and frame that two bodies share."""
+    topics = [
+        (body, getattr(body.parameters, name, None))
+        for body in bodies
+        for name in ("pose", "pose2d", "position")
+    ]
+    yield from _shared("topic", topics)
+    yield from _shared("child_frame_id", [(b, b.parameters.child_frame_id) for b in bodies])
+
+
+def _shared(what, owned):
+    owners: dict[str, str] = {}
+    for body, value in owned:
+        if value in owners:
+            yield f"{owners[value]} and {body.key} share {what} {shown(value)}"
+        elif value is not None:
+            owners[value] = body.key

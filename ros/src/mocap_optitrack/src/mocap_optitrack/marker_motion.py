@@ -1,0 +1,125 @@
+"""The motion of one reflecting marker, and where it must be next."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mocap_optitrack.frames import Vector3
+
+Point = npt.NDArray[np.float64]
+"""x, y, z in m, z up."""
+
+GATE = 4.0
+"""Standard deviations: of three normal variables together, 1 in 1000 is farther away."""
+
+_MEASUREMENT_VARIANCE = 0.002**2
+"""Of a marker along each axis, m^2. OptiTrack tells less than 0.3 mm; a marker that is seen in
+part by some cameras is off by more."""
+
+UNSEEN_COST = 40.0
+"""Of `MarkerMotion.costs`: -2 log(0.1 * 0.1 / m^3 * (2 pi _MEASUREMENT_VARIANCE)^1.5), for a marker
+that is missing in one frame of ten, and one reflection in 10 m^3."""
+
+_FIRST_SPEED_VARIANCE = 1.0
+"""Of a marker that has been seen once, m^2/s^2."""
+
+_BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5
+"""Noise of two measurements, m."""
+
+
+class MotionLimits(NamedTuple):
+    """Limits of a vehicle's motion.
+
+    Attributes
+    ----------
+    max_velocity : Vector3
+        Along each axis, m/s; those of crazyswarm2's dynamics configurations.
+    max_acceleration : float
+        m/s^2; three standard deviations of the filter's acceleration.
+    """
+
+    max_velocity: Vector3 = (2.0, 2.0, 3.0)
+    max_acceleration: float = 8.0
+
+
+class MarkerMotion:
+    """Constant-velocity Kalman filter of a marker; its three axes have one covariance.
+
+    The acceleration is constant from one measurement to the next, and independent of that
+    before (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
+    Navigation, 2001, section 6.3.2, discrete white noise acceleration).
+
+    Parameters
+    ----------
+    time : float
+        Of the first measurement, s.
+    position : (3,) array
+        m.
+    limits : MotionLimits
+
+    Attributes
+    ----------
+    time : float
+        Of the last measurement, s.
+    position, velocity : (3,) array
+        Estimates at that time, m and m/s.
+    measured : (3,) array
+        The last measurement, m.
+    limits : MotionLimits
+        From the next prediction on.
+    """
+
+    def __init__(self, time: float, position: Point, limits: MotionLimits):
+        self.time = time
+        self.position = self.measured = position
+        self.velocity = np.zeros(3)
+        self.limits = limits
+        self._covariance = (_MEASUREMENT_VARIANCE, 0.0, _FIRST_SPEED_VARIANCE)
+
+    def variance(self, time: float) -> float:
+        """Return the variance of the next measurement along each axis, m^2."""
+        return self._predicted(time - self.time)[0] + _MEASUREMENT_VARIANCE
+
+    def radius(self, time: float) -> float:
+        """Return how far from its predicted position the marker may be, m."""
+        return GATE * float(self.variance(time) ** 0.5)
+
+    def costs(self, time: float, points: Point) -> npt.NDArray[np.float64]:
+        """Return how unlikely the measurements (n, 3) are: -2 times the logarithm of their density.
+
+        They are relative to that of a measurement without error, and infinite beyond `GATE` and
+        where the marker would have needed more than its maximum velocity.
+        """
+        dt, variance = time - self.time, self.variance(time)
+        squares = np.sum((points - self.position - dt * self.velocity) ** 2, axis=1) / variance
+        reach = np.array(self.limits.max_velocity) * dt + _BOX_MARGIN
+        is_possible = np.all(abs(points - self.measured) <= reach, axis=1) & (squares <= GATE**2)
+        spread = 3.0 * math.log(variance / _MEASUREMENT_VARIANCE)
+        return np.where(is_possible, squares + spread, np.inf)
+
+    def can_reach(self, point: Point, dt: float) -> bool:
+        """Return whether a point (3,) can be reached in a time (s) by the maximum velocity."""
+        reach = np.array(self.limits.max_velocity) * dt + _BOX_MARGIN
+        return bool(np.all(abs(point - self.measured) <= reach))
+
+    def update(self, time: float, measured: Point) -> None:
+        """Process a measurement (m)."""
+        dt = time - self.time
+        p, m, v = self._predicted(dt)
+        gain_p, gain_v = np.array((p, m)) / (p + _MEASUREMENT_VARIANCE)
+        predicted = self.position + dt * self.velocity
+        self.position = predicted + gain_p * (measured - predicted)
+        self.velocity = self.velocity + gain_v * (measured - predicted)
+        self._covariance = ((1.0 - gain_p) * p, (1.0 - gain_p) * m, v - gain_v * m)
+        self.time, self.measured = time, measured
+
+    def _predicted(self, dt: float) -> tuple[float, float, float]:
+        p, m, v = self._covariance
+        q = (self.limits.max_acceleration / 3.0) ** 2
+        return (
+            p + 2.0 * dt * m + dt * dt * v + q * dt**4 / 4.0,
+            m + dt * v + q * dt**3 / 2.0,
+            v + q * dt * dt,
+        )

@@ -2,10 +2,24 @@
 
 from typing import Any
 
+from crazyflie_fleet import motion_capture_file
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters, NodeParameters
-from crazyflie_utils import Node, NodeHandle
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameters.types import Text
 from mocap_optitrack.mocap_node import MocapNode
+
+
+class MocapFleetParameters(FleetParameters):
+    """Which vehicles there are, and where motion capture is."""
+
+    motion_capture: str = parameter(
+        Text(may_be_empty=True),
+        "crazyswarm2's motion_capture.yaml; its type, hostname, and configurations of markers and "
+        "dynamics replace those of mocap_node",
+        "",
+        "fleet/motion_capture",
+    )
 
 
 def bodies(fleet: FleetConfig, fixed_frame: str) -> dict[str, Any]:
@@ -37,7 +51,10 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     ParameterError
         A parameter, or the fleet file, is wrong.
     """
-    config = handle.load(FleetParameters)
+    config = handle.load(MocapFleetParameters)
+    if config.motion_capture:
+        for key, value in motion_capture_file.load(config.motion_capture).items():
+            handle.set_param(f"{handle.name}/{key}", value)
     for key, entries in bodies(config.fleet(), config.fixed_frame).items():
         configured = handle.get_param(f"~{key}", NodeParameters(), {})
         frames = [entry.get("child_frame_id") for entry in configured.values()]

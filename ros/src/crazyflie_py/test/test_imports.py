@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 import numpy as np
-import pycrazyswarm
+import pycrazyswarm.cfsim.cffirmware
 import pytest
 import uav_trajectory
 from pycrazyswarm.util import check_ellipsoid_collisions, grid_yaml, poisson_disk_sample
@@ -22,6 +22,7 @@ NAMES = [
     "from pycrazyswarm.crazyswarm_py import Crazyswarm",
     "from crazyflie_py.crazyswarm_py import Crazyswarm",
     "from crazyflie_py.crazyflie import Crazyflie, CrazyflieServer, TimeHelper",
+    "import pycrazyswarm.cfsim.cffirmware as firm",
     "from crazyflie_py.uav_trajectory import Trajectory, Polynomial4D",
     "from pycrazyswarm.util import *; check_ellipsoid_collisions, grid_yaml",
     "from pycrazyswarm import util; util.poisson_disk_sample, util.clamp_norm, util.normalize",
@@ -31,6 +32,11 @@ NAMES = [
 @pytest.mark.parametrize("line", NAMES)
 def test_a_line_of_scripts(line):
     exec(line, {})
+
+
+def test_bindings_of_the_firmware_are_not_here():
+    with pytest.raises(AttributeError, match="cffirmware has no mkvec: .* expected functions of"):
+        pycrazyswarm.cfsim.cffirmware.mkvec  # noqa: B018
 
 
 def test_names_of_one_thing():

@@ -2,6 +2,7 @@
 
 import sys
 
+import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
@@ -33,9 +34,14 @@ def test_without_a_display_nothing_is_drawn():
     assert swarm.timeHelper.time() == pytest.approx(2.0)
 
 
-def test_a_display_that_does_not_answer_is_reported(monkeypatch, caplog):
-    monkeypatch.setenv("DISPLAY", ":99")
-    monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
+@pytest.mark.parametrize("has_toolkit", [False, True])
+def test_a_display_that_does_not_answer_is_reported(monkeypatch, caplog, has_toolkit):
+    monkeypatch.setenv("DISPLAY", ":9999")
+    if has_toolkit:
+        # What matplotlib chooses then.
+        matplotlib.use("agg")
+    else:
+        monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
     swarm = swarm_with("--vis mpl")
     swarm.timeHelper.sleep(0.2)
     assert "no window can be opened" in caplog.text

@@ -74,7 +74,7 @@ class CollisionAvoidance:
         cell = _Cell(self.settings, position, others)
         wanted = goal - position
         feasible = cell.sidestep(wanted, is_velocity=False)
-        if feasible is None:
+        if feasible is None or not cell.contains(feasible):
             stay = position if self._last_feasible is None else self._last_feasible
             self._last_feasible = stay
             return stay, np.zeros(3)
@@ -139,7 +139,8 @@ class _Cell:
         rates = self._normals @ direction
         ahead = rates > 0.0
         room = self._limits[ahead] - self._normals[ahead] @ origin
-        return float(np.min(room / rates[ahead], initial=math.inf))
+        with np.errstate(over="ignore"):
+            return float(np.min(room / rates[ahead], initial=math.inf))
 
     def sidestep(self, goal, is_velocity):
         """Return the goal, moved to the right before a wall, in the cell; None if it is empty.

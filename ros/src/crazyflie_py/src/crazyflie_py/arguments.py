@@ -43,9 +43,9 @@ def _number(value: Any) -> float:
     return float(value) if isinstance(value, numbers.Real) else math.nan
 
 
-def group_mask(where: str, value: Any) -> int:
-    """Return a mask of 8 groups."""
-    return integer(where, "groupMask", value, 0, 255)
+def byte(where: str, name: str, value: Any) -> int:
+    """Return an integer from 0 to 255, as ids and masks are."""
+    return integer(where, name, value, 0, 255)
 
 
 def triple(where: str, name: str, value: Any, low: float = -math.inf) -> Triple:
@@ -117,7 +117,8 @@ def parameters(where: str, values: Any) -> dict[str, float]:
     checked = {}
     for name, value in values.items():
         key = parameter_name(where, name)
-        checked[key] = value if isinstance(value, int) else number(where, key, value)
+        is_integer = isinstance(value, numbers.Integral)
+        checked[key] = int(value) if is_integer else number(where, key, value)
     return checked
 
 

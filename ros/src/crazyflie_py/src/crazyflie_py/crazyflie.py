@@ -1,4 +1,4 @@
-"""The vehicles, all of them, and their clock, as Crazyswarm's scripts see them.
+"""The vehicles as Crazyswarm's scripts see them: each of them, and all.
 
 Names, arguments and defaults are Crazyswarm's. Angles are in rad unless a method says otherwise,
 lengths in m, times in s.
@@ -15,186 +15,23 @@ from uav_trajectory import Trajectory
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_py import arguments as check
-from crazyflie_py.backend import Commands, SwarmBackend, VehicleBackend, Visualizer
+from crazyflie_py.backend import SwarmBackend, VehicleBackend
+from crazyflie_py.script_commands import ScriptCommands
 from crazyflie_py.setpoints import (
     Attitude,
-    FullState,
     Hover,
     MotorsOff,
     Position,
     VelocityWorld,
 )
+from crazyflie_py.time_helper import TimeHelper
+
+__all__ = ["Crazyflie", "CrazyflieServer", "TimeHelper"]
 
 Array = NDArray[np.float64]
 
-_MAX_ID = 255
-"""Largest id of a trajectory, and number of pieces, that fits into a byte."""
 
-
-class TimeHelper:
-    """The clock: of the simulation with --sim, otherwise ROS's.
-
-    Attributes
-    ----------
-    dt : float
-        Period of the simulation's steps, s; 0 without --sim.
-    visualizer : Visualizer
-        What --sim draws with; without --sim it does nothing.
-    crazyflies : list of Crazyflie
-    """
-
-    def __init__(self, backend: SwarmBackend):
-        self._backend = backend
-        self.visualizer: Visualizer = backend.visualizer
-        self.crazyflies: list[Crazyflie] = []
-
-    @property
-    def dt(self) -> float:
-        """Period of the simulation's steps, s."""
-        return self._backend.dt
-
-    def time(self) -> float:
-        """Return the time, s."""
-        return self._backend.time()
-
-    def sleep(self, duration: float) -> None:
-        """Wait for a duration, s."""
-        self._backend.sleep(check.number("timeHelper.sleep", "duration", duration))
-
-    def sleepForRate(self, rateHz: float) -> None:
-        """Wait, so that the calls of a loop are 1/rateHz apart."""
-        rate = check.number("timeHelper.sleepForRate", "rateHz", rateHz, 1e-3, 1e5)
-        self._backend.sleep_for_rate(rate)
-
-    def isShutdown(self) -> bool:
-        """Return whether the script should end, as after Ctrl-C."""
-        return self._backend.is_shutdown()
-
-    def nextPhase(self) -> None:
-        """Begin the next file of --writecsv."""
-        self._backend.next_phase()
-
-
-class _Commands:
-    """Commands with the same arguments for one vehicle and for all."""
-
-    def __init__(self, name: str, commands: Commands):
-        self._name = name
-        self._commands = commands
-
-    def _where(self, method: str) -> str:
-        return f"{self._name}.{method}"
-
-    def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
-        """Fly straight up to a height in a duration; returns at once.
-
-        Parameters
-        ----------
-        targetHeight : float
-            z in the world frame, m.
-        duration : float
-            s.
-        groupMask : int
-            0, or the groups that are meant; see `Crazyflie.setGroupMask`.
-        """
-        self._commands.take_off(*self._climb("takeoff", targetHeight, duration, groupMask))
-
-    def land(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
-        """Fly straight down to a height and stop the motors there; see `takeoff`."""
-        self._commands.land(*self._climb("land", targetHeight, duration, groupMask))
-
-    def _climb(self, method, height, duration, mask):
-        where = self._where(method)
-        return (
-            check.number(where, "targetHeight", height),
-            check.number(where, "duration", duration, 0.0),
-            check.group_mask(where, mask),
-        )
-
-    def stop(self, groupMask: int = 0) -> None:
-        """Stop the motors: after a landing, as a vehicle in the air falls."""
-        self._commands.stop(check.group_mask(self._where("stop"), groupMask))
-
-    def _go_to(self, goal, yaw, duration, relative, mask):
-        where = self._where("goTo")
-        self._commands.go_to(
-            check.triple(where, "goal", goal),
-            check.number(where, "yaw", yaw),
-            check.number(where, "duration", duration, 0.0),
-            bool(relative),
-            check.group_mask(where, mask),
-        )
-
-    def startTrajectory(
-        self,
-        trajectoryId: int,
-        timescale: float = 1.0,
-        reverse: bool = False,
-        relative: bool = True,
-        groupMask: int = 0,
-    ) -> None:
-        """Fly along an uploaded trajectory; returns at once.
-
-        Parameters
-        ----------
-        trajectoryId : int
-            As at `Crazyflie.uploadTrajectory`.
-        timescale : float
-            2 takes twice as long.
-        reverse : bool
-            From its end to its beginning.
-        relative : bool
-            Shifted, so that it begins at the planned position.
-        groupMask : int
-            See `Crazyflie.setGroupMask`.
-        """
-        where = self._where("startTrajectory")
-        self._commands.start_trajectory(
-            check.integer(where, "trajectoryId", trajectoryId, 0, _MAX_ID),
-            check.number(where, "timescale", timescale, 1e-3, 1e3),
-            bool(reverse),
-            bool(relative),
-            check.group_mask(where, groupMask),
-        )
-
-    def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:
-        """Return from setpoints (cmd...) to commands such as `land`.
-
-        Parameters
-        ----------
-        remainValidMillisecs : int
-            How long the last setpoint still counts, ms.
-        groupMask : int
-            See `Crazyflie.setGroupMask`.
-        """
-        where = self._where("notifySetpointsStop")
-        remain = check.integer(where, "remainValidMillisecs", remainValidMillisecs, 0, 2**31 - 1)
-        self._commands.notify_setpoints_stop(remain, check.group_mask(where, groupMask))
-
-    def emergency(self) -> None:
-        """Stop the motors at once; until a restart, nothing has an effect any more."""
-        self._commands.emergency()
-
-    def arm(self, arm: bool = True) -> None:
-        """Arm, or disarm."""
-        self._commands.arm(bool(arm))
-
-    def setParam(self, name: str, value: float) -> None:
-        """Set a firmware parameter, GROUP/NAME or GROUP.NAME."""
-        self._commands.set_parameters(check.parameters(self._where("setParam"), {name: value}))
-
-    def cmdFullState(
-        self, pos: ArrayLike, vel: ArrayLike, acc: ArrayLike, yaw: float, omega: ArrayLike
-    ) -> None:
-        """Send a setpoint: position, velocity, acceleration, yaw, body rates (rad/s)."""
-        where = self._where("cmdFullState")
-        position, velocity = check.triple(where, "pos", pos), check.triple(where, "vel", vel)
-        acceleration = check.triple(where, "acc", acc)
-        heading, rates = check.number(where, "yaw", yaw), check.triple(where, "omega", omega)
-        self._commands.send(FullState(position, velocity, acceleration, heading, rates))
-
-
-class Crazyflie(_Commands):
+class Crazyflie(ScriptCommands):
     """One vehicle.
 
     Attributes
@@ -220,7 +57,9 @@ class Crazyflie(_Commands):
 
         A command with a mask other than 0 concerns vehicles that have a bit in common with it.
         """
-        self._vehicle.set_group_mask(check.group_mask(self._where("setGroupMask"), groupMask))
+        self._vehicle.set_group_mask(
+            check.byte(self._where("setGroupMask"), "groupMask", groupMask)
+        )
 
     def goTo(
         self,
@@ -249,8 +88,8 @@ class Crazyflie(_Commands):
         """
         where = self._where("uploadTrajectory")
         self._vehicle.upload_trajectory(
-            check.integer(where, "trajectoryId", trajectoryId, 0, _MAX_ID),
-            check.integer(where, "pieceOffset", pieceOffset, 0, _MAX_ID),
+            check.byte(where, "trajectoryId", trajectoryId),
+            check.byte(where, "pieceOffset", pieceOffset),
             check.pieces(where, trajectory),
         )
 
@@ -396,7 +235,7 @@ class Crazyflie(_Commands):
         self._vehicle.disable_avoidance()
 
 
-class CrazyflieServer(_Commands):
+class CrazyflieServer(ScriptCommands):
     """All vehicles; its commands are broadcast and concern all at the same moment.
 
     Attributes

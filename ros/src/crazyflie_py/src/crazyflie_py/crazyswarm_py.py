@@ -86,8 +86,7 @@ class Crazyswarm:
         backend = _backend(crazyflies_yaml, options)
         atexit.register(backend.close)
         self.allcfs = CrazyflieServer(backend)
-        self.timeHelper = TimeHelper(backend)
-        self.timeHelper.crazyflies = self.allcfs.crazyflies
+        self.timeHelper = TimeHelper(backend, self.allcfs.crazyflies)
         self.input = Input(self.timeHelper, options.sim)
 
 

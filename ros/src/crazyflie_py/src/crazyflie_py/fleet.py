@@ -14,6 +14,9 @@ from crazyflie_utils.messages import shown
 _PLACES = ("../launch/crazyflies.yaml", "../config/crazyflies.yaml")
 """Where Crazyswarm and crazyswarm2 have the file, from the script's folder."""
 
+_SUFFIXES = (".yaml", ".yml")
+"""A text that ends so is the name of a file."""
+
 
 class FleetVehicle(NamedTuple):
     """A vehicle.
@@ -45,7 +48,7 @@ def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
     """
     if crazyflies_yaml is None:
         crazyflies_yaml = _usual_file()
-    is_text = isinstance(crazyflies_yaml, str) and ":" in crazyflies_yaml.replace(":/", "")
+    is_text = isinstance(crazyflies_yaml, str) and not crazyflies_yaml.endswith(_SUFFIXES)
     where = "crazyflies_yaml" if is_text else str(crazyflies_yaml)
     text = str(crazyflies_yaml) if is_text else Path(crazyflies_yaml).read_text()
     try:

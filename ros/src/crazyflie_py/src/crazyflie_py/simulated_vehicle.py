@@ -1,45 +1,23 @@
-"""One ideal vehicle of --sim: it is where its planner, or its setpoint, says."""
+"""One vehicle of --sim."""
 
 import logging
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.collision_avoidance import AvoidanceSettings, CollisionAvoidance
-from crazyflie_model.polynomials import PIECE_SIZE, PolynomialPiece
-from crazyflie_model.units import GRAVITY
+from crazyflie_model.collision_avoidance import AvoidanceSettings
+from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.backend import VehicleBackend, VehicleState
 from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.setpoints import (
-    Attitude,
-    FullState,
-    Hover,
-    MotorsOff,
-    Position,
-    Setpoint,
-    VelocityWorld,
-)
+from crazyflie_py.ideal_motion import IdealMotion, Motion, attitude
+from crazyflie_py.setpoints import Attitude, MotorsOff, Setpoint
 from crazyflie_py.simulated_parameters import SimulatedParameters
-from crazyflie_virtual.firmware.planner import (
-    ACTIVE,
-    DEFINITIONS,
-    IN_MEMORY,
-    MEMORY_SIZE,
-    POLYNOMIALS,
-    Planner,
-)
+from crazyflie_py.trajectory_memory import TrajectoryMemory
+from crazyflie_virtual.firmware.planner import ACTIVE, Planner
 from crazyflie_virtual.firmware.states import Estimate
 
-Array = NDArray[np.float64]
-
 _log = logging.getLogger(__name__)
-
-_ROOM = MEMORY_SIZE // PIECE_SIZE
-"""Pieces in the trajectory memory."""
 
 _FALL_HEIGHT = 0.1
 """Height above the start from which motors are not stopped without a warning, m."""
@@ -48,17 +26,11 @@ _SETPOINT_TIMEOUT = 0.5
 """Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE)."""
 
 
-class Motion(NamedTuple):
-    """Position (m), velocity (m/s), acceleration (m/s^2), each (3,), and yaw (rad)."""
-
-    position: Array
-    velocity: Array
-    acceleration: Array
-    yaw: float
-
-
 class SimulatedVehicle:
     """A vehicle of `crazyflie_py.backend.VehicleBackend`.
+
+    The firmware's planner flies it, or the last setpoint. Where an ideal vehicle does more than a
+    real one would, a warning says so, once.
 
     Parameters
     ----------
@@ -67,10 +39,6 @@ class SimulatedVehicle:
         Returns the time of the simulation, s.
     max_speed, disturbance : float
         Options --maxvel and --disturbance, m/s.
-
-    Attributes
-    ----------
-    motion : Motion
     """
 
     def __init__(
@@ -82,20 +50,16 @@ class SimulatedVehicle:
     ):
         self.name, self.id, self.initial_position, _ = vehicle
         self._time = time
-        self._max_speed = max_speed
-        self._disturbance = disturbance
+        self._motion = IdealMotion(self.initial_position, max_speed, disturbance)
         self._planner = Planner()
+        self._memory = TrajectoryMemory(self.name, self._planner, self._warn)
         self._parameters = SimulatedParameters(self.name, self._planner)
-        self._slots: dict[int, tuple[int, range]] = {}
         self._setpoint: Setpoint | None = None
-        self._expiry = math.inf
         self._sent = 0.0
+        self._expiry = math.inf
         self._locked = False
         self._armed = True
         self._warned: set[str] = set()
-        self._avoidance: CollisionAvoidance | None = None
-        self._others: list[SimulatedVehicle] = []
-        self.motion = _held(np.array(self.initial_position), 0.0)
 
     # Commands.
 
@@ -136,46 +100,13 @@ class SimulatedVehicle:
     def upload_trajectory(
         self, trajectory_id: int, piece_offset: int, pieces: Sequence[PolynomialPiece]
     ) -> None:
-        where = f"{self.name}.uploadTrajectory"
-        room = range(piece_offset, piece_offset + len(pieces))
-        if room.stop > _ROOM:
-            raise ValueError(
-                f"{where}: {len(pieces)} pieces from pieceOffset {piece_offset} on; expected no "
-                f"more than {_ROOM} in all, the room in the memory"
-            )
-        slot = self._slots.get(trajectory_id, (len(self._slots), room))[0]
-        if slot >= DEFINITIONS:
-            raise ValueError(
-                f"{where}: trajectoryId is {trajectory_id}; expected one of the {DEFINITIONS} that "
-                f"are in use: {sorted(self._slots)}"
-            )
-        if trajectory_id >= DEFINITIONS:
-            self._warn(
-                f"{where}: trajectoryId is {trajectory_id}; the firmware expects 0 to "
-                f"{DEFINITIONS - 1}, and a real vehicle refuses it"
-            )
-        for other, (_, taken) in self._slots.items():
-            if other != trajectory_id and set(taken) & set(room):
-                self._warn(
-                    f"{where}: pieces {room.start} to {room.stop - 1} overwrite trajectory "
-                    f"{other}; another pieceOffset keeps both"
-                )
-        self._slots[trajectory_id] = slot, room
-        begin = piece_offset * PIECE_SIZE
-        data = b"".join(piece.pack() for piece in pieces)
-        self._planner.memory[begin : begin + len(data)] = data
-        self._planner.define(slot, IN_MEMORY, POLYNOMIALS, begin, len(pieces))
+        self._memory.upload(trajectory_id, piece_offset, pieces)
 
     def start_trajectory(
         self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
     ) -> None:
-        if trajectory_id not in self._slots:
-            raise ValueError(
-                f"{self.name}.startTrajectory: trajectoryId is {trajectory_id}; expected one that "
-                f"uploadTrajectory has written: {sorted(self._slots) or 'there is none'}"
-            )
         if self._may_plan("startTrajectory", group_mask):
-            slot, _ = self._slots[trajectory_id]
+            slot = self._memory.slot(trajectory_id)
             self._planner.start(self._time(), slot, time_scale, reverse, relative, False)
 
     def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
@@ -222,13 +153,22 @@ class SimulatedVehicle:
     def enable_avoidance(
         self, others: Sequence[VehicleBackend], settings: AvoidanceSettings
     ) -> None:
-        self._others = [other for other in others if isinstance(other, SimulatedVehicle)]
-        self._avoidance = CollisionAvoidance(settings)
+        motions = [other._motion for other in others if isinstance(other, SimulatedVehicle)]
+        self._motion.avoid(motions, settings)
 
     def disable_avoidance(self) -> None:
-        self._avoidance = None
+        self._motion.avoid((), None)
 
     # State.
+
+    @property
+    def motion(self) -> Motion:
+        """Where the vehicle is, and how it moves."""
+        return self._motion.now
+
+    @motion.setter
+    def motion(self, motion: Motion) -> None:
+        self._motion.now = motion
 
     @property
     def is_flying(self) -> bool:
@@ -241,8 +181,10 @@ class SimulatedVehicle:
         return self._parameters.led_color
 
     def state(self) -> VehicleState:
-        x, v, a, yaw = self.motion
-        return VehicleState(_triple(x), _triple(v), _triple(a), attitude(a, yaw))
+        *vectors, yaw = self.motion
+        (x, y, z), (vx, vy, vz), (ax, ay, az) = (vector.tolist() for vector in vectors)
+        rpy = attitude(self.motion.acceleration, yaw)
+        return VehicleState((x, y, z), (vx, vy, vz), (ax, ay, az), rpy)
 
     def status(self) -> dict[str, Any]:
         seconds = math.floor(self._time())
@@ -261,121 +203,30 @@ class SimulatedVehicle:
             **dict.fromkeys(counts, 0),
         }
 
-    # Steps.
-
     def next_motion(self, dt: float) -> Motion:
         """Return where the vehicle is at the present time, ``dt`` (s) after `motion`."""
         now = self._time()
         if now > self._expiry:
             self._setpoint = None
         if self._setpoint is not None:
-            return self._track_setpoint(self._setpoint, now, dt)
+            if math.isinf(self._expiry) and now > self._sent + _SETPOINT_TIMEOUT + dt:
+                self._warn(
+                    f"{self.name}: no setpoint for {_SETPOINT_TIMEOUT:g} s; a real vehicle levels "
+                    "out and stops its motors 2 s after the last one"
+                )
+            return self._motion.at_setpoint(self._setpoint, dt)
         goal = self._planner.goal(now) if self._planner.state in ACTIVE else None
         # Ends a landing.
         self._planner.setpoint(now, self._estimate())
-        if goal is None:
-            return _held(self.motion.position, self.motion.yaw)
-        return self._limited(_motion(goal), dt)
-
-    def _track_setpoint(self, setpoint, now, dt):
-        if math.isinf(self._expiry) and now > self._sent + _SETPOINT_TIMEOUT + dt:
-            self._warn(
-                f"{self.name}: no setpoint for {_SETPOINT_TIMEOUT:g} s; a real vehicle levels out "
-                "and stops its motors 2 s after the last one"
-            )
-        yaw, zero = self.motion.yaw, np.zeros(3)
-        if isinstance(setpoint, FullState):
-            return self._limited(_motion(setpoint), dt)
-        if isinstance(setpoint, Position):
-            goal = Motion(np.array(setpoint.position), zero, zero, setpoint.yaw)
-            return self._approached(self._limited(goal, dt), dt)
-        if isinstance(setpoint, VelocityWorld):
-            return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
-        if isinstance(setpoint, Hover):
-            c, s = math.cos(yaw), math.sin(yaw)
-            climb = (setpoint.height - self.motion.position[2]) / dt
-            ahead, left = setpoint.vx, setpoint.vy
-            velocity = np.array([c * ahead - s * left, s * ahead + c * left, climb])
-            return self._at_velocity(velocity, setpoint.yaw_rate, dt)
-        return _held(self.motion.position, yaw)
-
-    def _limited(self, goal, dt):
-        """Return a goal as far as avoidance and --maxvel permit."""
-        position = velocity = None
-        if self._avoidance is not None:
-            position, velocity = self._avoidance.position_setpoint(
-                self.motion.position, self._other_positions(), goal.position, goal.velocity
-            )
-            if not np.array_equal(position, goal.position):
-                goal = self._approached(goal._replace(position=position), dt)
-            else:
-                goal = goal._replace(velocity=velocity)
-        way = goal.position - self.motion.position
-        if np.linalg.norm(way) <= self._max_speed * dt:
-            return goal
-        return self._approached(
-            goal._replace(position=self.motion.position + _clamped(way, self._max_speed * dt)), dt
-        )
-
-    def _approached(self, goal, dt):
-        """Return a goal with the velocity at which it is reached."""
-        velocity = (goal.position - self.motion.position) / dt
-        return goal._replace(velocity=velocity, acceleration=np.zeros(3))
-
-    def _at_velocity(self, velocity, yaw_rate, dt):
-        position = self.motion.position
-        if self._avoidance is not None:
-            others = self._other_positions()
-            velocity = self._avoidance.velocity_setpoint(position, others, velocity)
-        velocity = _clamped(velocity, self._max_speed)
-        if self._disturbance:
-            velocity = velocity + self._disturbance * np.random.normal(size=3)
-        yaw = self.motion.yaw + math.radians(yaw_rate) * dt
-        return Motion(position + dt * velocity, velocity, np.zeros(3), yaw)
-
-    def _other_positions(self):
-        return np.array([other.motion.position for other in self._others]).reshape(-1, 3)
+        return self._motion.held() if goal is None else self._motion.tracked(goal, dt)
 
     def _estimate(self) -> Estimate:
         (x, y, z), (vx, vy, vz) = self.motion.position.tolist(), self.motion.velocity.tolist()
         yaw = math.degrees(self.motion.yaw)
         return Estimate(x=x, y=y, z=z, vx=vx, vy=vy, vz=vz, yaw=yaw)
 
-    def _warn(self, text):
+    def _warn(self, text: str) -> None:
         # A loop must not flood the terminal.
         if text not in self._warned:
             self._warned.add(text)
             _log.warning(text)
-
-
-def attitude(acceleration: Array, yaw: float) -> Triple:
-    """Return roll, pitch and yaw (rad) of a multirotor that accelerates, by differential flatness.
-
-    Without rotation about its thrust: the body's x axis is above the heading. Acceleration of shape
-    (3,), m/s^2.
-    """
-    ax, ay, az = acceleration
-    c, s = math.cos(yaw), math.sin(yaw)
-    ahead, left, up = c * ax + s * ay, c * ay - s * ax, az + GRAVITY
-    pitch = math.atan2(ahead, up)
-    return math.atan2(-left, math.hypot(ahead, up)), pitch, yaw
-
-
-def _motion(goal):
-    vectors = (goal.position, goal.velocity, goal.acceleration)
-    position, velocity, acceleration = map(np.array, vectors)
-    return Motion(position, velocity, acceleration, goal.yaw)
-
-
-def _held(position, yaw):
-    return Motion(position, np.zeros(3), np.zeros(3), yaw)
-
-
-def _clamped(vector, limit):
-    length = float(np.linalg.norm(vector))
-    return vector * (limit / length) if length > limit else vector
-
-
-def _triple(vector: Array) -> Triple:
-    x, y, z = vector.tolist()
-    return x, y, z

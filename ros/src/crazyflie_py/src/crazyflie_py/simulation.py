@@ -3,15 +3,14 @@
 import argparse
 import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from crazyflie_fleet.fleet_config import close_pairs
-from crazyflie_model.angles import Triple
 from crazyflie_py.csv_output import CsvOutput
 from crazyflie_py.fleet import FleetVehicle
-from crazyflie_py.setpoints import Setpoint
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
 from crazyflie_py.visualizer import visualizer_for
 
@@ -19,6 +18,16 @@ _log = logging.getLogger(__name__)
 
 _ROUNDING = 1e-9
 """Part of a step by which a sleep may be too short for it, due to rounding."""
+
+
+def _broadcast(name: str) -> Any:
+    """Return a method that calls that of each vehicle."""
+
+    def command(self: "Simulation", *arguments: Any) -> None:
+        for vehicle in self.vehicles:
+            getattr(vehicle, name)(*arguments)
+
+    return command
 
 
 class Simulation:
@@ -108,46 +117,13 @@ class Simulation:
 
     # Broadcasts.
 
-    def take_off(self, height: float, duration: float, group_mask: int) -> None:
-        for vehicle in self.vehicles:
-            vehicle.take_off(height, duration, group_mask)
-
-    def land(self, height: float, duration: float, group_mask: int) -> None:
-        for vehicle in self.vehicles:
-            vehicle.land(height, duration, group_mask)
-
-    def stop(self, group_mask: int) -> None:
-        for vehicle in self.vehicles:
-            vehicle.stop(group_mask)
-
-    def go_to(
-        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
-    ) -> None:
-        for vehicle in self.vehicles:
-            vehicle.go_to(goal, yaw, duration, relative, group_mask)
-
-    def start_trajectory(
-        self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
-    ) -> None:
-        for vehicle in self.vehicles:
-            vehicle.start_trajectory(trajectory_id, time_scale, reverse, relative, group_mask)
-
-    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
-        for vehicle in self.vehicles:
-            vehicle.notify_setpoints_stop(remain_valid_ms, group_mask)
-
-    def emergency(self) -> None:
-        for vehicle in self.vehicles:
-            vehicle.emergency()
-
-    def arm(self, arm: bool) -> None:
-        for vehicle in self.vehicles:
-            vehicle.arm(arm)
-
-    def set_parameters(self, values: Mapping[str, float]) -> None:
-        for vehicle in self.vehicles:
-            vehicle.set_parameters(values)
-
-    def send(self, setpoint: Setpoint) -> None:
-        for vehicle in self.vehicles:
-            vehicle.send(setpoint)
+    take_off = _broadcast("take_off")
+    land = _broadcast("land")
+    stop = _broadcast("stop")
+    go_to = _broadcast("go_to")
+    start_trajectory = _broadcast("start_trajectory")
+    notify_setpoints_stop = _broadcast("notify_setpoints_stop")
+    emergency = _broadcast("emergency")
+    arm = _broadcast("arm")
+    set_parameters = _broadcast("set_parameters")
+    send = _broadcast("send")

@@ -71,6 +71,9 @@ class MatplotlibVisualizer(NullVisualizer):
             from matplotlib import pyplot
 
             figure = pyplot.figure()
+            # Where no toolkit finds the display, matplotlib draws without a window.
+            if figure.canvas.required_interactive_framework is None:
+                raise RuntimeError(f"matplotlib has chosen {pyplot.get_backend()}")
         except Exception as error:
             # Depends on the toolkit: ImportError, TclError, RuntimeError and others.
             _log.warning("--vis: no window can be opened (%s); nothing is drawn", error)

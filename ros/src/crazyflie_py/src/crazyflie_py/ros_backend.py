@@ -26,6 +26,9 @@ from crazyflie_py.visualizer import NullVisualizer
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.process import Process
 
+_FLEET = f"/all/{HIGH_LEVEL}"
+"""Namespace of a fleet's services for all."""
+
 _FIND_LIMIT = 10.0
 """For the vehicles of a file, s of the machine's clock."""
 
@@ -100,12 +103,22 @@ class RosBackend(SwarmBackend):
 
     @override
     def take_off(self, height: float, duration: float, group_mask: int) -> None:
-        vehicles = {vehicle.name: vehicle for vehicle in self._vehicles}
+        members = {v.name: v for v in self._vehicles if v.is_member(group_mask)}
+        begun = [vehicle.has_begun for vehicle in members.values()]
+        if self._top == _FLEET:
+            # One call: a hundred of them would keep the fleet from flying.
+            for vehicle in members.values():
+                vehicle.check_takeoff(height)
+            arguments = (group_mask, height, seconds(duration))
+            self._call(
+                "takeoff", srv.Takeoff, *arguments, has_begun=lambda: all(b() for b in begun)
+            )
+            return
         calls = {
             name: vehicle.begin_takeoff(height, duration, group_mask)
-            for name, vehicle in vehicles.items()
+            for name, vehicle in members.items()
         }
-        self._connection.finish("takeoff", calls, lambda name: vehicles[name].has_begun())
+        self._connection.finish("takeoff", calls, lambda name: members[name].has_begun())
 
     @override
     def land(self, height: float, duration: float, group_mask: int) -> None:
@@ -156,7 +169,7 @@ class RosBackend(SwarmBackend):
         for vehicle in self._vehicles:
             vehicle.send(setpoint)
 
-    def _call(self, name, service_type, *arguments):
+    def _call(self, name, service_type, *arguments, has_begun=lambda: False):
         if self._top is None:
             calls = {v.name: v.call(name, service_type, *arguments) for v in self._vehicles}
         else:
@@ -164,7 +177,7 @@ class RosBackend(SwarmBackend):
             service = f"{self._top}/{name}"
             call = self._connection.handle.call_service(service, service_type, request, 60.0)
             calls = {"allcfs": call}
-        self._connection.finish(name, calls)
+        self._connection.finish(name, calls, lambda _: has_begun())
 
     # Time.
 
@@ -246,7 +259,7 @@ def _common_services(services: Mapping[str, str], names: list[str]) -> str | Non
     fleet = {s.split("/")[1] for s in services if s.endswith(f"/{HIGH_LEVEL}/go_to")} - {"all"}
     if fleet:
         is_there = f"/all/{HIGH_LEVEL}/go_to" in services and fleet == {*names}
-        return f"/all/{HIGH_LEVEL}" if is_there else None
+        return _FLEET if is_there else None
     drivers = {
         s.rpartition("/")[0].strip("/"): node
         for s, node in services.items()

@@ -64,10 +64,18 @@ class RosVehicleBackend(VehicleBackend):
 
     def begin_takeoff(self, height: float, duration: float, group_mask: int) -> "Future[Any]":
         """Call takeoff; the future is done when the vehicle takes off, or has refused."""
+        self.check_takeoff(height)
+        return self._vehicle.take_off(height, duration, group_mask)
+
+    def check_takeoff(self, height: float) -> None:
+        """Refuse a height (m) out of the fence; note the flight otherwise."""
         x, y, _ = self._vehicle.position() or self.initial_position
         self._check("takeoff", (x, y, height))
         self.note_flight()
-        return self._vehicle.take_off(height, duration, group_mask)
+
+    def is_member(self, group_mask: int) -> bool:
+        """Return whether a command to groups concerns the vehicle."""
+        return group_mask == 0 or bool(group_mask & self._groups)
 
     @override
     def land(self, height: float, duration: float, group_mask: int) -> None:
@@ -176,7 +184,7 @@ class RosVehicleBackend(VehicleBackend):
 
     def note_landing(self, group_mask: int) -> None:
         """Note that the script has vehicles of groups land."""
-        self._is_landing = self._is_landing or group_mask == 0 or bool(group_mask & self._groups)
+        self._is_landing = self._is_landing or self.is_member(group_mask)
 
     @property
     def is_landing(self) -> bool:
@@ -232,7 +240,10 @@ class RosVehicleBackend(VehicleBackend):
                 "that its controllers fly apart, by the buffers of the fleet file"
             )
             return
-        self.set_parameters({**avoidance_parameters(settings), "colAv.enable": 1})
+        try:
+            self.set_parameters({**avoidance_parameters(settings), "colAv.enable": 1})
+        except ValueError as error:
+            self._connection.refuse(f"{self.name}: enableCollisionAvoidance: {error}")
 
     @override
     def disable_avoidance(self) -> None:

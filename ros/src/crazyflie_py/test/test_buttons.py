@@ -2,9 +2,11 @@
 
 import os
 import pty
+import signal
 import struct
 import sys
 import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -131,7 +133,12 @@ raise SystemExit(7)"""
         while b"ready" not in output:
             output += os.read(terminal, 1024)
         os.write(terminal, b"x")
-        _, status = os.waitpid(pid, 0)
+        deadline = time.monotonic() + 20.0
+        while (ended := os.waitpid(pid, os.WNOHANG))[0] == 0 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        if ended[0] == 0:
+            os.kill(pid, signal.SIGKILL)
+            ended = os.waitpid(pid, 0)
     finally:
         os.close(terminal)
-    assert os.waitstatus_to_exitcode(status) == 7
+    assert os.waitstatus_to_exitcode(ended[1]) == 7

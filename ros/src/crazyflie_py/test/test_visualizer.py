@@ -52,6 +52,7 @@ def test_without_ffmpeg_a_video_is_an_animation(tmp_path, caplog):
     swarm.timeHelper.visualizer.showEllipsoids([0.1, 0.1, 0.3])
     one, _ = swarm.allcfs.crazyflies
     one.setLEDColor(1.0, 0.0, 0.0)
+    assert one.ledRGB == (1.0, 0.0, 0.0)
     swarm.timeHelper.sleep(1.0)
     swarm.timeHelper.visualizer.finishVideoOutput()
     assert "ffmpeg is not installed" in caplog.text

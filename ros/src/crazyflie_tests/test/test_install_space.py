@@ -69,7 +69,7 @@ def test_modules_and_launch_files_are_complete(terminal, install_space):
 
 
 def test_users_scripts_find_their_modules(terminal):
-    terminal.run("python3 -c 'import crazyflie, uav_trajectory; crazyflie.Crazyflie'")
+    terminal.run("python3 -c 'import crazyflie, uav_trajectory, pycrazyswarm; crazyflie.Crazyflie'")
 
 
 @pytest.mark.parametrize("package", PACKAGES)

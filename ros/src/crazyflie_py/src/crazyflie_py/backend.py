@@ -12,6 +12,9 @@ from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.setpoints import Setpoint
 
+DEFAULT_COLOR = (0.5, 0.5, 1.0)
+"""Of vehicles in pictures, as Crazyswarm draws them: red, green and blue, 0 to 1."""
+
 
 class VehicleState(NamedTuple):
     """Position (m), velocity (m/s), acceleration (m/s^2) and roll, pitch, yaw (rad).

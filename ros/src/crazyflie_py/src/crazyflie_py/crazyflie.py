@@ -15,7 +15,7 @@ from uav_trajectory import Trajectory
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_py import arguments as check
-from crazyflie_py.backend import SwarmBackend, VehicleBackend
+from crazyflie_py.backend import DEFAULT_COLOR, SwarmBackend, VehicleBackend
 from crazyflie_py.script_commands import ScriptCommands
 from crazyflie_py.setpoints import (
     Attitude,
@@ -42,6 +42,8 @@ class Crazyflie(ScriptCommands):
         "cf1", "/cf1".
     initialPosition : (3,) array
         As the fleet file has it, m.
+    ledRGB : tuple, 3 components
+        What `setLEDColor` has set; before, Crazyswarm's colour in pictures.
     """
 
     def __init__(self, vehicle: VehicleBackend):
@@ -51,6 +53,7 @@ class Crazyflie(ScriptCommands):
         self.name = vehicle.name
         self.prefix = f"/{vehicle.name}"
         self.initialPosition: Array = np.array(vehicle.initial_position)
+        self.ledRGB = DEFAULT_COLOR
 
     def setGroupMask(self, groupMask: int) -> None:
         """Make the vehicle a member of up to 8 groups, a bit each.
@@ -150,6 +153,7 @@ class Crazyflie(ScriptCommands):
             for name, color in colors.items()
         }
         self._vehicle.set_parameters(levels)
+        self.ledRGB = (r, g, b)
 
     # Setpoints. The firmware levels out 0.5 s after the last one and stops the motors after 2 s.
 

@@ -36,5 +36,5 @@ class CsvOutput:
             data = np.array(rows)
             data[:, 0] -= data[0, 0]
             name = f"cf{vehicle_id}_phase{self._phase}.csv"
-            np.savetxt(name, data, delimiter=",", header="t,x,y,z,roll,pitch,yaw")
+            np.savetxt(name, data, "%.9g", ",", header="t,x,y,z,roll,pitch,yaw")
         self._rows.clear()

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from crazyflie_model.angles import Triple
+from crazyflie_py.backend import DEFAULT_COLOR
 
 _log = logging.getLogger(__name__)
 
 _COLOR = ("ring.solidRed", "ring.solidGreen", "ring.solidBlue")
-
-_DEFAULT_COLOR = (0.5, 0.5, 1.0)
-"""Crazyswarm's, in pictures."""
 
 
 class HasGroups(Protocol):
@@ -70,7 +68,7 @@ class SimulatedParameters:
     def led_color(self) -> Triple:
         """Red, green and blue, 0 to 1."""
         if not any(key in self._values for key in _COLOR):
-            return _DEFAULT_COLOR
+            return DEFAULT_COLOR
         red, green, blue = (min(max(self[key] / 255.0, 0.0), 1.0) for key in _COLOR)
         return red, green, blue
 

@@ -74,6 +74,19 @@ def test_one_message_on_tf_for_all(tmp_path, models):
         assert [each.child_frame_id for each in message.transforms] == ["cf0", "cf1", "cf2"]
 
 
+ONE_PLACE = "robots: {a: {initial_position: [0, 0, 0]}, b: {initial_position: [0, 0.1, 0]}}\n"
+
+
+def test_vehicles_that_start_at_one_place_do_not_take_off(tmp_path):
+    file = tmp_path / "fleet.yaml"
+    file.write_text(ONE_PLACE)
+    swarm = Swarm(fleet={"file": str(file)})
+    text = "a and b start at one place by the fleet file, and are 0.10 m apart; expected at least"
+    with pytest.raises(ServiceError, match=f"2 of 2 vehicles: a: /a/takeoff refused: {text}.*; b"):
+        swarm.call("/all/takeoff")
+    assert swarm.position("a")[2] == swarm.position("b")[2] == 0.0
+
+
 def test_all_cannot_go_to_one_place():
     swarm = Swarm(fleet={"n": 2})
     with pytest.raises(ServiceError, match="all vehicles cannot go to one place; expected relat"):

@@ -19,7 +19,7 @@ from crazyflie_utils.testing import FakeGraph
 MISSION = "/mission"
 """The node that makes references of a mission's commands."""
 
-MISSION_NODE = {MISSION.strip("/"): "crazyflie_mission_api.high_level_node:HighLevelNode"}
+MISSION_NODE = {MISSION.strip("/"): "crazyflie_fleet.high_level_node:HighLevelNode"}
 """It, as a launch file names nodes of a process."""
 
 MISSION_PARAMETERS = {

@@ -57,6 +57,12 @@ class VehicleConfig:
         """Name of its tf frame from motion capture."""
         return self.settings.mocap_frame or self.name
 
+    @property
+    def battery_limits(self) -> tuple[float, float]:
+        """With less takeoff is refused, and with less it is landed, V."""
+        own = self.settings if self.settings.voltages_act else RobotSettings
+        return own.voltage_warning, own.voltage_critical
+
 
 @dataclass(frozen=True)
 class FleetConfig:
@@ -65,7 +71,9 @@ class FleetConfig:
     vehicles: tuple[VehicleConfig, ...]  # Those that are enabled, in the order of the file.
     disabled: tuple[str, ...] = ()  # Names of the others.
     machines: Mapping[str, MachineSettings] = dataclasses.field(default_factory=dict)
-    warnings: tuple[str, ...] = ()  # Entries without effect: file, line and reason.
+    warnings: tuple[str, ...] = ()  # Remarks on the file: line and reason.
+    # Names of two whose start points are closer than their buffers.
+    unplaced: tuple[tuple[str, str], ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:

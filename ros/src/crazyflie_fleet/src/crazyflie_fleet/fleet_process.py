@@ -1,11 +1,16 @@
 """The process that flies the vehicles of a fleet."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
+from crazyflie_fleet.battery_report_node import BatteryReportNode
 from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_fleet.fleet_parameters import FlyParameters
 from crazyflie_fleet.fleet_services_node import FleetServicesNode
+from crazyflie_fleet.high_level_node import HighLevelNode
+from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_fleet.placement_node import PlacementNode
 from crazyflie_fleet.references_node import ReferencesNode
 from crazyflie_fleet.safe_descents_node import SafeDescentsNode
 from crazyflie_fleet.vectorized_simulator_node import (
@@ -14,7 +19,7 @@ from crazyflie_fleet.vectorized_simulator_node import (
     VectorizedSimulatorNode,
     VectorizedSimulatorParameters,
 )
-from crazyflie_fleet.vehicle_nodes import BUFFER, Tree, merged, node_classes, parameters
+from crazyflie_fleet.vehicle_nodes import BUFFER, INHIBITION, Tree, merged, node_classes, parameters
 from crazyflie_takeoff.all_emergency_node import AllEmergencyNode
 from crazyflie_utils import Node, NodeHandle, ParameterError
 
@@ -47,14 +52,25 @@ class _NodeFactory:
             of_model = tuple(each for each in vehicles if each.settings.model == model)
             if of_model:
                 vectorized[self._add_vectorized(model, of_model)] = of_model
+        self._unplaced = {name for pair in fleet.unplaced for name in pair}
         for vehicle in vehicles:
             self._add_vehicle(vehicle)
-        references = ReferencesNode(vehicles, others, config.fixed_frame, vectorized)
+        references = ReferencesNode(
+            vehicles, others, config.fixed_frame, vectorized, self._unplaced
+        )
+        for number, vehicle in enumerate(vehicles):
+            self._add_high_level(vehicle, partial(references.states.goal, number))
         buffers = [vehicle.buffer for vehicle in (*vehicles, *others)]
         self.nodes[f"{handle.name}/references"] = references
         self.nodes[f"{handle.name}/descents"] = SafeDescentsNode(
             vehicles, references.states, buffers
         )
+        if self._unplaced:
+            self.nodes[f"{handle.name}/placement"] = PlacementNode(
+                [vehicle.name for vehicle in vehicles], fleet, references.states
+            )
+        if not config.is_simulated:
+            self.nodes[f"{handle.name}/battery_report"] = BatteryReportNode(vehicles)
         if vehicles[0] is fleet.vehicles[0]:
             # One process serves all vehicles, also those of other machines.
             self.nodes[handle.name] = FleetServicesNode(fleet, references.states)
@@ -98,12 +114,21 @@ class _NodeFactory:
         self._handle.set_param(f"/{vehicle.name}/{BUFFER}", vehicle.buffer)
         frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
         tree = parameters(vehicle, frames, self._common(vehicle.settings.model))
+        if vehicle.name in self._unplaced:
+            tree["takeoff_server"]["topics"]["inhibition"] = INHIBITION
         for name, node_class in (self._config.extra_nodes or {}).items():
             own = merged(tree.get(name, {}), {"frames": frames})
             self._add(f"/{vehicle.name}/{name}", node_class(), own)
         for name, node_class in classes.items():
             self._add(f"/{vehicle.name}/{name}", node_class(), tree[name])
         self._has_clock = True
+
+    def _add_high_level(self, vehicle, measured):
+        name = f"/{vehicle.name}/{HIGH_LEVEL}"
+        if name not in self.nodes:
+            own = self._common(vehicle.settings.model).get(HIGH_LEVEL, {})
+            frames = {"fixed": self._config.fixed_frame, "robot": vehicle.name}
+            self._add(name, HighLevelNode(measured), merged(own, {"frames": frames}))
 
 
 def _paths(tree: Mapping[str, Any], prefix: str = "") -> list[str]:

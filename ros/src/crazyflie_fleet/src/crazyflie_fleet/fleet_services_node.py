@@ -7,12 +7,22 @@ from typing import Any
 from std_srvs.srv import Empty, EmptyResponse
 from typing_extensions import override
 
-from crazyflie_driver.srv import GoTo, GoToResponse
+from crazyflie_driver import srv
 from crazyflie_fleet.fleet_config import FleetConfig
+from crazyflie_fleet.high_level_parameters import HIGH_LEVEL, START_TOPIC
 from crazyflie_fleet.lander import SERVICE_TIMEOUT, Lander, Refusals
 from crazyflie_fleet.mission_watch import MISSION_TIMEOUT, MissionWatch
 from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_utils import Node, NodeHandle, ServiceError
+
+_HIGH_LEVEL_SERVICES = {
+    "takeoff": srv.Takeoff,
+    "land": srv.Land,
+    "stop": srv.Stop,
+    "go_to": srv.GoTo,
+    "start_trajectory": srv.StartTrajectory,
+    "notify_setpoints_stop": srv.NotifySetpointsStop,
+}
 
 
 class FleetServicesNode(Node):
@@ -37,19 +47,27 @@ class FleetServicesNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         self._lander = Lander(handle, self._fleet, self._states)
-        for service, call in (("takeoff", self._on_takeoff), ("land", self._on_land)):
+        for service, call in (
+            ("takeoff", partial(self._call_all, "takeoff", Empty)),
+            ("land", self._on_land),
+        ):
             handle.advertise_service(f"/all/{service}", Empty, call)
             handle.advertise_service(f"/{service}_all", Empty, call)
-        handle.advertise_service("/all/go_to", GoTo, self._on_go_to)
+        handle.advertise_service("/all/go_to", srv.GoTo, partial(self._on_go_to, "go_to"))
+        for name, service_type in _HIGH_LEVEL_SERVICES.items():
+            path = f"{HIGH_LEVEL}/{name}"
+            call = partial(self._call_all, path, service_type)
+            if name == "go_to":
+                call = partial(self._on_go_to, path)
+            handle.advertise_service(f"/all/{path}", service_type, call)
+            if name == "start_trajectory":
+                handle.advertise_service(START_TOPIC, service_type, call)
         self._missions = MissionWatch(handle, self._on_lost_mission)
 
     @override
     def enter_safe_state(self) -> None:
         """Answer the callers of landings; each vehicle has services of its own."""
         self._lander.abort()
-
-    def _on_takeoff(self, request):
-        return self._call_all("takeoff", Empty, request, EmptyResponse())
 
     def _on_land(self, _):
         answer: Future[Any] = Future()
@@ -82,14 +100,16 @@ class FleetServicesNode(Node):
         texts = "; ".join(f"{name}: {text}" for name, text in sorted(refusals.items()))
         return f"{len(refusals)} of {len(self._fleet.vehicles)} vehicles: {texts}"
 
-    def _on_go_to(self, request):
+    def _on_go_to(self, service, request):
         if not request.relative and len(self._fleet.vehicles) > 1:
             raise ServiceError(
-                "/all/go_to refused: all vehicles cannot go to one place; expected relative: true"
+                f"/all/{service} refused: all vehicles cannot go to one place; expected relative: "
+                "true"
             )
-        return self._call_all("go_to", GoTo, request, GoToResponse())
+        return self._call_all(service, srv.GoTo, request)
 
-    def _call_all(self, service, service_type, request, response):
+    def _call_all(self, service, service_type, request):
+        response = service_type._response_class()
         answer: Future[Any] = Future()
         open_calls = set(self._fleet.names)
         refusals: dict[str, str] = {}

@@ -4,13 +4,27 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
+from crazyflie_fleet import motion_capture_file
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters, NodeParameters
-from crazyflie_utils import Node, NodeHandle, ParameterError
+from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
+from crazyflie_utils.parameters.types import Text
 from mocap_optitrack.mocap_node import MocapNode
 
 Configurations = Mapping[str, Mapping[str, Any]]
 """Name to configuration, as crazyswarm2's motion_capture.yaml has them."""
+
+
+class MocapFleetParameters(FleetParameters):
+    """Which vehicles there are, and where motion capture is."""
+
+    motion_capture: str = parameter(
+        Text(may_be_empty=True),
+        "crazyswarm2's motion_capture.yaml; its type, hostname, and configurations of markers and "
+        "dynamics replace those of mocap_node",
+        "",
+        "fleet/motion_capture",
+    )
 
 
 def bodies(
@@ -85,7 +99,10 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
     ParameterError
         A parameter, or the fleet file, is wrong.
     """
-    config = handle.load(FleetParameters)
+    config = handle.load(MocapFleetParameters)
+    if config.motion_capture:
+        for key, value in motion_capture_file.load(config.motion_capture).items():
+            handle.set_param(f"{handle.name}/{key}", value)
     fleet, kind = config.fleet(), NodeParameters()
     dynamics = handle.get_param("~dynamics_configurations", kind, {})
     markers = handle.get_param("~marker_configurations", kind, {})

@@ -1,6 +1,6 @@
 """ROS interface of straight moves, and of what keeps vehicles apart."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -53,6 +53,8 @@ class _TrackedVehicle:
     move_time: float = 0.0
     is_held: bool = False
     is_to_land: bool = False
+    # Where its takeoffs end by the fleet file, if the file does not say where it starts, m.
+    hover_point: tuple[float, float, float] | None = None
 
 
 class ReferencesNode(Node):
@@ -60,7 +62,7 @@ class ReferencesNode(Node):
 
     ``vehicles`` are flown in this process and keep apart from ``others``, flown elsewhere, too.
     ``vectorized`` are topics that have the states of several vehicles in one message. The attribute
-    ``states`` has those of all.
+    ``states`` has those of all. Vehicles named in ``unplaced`` take off from where they are seen.
     """
 
     needed_in_flight = True
@@ -71,7 +73,9 @@ class ReferencesNode(Node):
         others: tuple[VehicleConfig, ...],
         fixed_frame: str,
         vectorized: Mapping[str, tuple[VehicleConfig, ...]] | None = None,
+        unplaced: Collection[str] = (),
     ):
+        self._unplaced = unplaced
         self._vehicles = vehicles
         self._fixed_frame = fixed_frame
         # Own ones first.
@@ -101,6 +105,8 @@ class ReferencesNode(Node):
         top, message_type = f"/{vehicle.name}/", PositionVelocityStateStamped
         publisher = handle.publisher(top + SAFE_REFERENCE, message_type)
         tracked = _TrackedVehicle(len(self._tracked), vehicle.name, vehicle.buffer, publisher)
+        if vehicle.name in self._unplaced:
+            tracked.hover_point = vehicle.hover_point
         self._tracked.append(tracked)
         handle.advertise_service(top + "go_to", GoTo, partial(self._on_go_to, tracked))
         handle.subscribe(top + REFERENCE, message_type, partial(self._on_reference, tracked))
@@ -139,6 +145,10 @@ class ReferencesNode(Node):
             # The controller decides what follows from it.
             tracked.publisher.publish(message)
             return
+        if tracked.hover_point == to_tuple(message.state)[:3]:
+            x, y, z = self.states.positions[tracked.number].tolist()
+            hover = np.array([x, y, max(z, tracked.hover_point[2])])
+            message = self._reference(hover, np.zeros(3))
         tracked.move = None
         self._command(tracked, message)
 

@@ -19,6 +19,9 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.text_input import number_from_text
 
+WITHOUT_EFFECT = "crazyswarm2's; has no effect here"
+"""Help of settings that are read, and of which a remark is made."""
+
 VENDOR, SINGLE_MARKER = "vendor", "single_marker"
 """How motion capture knows a vehicle: its system does, or by the only marker of the vehicle."""
 
@@ -131,7 +134,7 @@ class LogTopicSettings(Parameters):
 class DefaultTopicSettings(Parameters):
     """A standard topic; it comes at the driver's own rate."""
 
-    frequency: float = parameter(Number("Hz", above=0.0), "has no effect here", 10.0)
+    frequency: float = parameter(Number("Hz", above=0.0), WITHOUT_EFFECT, 10.0)
 
 
 class Settings(Parameters):
@@ -156,14 +159,21 @@ class Settings(Parameters):
         TEXT, "computer that flies it, of `machines`; `local` is always one of them", LOCAL
     )
     voltage_warning: float = parameter(
-        Number("V", minimum=0.0), "with less takeoff is refused", 3.2, "battery/voltage_warning"
+        Number("V", minimum=0.0),
+        "with less there is a warning; and takeoff is refused with `act`, else below 3.2",
+        3.2,
+        "battery/voltage_warning",
     )
     voltage_critical: float = parameter(
-        Number("V", minimum=0.0), "with less the vehicle is landed", 3.0, "battery/voltage_critical"
+        Number("V", minimum=0.0),
+        "with less there is a warning; and the vehicle is landed with `act`, else below 3",
+        3.0,
+        "battery/voltage_critical",
     )
-    mocap_enabled: bool = parameter(
-        BOOLEAN, "crazyswarm2's; has no effect here", True, "motion_capture/enabled"
+    voltages_act: bool = parameter(
+        BOOLEAN, "the two voltages count for takeoffs and landings", False, "battery/act"
     )
+    mocap_enabled: bool = parameter(BOOLEAN, WITHOUT_EFFECT, True, "motion_capture/enabled")
     mocap_frame: str | None = parameter(
         FRAME, "motion capture's frame; by default the vehicle's name", None, "motion_capture/frame"
     )
@@ -187,8 +197,8 @@ class Settings(Parameters):
         "default",
         "motion_capture/dynamics",
     )
-    big_quad: bool = parameter(BOOLEAN, "crazyswarm2's; has no effect here", False)
-    reference_frame: str = parameter(TEXT, "crazyswarm2's; has no effect here", "world")
+    big_quad: bool = parameter(BOOLEAN, WITHOUT_EFFECT, False)
+    reference_frame: str = parameter(TEXT, WITHOUT_EFFECT, "world")
 
     @property
     def has_single_marker(self) -> bool:
@@ -198,15 +208,23 @@ class Settings(Parameters):
         return self.mocap_tracking == SINGLE_MARKER
 
 
-class RobotSettings(Settings):
-    """Settings of one vehicle below ``robots``."""
+class PartialSettings(Settings):
+    """Settings in one place, of a vehicle, its type or ``all``, before they are merged."""
 
     enabled: bool = parameter(BOOLEAN, "whether it takes part", True)
     uri: str | None = parameter(URI, "its address; not needed in simulation", None)
+    position: tuple[float, float, float] | None = parameter(
+        StartPosition(), "its position before takeoff", None, "initial_position"
+    )
+    type: str | None = parameter(TEXT, "of `robot_types`", None)
+
+
+class RobotSettings(PartialSettings):
+    """Settings of one vehicle below ``robots``."""
+
     position: tuple[float, float, float] = parameter(
         StartPosition(), "its position before takeoff", name="initial_position"
     )
-    type: str | None = parameter(TEXT, "of `robot_types`", None)
 
 
 class MachineSettings(Parameters):

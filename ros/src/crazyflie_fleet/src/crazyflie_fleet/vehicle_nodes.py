@@ -29,6 +29,9 @@ IN_FLIGHT = "in_flight"
 FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"
 """Topics and services of a vehicle, below its name."""
 
+INHIBITION = "takeoff_inhibition"
+"""Topic below a vehicle's name: why its takeoffs are refused; empty if they are not."""
+
 BUFFER = "buffer"
 """Parameter below a vehicle's name: its collision buffer, m, by which missions are planned."""
 
@@ -61,7 +64,7 @@ def parameters(
     ``frames`` are the names of the tf frames, fixed and robot; ``common`` the parameters of all
     vehicles, node by node.
     """
-    hover, settings = vehicle.hover_point, vehicle.settings
+    hover = vehicle.hover_point
     own: Tree = {
         "simulator": {
             "frames": frames,
@@ -95,7 +98,7 @@ def parameters(
                 "battery": "battery",
             },
             "srv": {"takeoff": "takeoff", "land": "land"},
-            "battery": {"low": settings.voltage_warning, "critical": settings.voltage_critical},
+            "battery": dict(zip(("low", "critical"), vehicle.battery_limits, strict=True)),
         },
         "takeoff_control_filter": {
             "topics": {

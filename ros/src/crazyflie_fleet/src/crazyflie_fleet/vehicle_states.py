@@ -9,6 +9,7 @@ from std_msgs.msg import Float64MultiArray
 
 from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_fleet.vehicle_nodes import FLIGHT_STATUS, STATE
+from crazyflie_model.polynomials import Goal
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.vectors import to_tuple
@@ -69,6 +70,13 @@ class VehicleStates:
         """Return which positions are finite and younger than `MAX_STATE_AGE`, shape (n,)."""
         age = self._handle.time() - self._times
         return (age >= 0.0) & (age < MAX_STATE_AGE) & np.isfinite(self.positions).all(axis=1)
+
+    def goal(self, number: int) -> Goal[float] | None:
+        """Return position and velocity of one as a goal with the heading 0; None if not fresh."""
+        if not self.are_fresh()[number]:
+            return None
+        x, y, z, *velocity = self._states[number].tolist()
+        return Goal((x, y, z), tuple(velocity), (0.0, 0.0, 0.0), 0.0, 0.0)
 
     def are_in_flight(self) -> NDArray[np.bool_]:
         """Return from which vehicles others have to keep apart, shape (n,)."""

@@ -14,11 +14,11 @@ from std_msgs.msg import String
 from typing_extensions import override
 
 from crazyflie_fleet import fleet_file
+from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC
 from crazyflie_fleet.vehicle_nodes import BUFFER
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.group_state import Rules
-from crazyflie_mission_api.high_level_node import HighLevelNode
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
 from crazyflie_mission_api.ros_clock import RosClock
 from crazyflie_mission_api.ros_vehicle import RosVehicle, prefix
@@ -38,6 +38,9 @@ _SERVICES = (
     "stop",
     "emergency",
     "update_params",
+    "set_group_mask",
+    "notify_setpoints_stop",
+    "arm",
 )
 
 _POLL = 0.2
@@ -90,7 +93,7 @@ class Fleet(VehicleGroup):
         self._end: Callable[[], None] = lambda: None
         if process is None:
             process, self._end = begin_script("mission")
-            _catch_signals()
+            catch_signals()
         self._handle = process.handle("/mission")
         try:
             vehicles = _connect(process, self._handle, chosen, startup_timeout)
@@ -110,6 +113,21 @@ class Fleet(VehicleGroup):
         except BaseException:
             self._end()
             raise
+
+    def vehicle(self, name: str) -> RosVehicle:
+        """Return a vehicle."""
+        self._check_names([name])
+        vehicle = self._vehicles[name]
+        assert isinstance(vehicle, RosVehicle)
+        return vehicle
+
+    @override
+    def adopt(self, name: str) -> None:
+        """Note that a vehicle flies by other commands: it is landed at the end."""
+        is_new = name not in self.flying
+        super().adopt(name)
+        if is_new:
+            self._handle.submit(self._publish_flying)
 
     def dry_run(self, mission: Callable[[VehicleGroup], Any]) -> float:
         """Check ``mission(fleet)`` by a dry run; return its duration, s.
@@ -247,8 +265,9 @@ def _below(top):
     return {service: f"{top}/{service}" for service in _SERVICES}
 
 
-def _catch_signals():
-    # What ends a script must end its with block, which lands; also where it is a node of rospy's.
+def catch_signals() -> None:
+    """Have SIGINT and SIGTERM raise, so that what lands at the end of a script is reached."""
+    # Also where the script is a node of rospy's.
     if threading.current_thread() is not threading.main_thread():
         return
     signal.signal(signal.SIGINT, signal.default_int_handler)

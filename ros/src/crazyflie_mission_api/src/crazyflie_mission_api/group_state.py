@@ -74,6 +74,20 @@ class GroupState:
         """Names of the vehicles in flight."""
         return [name for name in self._vehicles if name in self._commanded]
 
+    @property
+    def clock(self) -> Clock:
+        """The time of the vehicles."""
+        return self._clock
+
+    def adopt(self, name: str) -> None:
+        """Note that a vehicle flies by other commands: it is landed at the end."""
+        place = self._vehicles[name].position() or (0.0, 0.0, 0.0)
+        self._commanded[name] = TimedTrajectory.hover(place)
+
+    def release(self, name: str) -> None:
+        """Note that a vehicle that was adopted has landed."""
+        self._commanded.pop(name, None)
+
     def time(self) -> float:
         """Return the time of the vehicles, s."""
         return self._clock.time()

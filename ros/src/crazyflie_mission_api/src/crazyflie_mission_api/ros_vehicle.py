@@ -3,7 +3,7 @@
 import math
 from concurrent.futures import Future
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import genpy
 from geometry_msgs.msg import Point, PoseStamped
@@ -11,15 +11,15 @@ from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_mission_api.conversions import heading, to_message
-from crazyflie_mission_api.flight_words import WORDS
+from crazyflie_fleet.conversions import heading, to_message
+from crazyflie_fleet.flight_words import WORDS
 from crazyflie_mission_api.futures import done, in_turn
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.mission_vehicle import MissionVehicle
 from crazyflie_mission_api.stream import SetpointStream
 from crazyflie_mission_api.synchronized_start import SynchronizedStart
 from crazyflie_mission_api.timed_trajectory import START_SKEW
-from crazyflie_model.angles import Triple
+from crazyflie_model.angles import Triple, quaternion_from_rpy
 from crazyflie_model.trajectory import Pieces
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
@@ -32,7 +32,7 @@ MEMORY = 31
 """Pieces that the memory of a vehicle holds."""
 
 MAX_POSITION_AGE = 0.5
-"""A position older than this is not known, s; as `high_level_node.MAX_STATE_AGE`."""
+"""A position older than this is not known, s; as `commanded_references.MAX_STATE_AGE`."""
 
 _LANDED_HEIGHT = 0.1
 """Above the start, m: a vehicle below has landed."""
@@ -60,6 +60,14 @@ _LANDING_RETRY_TIME = 10.0
 with the mission, and the vehicle would fall."""
 
 
+class Pose(NamedTuple):
+    """Position (m), rotation (quaternion x, y, z, w) and their time (s)."""
+
+    position: Triple
+    rotation: tuple[float, float, float, float]
+    time: float
+
+
 class RosVehicle(MissionVehicle):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`.
 
@@ -82,17 +90,16 @@ class RosVehicle(MissionVehicle):
         self.bounds = fence(handle, prefix(name))
         self.start_skew = START_SKEW if synchronized_start is None else 0.0
         self._handle = handle
-        self._services = services
+        self.services = services
         self._synchronized_start = synchronized_start
-        self._uses_driver = uses_driver = synchronized_start is None
-        self._has_yaw = has_yaw
-        # Position and heading.
-        self._pose: tuple[Triple, float] | None = None
+        self.uses_driver = uses_driver = synchronized_start is None
+        self.has_yaw = has_yaw
+        self._pose: Pose | None = None
         self._seen_at = -math.inf
         self._ground = 0.0
         self._landing_end = 0.0
-        self._flight_status = FlightStatus()
-        self._driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
+        self.flight_status = FlightStatus()
+        self.driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
         top = prefix(name)
@@ -113,15 +120,16 @@ class RosVehicle(MissionVehicle):
 
     @override
     def position(self) -> Triple | None:
-        pose = self._latest_pose()
-        return None if pose is None else pose[0]
+        pose = self.pose()
+        return None if pose is None else pose.position
 
     @override
     def heading(self) -> float:
-        pose = self._latest_pose() if self._has_yaw else None
-        return 0.0 if pose is None else pose[1]
+        pose = self.pose() if self.has_yaw else None
+        return 0.0 if pose is None else heading(*pose.rotation)
 
-    def _latest_pose(self):
+    def pose(self) -> Pose | None:
+        """Return where the vehicle is; None when that is not known."""
         if self._handle.time() - self._seen_at < MAX_POSITION_AGE:
             return self._pose
         if self._lookup is None:
@@ -134,27 +142,27 @@ class RosVehicle(MissionVehicle):
         age = (self._handle.nanoseconds() - pose.stamp) * 1e-9
         if age >= MAX_POSITION_AGE:
             return None
-        return pose.position, heading(*pose.rotation)
+        return Pose(pose.position, pose.rotation, pose.stamp * 1e-9)
 
     @override
     def fault(self) -> str:
         if self._stream is not None:
-            status = self._driver_status
+            status = self.driver_status
             is_cut_off = status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
             is_bad = is_cut_off or status.is_emergency or status.supervisor & _FAULTS
             return status.text if is_bad else self._stream.fault()
-        status = self._flight_status
+        status = self.flight_status
         if status.state in _ENDED:
             return f"it does not fly any more: {status.reason or WORDS[status.state]}"
         return ""
 
     @override
     def has_landed(self) -> bool:
-        if not self._uses_driver:
-            return self._flight_status.state == FlightStatus.ON_GROUND
+        if not self.uses_driver:
+            return self.flight_status.state == FlightStatus.ON_GROUND
         place = self.position()
         if place is None:
-            status = self._driver_status
+            status = self.driver_status
             is_down = (
                 status.link == VehicleStatus.CONNECTED
                 and status.has_supervisor
@@ -168,37 +176,39 @@ class RosVehicle(MissionVehicle):
 
     def _on_pose(self, message):
         p, q = message.pose.position, message.pose.orientation
-        self._pose = ((p.x, p.y, p.z), heading(q.x, q.y, q.z, q.w))
         self._seen_at = self._handle.time()
+        self._pose = Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), self._seen_at)
 
     def _on_state(self, message):
         s = message.state
-        self._pose, self._seen_at = ((s.x, s.y, s.z), s.yaw), self._handle.time()
+        self._seen_at = self._handle.time()
+        rotation = quaternion_from_rpy(0.0, 0.0, s.yaw)
+        self._pose = Pose((s.x, s.y, s.z), rotation, self._seen_at)
 
     def _on_flight_status(self, message):
-        self._flight_status = message
+        self.flight_status = message
 
     def _on_driver_status(self, message):
-        self._driver_status = message
+        self.driver_status = message
 
     # Commands.
 
     @override
-    def take_off(self, height: float, duration: float) -> "Future[Any]":
+    def take_off(self, height: float, duration: float, group_mask: int = 0) -> "Future[Any]":
         place = self.position()
         self._ground = 0.0 if place is None else place[2]
 
         def climb():
-            return self._call("takeoff", srv.Takeoff, 0, height, _seconds(duration))
+            return self.call("takeoff", srv.Takeoff, group_mask, height, _seconds(duration))
 
-        if not self._uses_driver:
+        if not self.uses_driver:
             return climb()
         # The first call waits for the driver to have read the parameters, which it sets then.
         parameter = f"{prefix(self.name)}/{_HIGH_LEVEL}"
         return in_turn(
-            lambda: self._call("update_params", srv.UpdateParams, []),
+            lambda: self.call("update_params", srv.UpdateParams, []),
             lambda: self._handle.set_param_later(parameter, 1),
-            lambda: self._call("update_params", srv.UpdateParams, [_HIGH_LEVEL]),
+            lambda: self.call("update_params", srv.UpdateParams, [_HIGH_LEVEL]),
             climb,
         )
 
@@ -206,26 +216,26 @@ class RosVehicle(MissionVehicle):
     def land(self, duration: float) -> "Future[Any]":
         self._landing_end = self._handle.time() + duration + _SETTLING_TIME
         return self._hand_over(
-            lambda: self._call("land", srv.Land, 0, self._ground, _seconds(duration)),
+            lambda: self.call("land", srv.Land, 0, self._ground, _seconds(duration)),
             _LANDING_RETRY_TIME,
         )
 
     @override
     def stop_motors(self) -> None:
-        if self._uses_driver:
-            self._call("stop", srv.Stop, 0)
+        if self.uses_driver:
+            self.call("stop", srv.Stop, 0)
 
     @override
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
         request = (0, False, Point(*goal), yaw, _seconds(duration))
-        return self._hand_over(lambda: self._call("go_to", srv.GoTo, *request))
+        return self._hand_over(lambda: self.call("go_to", srv.GoTo, *request))
 
     @override
     def prepare(self, pieces: Pieces, stream: bool) -> "Future[Any]":
-        self._prepared = pieces if stream and self._uses_driver else None
+        self._prepared = pieces if stream and self.uses_driver else None
         if self._prepared is not None:
             return done(None)
-        if self._uses_driver and len(pieces) > MEMORY:
+        if self.uses_driver and len(pieces) > MEMORY:
             return done(
                 ServiceError(
                     f"the trajectory has {len(pieces)} pieces; expected at most {MEMORY}, which is "
@@ -233,38 +243,39 @@ class RosVehicle(MissionVehicle):
                 )
             )
         messages = [to_message(piece) for piece in pieces]
-        return self._call("upload_trajectory", srv.UploadTrajectory, 0, 0, messages)
+        return self.call("upload_trajectory", srv.UploadTrajectory, 0, 0, messages)
 
     @override
     def start(self) -> "Future[Any]":
         if self._prepared is not None and self._stream is not None:
             return self._stream.start(self._prepared)
         if self._synchronized_start is not None:
-            self._synchronized_start.start(self._services["start_trajectory"].rpartition("/")[0])
+            self._synchronized_start.start(self.services["start_trajectory"].rpartition("/")[0])
             return done(None)
         request = (0, 0, 1.0, False, False)
-        return self._hand_over(
-            lambda: self._call("start_trajectory", srv.StartTrajectory, *request)
-        )
+        return self._hand_over(lambda: self.call("start_trajectory", srv.StartTrajectory, *request))
 
     @override
     def emergency(self) -> "Future[Any]":
         if self._stream is not None:
             self._stream.stop()
         return self._handle.call_service(
-            self._services["emergency"], Empty, EmptyRequest(), CALL_TIMEOUT
+            self.services["emergency"], Empty, EmptyRequest(), CALL_TIMEOUT
         )
 
-    def _call(self, name, service_type, *arguments, limit=CALL_TIMEOUT):
+    def call(
+        self, name: str, service_type: Any, *arguments: Any, limit: float = CALL_TIMEOUT
+    ) -> "Future[Any]":
+        """Call a service by its short name; ``limit`` is in s of the machine's clock."""
         request = service_type._request_class(*arguments)
-        return self._handle.call_service(self._services[name], service_type, request, limit)
+        return self._handle.call_service(self.services[name], service_type, request, limit)
 
     def _hand_over(self, send, retry_time=0.0):
         return send() if self._stream is None else self._stream.hand_over(send, retry_time)
 
     def _hold(self, goal):
         request = (0, False, Point(*goal.position), goal.yaw, _seconds(_HOLD_DURATION))
-        return self._call("go_to", srv.GoTo, *request, limit=_HOLD_TIMEOUT)
+        return self.call("go_to", srv.GoTo, *request, limit=_HOLD_TIMEOUT)
 
 
 def prefix(name: str) -> str:

@@ -2,7 +2,7 @@
 
 from std_msgs.msg import String
 
-from crazyflie_mission_api.high_level_parameters import START_TOPIC
+from crazyflie_fleet.high_level_parameters import START_TOPIC
 from crazyflie_utils import NodeHandle
 
 _STEP = 0.02

@@ -3,14 +3,20 @@
 import functools
 import logging
 from collections.abc import Mapping
+from typing import Protocol
 
 from crazyflie_model.angles import Triple
 from crazyflie_py.backend import DEFAULT_COLOR
-from crazyflie_virtual.firmware.planner import Planner
 
 _log = logging.getLogger(__name__)
 
 _COLOR = ("ring.solidRed", "ring.solidGreen", "ring.solidBlue")
+
+
+class HasGroups(Protocol):
+    """Has a mask of groups."""
+
+    groups: int
 
 
 class SimulatedParameters:
@@ -22,11 +28,11 @@ class SimulatedParameters:
     ----------
     name : str
         Of the vehicle.
-    planner : Planner
-        Has the groups.
+    planner : Planner or other object
+        Has the ``groups``.
     """
 
-    def __init__(self, name: str, planner: Planner):
+    def __init__(self, name: str, planner: HasGroups):
         self._name = name
         self._planner = planner
         self._values: dict[str, float] = {}

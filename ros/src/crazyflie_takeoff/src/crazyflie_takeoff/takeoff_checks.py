@@ -26,6 +26,9 @@ class TakeoffChecks:
         # Without a filter nothing publishes whether there is one.
         self.has_controller = True
         self._had_controller = False
+        topic = parameters.inhibition_topic
+        # Why another node refuses takeoffs; empty if it does not.
+        self.inhibition = "" if topic is None else f"nothing has come on {resolve(topic)}"
         self._resolve = resolve
 
     def set_box(self, box: Box) -> None:
@@ -55,6 +58,7 @@ class TakeoffChecks:
             or self.driver.cannot_fly(now)
             or self._position_refusal(now)
             or self._controller_refusal()
+            or self.inhibition
             or self.battery_complaint(now)
         )
 

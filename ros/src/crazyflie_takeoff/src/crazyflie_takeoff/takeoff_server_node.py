@@ -2,7 +2,7 @@
 
 from concurrent.futures import Future
 
-from std_msgs.msg import Bool, Empty, Float32
+from std_msgs.msg import Bool, Empty, Float32, String
 from std_srvs.srv import Empty as EmptyService
 from std_srvs.srv import EmptyResponse
 from typing_extensions import override
@@ -99,6 +99,8 @@ class TakeoffServerNode(Node):
             handle.subscribe(parameters.connected_topic, Bool, self._on_connected)
         if (topic := parameters.vehicle_status_topic) is not None:
             handle.subscribe(topic, VehicleStatus, self._on_vehicle_status)
+        if parameters.inhibition_topic is not None:
+            handle.subscribe(parameters.inhibition_topic, String, self._on_inhibition)
         if parameters.state_topic is not None:
             handle.subscribe(
                 parameters.state_topic,
@@ -209,6 +211,9 @@ class TakeoffServerNode(Node):
     def _on_vehicle_status(self, message):
         state = SupervisorState(message.supervisor)
         self._checks.driver.update_state(self._handle.time(), state, message.is_emergency)
+
+    def _on_inhibition(self, message):
+        self._checks.inhibition = message.data
 
     def _on_battery(self, message):
         if message.data == message.data:

@@ -82,6 +82,12 @@ class TakeoffServerParameters(FlightTopicParameters):
         None,
         "topics/vehicle_status",
     )
+    inhibition_topic: str | None = parameter(
+        TOPIC,
+        "why another node refuses takeoffs; empty text if it does not",
+        None,
+        "topics/inhibition",
+    )
     takeoff_service: str = parameter(SERVICE, "takes off", "/takeoff", "srv/takeoff")
     land_service: str = parameter(SERVICE, "lands", "/land", "srv/land")
     hover_x: float = parameter(METRES, "hover point after takeoff", name="hover/x", live=True)

@@ -7,7 +7,7 @@ not fit the parameter server::
         boxes[name] = entry.read(BoxParameters)
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -31,17 +31,29 @@ def load(path: str | Path) -> "Entry":
         It cannot be read, is no YAML, no mapping, has a key twice, or is larger than a file of
         settings can be: see `yaml_loader`.
     """
-    path = Path(path)
     try:
-        node = compose(read_text(path, MAX_SIZE))
+        text = read_text(path, MAX_SIZE)
     except TextFileError as error:
-        where = shortened(str(path)) if error.line is None else f"{path}:{error.line}"
-        raise ParameterError(f"{where}: {error}") from None
+        raise _refusal(path, error) from None
+    return parse(text, path)
+
+
+def parse(text: str, name: str | Path) -> "Entry":
+    """Return the content of a text, which is a mapping; ``name`` is for errors. See `load`."""
+    try:
+        node = compose(text, str(name))
+    except TextFileError as error:
+        raise _refusal(name, error) from None
     if node is None:
-        raise ParameterError(f"{path}: is empty; expected a mapping")
-    entry = Entry(path, "", node)
+        raise ParameterError(f"{name}: is empty; expected a mapping")
+    entry = Entry("", node)
     entry.entries()
     return entry
+
+
+def _refusal(name, error):
+    where = shortened(str(name)) if error.line is None else f"{name}:{error.line}"
+    return ParameterError(f"{where}: {error}")
 
 
 @dataclass(frozen=True)
@@ -50,16 +62,19 @@ class Entry:
 
     Attributes
     ----------
-    file : Path
     name : str
         Its keys from the top of the file, such as "boxes/table"; empty for the whole.
     node : yaml.Node
         What the parser made of it.
     """
 
-    file: Path
     name: str
     node: yaml.Node
+
+    @property
+    def file(self) -> Path:
+        """The file that it is in."""
+        return Path(self.node.start_mark.name)
 
     @property
     def line(self) -> int:
@@ -88,12 +103,12 @@ class Entry:
             raise self.error(f"is {shown(self.value)}; expected a mapping")
         found: dict[str, Entry] = {}
         for key_node, node in self.node.value:
-            key = Entry(self.file, self.name, key_node).value
+            key = Entry(self.name, key_node).value
             if not isinstance(key, str):
-                raise Entry(self.file, self.name, key_node).error(
+                raise Entry(self.name, key_node).error(
                     f"has the key {shown(key)}; expected a string"
                 )
-            entry = Entry(self.file, f"{self.name}/{key}".lstrip("/"), node)
+            entry = Entry(f"{self.name}/{key}".lstrip("/"), node)
             if key in found:
                 raise entry.error(f"is there twice, first in line {found[key].line}")
             found[key] = entry
@@ -103,10 +118,7 @@ class Entry:
         """Return what it holds in order, if it is a list."""
         if not isinstance(self.node, yaml.SequenceNode):
             raise self.error(f"is {shown(self.value)}; expected a list")
-        return [
-            Entry(self.file, f"{self.name}[{index}]", node)
-            for index, node in enumerate(self.node.value)
-        ]
+        return [Entry(f"{self.name}[{index}]", node) for index, node in enumerate(self.node.value)]
 
     def __contains__(self, key: str) -> bool:
         return key in self.entries()
@@ -117,11 +129,17 @@ class Entry:
             raise self.error(f"has no {key}; it has {shortened(', '.join(entries)) or 'nothing'}")
         return entries[key]
 
-    def read(self, parameters: type[P], besides: tuple[str, ...] = ()) -> P:
+    def read(
+        self,
+        parameters: type[P],
+        besides: tuple[str, ...] = (),
+        on_unknown: Callable[["Entry", set[str]], None] | None = None,
+    ) -> P:
         """Return the parameters that it holds; those of a group in a mapping of their own.
 
         Keys in ``besides`` are known, too, and read elsewhere. The error is about everything that
-        is missing, unknown, or not what is expected.
+        is missing, unknown, or not what is expected; with ``on_unknown(entry, known)`` this is
+        called with each entry that is unknown instead.
         """
         names = {declaration.name for declaration in parameters.declarations()}
         known: dict[str, Entry] = {}
@@ -129,7 +147,11 @@ class Entry:
         for path, entry in self._leaves(names):
             if path in names:
                 known[path] = entry
-            elif path not in besides:
+            elif path in besides:
+                continue
+            elif on_unknown is not None:
+                on_unknown(entry, names | set(besides))
+            else:
                 expected = ", ".join(sorted(names | set(besides)))
                 complaints += entry.error(f"is not known; expected one of {expected}").complaints
 

@@ -22,14 +22,14 @@ MAX_NODES = 50_000
 """Values and keys; an alias counts as what it stands for."""
 
 
-def compose(text: str) -> yaml.Node | None:
-    """Return the node of a YAML text; None for one without content.
+def compose(text: str, name: str) -> yaml.Node | None:
+    """Return the node of a YAML text; None for one without content. ``name`` is its file's.
 
     Raises `TextFileError` if it is no YAML, is beyond the limits above, or has an alias in what the
     alias stands for.
     """
     try:
-        loader = _Loader(text)
+        loader = _Loader(text, name)
     except yaml.reader.ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         reason = f"is no YAML: it has the character U+{error.character:04X}"
@@ -45,8 +45,9 @@ def compose(text: str) -> yaml.Node | None:
 
 
 class _Loader(yaml.SafeLoader):
-    def __init__(self, text: str):
+    def __init__(self, text: str, name: str):
         super().__init__(text)
+        self.name = name  # In the marks of its nodes.
         self._depth = 0
         self._count = 0
         self._sizes: dict[int, int] = {}

@@ -8,15 +8,22 @@ from high_level_bench import SECONDS, TOP, Bench
 from std_msgs.msg import String
 
 from crazyflie_driver import srv
-from crazyflie_driver.msg import Position
-from crazyflie_mission_api.conversions import full_state_message, setpoint_goal, to_message
-from crazyflie_mission_api.minimum_snap import plan
-from crazyflie_model.polynomials import Goal
+from crazyflie_fleet.conversions import full_state_message, to_message
+from crazyflie_model.planner import smooth_piece
+from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import (
     PositionVelocityState,
     PositionVelocityStateStamped,
 )
 from crazyflie_utils import ServiceError
+
+
+def pieces_through(*points):
+    """Return pieces of 1 s from rest to rest."""
+    return [
+        smooth_piece(at_rest(start, 0.0), end, 0.0, 1.0)
+        for start, end in zip(points, points[1:], strict=False)
+    ]
 
 
 @pytest.fixture
@@ -79,7 +86,7 @@ def test_a_move_after_setpoints_begins_where_they_were(bench):
 
 
 def test_trajectories_are_uploaded_and_flown(bench):
-    pieces = plan([(0, 0, 1), (1, 0, 1), (1, 1, 1)])
+    pieces = pieces_through((0.0, 0.0, 1.0), (1.0, 0.0, 1.0), (1.0, 1.0, 1.0))
     bench.call("upload_trajectory", srv.UploadTrajectory, 3, 0, [to_message(p) for p in pieces])
     bench.call("start_trajectory", srv.StartTrajectory, 0, 3, 0.5, False, False)
     duration = 0.5 * sum(piece.duration for piece in pieces)
@@ -146,35 +153,6 @@ def test_is_silent_while_the_vehicle_lands(bench):
     assert len(bench.references()) == count
 
 
-def test_setpoints_are_followed_until_they_stop(bench):
-    goal = Goal((0.5, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 0.0), 0.3, 0.0)
-    assert setpoint_goal(full_state_message(goal)).yaw == pytest.approx(0.3)
-    bench.process.publish(f"{TOP}/cmd_full_state", full_state_message(goal))
-    assert bench.references()[-1] == pytest.approx([0.5, 0.0, 1.0, 0.2, 0.0, 0.0])
-    bench.see((0.5, 0.0, 1.0))
-    assert bench.fly(1.2)[-1] == pytest.approx([0.5, 0.0, 1.0, 0.0, 0.0, 0.0])
-    for x in (0.4, math.nan):
-        bench.process.publish(f"{TOP}/cmd_position", Position(x=x, z=1.0))
-    assert bench.references()[-1] == pytest.approx([0.4, 0.0, 1.0, 0.0, 0.0, 0.0], abs=1e-6)
-
-
-def test_setpoints_that_stop_together_with_the_states_leave_a_reference_at_rest(bench):
-    goal = Goal((0.5, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 0.0), 0.3, 0.0)
-    bench.process.publish(f"{TOP}/cmd_full_state", full_state_message(goal))
-    bench.process.advance(1.2)
-    assert bench.references()[-1] == pytest.approx([0.5, 0.0, 1.0, 0.0, 0.0, 0.0])
-
-
-def test_a_setpoint_ends_a_way(bench):
-    bench.go_to((1.0, 0.0, 1.0))
-    bench.fly(0.5)
-    bench.process.publish(f"{TOP}/cmd_position", Position(x=0.1, z=1.0))
-    bench.process.advance(0.3)
-    assert bench.references()[-1][0] == pytest.approx(0.1)
-    bench.node.shutdown()
-    assert bench.references()[-1] == pytest.approx([0.1, 0.0, 1.0, 0.0, 0.0, 0.0])
-
-
 def test_references_have_a_heading_for_controllers_that_follow_it():
     bench = Bench(**{"reference/yaw": True})
     bench.be("flying")
@@ -217,8 +195,7 @@ def test_what_makes_no_sense_is_refused(bench, text):
 
 
 def test_who_is_named_begins_what_was_uploaded(bench):
-    path = plan([(0, 0, 1), (0.5, 0, 1)])
-    pieces = [to_message(piece) for piece in path]
+    pieces = [to_message(p) for p in pieces_through((0.0, 0.0, 1.0), (0.5, 0.0, 1.0))]
     bench.be("flying")
     bench.call("upload_trajectory", srv.UploadTrajectory, 0, 0, pieces)
     bench.process.publish("/all/start_trajectory", String("/cf2/high_level /cf11/high_level"))

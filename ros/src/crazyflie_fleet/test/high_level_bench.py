@@ -6,7 +6,7 @@ from geometry_msgs.msg import Point
 from std_srvs.srv import EmptyResponse
 
 from crazyflie_driver import srv
-from crazyflie_mission_api.high_level_node import HighLevelNode
+from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_msgs.msg import (
     FlightStatus,
     PositionVelocityYawState,

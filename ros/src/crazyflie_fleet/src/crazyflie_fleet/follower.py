@@ -1,6 +1,7 @@
 """References of a high-level commander: hover, straight moves, trajectories."""
 
 import math
+from typing import NamedTuple
 
 from crazyflie_model.angles import Triple
 from crazyflie_model.planner import smooth_piece
@@ -11,6 +12,17 @@ from crazyflie_utils.refusal import RefusalError
 NEAR = 0.5
 """A move begins at the present goal if the vehicle is this near to it, m; otherwise where the
 vehicle is, since another node has moved it."""
+
+
+_MAX_STEP = 0.1
+"""Longest time between two setpoints of a velocity for which the goal moves on, s."""
+
+
+class Velocity(NamedTuple):
+    """A setpoint without a position."""
+
+    velocity: Triple  # Of the vehicle in the fixed frame, m/s.
+    height: float | None = None  # Above the ground, m.
 
 
 class Follower:
@@ -30,9 +42,25 @@ class Follower:
         """Delete the goal; uploaded trajectories stay."""
         self._trajectory = self._setpoint = None
 
-    def take_setpoint(self, goal: Goal[float]) -> None:
+    def take_setpoint(self, time: float, goal: Goal[float]) -> None:
         """Replace any command by the goal of a setpoint."""
         self._trajectory, self._setpoint = None, goal
+        self._begin = time
+
+    def take_velocity(
+        self, time: float, measured: Goal[float], setpoint: Velocity, ground: float
+    ) -> None:
+        """Replace any command by a goal that moves on from the present one at a velocity.
+
+        ``ground`` is the height (z) above which that of the setpoint counts, m.
+        """
+        start = self._start(time, measured)
+        passed = 0.0 if self._setpoint is None else min(max(time - self._begin, 0.0), _MAX_STEP)
+        x, y, z = (p + v * passed for p, v in zip(start.position, start.velocity, strict=True))
+        if setpoint.height is not None:
+            z = ground + setpoint.height
+        still = (0.0, 0.0, 0.0)
+        self.take_setpoint(time, Goal((x, y, z), setpoint.velocity, still, start.yaw, 0.0))
 
     def is_moving(self, time: float) -> bool:
         """Return whether a move or a trajectory has not ended."""

@@ -1,0 +1,143 @@
+"""References of a controller that follow from commands and setpoints."""
+
+from collections.abc import Callable
+from typing import Any
+
+from crazyflie_fleet.conversions import reference_message
+from crazyflie_fleet.follower import Follower, Velocity
+from crazyflie_fleet.high_level_parameters import HighLevelParameters
+from crazyflie_model.polynomials import Goal, at_rest
+from crazyflie_msgs.msg import PositionVelocityYawStateStamped
+from crazyflie_utils import NodeHandle, ServiceError
+from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.timers import Timer
+
+MAX_STATE_AGE = 0.5
+"""Of a state that says where the vehicle is, and of the last setpoint of a stream, s."""
+
+_HOLD_DURATION = 0.5
+"""Of the move to the goal of the last setpoint, s."""
+
+
+class CommandedReferences:
+    """Publishes references while there is something to follow.
+
+    ``measured()`` returns the present state of the vehicle, or None if it is not known; without it
+    the topic of the parameters is subscribed to.
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        parameters: HighLevelParameters,
+        measured: Callable[[], Goal[float] | None] | None,
+    ):
+        self._handle = handle
+        self._parameters = parameters
+        self.follower = Follower()
+        self._is_moving = False
+        # When the last setpoint came; None without a stream.
+        self._setpoint_time: float | None = None
+        self._timer: Timer | None = None
+        self._state: Goal[float] | None = None
+        self._state_time = 0.0
+        self._measured = measured or self._received
+        self._publisher = handle.publisher(parameters.reference_topic, parameters.reference_type)
+        if measured is None:
+            state_type = PositionVelocityYawStateStamped
+            handle.subscribe(parameters.state_topic, state_type, self._on_state, finite="state")
+
+    def present(self) -> Goal[float]:
+        """Return the present state of the vehicle; raises `ServiceError` if it is not known."""
+        measured = self._measured()
+        if measured is None:
+            topic = self._handle.resolve(self._parameters.state_topic)
+            raise ServiceError(f"no state has come on {topic} for {MAX_STATE_AGE:g} s")
+        return measured
+
+    def begin(self, command: Callable[..., None], *arguments: Any) -> None:
+        """Begin a command of `Follower`; raises `ServiceError` if it is refused."""
+        try:
+            command(self.follower, self._handle.time(), self.present(), *arguments)
+        except RefusalError as reason:
+            raise ServiceError(str(reason)) from None
+        self._setpoint_time = None
+        self._is_moving = True
+        self._set_timer()
+
+    def take(self, setpoint: Goal[float] | Velocity, ground: float) -> None:
+        """Follow a setpoint; heights of a velocity count above ``ground``, m."""
+        now = self._handle.time()
+        if isinstance(setpoint, Goal):
+            self.follower.take_setpoint(now, setpoint)
+        else:
+            self.follower.take_velocity(now, self.present(), setpoint, ground)
+        self._is_moving = False
+        self._setpoint_time = now
+        self._set_timer()
+        self.publish()
+
+    def end_setpoints(self) -> None:
+        """Hover at the goal of the last setpoint, if there are setpoints."""
+        last = self.follower.goal(self._handle.time())
+        if self._setpoint_time is None or last is None:
+            return
+        self.forget()
+        try:
+            self.begin(Follower.go_to, last.position, last.yaw, _HOLD_DURATION)
+        except ServiceError as reason:
+            # The last reference has a velocity, and the controller goes on with it.
+            self._handle.warn(f"setpoints have stopped, and {reason}: stays at the last one")
+            self.publish(at_rest(last.position, last.yaw))
+
+    def rest(self) -> None:
+        """Leave the controller a reference at rest, if it follows one that moves."""
+        goal = self.follower.goal(self._handle.time())
+        if (self._is_moving or self._setpoint_time is not None) and goal is not None:
+            self.publish(at_rest(goal.position, goal.yaw))
+
+    def forget(self) -> None:
+        """End references; uploaded trajectories stay."""
+        self.follower.forget()
+        self._is_moving = False
+        self._setpoint_time = None
+        self._set_timer()
+
+    def publish(self, goal: Goal[float] | None = None) -> None:
+        """Publish a goal as reference, by default that of now."""
+        goal = goal or self.follower.goal(self._handle.time())
+        if goal is not None:
+            message = reference_message(goal, self._parameters.has_yaw)
+            message.header.stamp = self._handle.stamp()
+            self._publisher.publish(message)
+
+    def _set_timer(self):
+        """Have a timer only while there are references to publish: a fleet has many vehicles."""
+        is_needed = self._is_moving or self._setpoint_time is not None
+        if is_needed and self._timer is None:
+            self._timer = self._handle.timer(self._parameters.time_step, self._on_timer)
+        elif not is_needed and self._timer is not None:
+            self._timer.stop()
+            self._timer = None
+
+    def _on_timer(self):
+        now = self._handle.time()
+        last = self._setpoint_time
+        if last is not None and not 0.0 <= now - last < MAX_STATE_AGE:
+            self.end_setpoints()
+        if self._is_moving:
+            # The last one, at rest, is published, too.
+            self._is_moving = self.follower.is_moving(now)
+            self.publish()
+            self._set_timer()
+
+    def _on_state(self, message):
+        s = message.state
+        yaw = s.yaw if self._parameters.has_yaw else 0.0
+        velocity = (s.x_dot, s.y_dot, s.z_dot)
+        self._state = Goal((s.x, s.y, s.z), velocity, (0.0,) * 3, yaw, 0.0)
+        self._state_time = self._handle.time()
+
+    def _received(self):
+        is_fresh = 0.0 <= self._handle.time() - self._state_time < MAX_STATE_AGE
+        return self._state if is_fresh else None

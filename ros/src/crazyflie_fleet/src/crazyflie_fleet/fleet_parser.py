@@ -1,0 +1,280 @@
+"""Parser of fleet files."""
+
+from collections.abc import Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import yaml
+
+from crazyflie_fleet.fleet_config import FleetConfig, LogTopic, VehicleConfig, close_pairs
+from crazyflie_fleet.remarks import Remarks
+from crazyflie_fleet.settings import (
+    DEFAULT_TOPICS,
+    LOCAL,
+    VEHICLE_NAME,
+    WITHOUT_EFFECT,
+    DefaultTopicSettings,
+    FirmwareNumber,
+    LogTopicSettings,
+    MachineSettings,
+    PartialSettings,
+    RobotSettings,
+    same_vehicle,
+)
+from crazyflie_utils import ParameterError
+from crazyflie_utils.messages import shortened, shown
+from crazyflie_utils.parameters.types import BOOLEAN, ParameterType
+from crazyflie_utils.parameters.yaml_file import Entry
+
+_TOP = ("robots", "robot_types", "all", "machines", "fileversion")
+_FIRMWARE = ("firmware_params", "firmware_logging")
+_LOGGING = ("enabled", "default_topics", "custom_topics")
+_FIRMWARE_NUMBER = FirmwareNumber()
+_WITHOUT_EFFECT = [
+    declaration.name
+    for declaration in RobotSettings.declarations()
+    if declaration.help == WITHOUT_EFFECT
+]
+
+
+class FleetParser:
+    """Parses one file in crazyswarm2's layout; collects all errors, and remarks."""
+
+    def __init__(self, top: Entry):
+        self._top = top
+        self._parts = top.entries()
+        self._errors: list[str] = []
+        self.remarks = Remarks()
+
+    def fleet(self) -> FleetConfig:
+        """Return the fleet, or raise `ParameterError`."""
+        if "robots" not in self._parts:
+            raise self._top.error(
+                "has no robots, as crazyswarm2's, and no crazyflies, as Crazyswarm 1's; it has "
+                f"{shortened(', '.join(self._parts)) or 'nothing'}"
+            )
+        self._check_keys(self._parts, _TOP)
+        robots = self._parts["robots"].entries()
+        types = _entries(self._parts, "robot_types")
+        common = self._parts.get("all")
+        machines = {
+            name: self._read(entry, MachineSettings)
+            for name, entry in _entries(self._parts, "machines").items()
+        }
+        # What vehicles inherit is checked where it is given: once, and not in each of them.
+        for entry in types.values():
+            self._check(entry)
+        if common is not None:
+            self._check(common, "broadcasts")
+            if "broadcasts" in common:
+                self.remarks.idle(common["broadcasts"], "broadcasts")
+        for name, entry in robots.items():
+            self._check_type(VEHICLE_NAME, name, entry)
+            self._check(entry)
+            self._check_choice(entry, "type", types)
+        for entry in (*robots.values(), *types.values(), *([common] if common else [])):
+            self._check_choice(entry, "machine", (LOCAL, *machines))
+        self._raise_errors()
+        # And what is wrong only together, in each of them.
+        vehicles = [self._vehicle(name, entry, types, common) for name, entry in robots.items()]
+        self._raise_errors()
+        enabled = [vehicle for vehicle in vehicles if vehicle.settings.enabled]
+        self._check_addresses(enabled, robots)
+        self._raise_errors()
+        disabled = [vehicle.name for vehicle in vehicles if not vehicle.settings.enabled]
+        if not enabled:
+            raise self._parts["robots"].error(
+                "has no vehicle that is enabled; expected one at least"
+            )
+        unplaced = self._unplaced(enabled)
+        return FleetConfig(
+            tuple(enabled), tuple(disabled), machines, self.remarks.texts(), unplaced
+        )
+
+    # What is wrong.
+
+    def _error(self, entry, text):
+        self._errors += entry.error(text).complaints
+
+    def _raise_errors(self):
+        if self._errors:
+            raise ParameterError(*dict.fromkeys(self._errors))
+
+    def _read(self, entry, settings, *besides):
+        def on_unknown(unknown, known):
+            with self._collecting():
+                self.remarks.unknown(unknown, known)
+
+        with self._collecting():
+            return entry.read(settings, besides, on_unknown)
+
+    @contextmanager
+    def _collecting(self):
+        try:
+            yield
+        except ParameterError as error:
+            self._errors += error.complaints
+
+    def _check(self, entry, *besides):
+        if self._read(entry, PartialSettings, *_FIRMWARE, *besides) is None:
+            return
+        for key in _WITHOUT_EFFECT:
+            if (idle := _inner(entry, key)) is not None:
+                self.remarks.idle(idle, key)
+        with self._collecting():
+            self._firmware(entry)
+
+    def _check_keys(self, entries, known):
+        for key, entry in entries.items():
+            if key not in known:
+                with self._collecting():
+                    self.remarks.unknown(entry, known)
+
+    def _check_type(self, expected: ParameterType, value: Any, entry: Entry) -> Any:
+        try:
+            return expected(value)
+        except ValueError:
+            self._error(entry, f"is {shown(value)}; expected {expected}")
+            return None
+
+    def _check_choice(self, entry, key, known):
+        if isinstance(entry.node, yaml.MappingNode) and key in entry:
+            chosen = entry[key]
+            if chosen.value and chosen.value not in list(known):
+                expected = (
+                    f"one of {shortened(', '.join(known))}"
+                    if known
+                    else f"none, as there are no {key}s"
+                )
+                self._error(chosen, f"is {shown(chosen.value)}; expected {expected}")
+
+    def _check_addresses(self, vehicles, robots):
+        seen: dict[str, str] = {}
+        for vehicle in vehicles:
+            if vehicle.uri is None:
+                continue
+            other = seen.setdefault(same_vehicle(vehicle.uri), vehicle.name)
+            if other != vehicle.name:
+                line = (_inner(robots[other], "uri") or robots[other]).line
+                self._error(
+                    _inner(robots[vehicle.name], "uri") or robots[vehicle.name],
+                    f"is {vehicle.uri}, as that of {other} in line {line}; expected an address "
+                    "of its own",
+                )
+
+    def _unplaced(self, vehicles):
+        pairs = []
+        for i, j, distance, limit in close_vehicles(vehicles):
+            first, second = vehicles[i].name, vehicles[j].name
+            pairs.append((first, second))
+            self.remarks.add(
+                f"{self._top.file}: the start points of {first} and {second} are {distance:.3g} m "
+                f"apart, and their collision buffers need {limit:.3g} m; neither takes off until "
+                "they are seen that far apart"
+            )
+        return tuple(pairs)
+
+    # What vehicles are.
+
+    def _vehicle(self, name, robot, types, common):
+        layers = [common, types.get(robot["type"].value) if "type" in robot else None, robot]
+        node = _merged([layer.node for layer in layers if layer is not None])
+        merged = Entry(robot.name, node)
+        settings = self._read(merged, RobotSettings, *_FIRMWARE, "broadcasts")
+        if settings is None:
+            return None
+        self._check_voltages(merged, settings)
+        return VehicleConfig(name, settings.position, settings, *self._firmware(merged))
+
+    def _check_voltages(self, merged, settings):
+        # Which of the robot, its type and all has which of them is known only here.
+        critical, warning = settings.voltage_critical, settings.voltage_warning
+        if critical <= warning:
+            return
+        given = merged["battery"].entries()
+        if "voltage_critical" in given:
+            entry, text = given["voltage_critical"], f"is {critical:g}; expected not more than"
+            other = f"voltage_warning, {warning:g} (V)"
+        else:
+            entry, text = given["voltage_warning"], f"is {warning:g}; expected not less than"
+            other = f"voltage_critical, {critical:g} (V)"
+        # Without the robot's name: what several inherit is wrong once.
+        name = entry.name.removeprefix(f"{merged.name}/")
+        self._error(Entry(name, entry.node), f"{text} {other}")
+
+    def _firmware(self, entry):
+        parts = entry.entries()
+        params = {
+            f"{group}.{key}": self._check_type(_FIRMWARE_NUMBER, value.value, value)
+            for group, inner in _entries(parts, "firmware_params").items()
+            for key, value in inner.entries().items()
+        }
+        if "firmware_logging" not in parts:
+            return params, ("battery",), ()
+        return params, *self._logging(parts["firmware_logging"])
+
+    def _logging(self, entry):
+        parts = entry.entries()
+        self._check_keys(parts, _LOGGING)
+        default_topics = _entries(parts, "default_topics")
+        self._check_keys(default_topics, DEFAULT_TOPICS)
+        standard = []
+        for key, inner in default_topics.items():
+            if DEFAULT_TOPICS.get(key) == "":
+                remark = inner.error("is not offered by the driver, and left out")
+                self.remarks.add(str(remark), inner.line)
+            elif key in DEFAULT_TOPICS and self._read(inner, DefaultTopicSettings) is not None:
+                standard.append(DEFAULT_TOPICS[key])
+                if "frequency" in inner:
+                    self.remarks.idle(inner["frequency"], "frequency of a default topic")
+        custom = []
+        for key, inner in _entries(parts, "custom_topics").items():
+            topic = self._read(inner, LogTopicSettings)
+            self._check_type(VEHICLE_NAME, key, inner)
+            if topic is not None:
+                custom.append(LogTopic(key, topic.frequency, topic.variables))
+        enabled = "enabled" not in parts or self._check_type(
+            BOOLEAN, parts["enabled"].value, parts["enabled"]
+        )
+        # Without its battery a vehicle is not safe: it is watched in any case.
+        names = ("battery", *standard) if enabled else ("battery",)
+        return tuple(dict.fromkeys(names)), tuple(custom) if enabled else ()
+
+
+def _entries(parts, key):
+    return parts[key].entries() if key in parts else {}
+
+
+def _inner(entry, path):
+    """Return the entry at a path, such as motion_capture/marker; None if there is none."""
+    for key in path.split("/"):
+        if key not in entry:
+            return None
+        entry = entry[key]
+    return entry
+
+
+def close_vehicles(
+    vehicles: Sequence[VehicleConfig],
+) -> list[tuple[int, int, float, float]]:
+    """Return the pairs of vehicles whose start points are too close; see `close_pairs`."""
+    if not vehicles:
+        return []
+    positions = np.array([vehicle.position for vehicle in vehicles])
+    return sorted(close_pairs(positions, [vehicle.buffer for vehicle in vehicles]))
+
+
+def _merged(nodes):
+    """Return a mapping with the values of all, the last one's first; each keeps its line."""
+    if not all(isinstance(node, yaml.MappingNode) for node in nodes):
+        return nodes[-1]
+    values: dict[str, list[yaml.Node]] = {}
+    keys = {}
+    for node in nodes:
+        for key, value in node.value:
+            keys[key.value] = key
+            values.setdefault(key.value, []).append(value)
+    merged = [(keys[name], _merged(layers)) for name, layers in values.items()]
+    last = nodes[-1]
+    return yaml.MappingNode(last.tag, merged, last.start_mark, last.end_mark)

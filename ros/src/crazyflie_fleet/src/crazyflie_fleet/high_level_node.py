@@ -1,0 +1,300 @@
+"""The driver's high-level services for a vehicle that the workspace's controller flies."""
+
+import math
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from std_msgs.msg import String
+from std_srvs.srv import Empty, EmptyResponse
+from typing_extensions import override
+
+from crazyflie_driver import srv
+from crazyflie_fleet.commanded_references import CommandedReferences
+from crazyflie_fleet.conversions import from_message
+from crazyflie_fleet.flight_words import WORDS
+from crazyflie_fleet.follower import Follower
+from crazyflie_fleet.groups import Groups
+from crazyflie_fleet.high_level_parameters import HighLevelParameters
+from crazyflie_fleet.service_relay import relay
+from crazyflie_fleet.setpoint_subscribers import SetpointSubscribers
+from crazyflie_model.polynomials import Goal, at_rest
+from crazyflie_msgs.msg import FlightStatus
+from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status
+from crazyflie_utils.last_valid import HOLD_LIMIT
+from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.timers import Timer
+
+CLIMB_SPEED = 0.7
+"""Largest mean speed of a takeoff, m/s."""
+
+
+@dataclass
+class _Takeoff:
+    """A takeoff by this node.
+
+    Its references begin `HOLD_LIMIT` after the takeoff server has handed over: so long the filter
+    holds the server's last control.
+    """
+
+    hover: Goal[float]
+    end: float  # s.
+    handover: Timer | None = None
+    is_followed: bool = False
+
+
+class HighLevelNode(Node):
+    """Fly a vehicle by high-level commands: make references for its controller.
+
+    In its own namespace it offers the services of the driver for a real vehicle, so that the same
+    clients fly simulated vehicles. It is silent on the ground and during landing.
+    ``measured()`` returns the present state, or None if it is not known; without it the node
+    subscribes to the topic.
+    """
+
+    needed_in_flight = True
+
+    def __init__(self, measured: Callable[[], Goal[float] | None] | None = None) -> None:
+        self._measured = measured
+        self._status = FlightStatus()
+        self._groups = Groups()
+        self._takeoff: _Takeoff | None = None
+        self._next: tuple[Any, ...] | None = None  # A command during a takeoff, for its end.
+        self._landings: list[Future[Any]] = []
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        self._parameters = handle.load(HighLevelParameters)
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        parameters = self._parameters
+        self._references = CommandedReferences(handle, parameters, self._measured)
+        for name, service_type, callback in (
+            ("takeoff", srv.Takeoff, self._on_takeoff),
+            ("land", srv.Land, self._on_land),
+            ("stop", srv.Stop, self._on_stop),
+            ("go_to", srv.GoTo, self._on_go_to),
+            ("start_trajectory", srv.StartTrajectory, self._on_start),
+        ):
+            handle.advertise_service(
+                f"~{name}", service_type, self._groups.for_members(service_type, callback)
+            )
+        for name, service_type, callback in (
+            ("emergency", Empty, self._on_emergency),
+            ("upload_trajectory", srv.UploadTrajectory, self._on_upload),
+            ("notify_setpoints_stop", srv.NotifySetpointsStop, self._on_setpoints_stop),
+            ("set_group_mask", srv.SetGroupMask, self._groups.on_set_group_mask),
+            # There is no firmware here.
+            ("update_params", srv.UpdateParams, lambda _: srv.UpdateParamsResponse()),
+        ):
+            handle.advertise_service(f"~{name}", service_type, callback)
+        flight_status.subscribe(
+            handle,
+            parameters.flight_status_topic,
+            parameters.flight_state_topic,
+            self._on_flight_status,
+        )
+        handle.subscribe(parameters.reference_topic, parameters.reference_type, self._on_reference)
+        handle.subscribe(parameters.start_topic, String, self._on_start_all)
+        SetpointSubscribers(handle, self._on_setpoint, parameters.has_yaw)
+
+    @override
+    def enter_safe_state(self) -> None:
+        """Leave the controller a reference at rest."""
+        if self._is_followed():
+            self._references.rest()
+        self._references.forget()
+
+    # State of the flight.
+
+    def _on_flight_status(self, status):
+        before, self._status = self._status.state, status
+        state = status.state
+        if state == before:
+            return
+        if state == FlightStatus.FLYING:
+            self._on_flying()
+        else:
+            self._references.forget()
+            if state != FlightStatus.TAKING_OFF and before == FlightStatus.TAKING_OFF:
+                # A command during an aborted takeoff must not take effect after the next one.
+                self._forget_takeoff()
+        if state in (FlightStatus.DESCENDING, FlightStatus.LANDING):
+            landings, self._landings = self._landings, []
+            for answer in landings:
+                if not answer.done():
+                    answer.set_result(srv.LandResponse())
+
+    def _on_flying(self):
+        if self._takeoff is not None and not self._takeoff.is_followed:
+            self._climb(self._takeoff)
+        self._takeoff = None
+        self._begin_next()
+
+    def _on_reference(self, _):
+        # With its hover point the server leaves the vehicle to the controller.
+        takeoff = self._takeoff
+        if takeoff is None or takeoff.handover or self._status.state != FlightStatus.TAKING_OFF:
+            return
+        takeoff.handover = self._handle.timer(HOLD_LIMIT, self._on_handover)
+        x, y, _ = takeoff.hover.position
+        try:
+            height = self._references.present().position[2]
+        except ServiceError:
+            height = takeoff.hover.position[2]
+        self._references.publish(at_rest((x, y, height), takeoff.hover.yaw))
+
+    def _on_handover(self):
+        takeoff = self._takeoff
+        if takeoff is not None and not takeoff.is_followed:
+            self._climb(self._takeoff)
+            self._begin_next()
+
+    def _climb(self, takeoff):
+        references = self._references
+        takeoff.is_followed = True
+        if takeoff.handover is not None:
+            takeoff.handover.stop()
+        (x, y, height), yaw = takeoff.hover.position, takeoff.hover.yaw
+        try:
+            way = height - references.present().position[2]
+            left = takeoff.end - self._handle.time()
+            duration = max(left, abs(way) / CLIMB_SPEED, self._parameters.time_step)
+            references.begin(Follower.go_to, (x, y, height), yaw, duration)
+            references.publish()
+        except ServiceError as reason:
+            self._handle.warn(f"takeoff: {reason}")
+            references.publish(takeoff.hover)
+
+    def _forget_takeoff(self):
+        if self._takeoff is not None and self._takeoff.handover is not None:
+            self._takeoff.handover.stop()
+        self._takeoff = self._next = None
+
+    def _begin_next(self):
+        command, self._next = self._next, None
+        if command is not None:
+            self._begin_or_log(*command)
+
+    def _is_followed(self):
+        """Return whether the controller follows the references of this node."""
+        if self._status.state == FlightStatus.TAKING_OFF:
+            return self._takeoff is not None and self._takeoff.is_followed
+        return self._status.state == FlightStatus.FLYING
+
+    # Commands.
+
+    def _on_takeoff(self, request):
+        duration = request.duration.to_sec()
+        if not (request.height > 0.0 and math.isfinite(request.height) and duration > 0.0):
+            raise ServiceError(
+                f"height and duration are {request.height:g} m and {duration:g} s; expected "
+                "more than 0"
+            )
+        start = self._references.present()
+        x, y, ground = start.position
+        if request.height <= ground:
+            raise ServiceError(
+                f"height is {request.height:g} m, and the vehicle is at {ground:.2f} m; expected "
+                "more"
+            )
+        hover = at_rest((x, y, request.height), start.yaw)
+        if self._is_followed() or self._takeoff is not None:
+            self._execute(Follower.go_to, hover.position, hover.yaw, duration)
+            return srv.TakeoffResponse()
+        takeoff = self._takeoff = _Takeoff(hover, self._handle.time() + duration)
+
+        def forget_refused(call):
+            if call.exception() is not None and self._takeoff is takeoff:
+                self._forget_takeoff()
+
+        call = relay(self._handle, self._parameters.takeoff, srv.TakeoffResponse)
+        call.add_done_callback(self._handle.guard(forget_refused))
+        return call
+
+    def _on_land(self, _):
+        if self._status.state == FlightStatus.ON_GROUND:
+            return srv.LandResponse()
+        answer = relay(self._handle, self._parameters.land, srv.LandResponse)
+        if self._status.state in (FlightStatus.DESCENDING, FlightStatus.LANDING):
+            return srv.LandResponse()
+        # The server answers after the landing, the driver when it begins.
+        self._landings.append(answer)
+        return answer
+
+    def _on_emergency(self, _):
+        self._references.forget()
+        return relay(self._handle, self._parameters.emergency, EmptyResponse)
+
+    def _on_stop(self, _):
+        if self._status.state in (FlightStatus.FLYING, FlightStatus.TAKING_OFF):
+            raise ServiceError(
+                f"the vehicle is {WORDS[self._status.state]}; expected it to have landed: stop "
+                "would let it fall, which is what emergency is for"
+            )
+        return srv.StopResponse()
+
+    def _on_go_to(self, request):
+        if request.yaw and not self._parameters.has_yaw:
+            raise ServiceError(
+                f"yaw is {request.yaw:g} rad, and the controller keeps the heading 0; expected 0"
+            )
+        goal = (request.goal.x, request.goal.y, request.goal.z)
+        duration = request.duration.to_sec()
+        self._execute(Follower.go_to, goal, request.yaw, duration, request.relative)
+        return srv.GoToResponse()
+
+    def _on_upload(self, request):
+        turns = any(any(piece.poly_yaw) for piece in request.pieces)
+        if turns and not self._parameters.has_yaw:
+            raise ServiceError(
+                f"trajectory {request.trajectoryId} has a yaw, and the controller keeps the "
+                "heading 0; expected coefficients 0"
+            )
+        try:
+            self._references.follower.upload(
+                request.trajectoryId, [from_message(p) for p in request.pieces]
+            )
+        except RefusalError as reason:
+            raise ServiceError(str(reason)) from None
+        return srv.UploadTrajectoryResponse()
+
+    def _on_start(self, request):
+        flown = (request.trajectoryId, request.timescale, request.reversed, request.relative)
+        self._execute(Follower.start, *flown)
+        return srv.StartTrajectoryResponse()
+
+    def _on_start_all(self, message):
+        if self._handle.name not in message.data.split():
+            return
+        if self._status.state == FlightStatus.FLYING:
+            self._begin_or_log(Follower.start, 0)
+        else:
+            self._handle.error(f"not started: the vehicle is {WORDS[self._status.state]}")
+
+    def _on_setpoints_stop(self, _):
+        self._references.end_setpoints()
+        return srv.NotifySetpointsStopResponse()
+
+    def _execute(self, command, *arguments):
+        if self._is_followed():
+            self._references.begin(command, *arguments)
+        elif self._status.state == FlightStatus.TAKING_OFF:
+            self._next = (command, *arguments)
+        else:
+            raise ServiceError(f"the vehicle is {WORDS[self._status.state]}; expected it to fly")
+
+    def _begin_or_log(self, command, *arguments):
+        try:
+            self._references.begin(command, *arguments)
+        except ServiceError as reason:
+            self._handle.error(f"not done: {reason}")
+
+    def _on_setpoint(self, setpoint):
+        if self._is_followed():
+            try:
+                self._references.take(setpoint, self._status.ground)
+            except ServiceError as reason:
+                self._handle.warn(f"ignoring a setpoint: {reason}", throttle=1.0)

@@ -1,0 +1,48 @@
+"""crazyswarm2's motion_capture.yaml as parameters of mocap_node."""
+
+from pathlib import Path
+from typing import Any
+
+from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters import yaml_file
+from crazyflie_utils.parameters.types import TEXT, Text
+
+_CONFIGURATIONS = ("marker_configurations", "dynamics_configurations")
+
+_BACKENDS = {
+    "optitrack": "natnet",
+    "optitrack_closed_source": "natnet",
+    "vicon": "vicon",
+    "qualisys": "qualisys",
+    "vrpn": "vrpn",
+}
+"""Their type -> backend of mocap_node."""
+
+
+class MotionCaptureSettings(Parameters):
+    """Where motion capture is."""
+
+    type: str = parameter(Text(tuple(_BACKENDS)), "of the system")
+    hostname: str = parameter(TEXT, "of the computer that runs it")
+
+
+def load(path: str | Path) -> dict[str, Any]:
+    """Return backend, address, and configurations of markers and dynamics, as mocap_node has them.
+
+    Raises
+    ------
+    ParameterError
+        About everything that is wrong: file, line, and what was expected.
+    """
+    top = yaml_file.load(path)
+    inner = (node.entries().get("ros__parameters") for node in top.entries().values())
+    nodes = [node for node in inner if node is not None]
+    if not nodes:
+        raise top.error("has no ros__parameters of a node; expected crazyswarm2's layout")
+    # Topics and rigid bodies of theirs follow from the fleet file here.
+    settings = nodes[0].read(MotionCaptureSettings, _CONFIGURATIONS, lambda entry, known: None)
+    backend = _BACKENDS[settings.type]
+    is_natnet = backend == "natnet"
+    address = "optitrack_config/server_address" if is_natnet else "motioncapture_config/hostname"
+    given = {key: nodes[0][key].value for key in _CONFIGURATIONS if key in nodes[0]}
+    return {"backend": backend, address: settings.hostname, **given}

@@ -1,0 +1,60 @@
+"""Setpoints of a vehicle that the workspace's controller flies, by the driver's topics."""
+
+import math
+from collections.abc import Callable
+
+from std_msgs.msg import Empty
+
+from crazyflie_driver.msg import FullState, Hover, Position, VelocityWorld
+from crazyflie_fleet.conversions import setpoint_goal
+from crazyflie_fleet.follower import Velocity
+from crazyflie_model.polynomials import Goal
+from crazyflie_utils import NodeHandle
+
+
+class SetpointSubscribers:
+    """Subscribe to the driver's setpoints below a node; ``on_setpoint`` takes the finite ones.
+
+    Without ``has_yaw`` yaw and yaw rate are ignored with a warning; cmd_stop is in any case.
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        on_setpoint: Callable[[Goal[float] | Velocity], None],
+        has_yaw: bool,
+    ):
+        self._handle = handle
+        self._on_setpoint = on_setpoint
+        self._has_yaw = has_yaw
+        handle.subscribe("~cmd_full_state", FullState, self._on_position)
+        handle.subscribe("~cmd_position", Position, self._on_position)
+        handle.subscribe("~cmd_velocity_world", VelocityWorld, self._on_velocity)
+        handle.subscribe("~cmd_hover", Hover, self._on_hover)
+        handle.subscribe("~cmd_stop", Empty, self._on_stop)
+
+    def _on_position(self, message):
+        goal = setpoint_goal(message)
+        self._pass(goal, (*goal.position, *goal.velocity), goal.yaw)
+
+    def _on_velocity(self, message):
+        velocity = (message.vel.x, message.vel.y, message.vel.z)
+        self._pass(Velocity(velocity), velocity, message.yawRate)
+
+    def _on_hover(self, message):
+        velocity = (message.vx, message.vy, 0.0)
+        self._pass(
+            Velocity(velocity, message.zDistance), (*velocity, message.zDistance), message.yawrate
+        )
+
+    def _on_stop(self, _):
+        self._handle.warn("ignoring cmd_stop: a vehicle in flight would fall", throttle=1.0)
+
+    def _pass(self, setpoint, numbers, turn):
+        if not all(map(math.isfinite, (*numbers, turn))):
+            self._handle.warn("ignoring a setpoint that is not finite", throttle=1.0)
+            return
+        if turn and not self._has_yaw:
+            text = "the controller keeps the heading 0: yaw and yaw rate of setpoints are ignored"
+            self._handle.warn(text, throttle=10.0)
+        self._on_setpoint(setpoint)

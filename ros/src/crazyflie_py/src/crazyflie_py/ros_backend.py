@@ -1,0 +1,272 @@
+"""Crazyswarm's API on vehicles that run: simulated, virtual or real ones, by ROS."""
+
+import argparse
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import rosgraph
+from geometry_msgs.msg import Point
+from std_msgs.msg import String
+from typing_extensions import override
+
+from crazyflie_driver import srv
+from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_mission_api import Fleet, MissionError
+from crazyflie_mission_api.fleet import catch_signals
+from crazyflie_model.angles import Triple
+from crazyflie_py import fleet as fleet_files
+from crazyflie_py.backend import SwarmBackend, Visualizer
+from crazyflie_py.ros_connection import Connection, running_vehicles
+from crazyflie_py.ros_vehicle import RosVehicleBackend, seconds
+from crazyflie_py.setpoints import Setpoint
+from crazyflie_py.visualizer import NullVisualizer
+from crazyflie_utils.main import begin_script
+from crazyflie_utils.process import Process
+
+_FLEET = f"/all/{HIGH_LEVEL}"
+"""Namespace of a fleet's services for all."""
+
+_FIND_LIMIT = 10.0
+"""For the vehicles of a file, s of the machine's clock."""
+
+_LANDING_LIMIT = 15.0
+"""For landings of the script at its end, s."""
+
+
+class RosBackend(SwarmBackend):
+    """All vehicles; see `crazyflie_py.backend.SwarmBackend`.
+
+    ``crazyflies_yaml`` says which of the vehicles that run take part, by default all do. The
+    process is made, unless it is given. Without a master or vehicles, the script ends with the
+    reason and status 1.
+    """
+
+    dt = 0.0
+
+    def __init__(
+        self,
+        crazyflies_yaml: str | Path | None,
+        options: argparse.Namespace,
+        process: Process | None = None,
+    ):
+        self._visualizer = NullVisualizer()
+        self._is_closed = False
+        self._rates: dict[float, float] = {}
+        vehicles = None if crazyflies_yaml is None else fleet_files.load(crazyflies_yaml)
+        self._end = lambda: None
+        if process is None:
+            process, self._end = _begin()
+        self._process = process
+        handle = process.handle("/crazyswarm")
+        try:
+            names = [v.name for v in vehicles] if vehicles else running_vehicles(handle)
+            fleet = Fleet(names, startup_timeout=_FIND_LIMIT, process=process)
+        except MissionError as error:
+            self._end()
+            sys.exit(str(error))
+        self._connection = Connection(handle, fleet, options.unchecked)
+        ids = [v.id for v in vehicles] if vehicles else ids_of(names)
+        places: list[Any] = [v.position for v in vehicles] if vehicles else [None] * len(names)
+        services = handle.service_nodes()
+        self._vehicles = [
+            RosVehicleBackend(
+                fleet.vehicle(name),
+                number,
+                place,
+                self._connection,
+                f"/{name}/update_params" in services,
+            )
+            for name, number, place in zip(names, ids, places, strict=True)
+        ]
+        self._top = _common_services(services, names)
+        handle.subscribe("/fleet/waiting", String, self._on_held)
+
+    @property
+    @override
+    def vehicles(self) -> Sequence[RosVehicleBackend]:
+        return self._vehicles
+
+    @property
+    @override
+    def visualizer(self) -> Visualizer:
+        return self._visualizer
+
+    def _on_held(self, message):
+        if message.data:
+            text = f"held by the fleet, since another vehicle is too near: {message.data}"
+            self._connection.handle.warn(text)
+
+    # Commands to all.
+
+    @override
+    def take_off(self, height: float, duration: float, group_mask: int) -> None:
+        members = {v.name: v for v in self._vehicles if v.is_member(group_mask)}
+        begun = [vehicle.has_begun for vehicle in members.values()]
+        if self._top == _FLEET:
+            # One call: a hundred of them would keep the fleet from flying.
+            for vehicle in members.values():
+                vehicle.check_takeoff(height)
+            arguments = (group_mask, height, seconds(duration))
+            self._call(
+                "takeoff", srv.Takeoff, *arguments, has_begun=lambda: all(b() for b in begun)
+            )
+            return
+        calls = {
+            name: vehicle.begin_takeoff(height, duration, group_mask)
+            for name, vehicle in members.items()
+        }
+        self._connection.finish("takeoff", calls, lambda name: members[name].has_begun())
+
+    @override
+    def land(self, height: float, duration: float, group_mask: int) -> None:
+        self._call("land", srv.Land, group_mask, height, seconds(duration))
+        for vehicle in self._vehicles:
+            vehicle.note_landing(group_mask)
+
+    @override
+    def stop(self, group_mask: int) -> None:
+        self._call("stop", srv.Stop, group_mask)
+
+    @override
+    def go_to(
+        self, goal: Triple, yaw: float, duration: float, relative: bool, group_mask: int
+    ) -> None:
+        yaw = self._vehicles[0].checked_yaw(yaw)
+        self._call("go_to", srv.GoTo, group_mask, relative, Point(*goal), yaw, seconds(duration))
+
+    @override
+    def start_trajectory(
+        self, trajectory_id: int, time_scale: float, reverse: bool, relative: bool, group_mask: int
+    ) -> None:
+        arguments = (group_mask, trajectory_id, time_scale, reverse, relative)
+        self._call("start_trajectory", srv.StartTrajectory, *arguments)
+
+    @override
+    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
+        for vehicle in self._vehicles:
+            vehicle.notify_setpoints_stop(remain_valid_ms, group_mask)
+
+    @override
+    def emergency(self) -> None:
+        for vehicle in self._vehicles:
+            vehicle.emergency()
+
+    @override
+    def arm(self, arm: bool) -> None:
+        for vehicle in self._vehicles:
+            vehicle.arm(arm)
+
+    @override
+    def set_parameters(self, values: Mapping[str, float]) -> None:
+        for vehicle in self._vehicles:
+            vehicle.set_parameters(values)
+
+    @override
+    def send(self, setpoint: Setpoint) -> None:
+        for vehicle in self._vehicles:
+            vehicle.send(setpoint)
+
+    def _call(self, name, service_type, *arguments, has_begun=lambda: False):
+        if self._top is None:
+            calls = {v.name: v.call(name, service_type, *arguments) for v in self._vehicles}
+        else:
+            request = service_type._request_class(*arguments)
+            service = f"{self._top}/{name}"
+            call = self._connection.handle.call_service(service, service_type, request, 60.0)
+            calls = {"allcfs": call}
+        self._connection.finish(name, calls, lambda _: has_begun())
+
+    # Time.
+
+    @override
+    def time(self) -> float:
+        return self._connection.fleet.time()
+
+    @override
+    def sleep(self, duration: float) -> None:
+        self._connection.sleep(duration)
+
+    @override
+    def sleep_for_rate(self, rate: float) -> None:
+        now = self.time()
+        wake = max(self._rates.get(rate, now) + 1.0 / rate, now)
+        self._connection.sleep(wake - now)
+        self._rates[rate] = wake
+
+    @override
+    def is_shutdown(self) -> bool:
+        return self._process.exit_status is not None
+
+    @override
+    def next_phase(self) -> None:
+        pass
+
+    # End.
+
+    @override
+    def close(self) -> None:
+        if self._is_closed:
+            return
+        self._is_closed = True
+        try:
+            self._land()
+        except MissionError as error:
+            self._connection.handle.error(str(error))
+        finally:
+            self._end()
+
+    def _land(self):
+        fleet = self._connection.fleet
+        vehicles = {v.name: v for v in self._vehicles if v.name in fleet.flying}
+        landing = [v for v in vehicles.values() if v.is_landing]
+        limit = fleet.time() + _LANDING_LIMIT
+        fleet.clock.wait_until(lambda: all(v.has_landed() for v in landing), limit)
+        for name, vehicle in vehicles.items():
+            if vehicle.has_landed():
+                fleet.release(name)
+            else:
+                # From where it is by now.
+                fleet.adopt(name)
+        # As after an error: whatever their distances, they land.
+        fleet.__exit__(RuntimeError, None, None)
+
+
+def ids_of(names: list[str]) -> list[int]:
+    """Return ids of vehicles: the numbers at the end of their names, or 1, 2, ..."""
+    numbers = [re.search(r"\d+$", name) for name in names]
+    ids = [int(match[0]) for match in numbers if match]
+    if len(set(ids)) == len(names):
+        return ids
+    return list(range(1, len(names) + 1))
+
+
+def _begin():
+    if not rosgraph.is_master_online():
+        sys.exit(
+            f"no ROS master at {rosgraph.get_master_uri()}, so no vehicle runs; expected, for "
+            "example, roslaunch crazyflie_examples sw_swarm.launch, or the option --sim"
+        )
+    process, end = begin_script("crazyswarm")
+    catch_signals()
+    return process, end
+
+
+def _common_services(services: Mapping[str, str], names: list[str]) -> str | None:
+    """Return the namespace of services for exactly these vehicles, if there is one."""
+    fleet = {s.split("/")[1] for s in services if s.endswith(f"/{HIGH_LEVEL}/go_to")} - {"all"}
+    if fleet:
+        is_there = f"/all/{HIGH_LEVEL}/go_to" in services and fleet == {*names}
+        return _FLEET if is_there else None
+    drivers = {
+        s.rpartition("/")[0].strip("/"): node
+        for s, node in services.items()
+        if s.endswith("/upload_trajectory")
+    }
+    nodes = {*drivers.values()}
+    if {*drivers} == {*names} and len(nodes) == 1:
+        top = f"{nodes.pop()}/all"
+        return top if f"{top}/go_to" in services else None
+    return None

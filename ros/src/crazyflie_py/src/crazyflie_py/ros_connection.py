@@ -1,0 +1,106 @@
+"""The vehicles that run, for scripts of Crazyswarm's API."""
+
+import math
+import re
+import time
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from typing import Any
+
+from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_mission_api import Fleet, MissionError
+from crazyflie_mission_api.mission_vehicle import never
+from crazyflie_utils import NodeHandle
+
+_SEARCH_LIMIT = 5.0
+"""For vehicles, s of the machine's clock."""
+
+_ANSWER_LIMIT = 15.0
+"""For the answer to a command, s of the machine's clock."""
+
+
+class CommandRefusedError(RuntimeError):
+    """A vehicle refuses a command, or has not answered; the text names it and the reason."""
+
+
+class Connection:
+    """What the vehicles of a script have in common.
+
+    Attributes
+    ----------
+    handle : NodeHandle
+    fleet : Fleet
+    """
+
+    def __init__(self, handle: NodeHandle, fleet: Fleet, is_unchecked: bool):
+        self.handle = handle
+        self.fleet = fleet
+        self._is_unchecked = is_unchecked
+
+    def refuse(self, text: str) -> None:
+        """Raise `CommandRefusedError`; with --unchecked warn."""
+        if not self._is_unchecked:
+            raise CommandRefusedError(f"{text}; with --unchecked this is a warning")
+        self.handle.warn(text)
+
+    def finish(
+        self,
+        what: str,
+        calls: Mapping[str, "Future[Any]"],
+        has_begun: Callable[[str], bool] = lambda name: False,
+    ) -> None:
+        """Wait for the answers of calls, by name of the vehicle, or until each has begun."""
+        end = time.monotonic() + _ANSWER_LIMIT
+
+        def waiting():
+            return [name for name, call in calls.items() if not call.done() and not has_begun(name)]
+
+        self.fleet.clock.wait_until(lambda: not waiting() or time.monotonic() > end, math.inf)
+        failures = {name: f"no answer for {_ANSWER_LIMIT:g} s" for name in waiting()}
+        for name, call in calls.items():
+            if call.done() and call.exception() is not None:
+                failures[name] = str(call.exception())
+        if failures:
+            self.refuse("; ".join(f"{name}: {what}: {text}" for name, text in failures.items()))
+
+    def sleep(self, duration: float) -> None:
+        """Let a duration pass, s of the vehicles' time."""
+        clock = self.fleet.clock
+        clock.wait_until(never, clock.time() + duration)
+
+
+def running_vehicles(handle: NodeHandle) -> list[str]:
+    """Return the names of the vehicles that run, in the order of their numbers.
+
+    Raises
+    ------
+    MissionError
+        There are none.
+    """
+    end = time.monotonic() + _SEARCH_LIMIT
+    while time.monotonic() < end:
+        services = handle.service_nodes()
+        tops = {_top(service) for service in services if _is_flown(service, services)}
+        if names := tops - {"", "all"}:
+            return sorted(names, key=_number_key)
+        time.sleep(0.1)
+    raise MissionError(
+        f"no vehicle runs: for {_SEARCH_LIMIT:g} s there was no service /NAME/{HIGH_LEVEL}/go_to "
+        "or /NAME/upload_trajectory; expected, for example, roslaunch crazyflie_examples "
+        "sw_swarm.launch, or a vehicle of crazyflie_driver; or the option --sim"
+    )
+
+
+def _is_flown(service, services):
+    top, _, name = service.rpartition("/")
+    if name == "upload_trajectory":
+        return services.get(f"{top}/go_to") == services[service]
+    return service.endswith(f"/{HIGH_LEVEL}/go_to")
+
+
+def _top(service):
+    return service.strip("/").split("/")[0] if service.count("/") > 1 else ""
+
+
+def _number_key(name):
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]

@@ -1,0 +1,86 @@
+"""Examples on two simulated vehicles of a fleet; they stand at y = -0.5 and 0.5 m."""
+
+import numpy as np
+import pytest
+from scripted import EXAMPLES, fly, run
+
+NEAR = 0.1
+"""m; the controllers follow a little behind."""
+
+FAULTY = """
+from pycrazyswarm import Crazyswarm
+
+swarm = Crazyswarm()
+cf1, cf2 = swarm.allcfs.crazyflies
+swarm.allcfs.takeoff(0.8, 2.0)
+swarm.timeHelper.sleep(2.5)
+print("bits", [cf.get_status()["supervisor"] for cf in (cf1, cf2)])
+print("height", round(cf1.position()[2], 1), "speed", round(abs(cf1.velocity()[0]), 1))
+try:
+    cf1.setParam("ring/colour", 3)
+except ValueError as error:
+    print(error)
+cf1.goTo([0.0, 0.0, -1.0], 0.0, 2.0)
+"""
+
+
+def lands(track):
+    """Return whether vehicles are above their first places, on the ground or nearly so.
+
+    The takeoff server's landing takes a little longer than the scripts wait.
+    """
+    places = np.allclose(track[-1, :, :2], track[0, :, :2], atol=NEAR)
+    return places and track[-1, :, 2].max() < 0.4
+
+
+def test_nice_hover():
+    track = fly("nice_hover.py")
+    assert track[1] == pytest.approx(np.c_[track[0, :, :2], [1.0, 1.0]], abs=0.05)
+    assert lands(track)
+
+
+def test_groups():
+    track = fly("group_mask.py")
+    assert track[0, :, 2] == pytest.approx([1.0, 0.0], abs=NEAR)
+    assert track[1, :, 2] == pytest.approx([1.0, 0.5], abs=NEAR)
+    assert track[2, :, 2] == pytest.approx([1.0, 1.0], abs=NEAR)
+    assert lands(track)
+
+
+def test_trajectories():
+    track = fly("multi_trajectory.py")
+    assert track[1] == pytest.approx(track[0] + [0.8, 0.0, 0.0], abs=NEAR)
+    assert track[2] == pytest.approx(track[0], abs=NEAR)
+
+
+def test_swap():
+    track = fly("swap.py")
+    assert track[1, :, :2] == pytest.approx(track[0, ::-1, :2], abs=NEAR)
+
+
+def test_setpoints():
+    # A figure eight, and back to where it began.
+    track = fly("full_state.py")[:, 0]
+    assert np.ptp(track[:, 0]) > 1.3
+    assert np.ptp(track[:, 1]) > 0.7
+    assert track[-1, :2] == pytest.approx(track[0, :2], abs=NEAR)
+
+
+def test_what_is_refused_is_a_warning_if_it_is_asked_for():
+    printed = run(EXAMPLES / "dance.py", status=1)
+    assert "a yaw of 0.393: its controller keeps the heading 0; expected 0" in printed
+    printed = run(EXAMPLES / "dance.py", "--unchecked")
+    assert "a yaw of 0.393" in printed
+
+
+def test_the_end_of_a_script_lands(tmp_path):
+    script = tmp_path / "faulty.py"
+    script.write_text(FAULTY)
+    printed = run(script, status=1)
+    assert "bits [27, 27]" in printed
+    assert "height 0.8 speed 0.0" in printed
+    assert "name is ring.colour; expected ring." in printed
+    assert "cf1: goTo: z is -1 m, out of the fence; expected 0 to inf m" in printed
+    assert "landing cf1, cf2" in printed
+    # On the ground, or the takeoff would be refused.
+    assert fly("hello_world.py")[0, 0, 2] == pytest.approx(1.0, abs=NEAR)

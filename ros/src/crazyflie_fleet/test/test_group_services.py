@@ -49,9 +49,11 @@ def test_a_group_takes_off_goes_and_lands(swarm):
     swarm.process.advance(2.5)
     expected = [before[0] + 0.3, before[1], before[2] + 0.2]
     assert swarm.position("cf3") == pytest.approx(expected, abs=0.05)
-    swarm.call("/all/high_level/land", srv.LandRequest(EVEN, 0.0, seconds(2.0)), 6.0)
+    swarm.call("/all/high_level/land", srv.LandRequest(EVEN, 0.0, seconds(2.0)))
+    swarm.process.advance(6.0)
     assert swarm.heights() == pytest.approx([0.8, 0.0, 0.8], abs=0.05)
-    swarm.call("/all/high_level/land", srv.LandRequest(0, 0.0, seconds(2.0)), 6.0)
+    swarm.call("/all/high_level/land", srv.LandRequest(0, 0.0, seconds(2.0)))
+    swarm.process.advance(6.0)
     assert swarm.heights() == pytest.approx([0.0, 0.0, 0.0], abs=0.02)
 
 

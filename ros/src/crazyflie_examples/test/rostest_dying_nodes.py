@@ -11,8 +11,11 @@ from crazyflie_reports.flight_operator import ready_operator
 from crazyflie_utils.testing.peer import wait_until
 
 NODES = ("/takeoff_control_filter", "/takeoff_server", "/lqr_controller", "/state_estimator")
-LOWEST = 0.9
-"""The vehicle does not sink below this while a node is missing, m."""
+LOWEST = 0.8
+"""The vehicle does not sink below this while a node is missing, m.
+
+Without a state it begins to sink, 0.13 m in the 1.6 s after which the flight would be over.
+"""
 
 
 def process_id(node):

@@ -182,7 +182,8 @@ def add_the_vehicle_again(flight):
     rospy.ServiceProxy("/remove_crazyflie", RemoveCrazyflie)(flight.vehicle.uri)
     flight.vehicle.restart()
     # Its parameters are those that the launch file has set.
-    add = ["crazyflie_add", "__ns:=/crazyflie", "__name:=crazyflie_add"]
+    name = next(name for name in rospy.get_param("/crazyflie") if "crazyflie_add" in name)
+    add = ["crazyflie_add", "__ns:=/crazyflie", f"__name:={name}"]
     with running("rosrun", "crazyflie_driver", *add, stdout=subprocess.DEVNULL) as adding:
         adding.wait(LIMIT)
     flight.wait_for_vehicle()

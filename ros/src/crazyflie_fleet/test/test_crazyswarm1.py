@@ -79,7 +79,6 @@ def test_without_that_file_types_have_no_effect(load, from_text):
         (VEHICLES.replace("26", "1"), TYPES, "yaml:6: crazyflies.1./id is that of cf1 in line 2"),
         (VEHICLES.replace("26", "256"), TYPES, "crazyflies.1./id is 256; expected an integer fro"),
         (VEHICLES.replace("80", "x"), TYPES, ":7: crazyflies.1./channel is 'x'; expected an integ"),
-        (VEHICLES.replace("    channel: 80\n", ""), TYPES, "crazyflies.1. has no channel; it has"),
         (VEHICLES.replace("single", "none"), TYPES, "type is 'none'; expected one of default, sin"),
         ("crazyflies: {}", TYPES, "crazyflies is {}; expected a list"),
         ("crazyflies: []", TYPES, "has no vehicle that is enabled"),
@@ -90,3 +89,8 @@ def test_without_that_file_types_have_no_effect(load, from_text):
 def test_what_is_wrong_is_named_with_its_line(load, vehicles, types, text):
     with pytest.raises(ParameterError, match=text):
         load(vehicles, types)
+
+
+def test_a_vehicle_without_a_channel_has_no_address(load):
+    fleet = load(VEHICLES.replace("    channel: 80\n", ""))
+    assert fleet["cf1"].uri is not None and fleet["cf26"].uri is None

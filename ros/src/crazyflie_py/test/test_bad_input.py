@@ -85,14 +85,19 @@ def test_an_unknown_parameter_is_kept_with_a_warning(swarm, caplog):
 
 
 FLEETS = [
-    ("crazyflies: [{id: 1, initialPosition: [0, 0]}]", "initialPosition of id 1 is .* three"),
+    ("crazyflies: [{id: 1, initialPosition: [0, 0]}]", "cf1/initial_position .* list of 3"),
     ("crazyflies: [{id: 300, initialPosition: [0, 0, 0]}]", "id is 300; expected an integer"),
-    ("crazyflies: [{initialPosition: [0, 0, 0]}]", "expected id and initialPosition"),
-    (PAIR.replace("id: 2", "id: 1"), "cf1, cf1 have one id, 1; expected different ids"),
-    ("vehicles: {a: 1}", "expected a list crazyflies .* or a mapping robots"),
+    ("crazyflies: [{initialPosition: [0, 0, 0]}]", "crazyflies.0. has no id; it has initialPosition"),
+    (PAIR.replace("id: 2", "id: 1"), "id is that of cf1 in line 3; expected another"),
+    ("vehicles: {a: 1}", "has no robots, .* and no crazyflies"),
     ("crazyflies: [", "is no YAML"),
     ("crazyflies: []", "has no vehicle that is enabled"),
-    ("robots: {cf1: {uri: usb, initial_position: [0, 0, 0]}}", "uri of cf1 is 'usb'; expected"),
+    ("robots: {cf1: {uri: usb, initial_position: [0, 0, 0]}}", "cf1/uri .* is 'usb'; expected radio"),
+    ("robots: {a: {initial_position: [0, 0, 0]}}", "a has no id: its address is None; expected"),
+    (
+        "robots: {cf1: {initial_position: [0, 0, 0]}, b1: {initial_position: [1, 0, 0]}}",
+        "cf1, b1 have one id, 1; expected different ids",
+    ),
     ("robots: {cf1: 3}", "cf1 is 3; expected a mapping"),
 ]
 

@@ -33,12 +33,12 @@ def converted(vehicles: Entry, types: Entry | None) -> Entry:
     """Return both files as crazyswarm2 lays out one; values keep their file and line.
 
     Vehicle k is named cfk; its address is radio://0/CHANNEL/2M/E7E7E7E7 and k with two hexadecimal
-    digits. Without ``types`` no vehicle has a type.
+    digits. One without a channel has no address. Without ``types`` no vehicle has a type.
 
     Raises
     ------
     ParameterError
-        A vehicle has no id or channel, or another's id.
+        A vehicle has no id, or another's.
     """
     robots: dict[str, yaml.Node] = {}
     errors: list[str] = []
@@ -65,11 +65,13 @@ def converted(vehicles: Entry, types: Entry | None) -> Entry:
 
 
 def _robot(entry, has_types):
-    number, channel = _number(entry["id"], _ID), _number(entry["channel"], _CHANNEL)
+    number = _number(entry["id"], _ID)
     parts = {key: value.node for key, value in entry.entries().items()}
-    uri = f"radio://0/{channel}/2M/E7E7E7E7{number:02X}"
-    parts["uri"] = _text(uri, parts.pop("id"))
-    del parts["channel"]
+    place = parts.pop("id")
+    if "channel" in parts:
+        channel = _number(entry["channel"], _CHANNEL)
+        parts["uri"] = _text(f"radio://0/{channel}/2M/E7E7E7E7{number:02X}", place)
+        del parts["channel"]
     if not has_types:
         parts.pop("type", None)
     if "initialPosition" in parts:

@@ -1,15 +1,14 @@
 """The vehicles of a fleet file, in Crazyswarm's layout or crazyswarm2's."""
 
+import re
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import yaml
-
+from crazyflie_fleet import fleet_file
+from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_model.angles import Triple
-from crazyflie_py import arguments as check
-from crazyflie_utils.messages import shown
+from crazyflie_utils import ParameterError
 
 _PLACES = ("../launch/crazyflies.yaml", "../config/crazyflies.yaml")
 """Where Crazyswarm and crazyswarm2 have the file, from the script's folder."""
@@ -25,7 +24,7 @@ class FleetVehicle(NamedTuple):
     ----------
     name : str
     id : int
-        Last byte of the radio address.
+        Last byte of the radio address, or else the number at the end of the name.
     position : tuple, 3 components
         Before takeoff, m.
     buffer : float
@@ -49,19 +48,37 @@ def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
     if crazyflies_yaml is None:
         crazyflies_yaml = _usual_file()
     is_text = isinstance(crazyflies_yaml, str) and not crazyflies_yaml.endswith(_SUFFIXES)
-    where = "crazyflies_yaml" if is_text else str(crazyflies_yaml)
-    text = str(crazyflies_yaml) if is_text else Path(crazyflies_yaml).read_text()
     try:
-        content = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise ValueError(f"{where} is no YAML: {error}") from None
-    vehicles = _vehicles(where, content)
+        if is_text:
+            config = fleet_file.parse(str(crazyflies_yaml), "crazyflies_yaml")
+        else:
+            config = fleet_file.load(crazyflies_yaml)
+    except ParameterError as error:
+        raise ValueError(str(error)) from None
+    vehicles = [
+        FleetVehicle(vehicle.name, _id(vehicle), vehicle.position, vehicle.buffer)
+        for vehicle in config.vehicles
+    ]
     ids = [vehicle.id for vehicle in vehicles]
     for vehicle_id in ids:
         if ids.count(vehicle_id) > 1:
             names = ", ".join(v.name for v in vehicles if v.id == vehicle_id)
-            raise ValueError(f"{where}: {names} have one id, {vehicle_id}; expected different ids")
+            raise ValueError(f"{names} have one id, {vehicle_id}; expected different ids")
     return vehicles
+
+
+def _id(vehicle: VehicleConfig) -> int:
+    # As in crazyswarm2 the end of the address; the number in the name of one without.
+    address = "" if vehicle.uri is None else vehicle.uri.split("?")[0]
+    if found := re.search("[0-9A-Fa-f]{2}$", address):
+        return int(found[0], 16)
+    if found := re.search("[0-9]+$", vehicle.name):
+        return int(found[0])
+    raise ValueError(
+        f"{vehicle.name} has no id: its address is {vehicle.uri}; expected "
+        "radio://0/80/2M/E7E7E7E7E7 or another whose last two characters are the id, hexadecimal, "
+        "or a name with a number at its end"
+    )
 
 
 def _usual_file():
@@ -74,46 +91,3 @@ def _usual_file():
         f"there is no fleet file: none of {', '.join(map(str, dict.fromkeys(places)))}; "
         "expected one there, or the argument crazyflies_yaml of Crazyswarm"
     )
-
-
-def _vehicles(where: str, content: Any) -> list[FleetVehicle]:
-    if isinstance(content, Mapping) and isinstance(content.get("crazyflies"), list):
-        found = [_from_crazyswarm(where, entry) for entry in content["crazyflies"]]
-    elif isinstance(content, Mapping) and isinstance(content.get("robots"), Mapping):
-        robots = [_from_robot(where, *robot) for robot in content["robots"].items()]
-        found = [robot for robot in robots if robot is not None]
-    else:
-        raise ValueError(
-            f"{where} is {shown(content)}; expected a list crazyflies of channel, id, "
-            "initialPosition and type, or a mapping robots: name -> uri, initial_position, ..."
-        )
-    if not found:
-        raise ValueError(f"{where} has no vehicle that is enabled; expected one at least")
-    return found
-
-
-def _from_crazyswarm(where, entry):
-    if not isinstance(entry, Mapping) or not {"id", "initialPosition"} <= set(entry):
-        raise ValueError(
-            f"{where}: an entry of crazyflies is {shown(entry)}; expected id and initialPosition"
-        )
-    number = check.integer(where, "id", entry["id"], 0, 255)
-    position = check.triple(where, f"initialPosition of id {number}", entry["initialPosition"])
-    return FleetVehicle(f"cf{number}", number, position)
-
-
-def _from_robot(where, name, entry):
-    if not isinstance(entry, Mapping):
-        raise ValueError(f"{where}: {name} is {shown(entry)}; expected a mapping")
-    if not entry.get("enabled", True):
-        return None
-    uri = str(entry.get("uri", ""))
-    try:
-        number = int(uri.split("?")[0][-2:], 16)
-    except ValueError:
-        raise ValueError(
-            f"{where}: uri of {name} is {shown(uri)}; expected radio://0/80/2M/E7E7E7E7E7 or "
-            "another whose last two characters are the id, hexadecimal"
-        ) from None
-    position = check.triple(where, f"initial_position of {name}", entry.get("initial_position"))
-    return FleetVehicle(str(name), number, position)

@@ -163,6 +163,7 @@ def test_a_link_that_is_lost_and_comes_back(server, vehicle):
     vehicle.is_frozen = True
     wait_until(lambda: status(server).level == DiagnosticStatus.ERROR, "the loss")
     assert "has not been heard" in status(server).message
+    wait_until(lambda: server.process.logged("error"), "the message about the loss")
     assert "trying to connect again" in server.process.logged("error")[0]
     server.process.publish("/cf1/cmd_vel", Twist(Vector3(0, 0, 1000.0), Vector3()))
     assert any(

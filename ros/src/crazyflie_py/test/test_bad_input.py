@@ -87,12 +87,18 @@ def test_an_unknown_parameter_is_kept_with_a_warning(swarm, caplog):
 FLEETS = [
     ("crazyflies: [{id: 1, initialPosition: [0, 0]}]", "cf1/initial_position .* list of 3"),
     ("crazyflies: [{id: 300, initialPosition: [0, 0, 0]}]", "id is 300; expected an integer"),
-    ("crazyflies: [{initialPosition: [0, 0, 0]}]", "crazyflies.0. has no id; it has initialPosition"),
+    (
+        "crazyflies: [{initialPosition: [0, 0, 0]}]",
+        "crazyflies.0. has no id; it has initialPosition",
+    ),
     (PAIR.replace("id: 2", "id: 1"), "id is that of cf1 in line 3; expected another"),
     ("vehicles: {a: 1}", "has no robots, .* and no crazyflies"),
     ("crazyflies: [", "is no YAML"),
     ("crazyflies: []", "has no vehicle that is enabled"),
-    ("robots: {cf1: {uri: usb, initial_position: [0, 0, 0]}}", "cf1/uri .* is 'usb'; expected radio"),
+    (
+        "robots: {cf1: {uri: usb, initial_position: [0, 0, 0]}}",
+        "cf1/uri .* is 'usb'; expected radio",
+    ),
     ("robots: {a: {initial_position: [0, 0, 0]}}", "a has no id: its address is None; expected"),
     (
         "robots: {cf1: {initial_position: [0, 0, 0]}, b1: {initial_position: [1, 0, 0]}}",
@@ -122,7 +128,8 @@ def test_a_wrong_option(options, message, capsys):
     assert message in capsys.readouterr().err
 
 
-def test_without_a_fleet_file_the_message_says_where_one_is_expected(tmp_path, monkeypatch):
+def test_without_a_fleet_file_the_vehicles_of_the_examples_fly(tmp_path, monkeypatch, caplog):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(FileNotFoundError, match="../launch/crazyflies.yaml.* crazyflies_yaml"):
-        simulated(fleet=None)
+    monkeypatch.setattr("sys.argv", ["script.py"])
+    assert [cf.id for cf in simulated(fleet=None).allcfs.crazyflies] == [1, 2]
+    assert "no fleet file: none of ../launch/crazyflies.yaml" in caplog.text

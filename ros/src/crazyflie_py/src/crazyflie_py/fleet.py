@@ -1,14 +1,19 @@
 """The vehicles of a fleet file, in Crazyswarm's layout or crazyswarm2's."""
 
+import logging
 import re
 import sys
 from pathlib import Path
 from typing import NamedTuple
 
+import rospkg
+
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_model.angles import Triple
 from crazyflie_utils import ParameterError
+
+_LOG = logging.getLogger(__name__)
 
 _PLACES = ("../launch/crazyflies.yaml", "../config/crazyflies.yaml")
 """Where Crazyswarm and crazyswarm2 have the file, from the script's folder."""
@@ -38,7 +43,9 @@ class FleetVehicle(NamedTuple):
 
 
 def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:
-    """Return the vehicles of a file, or of a text in YAML; without either, of the usual file.
+    """Return the vehicles of a file, or of a text in YAML.
+
+    Without either they are those of the usual file, or else those of the examples.
 
     Raises
     ------
@@ -87,7 +94,10 @@ def _usual_file():
     for path in places:
         if path.is_file():
             return path
-    raise FileNotFoundError(
-        f"there is no fleet file: none of {', '.join(map(str, dict.fromkeys(places)))}; "
-        "expected one there, or the argument crazyflies_yaml of Crazyswarm"
+    path = Path(rospkg.RosPack().get_path("crazyflie_py")) / "launch" / "crazyflies.yaml"
+    _LOG.warning(
+        "there is no fleet file: none of %s; flying the vehicles of %s",
+        ", ".join(map(str, dict.fromkeys(places))),
+        path,
     )
+    return path

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import Point
 from high_level_bench import SECONDS, TOP, Bench
 from std_msgs.msg import String
 
@@ -115,6 +116,17 @@ def test_what_is_told_during_a_takeoff_counts_after_it():
     bench.go_to((1.0, 0.0, 1.0))
     bench.be("flying")
     assert bench.fly(2.1)[-1][:3] == pytest.approx([1.0, 0.0, 1.0])
+
+
+def test_what_cannot_be_done_is_refused_during_a_takeoff_at_once():
+    bench = Bench()
+    bench.be("taking_off", (0.0, 0.0, 0.1))
+    with pytest.raises(ServiceError, match="no trajectory 1 was uploaded"):
+        bench.call("start_trajectory", srv.StartTrajectory, 0, 1, 1.0, False, False)
+    with pytest.raises(ServiceError, match="the duration is 0 s"):
+        bench.call("go_to", srv.GoTo, 0, False, Point(1.0, 0.0, 1.0), 0.0, SECONDS(0.0))
+    bench.be("flying")
+    assert bench.fly(0.5).size == 0
 
 
 @pytest.mark.parametrize("how", ["by this node", "by the takeoff server"])

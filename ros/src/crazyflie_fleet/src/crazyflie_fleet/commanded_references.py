@@ -1,5 +1,6 @@
 """References of a controller that follow from commands and setpoints."""
 
+import copy
 from collections.abc import Callable
 from typing import Any
 
@@ -57,13 +58,21 @@ class CommandedReferences:
 
     def begin(self, command: Callable[..., None], *arguments: Any) -> None:
         """Begin a command of `Follower`; raises `ServiceError` if it is refused."""
-        try:
-            command(self.follower, self._handle.time(), self.present(), *arguments)
-        except RefusalError as reason:
-            raise ServiceError(str(reason)) from None
+        self._command(self.follower, command, arguments)
         self._setpoint_time = None
         self._is_moving = True
         self._set_timer()
+
+    def checked(self, command: Callable[..., None], *arguments: Any) -> tuple[Any, ...]:
+        """Return a command for later; raises `ServiceError` if it would be refused now."""
+        self._command(copy.copy(self.follower), command, arguments)
+        return (command, *arguments)
+
+    def _command(self, follower, command, arguments):
+        try:
+            command(follower, self._handle.time(), self.present(), *arguments)
+        except RefusalError as reason:
+            raise ServiceError(str(reason)) from None
 
     def take(self, setpoint: Goal[float] | Velocity, ground: float) -> None:
         """Follow a setpoint; heights of a velocity count above ``ground``, m."""

@@ -282,7 +282,7 @@ class HighLevelNode(Node):
         if self._is_followed():
             self._references.begin(command, *arguments)
         elif self._status.state == FlightStatus.TAKING_OFF:
-            self._next = (command, *arguments)
+            self._next = self._references.checked(command, *arguments)
         else:
             raise ServiceError(f"the vehicle is {WORDS[self._status.state]}; expected it to fly")
 

@@ -77,20 +77,15 @@ class Kalman(Estimator):
     Memory: position (3), velocity (3), acceleration (3), and the covariance that the axes share,
     upper half by rows (6).
 
-    Attributes
-    ----------
-    noise : float or ndarray, shape (n,)
-        Standard deviation of the poses' coordinates, m.
-    acceleration_walk : float or ndarray, shape (n,)
-        m/s^2/sqrt(s).
-
     Raises
     ------
     ValueError
         One of them is not positive.
     """
 
+    #: Float or ndarray, shape (n,). Standard deviation of the poses' coordinates, m.
     noise: ArrayLike = kalman.POSITION_NOISE
+    #: Float or ndarray, shape (n,); m/s^2/sqrt(s).
     acceleration_walk: ArrayLike = kalman.ACCELERATION_WALK
     memory_dim = 15
 

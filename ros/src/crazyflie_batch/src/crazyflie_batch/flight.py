@@ -49,24 +49,16 @@ def components(rows: Iterable[Any], dims: Mapping[str, int]) -> Components:
 
 @dataclass(frozen=True)
 class Plan:
-    """What all flights of a batch have in common.
+    """What all flights of a batch have in common."""
 
-    Attributes
-    ----------
-    make_model : callable
-        ``make_model(**parameters)`` returns the `Dynamics` of one vehicle, by the names in
-        ``model_parameters``.
-    max_tilt : float
-        A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
-    steps : int
-        Of the model in a tick, a multiple of `SAMPLE_STEPS`.
-    """
-
+    #: ``make_model(**parameters)`` returns the `Dynamics` of one vehicle, by the names in
+    #: ``model_parameters``.
     make_model: Callable[..., Dynamics]
     model_parameters: tuple[str, ...]
+    #: A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
     max_tilt: float
     estimator: type[Estimator]
-    steps: int
+    steps: int  #: Of the model in a tick, a multiple of `SAMPLE_STEPS`.
 
     @property
     def period(self) -> float:

@@ -21,22 +21,13 @@ _CONFIDENCE = 1.96
 
 @dataclass(frozen=True)
 class Findings:
-    """Parameters and outcomes of all flights.
-
-    Attributes
-    ----------
-    values : dict
-        Swept parameters; see `Settings.values`.
-    outcomes : dict
-        By the names of `crazyflie_batch.Flights`, arrays of all flights.
-    is_within : ndarray of bool, shape (flights,)
-        Whether they stayed within limits.
-    """
+    """Parameters and outcomes of all flights."""
 
     settings: Settings
-    values: dict[str, NDArray[np.float64]]
+    values: dict[str, NDArray[np.float64]]  #: Swept parameters; see `Settings.values`.
+    #: By the names of `crazyflie_batch.Flights`, arrays of all flights.
     outcomes: dict[str, NDArray[np.float64]]
-    is_within: NDArray[np.bool_]
+    is_within: NDArray[np.bool_]  #: Shape (flights,). Whether they stayed within limits.
 
     @property
     def worst(self) -> int:

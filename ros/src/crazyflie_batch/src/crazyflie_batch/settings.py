@@ -126,25 +126,13 @@ _EXPECTED = (
 
 @dataclass(frozen=True)
 class Sweep:
-    """Distribution of a parameter over the flights.
+    """Distribution of a parameter over the flights."""
 
-    Attributes
-    ----------
-    name : str
-        Of a `FlightParameters`.
-    unit : str
-    kind : str
-        `UNIFORM`, `NORMAL` or `VALUES`.
-    numbers : tuple of float
-        Lowest and highest; mean and standard deviation; or the values.
-    low, high : float
-        Range of the parameter, to which a normal distribution is cut off.
-    """
-
-    name: str
+    name: str  #: Of a `FlightParameters`.
     unit: str
-    kind: str
-    numbers: tuple[float, ...]
+    kind: str  #: `UNIFORM`, `NORMAL` or `VALUES`.
+    numbers: tuple[float, ...]  #: Lowest and highest; mean and standard deviation; or the values.
+    #: low, high: Range of the parameter, to which a normal distribution is cut off.
     low: float
     high: float
 

@@ -28,23 +28,15 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Model:
-    """Vehicles of one model, whose parameters may differ.
+    """Vehicles of one model, whose parameters may differ."""
 
-    Attributes
-    ----------
-    make : callable
-        ``make(**parameters)`` returns the `Dynamics` of one vehicle, computed by
-        `crazyflie_model.elementwise` since it is traced with `symbols`. Compiled once for each
-        function: no lambda.
-    parameters : mapping
-        Each a float, or an array of shape (n,).
-    max_tilt : float
-        See `crazyflie_simulator.vehicle.SimulatedVehicle`.
-    """
-
+    #: ``make(**parameters)`` returns the `Dynamics` of one vehicle, computed by
+    #: `crazyflie_model.elementwise` since it is traced with `symbols`. Compiled once for each
+    #: function: no lambda.
     make: Callable[..., Dynamics]
+    #: Each a float, or an array of shape (n,).
     parameters: Mapping[str, ArrayLike] = field(default_factory=dict)
-    max_tilt: float = math.inf
+    max_tilt: float = math.inf  #: See `crazyflie_simulator.vehicle.SimulatedVehicle`.
 
 
 def near_hover() -> Model:
@@ -101,21 +93,15 @@ class Controller:
 
     Each array may have one more axis in front, of length n.
 
-    Attributes
-    ----------
-    K : array_like, shape (4, 7)
-    u_ref : array_like, shape (4,)
-    integrator_k, integrator_limit : array_like, shape (3,)
-        The limit is >= 0.
-
     Raises
     ------
     ValueError
         A limit is negative.
     """
 
-    K: ArrayLike
-    u_ref: ArrayLike = HOVER
+    K: ArrayLike  #: Shape (4, 7).
+    u_ref: ArrayLike = HOVER  #: Shape (4,).
+    #: integrator_k, integrator_limit: Shape (3,). The limit is >= 0.
     integrator_k: ArrayLike = (0.0, 0.0, 0.0)
     integrator_limit: ArrayLike = (0.0, 0.0, 0.0)
 
@@ -127,17 +113,14 @@ class Controller:
 class Measurement:
     """`crazyflie_simulator.motion_capture.MotionCapture` for every vehicle.
 
-    Attributes
-    ----------
-    position_noise, attitude_noise, latency, dropout : float or array_like, shape (n,)
-        In m, rad, s, all >= 0, and a probability.
-
     Raises
     ------
     ValueError
         An argument is out of its range.
     """
 
+    #: position_noise, attitude_noise, latency, dropout: Float or array_like, shape (n,). In m, rad,
+    #: s, all >= 0, and a probability.
     position_noise: ArrayLike = 0.0
     attitude_noise: ArrayLike = 0.0
     latency: ArrayLike = 0.0

@@ -66,45 +66,25 @@ _LEGAL = {
 
 @dataclass
 class Watch:
-    """Compares everything that happens with what has to hold.
-
-    Attributes
-    ----------
-    graph : FakeGraph
-    violations : list of str
-        With the time of each.
-    highest, hardest, farthest : float
-        Largest height above the highest reference, m; speed at which the ground was met
-        with motors on, m/s; distance from the start, m.
-    is_blind : bool
-        Whether a fault keeps good poses away.
-    may_fly : bool
-        Whether a takeoff has been asked for since the vehicle was last on the ground.
-    may_fall : bool
-        Whether the vehicle may meet the ground at any speed.
-    is_emergency : bool
-        Whether motors have to stand still.
-    is_starved : bool
-        Whether all nodes have stopped again and again in this flight.
-    height, distance : float
-        Of the vehicle now from the ground and from the middle, m.
-    state : str
-        Of the flight, as the server tells it.
-    """
+    """Compares everything that happens with what has to hold."""
 
     graph: FakeGraph
-    violations: list[str] = field(default_factory=list)
+    violations: list[str] = field(default_factory=list)  #: With the time of each.
+    #: highest, hardest, farthest: Largest height above the highest reference, m; speed at which the
+    #: ground was met with motors on, m/s; distance from the start, m.
     highest: float = -math.inf
     hardest: float = 0.0
     farthest: float = 0.0
-    is_blind: bool = False
+    is_blind: bool = False  #: Whether a fault keeps good poses away.
+    #: Whether a takeoff has been asked for since the vehicle was last on the ground.
     may_fly: bool = False
-    may_fall: bool = False
-    is_emergency: bool = False
-    is_starved: bool = False
+    may_fall: bool = False  #: Whether the vehicle may meet the ground at any speed.
+    is_emergency: bool = False  #: Whether motors have to stand still.
+    is_starved: bool = False  #: Whether all nodes have stopped again and again in this flight.
+    #: height, distance: Of the vehicle now from the ground and from the middle, m.
     height: float = 0.0
     distance: float = 0.0
-    state: str = ""
+    state: str = ""  #: Of the flight, as the server tells it.
     _reference: float = 0.0
     _blind_since: float = math.inf
     _last: tuple[float, tuple[float, ...]] | None = None

@@ -44,24 +44,12 @@ _WAYPOINTS = np.array([(0, 0, 1), (0, 0, 1), (1, 0, 1), (1, 1, 1.5), (-1, 0.5, 0
 
 @dataclass(frozen=True)
 class ModelError:
-    """How a vehicle differs from the model that follows its controls at once.
+    """How a vehicle differs from the model that follows its controls at once."""
 
-    Attributes
-    ----------
-    response_time : float
-        Time constant of attitude and thrust, s.
-    thrust_factor : float
-        Thrust per commanded thrust.
-    drag : float
-        Deceleration per speed, 1/s.
-    gusts : float
-        Standard deviation of the wind's acceleration, m/s^2, which is correlated
-        over 1 s.
-    """
-
-    response_time: float = 0.0
-    thrust_factor: float = 1.0
-    drag: float = 0.0
+    response_time: float = 0.0  #: Time constant of attitude and thrust, s.
+    thrust_factor: float = 1.0  #: Thrust per commanded thrust.
+    drag: float = 0.0  #: Deceleration per speed, 1/s.
+    #: Standard deviation of the wind's acceleration, m/s^2, which is correlated over 1 s.
     gusts: float = 0.0
 
 
@@ -71,25 +59,14 @@ REAL = ModelError(response_time=0.05, thrust_factor=0.9, drag=0.2, gusts=0.3)
 
 @dataclass(frozen=True)
 class SampledFlight:
-    """A flight, sampled every `PERIOD`; n samples.
+    """A flight, sampled every `PERIOD`; n samples."""
 
-    Attributes
-    ----------
-    position, velocity : ndarray, shape (n, 3)
-        The truth, m and m/s.
-    yaw : ndarray, shape (n,)
-        rad.
-    control : ndarray, shape (n, 4)
-        Given at each sample and held until the next.
-    measured : ndarray, shape (n, 3)
-        Position with noise, m.
-    """
-
+    #: position, velocity: Shape (n, 3). The truth, m and m/s.
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
-    yaw: NDArray[np.float64]
-    control: NDArray[np.float64]
-    measured: NDArray[np.float64]
+    yaw: NDArray[np.float64]  #: Shape (n,); rad.
+    control: NDArray[np.float64]  #: Shape (n, 4). Given at each sample and held until the next.
+    measured: NDArray[np.float64]  #: Shape (n, 3). Position with noise, m.
 
     @property
     def time(self) -> NDArray[np.float64]:

@@ -36,48 +36,29 @@ USED_MARGIN = 2.0 / 3.0
 
 @dataclass(frozen=True)
 class Transform:
-    """A transform that was received.
+    """A transform that was received."""
 
-    Attributes
-    ----------
-    parent, child, node : str
-        Frames, and the publishing node.
-    stamp, arrival : float
-        ROS time, s.
-    is_static : bool
-        It came on /tf_static.
-    """
-
+    #: parent, child, node: Frames, and the publishing node.
     parent: str
     child: str
     node: str
+    #: stamp, arrival: ROS time, s.
     stamp: float
     arrival: float
-    is_static: bool = False
+    is_static: bool = False  #: It came on /tf_static.
 
 
 @dataclass
 class Recording:
-    """What was published for some seconds.
+    """What was published for some seconds."""
 
-    Attributes
-    ----------
-    transforms : list of Transform
-        In the order in which they came.
-    clocks : list of float
-        Of /clock, s.
-    delays : dict
-        Topic of controls -> times from stamp to arrival, s.
-    control_stamps : dict
-        Topic of controls -> stamps, s.
-    reported : dict
-        Address of a vehicle -> nodes whose diagnostics speak of it.
-    """
-
-    transforms: list[Transform] = field(default_factory=list)
-    clocks: list[float] = field(default_factory=list)
+    transforms: list[Transform] = field(default_factory=list)  #: In the order in which they came.
+    clocks: list[float] = field(default_factory=list)  #: Of /clock, s.
+    #: Topic of controls -> times from stamp to arrival, s.
     delays: dict[str, list[float]] = field(default_factory=dict)
+    #: Topic of controls -> stamps, s.
     control_stamps: dict[str, list[float]] = field(default_factory=dict)
+    #: Address of a vehicle -> nodes whose diagnostics speak of it.
     reported: dict[str, set[str]] = field(default_factory=dict)
 
 

@@ -19,26 +19,15 @@ _FREQUENCIES = 500
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop.
+    """Margins of one loop."""
 
-    Attributes
-    ----------
-    gain_up, gain_down : float
-        Factors by which the loop gain may grow and shrink; infinity and 0 if
-        they may without limit.
-    phase : float
-        Phase it may lose, rad; infinity if its gain is never 1.
-    crossover : float
-        Where the phase margin is, rad/s; NaN without one.
-    delay : float
-        Time by which the control may be late in addition, s.
-    """
-
+    #: gain_up, gain_down: Factors by which the loop gain may grow and shrink; infinity and 0 if
+    #: they may without limit.
     gain_up: float
     gain_down: float
-    phase: float
-    crossover: float
-    delay: float
+    phase: float  #: Phase it may lose, rad; infinity if its gain is never 1.
+    crossover: float  #: Where the phase margin is, rad/s; NaN without one.
+    delay: float  #: Time by which the control may be late in addition, s.
 
 
 def loop_response(design: Design, loop: int) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:

@@ -20,34 +20,19 @@ _CLEARANCE = 1e-6
 
 @dataclass(frozen=True)
 class AvoidanceSettings:
-    """Settings; names of the firmware's parameter group colAv in brackets.
+    """Settings; names of the firmware's parameter group colAv in brackets."""
 
-    Attributes
-    ----------
-    radii : tuple, 3 components
-        Of the ellipsoid that others stay out of, m (ellipsoidX, Y, Z).
-    box_min, box_max : tuple, 3 components
-        Corners of the box that the vehicle stays in, m (bboxMinX, ... bboxMaxZ).
-    horizon : float
-        How far ahead motion is limited, s (horizon).
-    max_speed : float
-        Of each axis, m/s (maxSpeed).
-    sidestep_threshold : float
-        Distance from a wall of the cell at which a sidestep to the right begins, m (sidestepThrsh).
-    tolerance : float
-        How far outside of its cell a point counts as inside, in tenths of m (vorTol).
-    max_iterations : int
-        Of the projection into the cell (vorIters).
-    """
-
-    radii: Triple
+    radii: Triple  #: Of the ellipsoid that others stay out of, m (ellipsoidX, Y, Z).
+    #: box_min, box_max: Corners of the box that the vehicle stays in, m (bboxMinX, ... bboxMaxZ).
     box_min: Triple = (-math.inf,) * 3
     box_max: Triple = (math.inf,) * 3
-    horizon: float = 1.0
-    max_speed: float = 0.5
+    horizon: float = 1.0  #: How far ahead motion is limited, s (horizon).
+    max_speed: float = 0.5  #: Of each axis, m/s (maxSpeed).
+    #: Distance from a wall of the cell at which a sidestep to the right begins, m (sidestepThrsh).
     sidestep_threshold: float = 0.25
+    #: How far outside of its cell a point counts as inside, in tenths of m (vorTol).
     tolerance: float = 1e-5
-    max_iterations: int = 100
+    max_iterations: int = 100  #: Of the projection into the cell (vorIters).
 
 
 class CollisionAvoidance:

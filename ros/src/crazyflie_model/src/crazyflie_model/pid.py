@@ -7,19 +7,14 @@ from crazyflie_model.elementwise import Number, clip
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains of a PID controller whose derivative is that of the measurement.
+    """Gains of a PID controller whose derivative is that of the measurement."""
 
-    Attributes
-    ----------
-    kp, ki, kd : float
-        Output per error, per integral of the error, per rate of change of the measurement.
-    limit : float
-        Of the integral's magnitude, unit of the error times s. The default is the firmware's.
-    """
-
+    #: kp, ki, kd: Output per error, per integral of the error, per rate of change of the
+    #: measurement.
     kp: float
     ki: float
     kd: float
+    #: Of the integral's magnitude, unit of the error times s. The default is the firmware's.
     limit: float = 5000.0
 
 

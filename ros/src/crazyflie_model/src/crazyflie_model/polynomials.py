@@ -74,19 +74,13 @@ def _power_basis(bernstein):
 
 
 class Goal(NamedTuple, Generic[Number]):
-    """Where a trajectory is at one time, or at many.
+    """Where a trajectory is at one time, or at many."""
 
-    Attributes
-    ----------
-    position, velocity, acceleration : tuple, 3 components
-        m, m/s, m/s^2.
-    yaw, yaw_rate : float or ndarray
-        rad, rad/s.
-    """
-
+    #: position, velocity, acceleration: m, m/s, m/s^2.
     position: tuple[Number, Number, Number]
     velocity: tuple[Number, Number, Number]
     acceleration: tuple[Number, Number, Number]
+    #: yaw, yaw_rate: rad, rad/s.
     yaw: Number
     yaw_rate: Number
 
@@ -99,17 +93,10 @@ def at_rest(position: Sequence[float], yaw: float = 0.0) -> Goal[float]:
 
 @dataclass(frozen=True)
 class PolynomialPiece:
-    """One piece of a trajectory: four polynomials of the time since it began.
+    """One piece of a trajectory: four polynomials of the time since it began."""
 
-    Attributes
-    ----------
-    duration : float
-        s.
-    x, y, z, yaw : sequence of float
-        Up to `COEFFICIENTS`, the constant first: m and rad, in powers of s.
-    """
-
-    duration: float
+    duration: float  #: s.
+    #: x, y, z, yaw: Up to `COEFFICIENTS`, the constant first: m and rad, in powers of s.
     x: Sequence[float]
     y: Sequence[float]
     z: Sequence[float]

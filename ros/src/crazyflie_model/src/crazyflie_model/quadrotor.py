@@ -39,39 +39,25 @@ class QuadrotorParameters:
     quadrocopter, bachelor thesis, ETH Zurich, 2015.
     [B] Bitcraze, Crazyflie 2.1 data sheet, and the firmware's constants, which
     agree with [F] in the torque of a rotor. [L] has four times as much.
-
-    Attributes
-    ----------
-    mass : float
-        kg, with battery [B, L].
-    inertia_x, inertia_y, inertia_z : float
-        Principal moments about forward, left and up, kg m^2 [L].
-    arm : float
-        From the centre to a rotor's axis, m: half of motor to motor [B].
-    thrust_constant : float
-        Thrust of a rotor over its speed squared, N s^2 [L].
-    torque_per_thrust : float
-        Torque of a rotor over its thrust, m [F].
-    drag_horizontal, drag_vertical : float
-        Drag over airspeed over the sum of the rotor speeds, across and along
-        the rotors' axes, kg [F].
-    motor_time_constant : float
-        Of the first-order lag between commanded and true speed, s [F: discrete
-        pole at 0.9695404 with 500 Hz].
-    max_rotor_speed : float
-        rad/s [L, at full PWM].
     """
 
-    mass: float = 0.027
+    mass: float = 0.027  #: kg, with battery [B, L].
+    #: inertia_x, inertia_y, inertia_z: Principal moments about forward, left and up, kg m^2 [L].
     inertia_x: float = 1.395e-5
     inertia_y: float = 1.436e-5
     inertia_z: float = 2.173e-5
-    arm: float = 0.046
+    arm: float = 0.046  #: From the centre to a rotor's axis, m: half of motor to motor [B].
+    #: Thrust of a rotor over its speed squared, N s^2 [L].
     thrust_constant: float = 3.1582e-10 * (30.0 / math.pi) ** 2
-    torque_per_thrust: float = 0.005964552
+    torque_per_thrust: float = 0.005964552  #: Torque of a rotor over its thrust, m [F].
+    #: drag_horizontal, drag_vertical: Drag over airspeed over the sum of the rotor speeds, across
+    #: and along the rotors' axes, kg [F].
     drag_horizontal: float = 9.1785e-7
     drag_vertical: float = 10.311e-7
+    #: Of the first-order lag between commanded and true speed, s [F: discrete pole at 0.9695404
+    #: with 500 Hz].
     motor_time_constant: float = -0.002 / math.log(0.9695404)
+    #: rad/s [L, at full PWM].
     max_rotor_speed: float = (0.2685 * FULL_PWM + 4070.3) * math.pi / 30.0
 
     @cached_property

@@ -71,21 +71,11 @@ def turned(pieces: Pieces, pivot: Triple, angle: float) -> list[PolynomialPiece]
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Pieces flown one after the other, then rest at the last position.
+    """Pieces flown one after the other, then rest at the last position."""
 
-    Attributes
-    ----------
-    pieces : sequence of PolynomialPiece
-        At least one.
-    time_scale : float
-        > 0; 2 is half as fast.
-    backwards : bool
-        From the end to the beginning.
-    """
-
-    pieces: Pieces
-    time_scale: float = 1.0
-    backwards: bool = False
+    pieces: Pieces  #: At least one.
+    time_scale: float = 1.0  #: > 0; 2 is half as fast.
+    backwards: bool = False  #: From the end to the beginning.
 
     @property
     def duration(self) -> float:

@@ -37,25 +37,13 @@ class Kind(Enum):
 
 @dataclass
 class Event:
-    """Something that happened.
+    """Something that happened."""
 
-    Attributes
-    ----------
-    time : float
-        s, when it was recorded.
-    namespace : str
-        Of the node or topic that it comes from.
-    kind : Kind
-    text : str
-    count : int
-        How many times in succession.
-    """
-
-    time: float
-    namespace: str
+    time: float  #: s, when it was recorded.
+    namespace: str  #: Of the node or topic that it comes from.
     kind: Kind
     text: str
-    count: int = 1
+    count: int = 1  #: How many times in succession.
 
 
 class EventLog:

@@ -37,14 +37,10 @@ class _BrokenOffError(Exception):
 
 @dataclass(frozen=True)
 class Connection:
-    """A topic of one publisher.
+    """A topic of one publisher."""
 
-    Attributes
-    ----------
-    topic, datatype, md5sum, definition : str
-        As the publisher named them; the definition is the text of the message file.
-    """
-
+    #: topic, datatype, md5sum, definition: As the publisher named them; the definition is the text
+    #: of the message file.
     topic: str
     datatype: str
     md5sum: str

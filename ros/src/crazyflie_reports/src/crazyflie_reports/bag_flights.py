@@ -39,36 +39,19 @@ class Phase:
 
 @dataclass
 class Flight:
-    """A flight of a vehicle.
+    """A flight of a vehicle."""
 
-    Attributes
-    ----------
-    vehicle : str
-        Its name.
-    number : int
-        Of the vehicle's flights in the recording, from 1.
-    phases : list of Phase
-    record : FlightRecord
-        With `MARGIN` before and after.
-    attitude, battery, link, delays : ndarray
-        As in `Vehicle`.
-    lost : int or None
-        As in `Vehicle`.
-    is_driven : bool
-        As in `Vehicle`.
-    events : list of Event
-    """
-
-    vehicle: str
-    number: int
+    vehicle: str  #: Its name.
+    number: int  #: Of the vehicle's flights in the recording, from 1.
     phases: list[Phase]
-    record: FlightRecord
+    record: FlightRecord  #: With `MARGIN` before and after.
+    #: attitude, battery, link, delays: As in `Vehicle`.
     attitude: Rows
     battery: Rows
     link: Rows
     delays: Rows
-    lost: int | None
-    is_driven: bool
+    lost: int | None  #: As in `Vehicle`.
+    is_driven: bool  #: As in `Vehicle`.
     events: list[Event]
 
     @property

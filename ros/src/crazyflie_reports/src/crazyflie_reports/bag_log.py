@@ -75,14 +75,7 @@ class Spool:
 
 @dataclass
 class Source:
-    """The series of a topic.
-
-    Attributes
-    ----------
-    topic, namespace : str
-    role : Role
-    spool : Spool
-    """
+    """The series of a topic."""
 
     topic: str
     namespace: str
@@ -92,30 +85,16 @@ class Source:
 
 @dataclass
 class BagLog:
-    """What a recording has for a report.
+    """What a recording has for a report."""
 
-    Attributes
-    ----------
-    name : str
-        Of the recording.
-    sources : dict of str to Source
-        By topic.
-    frames : dict of str to Spool
-        `POSE_FIELDS` by child frame of /tf.
-    events : EventLog
-    start, end : float
-        Times of the first and the last message that was read, s.
-    remarks : list of str
-        What is missing, or could not be read.
-    """
-
-    name: str
-    sources: dict[str, Source] = field(default_factory=dict)
-    frames: dict[str, Spool] = field(default_factory=dict)
+    name: str  #: Of the recording.
+    sources: dict[str, Source] = field(default_factory=dict)  #: By topic.
+    frames: dict[str, Spool] = field(default_factory=dict)  #: `POSE_FIELDS` by child frame of /tf.
     events: EventLog = field(default_factory=EventLog)
+    #: start, end: Times of the first and the last message that was read, s.
     start: float = float("inf")
     end: float = float("-inf")
-    remarks: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)  #: What is missing, or could not be read.
 
 
 def files_of(path: Path) -> list[Path]:

@@ -25,23 +25,12 @@ Row = Sequence[float]
 
 @dataclass(frozen=True)
 class Role:
-    """A series of numbers that topics of some names and types are for a vehicle.
-
-    Attributes
-    ----------
-    name : str
-    topics : str
-        Regular expression of the name below the vehicle's namespace.
-    fields : tuple of str
-        Of a row.
-    rows : dict
-        By type, what makes a row of a message.
-    """
+    """A series of numbers that topics of some names and types are for a vehicle."""
 
     name: str
-    topics: str
-    fields: tuple[str, ...]
-    rows: dict[str, Callable[[Any], Row]]
+    topics: str  #: Regular expression of the name below the vehicle's namespace.
+    fields: tuple[str, ...]  #: Of a row.
+    rows: dict[str, Callable[[Any], Row]]  #: By type, what makes a row of a message.
 
 
 def _of_pose(pose):
@@ -139,21 +128,12 @@ _HEADER = struct.Struct("<III")
 
 @dataclass(frozen=True)
 class Topic:
-    """How messages of a connection are read.
+    """How messages of a connection are read."""
 
-    Attributes
-    ----------
-    namespace : str
-        Of the vehicle, without slashes at its ends.
-    role : Role or None
-        None for messages that are events.
-    decode : callable
-        ``decode(data)`` returns stamp (s, 0 without one), number in sequence, and a row or,
-        without a role, the message.
-    """
-
-    namespace: str
-    role: Role | None
+    namespace: str  #: Of the vehicle, without slashes at its ends.
+    role: Role | None  #: None for messages that are events.
+    #: ``decode(data)`` returns stamp (s, 0 without one), number in sequence, and a row or, without
+    #: a role, the message.
     decode: Callable[[bytes], tuple[float, int, Any]]
 
 

@@ -43,20 +43,12 @@ LEAST_VOLTAGE = 3.2
 
 @dataclass(frozen=True)
 class Figure:
-    """A number that describes a flight.
-
-    Attributes
-    ----------
-    name, unit : str
-    value : float
-        NaN if it is not known.
-    minimum, maximum : float
-        What is normal, if that is limited.
-    """
+    """A number that describes a flight."""
 
     name: str
     unit: str
-    value: float
+    value: float  #: NaN if it is not known.
+    #: minimum, maximum: What is normal, if that is limited.
     minimum: float = -math.inf
     maximum: float = math.inf
 

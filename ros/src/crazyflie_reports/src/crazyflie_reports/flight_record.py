@@ -76,24 +76,15 @@ class Series:
 
 @dataclass
 class FlightRecord:
-    """Messages and events of one flight; times in s of ROS time.
+    """Messages and events of one flight; times in s of ROS time."""
 
-    Attributes
-    ----------
-    state, final_control, takeoff_control, reference : Series
-        What was published on these topics.
-    toggles : list of float
-        When in_flight was toggled.
-    events : dict
-        When something was done: "takeoff" and "land" (called), "flying" and
-        "landed" (answered).
-    """
-
+    #: state, final_control, takeoff_control, reference: What was published on these topics.
     state: Series = field(default_factory=lambda: Series(STATE_FIELDS))
     final_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     takeoff_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     reference: Series = field(default_factory=lambda: Series(STATE_FIELDS[:6]))
-    toggles: list[float] = field(default_factory=list)
+    toggles: list[float] = field(default_factory=list)  #: When in_flight was toggled.
+    #: When something was done: "takeoff" and "land" (called), "flying" and "landed" (answered).
     events: dict[str, float] = field(default_factory=dict)
 
     def position_error(self, point: ArrayLike) -> NDArray[np.float64]:

@@ -36,19 +36,12 @@ SILENCE_PERIOD = 0.1
 
 
 class StateEstimatorNode(Node):
-    """Publish the state of the vehicle that tf knows.
-
-    Attributes
-    ----------
-    state_type : type
-        Stamped message to publish, with a field ``state``, all float64.
-    parameters_type : type
-        `StateEstimatorParameters` or a subclass.
-    """
+    """Publish the state of the vehicle that tf knows."""
 
     needed_in_flight = True
 
-    state_type: type
+    state_type: type  #: Stamped message to publish, with a field ``state``, all float64.
+    #: `StateEstimatorParameters` or a subclass.
     parameters_type: type[StateEstimatorParameters] = StateEstimatorParameters
 
     def __init__(self) -> None:

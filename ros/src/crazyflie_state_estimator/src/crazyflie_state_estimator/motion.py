@@ -8,24 +8,12 @@ from crazyflie_state_estimator.rate_filter import Components, RateFilter
 
 
 class Motion(NamedTuple):
-    """Where a vehicle is and how it moves, in the fixed frame.
+    """Where a vehicle is and how it moves, in the fixed frame."""
 
-    Attributes
-    ----------
-    position : sequence, 3 components
-        x, y, z in m.
-    velocity : sequence, 3 components
-        m/s.
-    attitude : sequence, 3 components
-        Roll, pitch, yaw in rad, in [-pi, pi]; see `crazyflie_model.angles`.
-    attitude_rate : sequence, 3 components
-        Time derivatives of roll, pitch, yaw in rad/s (not the body's angular
-        velocity).
-    """
-
-    position: Components
-    velocity: Components
-    attitude: Components
+    position: Components  #: x, y, z in m.
+    velocity: Components  #: m/s.
+    attitude: Components  #: Roll, pitch, yaw in rad, in [-pi, pi]; see `crazyflie_model.angles`.
+    #: Time derivatives of roll, pitch, yaw in rad/s (not the body's angular velocity).
     attitude_rate: Components
 
 

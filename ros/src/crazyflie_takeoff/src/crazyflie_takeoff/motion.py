@@ -18,19 +18,12 @@ Position = tuple[float, float, float]
 
 
 class Motion(NamedTuple):
-    """A measured state.
+    """A measured state."""
 
-    Attributes
-    ----------
-    position, velocity : tuple of float, length 3
-        m and m/s, fixed frame, z up.
-    yaw : float
-        rad.
-    """
-
+    #: position, velocity: m and m/s, fixed frame, z up.
     position: Position
     velocity: tuple[float, float, float]
-    yaw: float = 0.0
+    yaw: float = 0.0  #: rad.
 
 
 class Measurement:

@@ -24,14 +24,9 @@ class Server(ABC):
     ----------
     sockets : socket
         Closed by `stop`.
-
-    Attributes
-    ----------
-    switches : object
-        Its attributes are the live fields of the settings.
     """
 
-    switches: Any
+    switches: Any  #: Its attributes are the live fields of the settings.
 
     def __init__(self, *sockets: socket.socket):
         self._sockets = sockets

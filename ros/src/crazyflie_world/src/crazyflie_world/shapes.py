@@ -32,23 +32,13 @@ WALL_COLOUR = (0.85, 0.85, 0.8)
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """What all solid shapes have.
+    """What all solid shapes have."""
 
-    Attributes
-    ----------
-    name : str
-        No two objects of a world have the same; for those that move it is that of their tf frame.
-    centre : tuple of float
-        x, y, z in the world's frame, m.
-    colour : tuple of float
-    path : Path or None
-        Where the centre moves, if it does.
-    """
-
+    #: No two objects of a world have the same; for those that move it is that of their tf frame.
     name: str
-    centre: Position
+    centre: Position  #: x, y, z in the world's frame, m.
     colour: Colour = (0.5, 0.5, 0.5)
-    path: Path | None = None
+    path: Path | None = None  #: Where the centre moves, if it does.
 
     @property
     def size(self) -> Position:
@@ -83,21 +73,12 @@ class Shape:
 
 @dataclass(frozen=True, kw_only=True)
 class Box(Shape):
-    """A box that stands upright.
+    """A box that stands upright."""
 
-    Attributes
-    ----------
-    extent : tuple of float
-        Along its own x, y and z, m.
-    yaw : float
-        How far it is turned about the vertical, rad.
-    picture : str
-        File of what is to be seen on its front, the side that looks along its own x; empty for
-        nothing.
-    """
-
-    extent: Position
-    yaw: float = 0.0
+    extent: Position  #: Along its own x, y and z, m.
+    yaw: float = 0.0  #: How far it is turned about the vertical, rad.
+    #: File of what is to be seen on its front, the side that looks along its own x; empty for
+    #: nothing.
     picture: str = ""
 
     @property

@@ -34,20 +34,11 @@ class Floor(Parameters):
 
 @dataclass(frozen=True)
 class World:
-    """A floor and objects, at one moment.
+    """A floor and objects, at one moment."""
 
-    Attributes
-    ----------
-    frame : str
-        The tf frame of all positions.
-    floor : Floor
-    objects : tuple of Shape
-        Walls are boxes.
-    """
-
-    frame: str
+    frame: str  #: The tf frame of all positions.
     floor: Floor
-    objects: tuple[Shape, ...] = ()
+    objects: tuple[Shape, ...] = ()  #: Walls are boxes.
 
     @property
     def solids(self) -> tuple[Shape, ...]:

@@ -46,18 +46,10 @@ class RigidBodyParameters(OutputParameters):
 
 @dataclass(frozen=True)
 class Body:
-    """A body that is to be published.
+    """A body that is to be published."""
 
-    Attributes
-    ----------
-    key : str
-        Its entry in the dictionary.
-    parameters : OutputParameters
-        Its topics and frames.
-    """
-
-    key: str
-    parameters: OutputParameters
+    key: str  #: Its entry in the dictionary.
+    parameters: OutputParameters  #: Its topics and frames.
 
     @property
     def name(self) -> str | None:
@@ -91,18 +83,10 @@ class RigidBody(Body):
 
 @dataclass(frozen=True)
 class Bodies:
-    """The bodies of one dictionary that are to be published.
+    """The bodies of one dictionary that are to be published."""
 
-    Attributes
-    ----------
-    bodies : list of Body
-        At least one.
-    unknown : list of str
-        Entries that have no meaning, such as "rigid_bodies/1/odom".
-    """
-
-    bodies: list[Body]
-    unknown: list[str]
+    bodies: list[Body]  #: At least one.
+    unknown: list[str]  #: Entries that have no meaning, such as "rigid_bodies/1/odom".
 
 
 class SingleMarkerParameters(OutputParameters):

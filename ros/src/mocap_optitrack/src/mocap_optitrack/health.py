@@ -33,24 +33,12 @@ class Event(Enum):
 
 
 class Status(NamedTuple):
-    """The state of the stream or of a body.
+    """The state of the stream or of a body."""
 
-    Attributes
-    ----------
-    component : str
-        What it is about.
-    level : int
-        `OK`, `WARN` or `ERROR`.
-    message : str
-        For an operator.
-    values : dict of str to str
-        Figures, with their units in the keys.
-    """
-
-    component: str
-    level: int
-    message: str
-    values: dict[str, str]
+    component: str  #: What it is about.
+    level: int  #: `OK`, `WARN` or `ERROR`.
+    message: str  #: For an operator.
+    values: dict[str, str]  #: Figures, with their units in the keys.
 
 
 class Health:

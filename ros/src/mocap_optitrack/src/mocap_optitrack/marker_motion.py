@@ -30,18 +30,11 @@ _BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5
 
 
 class MotionLimits(NamedTuple):
-    """Limits of a vehicle's motion.
+    """Limits of a vehicle's motion."""
 
-    Attributes
-    ----------
-    max_velocity : Vector3
-        Along each axis, m/s; those of crazyswarm2's dynamics configurations.
-    max_acceleration : float
-        m/s^2; three standard deviations of the filter's acceleration.
-    """
-
+    #: Along each axis, m/s; those of crazyswarm2's dynamics configurations.
     max_velocity: Vector3 = (2.0, 2.0, 3.0)
-    max_acceleration: float = 8.0
+    max_acceleration: float = 8.0  #: m/s^2; three standard deviations of the filter's acceleration.
 
 
 class MarkerMotion:

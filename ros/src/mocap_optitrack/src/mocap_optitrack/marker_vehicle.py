@@ -36,18 +36,10 @@ FORGET_TIME = 0.1
 
 
 class MarkerVehicle(NamedTuple):
-    """A vehicle with one marker.
-
-    Attributes
-    ----------
-    name : str
-    start : Vector3
-        Of its marker, before the first flight, m, z up.
-    limits : MotionLimits
-    """
+    """A vehicle with one marker."""
 
     name: str
-    start: Vector3
+    start: Vector3  #: Of its marker, before the first flight, m, z up.
     limits: MotionLimits = MotionLimits()
 
 

@@ -38,24 +38,14 @@ class DecodeError(Exception):
 
 
 class ServerInfo(NamedTuple):
-    """A server's answer to `CONNECT`.
+    """A server's answer to `CONNECT`."""
 
-    Attributes
-    ----------
-    name, version : str
-        Of the application, such as "Motive"; of the stream, such as "3.1".
-    clock_frequency : int or None
-        Ticks of its clock per second.
-    is_multicast : bool or None
-        Whether it sends to a group and not to each client.
-    multicast_address, data_port : str or None, int or None
-        The group.
-    """
-
+    #: name, version: Of the application, such as "Motive"; of the stream, such as "3.1".
     name: str
     version: str
-    clock_frequency: int | None = None
-    is_multicast: bool | None = None
+    clock_frequency: int | None = None  #: Ticks of its clock per second.
+    is_multicast: bool | None = None  #: Whether it sends to a group and not to each client.
+    #: multicast_address, data_port: The group.
     multicast_address: str | None = None
     data_port: int | None = None
 

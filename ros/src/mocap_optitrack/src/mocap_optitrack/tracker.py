@@ -28,23 +28,12 @@ _RESET = 1.0
 
 
 class BodyPose(NamedTuple):
-    """A body where the cameras saw it.
-
-    Attributes
-    ----------
-    body : Body
-    time : float
-        When, s of the local clock.
-    position : Vector3
-        m, z up.
-    quaternion : Quaternion or None
-        Of norm 1; None for a single marker.
-    """
+    """A body where the cameras saw it."""
 
     body: Body
-    time: float
-    position: Vector3
-    quaternion: Quaternion | None
+    time: float  #: When, s of the local clock.
+    position: Vector3  #: m, z up.
+    quaternion: Quaternion | None  #: Of norm 1; None for a single marker.
 
 
 class Tracker:

@@ -34,29 +34,17 @@ _SETTLING = 2.0
 
 @dataclass(frozen=True)
 class SwarmFigures:
-    """What a flight of some vehicles costs.
+    """What a flight of some vehicles costs."""
 
-    Attributes
-    ----------
-    n : int
-        Number of vehicles.
-    start : float
-        From roslaunch to the service that has them all take off, s.
-    cpu : float
-        Processor time of their process, % of the time of the flight, which may be simulated.
-    p50, p99, longest : float
-        Periods of the final control of three of them, as they arrive outside, ms.
-    memory : float
-        MiB.
-    """
-
-    n: int
-    start: float
+    n: int  #: Number of vehicles.
+    start: float  #: From roslaunch to the service that has them all take off, s.
+    #: Processor time of their process, % of the time of the flight, which may be simulated.
     cpu: float
+    #: p50, p99, longest: Periods of the final control of three of them, as they arrive outside, ms.
     p50: float
     p99: float
     longest: float
-    memory: float
+    memory: float  #: MiB.
 
 
 def measure(n: int, arguments: Sequence[str] = (), core: int = 0) -> SwarmFigures:

@@ -31,27 +31,15 @@ class ParameterError(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Declaration:
-    """What is known about a parameter.
+    """What is known about a parameter."""
 
-    Attributes
-    ----------
-    name : str
-        Below the node's name, such as "topics/state"; a name that begins with a
-        slash is not the node's own.
-    type : ParameterType
-    help : str
-        What it is; without its type, unit, range and default.
-    default : object
-        Taken as it is when the parameter is not set; `REQUIRED` for none.
-    live : bool
-        Whether it may be changed while the node runs.
-    """
-
+    #: Below the node's name, such as "topics/state"; a name that begins with a slash is not the
+    #: node's own.
     name: str
     type: ParameterType
-    help: str
-    default: Any
-    live: bool
+    help: str  #: What it is; without its type, unit, range and default.
+    default: Any  #: Taken as it is when the parameter is not set; `REQUIRED` for none.
+    live: bool  #: Whether it may be changed while the node runs.
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,21 +10,11 @@ from crazyflie_utils.text_input import number_from_text
 
 
 class ParameterType:
-    """Base class of parameter types.
+    """Base class of parameter types."""
 
-    Attributes
-    ----------
-    label : str
-        For tables and command lines, such as "float".
-    unit : str
-        Of a number; empty for none.
-    range : str
-        For tables, such as "> 0"; empty for none.
-    """
-
-    label: str
-    unit: str = ""
-    range: str = ""
+    label: str  #: For tables and command lines, such as "float".
+    unit: str = ""  #: Of a number; empty for none.
+    range: str = ""  #: For tables, such as "> 0"; empty for none.
 
     def __call__(self, value: Any) -> Any:
         """Return the value that a raw one, of the parameter server or a command line, means.

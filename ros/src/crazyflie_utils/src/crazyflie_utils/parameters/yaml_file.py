@@ -58,18 +58,10 @@ def _refusal(name, error):
 
 @dataclass(frozen=True)
 class Entry:
-    """A value in a file, and its place. What it is not, raises `ParameterError` with the place.
+    """A value in a file, and its place. What it is not, raises `ParameterError` with the place."""
 
-    Attributes
-    ----------
-    name : str
-        Its keys from the top of the file, such as "boxes/table"; empty for the whole.
-    node : yaml.Node
-        What the parser made of it.
-    """
-
-    name: str
-    node: yaml.Node
+    name: str  #: Its keys from the top of the file, such as "boxes/table"; empty for the whole.
+    node: yaml.Node  #: What the parser made of it.
 
     @property
     def file(self) -> Path:

@@ -25,24 +25,14 @@ _MAX_NAMES = 1000
 
 
 class StampedPose(NamedTuple):
-    """Where a frame is at a time.
+    """Where a frame is at a time."""
 
-    Attributes
-    ----------
-    parent, child : str
-        The frame that the pose is in, and the one whose pose it is.
-    stamp : int
-        ROS time, ns.
-    position : tuple of float
-        x, y, z in m.
-    rotation : tuple of float
-        Quaternion (x, y, z, w), from child to parent coordinates.
-    """
-
+    #: parent, child: The frame that the pose is in, and the one whose pose it is.
     parent: str
     child: str
-    stamp: int
-    position: tuple[float, float, float]
+    stamp: int  #: ROS time, ns.
+    position: tuple[float, float, float]  #: x, y, z in m.
+    #: Quaternion (x, y, z, w), from child to parent coordinates.
     rotation: tuple[float, float, float, float]
 
     @staticmethod

@@ -113,17 +113,9 @@ def _with_tilt(setpoint, roll, roll_is_rate, pitch, pitch_is_rate):
 
 
 class _FourFloats(NamedTuple):
-    """A type of setpoint whose payload is four floats.
+    """A type of setpoint whose payload is four floats."""
 
-    Attributes
-    ----------
-    fields : tuple of str
-        Of the setpoint: what the floats are.
-    mode : Modes
-    velocity_body : bool
-    """
-
-    fields: tuple[str, str, str, str]
+    fields: tuple[str, str, str, str]  #: Of the setpoint: what the floats are.
     mode: Modes
     velocity_body: bool = False
 

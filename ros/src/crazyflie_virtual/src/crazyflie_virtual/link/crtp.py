@@ -27,19 +27,12 @@ class Port(IntEnum):
 
 
 class Packet(NamedTuple):
-    """One packet.
+    """One packet."""
 
-    Attributes
-    ----------
-    port, channel : int
-        0 to 15 and 0 to 3.
-    data : bytes
-        At most `MAX_DATA`.
-    """
-
+    #: port, channel: 0 to 15 and 0 to 3.
     port: int
     channel: int
-    data: bytes
+    data: bytes  #: At most `MAX_DATA`.
 
     def encode(self) -> bytes:
         """Return the packet as a datagram.

@@ -32,24 +32,13 @@ _HEADER = struct.Struct("<HH")
 
 
 class BodyPose(NamedTuple):
-    """A rigid body in a frame.
-
-    Attributes
-    ----------
-    body_id, name : int, str
-    position : tuple, 3 components
-        m.
-    quaternion : tuple, 4 components
-        (x, y, z, w).
-    is_tracked : bool
-        Otherwise the pose is an old one.
-    """
+    """A rigid body in a frame."""
 
     body_id: int
     name: str
-    position: Triple
-    quaternion: Quaternion
-    is_tracked: bool
+    position: Triple  #: m.
+    quaternion: Quaternion  #: (x, y, z, w).
+    is_tracked: bool  #: Otherwise the pose is an old one.
 
 
 def parse(datagram: bytes) -> tuple[int, bytes] | None:

@@ -21,26 +21,14 @@ _STALE = 0.5
 
 @dataclass
 class MocapSwitches:
-    """What can be made to go wrong, at any time.
+    """What can be made to go wrong, at any time."""
 
-    Attributes
-    ----------
-    dropout : float
-        Probability with which a body is not tracked in a frame.
-    invalid : str
-        Numbers of bodies that are not tracked, separated by commas; or "all".
-    silent : bool
-        Whether frames are held back.
-    ghosts : float
-        Mean number of markers in a frame that are none: reflections, anywhere between the vehicles.
-    occlusions : float
-        How often a vehicle begins to be hidden, 1/s; each time for up to `OCCLUSION` s.
-    """
-
-    dropout: float = 0.0
-    invalid: str = ""
-    silent: bool = False
+    dropout: float = 0.0  #: Probability with which a body is not tracked in a frame.
+    invalid: str = ""  #: Numbers of bodies that are not tracked, separated by commas; or "all".
+    silent: bool = False  #: Whether frames are held back.
+    #: Mean number of markers in a frame that are none: reflections, anywhere between the vehicles.
     ghosts: float = 0.0
+    #: How often a vehicle begins to be hidden, 1/s; each time for up to `OCCLUSION` s.
     occlusions: float = 0.0
 
     def hides(self, body_id: int) -> bool:

@@ -17,17 +17,9 @@ _HEADER_MARK, _NAME, _REVISION = 0xEB, 1, 2
 
 
 class Deck(NamedTuple):
-    """A deck.
+    """A deck."""
 
-    Attributes
-    ----------
-    name : str
-        Also of its parameter in the group ``deck``.
-    product : int
-    revision : str
-    """
-
-    name: str
+    name: str  #: Also of its parameter in the group ``deck``.
     product: int
     revision: str
 

@@ -15,20 +15,12 @@ Read = Callable[[Firmware], float]
 
 
 class LogVariable(NamedTuple):
-    """A log variable.
-
-    Attributes
-    ----------
-    group, name : str
-    number_type : NumberType
-    read : callable
-        ``read(firmware)`` returns the value.
-    """
+    """A log variable."""
 
     group: str
     name: str
     number_type: NumberType
-    read: Read
+    read: Read  #: ``read(firmware)`` returns the value.
 
 
 def log_variables() -> list[LogVariable]:

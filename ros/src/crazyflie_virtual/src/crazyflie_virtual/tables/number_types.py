@@ -7,18 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class NumberType:
-    """A number's type.
+    """A number's type."""
 
-    Attributes
-    ----------
-    name : str
-        As in C.
-    format : str
-        As in the module struct, without byte order.
-    """
-
-    name: str
-    format: str
+    name: str  #: As in C.
+    format: str  #: As in the module struct, without byte order.
 
     @property
     def is_float(self) -> bool:

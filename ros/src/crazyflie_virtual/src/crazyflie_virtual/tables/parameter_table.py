@@ -17,27 +17,15 @@ NO_LIMITS = (-math.inf, math.inf)
 
 
 class ParameterSpec(NamedTuple):
-    """A parameter.
-
-    Attributes
-    ----------
-    group, name : str
-    number_type : NumberType
-    source : str or float
-        Path to the attribute, or the first value of one without effect.
-    persistent : bool
-        Can be stored on the vehicle.
-    read_only : bool
-    limits : tuple of float
-        Least and greatest value; a write of any other is without effect.
-    """
+    """A parameter."""
 
     group: str
     name: str
     number_type: NumberType
-    source: str | float
-    persistent: bool = False
+    source: str | float  #: Path to the attribute, or the first value of one without effect.
+    persistent: bool = False  #: Can be stored on the vehicle.
     read_only: bool = False
+    #: Least and greatest value; a write of any other is without effect.
     limits: tuple[float, float] = NO_LIMITS
 
 

@@ -14,11 +14,8 @@ from crazyflie_batch import Controller, Measurement, quadrotor, simulate
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_model.dynamics import STEP
 
-ONE, MANY = 1, 10_000
-"""Numbers of vehicles that have a goal."""
-
-DURATIONS = {ONE: 60.0, 100: 20.0, MANY: 2.0}
-"""Of the flights, s, by number of vehicles."""
+ONE, MANY = 1, 10_000  #: Numbers of vehicles that have a goal.
+DURATIONS = {ONE: 60.0, 100: 20.0, MANY: 2.0}  #: Of the flights, s, by number of vehicles.
 
 REPEATS = 5
 

@@ -25,8 +25,7 @@ class Estimator(ABC):
     of shape (n,). The class calculates.
     """
 
-    memory_dim: ClassVar[int]
-    """Number of components of the memory."""
+    memory_dim: ClassVar[int]  #: Number of components of the memory.
 
     @classmethod
     @abstractmethod

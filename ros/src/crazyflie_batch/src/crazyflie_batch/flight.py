@@ -22,20 +22,18 @@ from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector, functions, where
 from crazyflie_model.watchdog import watchdog_control
 
+#: Random numbers of a tick: noise of position (3) and attitude (3), of standard deviation 1; and
+#: one in [0, 1), by which a pose is lost.
 NOISE_DIM = 7
-"""Random numbers of a tick: noise of position (3) and attitude (3), of standard deviation 1; and
-one in [0, 1), by which a pose is lost."""
 
+#: Steps of the model from one sample of the inner loops to the next.
 SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
-"""Steps of the model from one sample of the inner loops to the next."""
+POSE_DIM = 5  #: Of a pose on its way: position (3), yaw, and 1 for one that is not lost.
 
-POSE_DIM = 5
-"""Of a pose on its way: position (3), yaw, and 1 for one that is not lost."""
-
+#: What is remembered of a flight: largest distance from the goal, m, and sum of the squared
+#: distances at the ticks after it has settled; of all ticks, the least cosine of the tilt and the
+#: largest speed, m/s.
 METRICS = ("largest_error", "squared_errors", "least_upright", "largest_speed")
-"""What is remembered of a flight: largest distance from the goal, m, and sum of the squared
-distances at the ticks after it has settled; of all ticks, the least cosine of the tilt and the
-largest speed, m/s."""
 
 
 Components = dict[str, Vector[Any]]

@@ -4,8 +4,8 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+#: Modules in which a formula ends that does what it must not.
 _CALCULATES = ("crazyflie_batch.symbols", "crazyflie_model.elementwise", "numpy")
-"""Modules in which a formula ends that does what it must not."""
 
 
 @contextmanager

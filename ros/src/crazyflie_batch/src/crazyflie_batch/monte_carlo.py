@@ -17,14 +17,11 @@ from crazyflie_batch.code_version import OtherFlightsError, code_version
 from crazyflie_batch.estimators import FiniteDifferences, Kalman
 from crazyflie_batch.settings import Settings
 
-CHUNK_SIZE = 256
-"""Flights in a chunk: some tenths of a second on one processor."""
-
+CHUNK_SIZE = 256  #: Flights in a chunk: some tenths of a second on one processor.
+#: Longest time without a finished chunk, s: workers of a cluster may be slow, or gone.
 CHUNK_TIMEOUT = 600.0
-"""Longest time without a finished chunk, s: workers of a cluster may be slow, or gone."""
-
+#: Columns of results; see `crazyflie_batch.Flights`.
 OUTCOMES = ("largest_error", "rms_error", "largest_tilt", "largest_speed", "has_crashed")
-"""Columns of results; see `crazyflie_batch.Flights`."""
 
 
 class Results:

@@ -27,8 +27,7 @@ _log = logging.getLogger(__name__)
 class ArrayProgram:
     """Flies groups of vehicles that have a plan in common by numpy's arrays; thread-safe."""
 
-    lanes = 256
-    """Vehicles in a group, the last axis of all arrays."""
+    lanes = 256  #: Vehicles in a group, the last axis of all arrays.
 
     def __init__(self, plan: Plan):
         self._plan = plan

@@ -12,11 +12,8 @@ from scipy.stats import rankdata
 from crazyflie_batch.monte_carlo import OUTCOMES
 from crazyflie_batch.settings import Settings
 
-QUINTILES = 5
-"""Groups of equal size into which flights are divided by a parameter."""
-
-_CONFIDENCE = 1.96
-"""95 %, in standard deviations."""
+QUINTILES = 5  #: Groups of equal size into which flights are divided by a parameter.
+_CONFIDENCE = 1.96  #: 95 %, in standard deviations.
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,8 @@ from crazyflie_model.limits import CRASH_TILT
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
 
-HOVER = (0.0, 0.0, 0.0, GRAVITY)
-"""Control at the reference."""
-
-_ROUNDING = 1e-6
-"""Of a whole number of periods, as a fraction of one."""
+HOVER = (0.0, 0.0, 0.0, GRAVITY)  #: Control at the reference.
+_ROUNDING = 1e-6  #: Of a whole number of periods, as a fraction of one.
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
+#: Class name under which rostest notes that a test node ran. The tests of that node are in a file
+#: of their own, rosunit-NAME.xml, beside rostest's.
 _ROSTEST = "rostest.runner.RosTest"
-"""Class name under which rostest notes that a test node ran. The tests of that node
-are in a file of their own, rosunit-NAME.xml, beside rostest's."""
 
 
 def verdicts(path: Path) -> Iterator[tuple[str, str]]:

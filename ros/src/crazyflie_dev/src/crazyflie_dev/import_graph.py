@@ -19,8 +19,7 @@ from pathlib import Path
 import rospkg
 from catkin_pkg.packages import find_packages
 
-Graph = Mapping[str, set[str]]
-"""Name -> names that it needs."""
+Graph = Mapping[str, set[str]]  #: Name -> names that it needs.
 
 PAGE = "docs/architecture.md"
 PICTURE = "docs/images/packages.svg"

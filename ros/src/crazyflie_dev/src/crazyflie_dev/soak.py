@@ -29,22 +29,17 @@ from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 
-HOVER_HEIGHT = 1.0
-"""Of the launch file, m."""
-
-_STEP = 0.05
-"""Between two looks of the operator at the flight, s."""
-
-_TIMEOUT = 30.0
-"""Longest wait for the reply to a call, or for the vehicle to come to rest, s."""
+HOVER_HEIGHT = 1.0  #: Of the launch file, m.
+_STEP = 0.05  #: Between two looks of the operator at the flight, s.
+_TIMEOUT = 30.0  #: Longest wait for the reply to a call, or for the vehicle to come to rest, s.
 
 
 FAULTS = (*soak_faults.FAULTS, *soak_operator.FAULTS, *soak_intruders.FAULTS)
 
 _SIMULATOR = "/simulator"
 
+#: A vehicle that comes to rest further away than this is carried back to the middle, m.
 _STRAY = 1.5
-"""A vehicle that comes to rest further away than this is carried back to the middle, m."""
 
 
 class Soak:

@@ -29,8 +29,7 @@ NODES = (CONTROLLER, ESTIMATOR, SERVER, FILTER)
 EMERGENCY = "emergency"
 STARVATION = "this computer is too busy"
 
-_RESPAWN = 1.0
-"""From the end of a node until roslaunch has started it anew, s."""
+_RESPAWN = 1.0  #: From the end of a node until roslaunch has started it anew, s.
 
 Undo = Callable[[], None]
 

@@ -10,40 +10,33 @@ from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff.safe_control import SINK_SPEED
 from crazyflie_utils.testing import FakeGraph
 
-MOST_THRUST = 16.0
-"""Of a final control, m/s^2: the controller's limit."""
+MOST_THRUST = 16.0  #: Of a final control, m/s^2: the controller's limit.
+MOST_TILT = math.radians(15.1)  #: Of a final control, rad: the controller's limit.
+OVERSHOOT = 0.2  #: How far above its highest reference a vehicle may be, m.
 
-MOST_TILT = math.radians(15.1)
-"""Of a final control, rad: the controller's limit."""
-
-OVERSHOOT = 0.2
-"""How far above its highest reference a vehicle may be, m."""
-
+#: The same while nothing passes the last node before the vehicle, which then keeps for 0.5 s what
+#: it was told last, m.
 DEAF_OVERSHOOT = 0.5
-"""The same while nothing passes the last node before the vehicle, which then keeps for 0.5 s
-what it was told last, m."""
 
+#: The same while all nodes stop for up to 0.6 s: a first stop in a climb at full thrust, of 6.2
+#: m/s^2, comes without warning and makes 1.1 m, and ending that climb with 4 m/s^2 1.7 m, less what
+#: was still to be climbed.
 STARVED_OVERSHOOT = 2.5
-"""The same while all nodes stop for up to 0.6 s: a first stop in a climb at full thrust, of
-6.2 m/s^2, comes without warning and makes 1.1 m, and ending that climb with 4 m/s^2 1.7 m,
-less what was still to be climbed."""
 
+#: How long a vehicle may be in the air without a good pose, s: 1.6 s in which the pose may come
+#: back, 5 s of descent, and what it falls then; and the way down at `SINK_SPEED` beside.
 BLIND_LIMIT = 8.0
-"""How long a vehicle may be in the air without a good pose, s: 1.6 s in which the pose may come
-back, 5 s of descent, and what it falls then; and the way down at `SINK_SPEED` beside."""
 
+#: Of a vehicle, m/s: references are 1.4 m away at most, and approached at less than half of it.
 MOST_SPEED = 3.0
-"""Of a vehicle, m/s: references are 1.4 m away at most, and approached at less than half of it."""
 
+#: How far from the middle a vehicle may come in a flight that begins there, m: the models of 7
+#: states have no drag, and glide on while they sink blindly.
 FLY_AWAY = 8.0
-"""How far from the middle a vehicle may come in a flight that begins there, m: the models of 7
-states have no drag, and glide on while they sink blindly."""
 
+#: Most speed at which it may meet the ground unless its motors were switched off, m/s.
 HARD_LANDING = 2.0
-"""Most speed at which it may meet the ground unless its motors were switched off, m/s."""
-
-_AIRBORNE = 0.05
-"""Height from which on a vehicle is in the air, m."""
+_AIRBORNE = 0.05  #: Height from which on a vehicle is in the air, m.
 
 _STATES = {
     FlightStatus.UNKNOWN: "",

@@ -29,11 +29,8 @@ from crazyflie_state_estimator.kalman import (
 from crazyflie_state_estimator.motion import MotionEstimator
 from crazyflie_state_estimator.rate_filter import FiniteDifference, RateFilter
 
-PERIOD = 0.01
-"""Time between two poses, s."""
-
-NOISE = 0.001
-"""Standard deviation of the poses' coordinates, m."""
+PERIOD = 0.01  #: Time between two poses, s.
+NOISE = 0.001  #: Standard deviation of the poses' coordinates, m.
 
 _SETTLED = slice(round(1.0 / PERIOD), None)
 _STEP = 0.001
@@ -120,6 +117,7 @@ def _correlated_noise(rng, steps, deviation):
     return np.vstack([np.zeros(3), lfilter([1.0], [1.0, _STEP - 1.0], drive, axis=0)])
 
 
+#: Name -> filter with the nodes' defaults, and whether it is given the control.
 FILTERS: dict[str, tuple[Callable[[], RateFilter], bool]] = {
     "finite difference": (FiniteDifference, False),
     "Kalman": (partial(ConstantAccelerationFilter, POSITION_NOISE, ACCELERATION_WALK), False),
@@ -128,7 +126,6 @@ FILTERS: dict[str, tuple[Callable[[], RateFilter], bool]] = {
         True,
     ),
 }
-"""Name -> filter with the nodes' defaults, and whether it is given the control."""
 
 
 def estimate(

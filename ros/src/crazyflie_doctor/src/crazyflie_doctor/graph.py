@@ -7,8 +7,7 @@ from typing import Any
 
 from crazyflie_doctor.finding import Finding, error, listed, warn
 
-Type = tuple[str, str]
-"""Name and MD5 sum of a message or service type."""
+Type = tuple[str, str]  #: Name and MD5 sum of a message or service type.
 
 CONTROLS = {
     "crazyflie_msgs/ControlStamped",
@@ -22,8 +21,8 @@ STATES_AND_REFERENCES = {
     "crazyflie_msgs/PositionVelocityYawStateStamped",
 }
 
+#: Inputs, by the ends of their parameters' names, without which a node does its work.
 _OPTIONAL = {"prioritized_control"}
-"""Inputs, by the ends of their parameters' names, without which a node does its work."""
 
 _BUILD = "build the workspace anew (./run build), source it in every shell, and restart the nodes"
 

@@ -6,13 +6,11 @@ from urllib.parse import urlsplit
 
 from crazyflie_doctor.finding import Finding, error, listed, warn
 
-LEAST_FREE = 100e6
-"""Below this much space the logs of a flight may not fit, bytes."""
+LEAST_FREE = 100e6  #: Below this much space the logs of a flight may not fit, bytes.
 
 FEW_FREE = 1e9
 
-_LOOPBACK = "127."
-"""Begin of addresses that no other computer can reach."""
+_LOOPBACK = "127."  #: Begin of addresses that no other computer can reach.
 
 _RULES = "sudo cp $(rospack find crazyflie_link)/udev/99-crazyflie.rules /etc/udev/rules.d/"
 _SOURCE = "source devel/setup.bash (or install/setup.bash) of the workspace in this shell"

@@ -15,8 +15,7 @@ from rosgraph.network import read_ros_handshake_header, write_ros_handshake_head
 
 from crazyflie_doctor.graph import Graph, Type
 
-LIMIT = 2.0
-"""Of the wait for one answer, s."""
+LIMIT = 2.0  #: Of the wait for one answer, s.
 
 _AT_A_TIME = 16
 

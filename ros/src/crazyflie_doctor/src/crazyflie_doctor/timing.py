@@ -14,24 +14,18 @@ from crazyflie_lqr.gain_file import GainFileError, load_matrix
 from crazyflie_lqr.margins import loop_margins
 from crazyflie_lqr.models import CONTROLS, LinearModel, full_state, near_hover
 
-LEAST_RATE = 50.0
-"""Below this rate of poses, Hz, velocities are poor."""
-
+LEAST_RATE = 50.0  #: Below this rate of poses, Hz, velocities are poor.
+#: Without a new pose for longer than this the vehicle is no longer controlled, s.
 LONGEST_PAUSE = 0.1
-"""Without a new pose for longer than this the vehicle is no longer controlled, s."""
+LONGEST_AGE = 0.1  #: Older poses, s, are too late for a controller.
 
-LONGEST_AGE = 0.1
-"""Older poses, s, are too late for a controller."""
-
+#: Stamps further ahead of the clock than this, s, are wrong: tf's own static_transform_publisher is
+#: ahead by its period.
 FUTURE = 0.5
-"""Stamps further ahead of the clock than this, s, are wrong: tf's own
-static_transform_publisher is ahead by its period."""
 
+#: Clocks that differ by more than this, s, are different clocks: simulated and real time.
 OTHER_CLOCK = 1e6
-"""Clocks that differ by more than this, s, are different clocks: simulated and real time."""
-
-USED_MARGIN = 2.0 / 3.0
-"""Of the delay margin; what is left is for the vehicle and for jitter."""
+USED_MARGIN = 2.0 / 3.0  #: Of the delay margin; what is left is for the vehicle and for jitter.
 
 
 @dataclass(frozen=True)

@@ -13,23 +13,14 @@ integrator continues with the thrust that was found.
 
 import math
 
-SPEED = 0.4
-"""Of the reference, m/s."""
-
-ACCELERATION = 0.5
-"""Of the reference, m/s^2."""
-
+SPEED = 0.4  #: Of the reference, m/s.
+ACCELERATION = 0.5  #: Of the reference, m/s^2.
+#: How far the reference may be above the vehicle, m: it waits for one that has not lifted off.
 LEAD = 0.15
-"""How far the reference may be above the vehicle, m: it waits for one that has not lifted off."""
-
-RATE = 3.0
-"""Bandwidth of the observer, 1/s."""
-
-LEARNING_TIME = 3.0 / RATE
-"""The shortest that a climb lasts, s, also where there is no way to go."""
-
+RATE = 3.0  #: Bandwidth of the observer, 1/s.
+LEARNING_TIME = 3.0 / RATE  #: The shortest that a climb lasts, s, also where there is no way to go.
+#: So near to its goal, m, and so slow, m/s, a vehicle has arrived.
 ARRIVAL_DISTANCE, ARRIVAL_SPEED = 0.05, 0.1
-"""So near to its goal, m, and so slow, m/s, a vehicle has arrived."""
 
 
 class Climb:

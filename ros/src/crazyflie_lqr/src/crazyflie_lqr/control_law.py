@@ -15,25 +15,19 @@ from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 
 ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
-YAW = 6
-"""Index of the yaw in states with position, velocity and yaw."""
+YAW = 6  #: Index of the yaw in states with position, velocity and yaw.
+X_DIM, U_DIM = 7, 4  #: Of these states, and of controls.
 
-X_DIM, U_DIM = 7, 4
-"""Of these states, and of controls."""
-
+#: Least and most of each control.
 LIMITS = (
     (-MAX_TILT, MAX_TILT),
     (-MAX_TILT, MAX_TILT),
     (-math.inf, math.inf),
     (MIN_THRUST, MAX_THRUST),
 )
-"""Least and most of each control."""
 
-INTEGRATED = (PITCH, ROLL, THRUST)
-"""The controls that the integrals of x, y and z act on."""
-
-MAX_GAP = 0.5
-"""Longest time between two states over which the position error is integrated, s."""
+INTEGRATED = (PITCH, ROLL, THRUST)  #: The controls that the integrals of x, y and z act on.
+MAX_GAP = 0.5  #: Longest time between two states over which the position error is integrated, s.
 
 
 def heading_error(

@@ -14,11 +14,8 @@ from scipy.linalg import expm
 
 from crazyflie_lqr.models import LinearModel
 
-_ROUNDOFF = 1e-9
-"""What is this much smaller than its surroundings counts as zero."""
-
-_MAX_DELAY_STEPS = 50
-"""Longest delay, in sample times; each adds u_dim states."""
+_ROUNDOFF = 1e-9  #: What is this much smaller than its surroundings counts as zero.
+_MAX_DELAY_STEPS = 50  #: Longest delay, in sample times; each adds u_dim states.
 
 
 class DesignError(ValueError):

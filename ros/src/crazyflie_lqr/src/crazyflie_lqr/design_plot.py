@@ -11,14 +11,13 @@ from crazyflie_lqr.design import Design
 from crazyflie_lqr.margins import loop_response
 from crazyflie_lqr.models import CONTROLS, LinearModel
 
+#: What a reference may step in, and the control that answers.
 _OUTPUTS = {"x": "pitch", "y": "roll", "z": "thrust", "yaw": "yaw_dot"}
-"""What a reference may step in, and the control that answers."""
 
 _UNITS = {"roll": "rad", "pitch": "rad", "yaw_dot": "rad/s", "thrust": "m/s²"}
 
 
-Responses = dict[str, NDArray[np.float64]]
-"""By name of an output, shape (n,)."""
+Responses = dict[str, NDArray[np.float64]]  #: By name of an output, shape (n,).
 
 
 def step_responses(

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-MAX_GAIN = 1e6
-"""Largest number of a gain file: larger ones make controls that are not finite."""
+MAX_GAIN = 1e6  #: Largest number of a gain file: larger ones make controls that are not finite.
 
 
 class LinearFeedbackParameters(Parameters):

@@ -7,8 +7,7 @@ from crazyflie_lqr.linear_feedback import Components, at_rest
 from crazyflie_lqr.reference_velocity import VELOCITY_LIMIT, VelocityCheck, limited
 from crazyflie_utils.last_valid import LastValid
 
-DESCENT_LIMIT = 0.3
-"""How long the reference of a descent counts, and it alone, s."""
+DESCENT_LIMIT = 0.3  #: How long the reference of a descent counts, and it alone, s.
 
 
 class GuardedReference:

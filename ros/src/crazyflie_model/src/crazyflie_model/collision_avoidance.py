@@ -14,8 +14,8 @@ from crazyflie_model.angles import Triple
 
 Array = NDArray[np.float64]
 
+#: How far within its cell a vehicle stays, m, so that two that touch do not overlap by rounding.
 _CLEARANCE = 1e-6
-"""How far within its cell a vehicle stays, m, so that two that touch do not overlap by rounding."""
 
 
 @dataclass(frozen=True)

@@ -20,12 +20,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-STEP = 0.001
-"""Integration step of every model, s."""
+STEP = 0.001  #: Integration step of every model, s.
 
+#: Friction coefficient of a 7-dimensional vehicle on the ground: dry plastic on a hard floor, for
+#: which tables have 0.3 to 0.6.
 GROUND_FRICTION = 0.5
-"""Friction coefficient of a 7-dimensional vehicle on the ground: dry plastic on a hard floor, for
-which tables have 0.3 to 0.6."""
 
 
 class Dynamics(ABC):

@@ -18,27 +18,16 @@ from crazyflie_model.mixer import limit, mix
 from crazyflie_model.pid import Gains, terms
 from crazyflie_model.units import pwm_from_thrust
 
-PERIOD = 0.002
-"""Time between two samples, s."""
+PERIOD = 0.002  #: Time between two samples, s.
+OUTPUT_LIMIT = 32767.0  #: Largest output of a rate controller, PWM: 16 bits in the firmware.
+TILT = Gains(6.0, 3.0, 0.0, 20.0)  #: Roll and pitch, deg, to body rates, deg/s.
+HEADING = Gains(6.0, 1.0, 0.35, 360.0)  #: Yaw, deg, to body rate, deg/s.
+TILT_RATE = Gains(250.0, 500.0, 2.5, 33.3)  #: Rates about forward and left, deg/s, to PWM.
+HEADING_RATE = Gains(120.0, 16.7, 0.0, 166.7)  #: Rate about up, deg/s, to PWM.
 
-OUTPUT_LIMIT = 32767.0
-"""Largest output of a rate controller, PWM: 16 bits in the firmware."""
-
-TILT = Gains(6.0, 3.0, 0.0, 20.0)
-"""Roll and pitch, deg, to body rates, deg/s."""
-
-HEADING = Gains(6.0, 1.0, 0.35, 360.0)
-"""Yaw, deg, to body rate, deg/s."""
-
-TILT_RATE = Gains(250.0, 500.0, 2.5, 33.3)
-"""Rates about forward and left, deg/s, to PWM."""
-
-HEADING_RATE = Gains(120.0, 16.7, 0.0, 166.7)
-"""Rate about up, deg/s, to PWM."""
-
+#: What the loops remember: integrals of the attitude errors (3), of the rate errors (3), last body
+#: rates about forward and left (2), heading that is held.
 MEMORY_DIM = 9
-"""What the loops remember: integrals of the attitude errors (3), of the rate
-errors (3), last body rates about forward and left (2), heading that is held."""
 
 _DEGREE = math.pi / 180.0
 

@@ -17,11 +17,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-COEFFICIENTS = 8
-"""Most coefficients of a polynomial, the constant first."""
-
+COEFFICIENTS = 8  #: Most coefficients of a polynomial, the constant first.
+#: Bytes of a piece in the vehicle's memory: 4 times 8 coefficients and the duration, float32.
 PIECE_SIZE = 132
-"""Bytes of a piece in the vehicle's memory: 4 times 8 coefficients and the duration, float32."""
 
 _PIECE = struct.Struct("<33f")
 

@@ -20,11 +20,8 @@ from crazyflie_model.integrators import rk4_step
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 
-BODY_DIM = 17
-"""Components of the airframe's state."""
-
-STILL_AIR = (0.0, 0.0, 0.0)
-"""No wind, m/s."""
+BODY_DIM = 17  #: Components of the airframe's state.
+STILL_AIR = (0.0, 0.0, 0.0)  #: No wind, m/s.
 
 
 @dataclass(frozen=True)
@@ -87,8 +84,7 @@ class QuadrotorParameters:
         )
 
 
-CRAZYFLIE = QuadrotorParameters()
-"""The Crazyflie 2.1."""
+CRAZYFLIE = QuadrotorParameters()  #: The Crazyflie 2.1.
 
 
 class Airframe:

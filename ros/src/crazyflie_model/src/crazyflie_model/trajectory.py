@@ -8,8 +8,8 @@ from crazyflie_model.angles import Triple
 from crazyflie_model.elementwise import Number, clip, where
 from crazyflie_model.polynomials import Goal, PolynomialPiece
 
+#: Flown one after the other: as in the CSV files of crazyflie_demo and in a vehicle's memory.
 Pieces = Sequence[PolynomialPiece]
-"""Flown one after the other: as in the CSV files of crazyflie_demo and in a vehicle's memory."""
 
 
 def minimum_jerk(s: Number) -> tuple[Number, Number]:

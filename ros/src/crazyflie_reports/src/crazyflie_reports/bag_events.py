@@ -12,11 +12,8 @@ from typing import Any
 
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
 
-MERGE_TIME = 1.0
-"""The same event within this time of the last counts as one, s."""
-
-MAX_EVENTS = 20_000
-"""Of a bag; more are only counted."""
+MERGE_TIME = 1.0  #: The same event within this time of the last counts as one, s.
+MAX_EVENTS = 20_000  #: Of a bag; more are only counted.
 
 _WARN, _ERROR = 4, 8  # Levels of rosgraph_msgs/Log.
 

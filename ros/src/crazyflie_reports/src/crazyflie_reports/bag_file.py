@@ -19,8 +19,7 @@ MAGIC = b"#ROSBAG V2.0\n"
 
 _MESSAGE, _BAG_HEADER, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
 
-_LARGEST_HEADER = 1 << 20
-"""Longer headers of records, bytes, are no headers: the file is damaged."""
+_LARGEST_HEADER = 1 << 20  #: Longer headers of records, bytes, are no headers: the file is damaged.
 
 _UINT32 = struct.Struct("<I")
 _UINT64 = struct.Struct("<Q")

@@ -10,14 +10,9 @@ from crazyflie_reports.bag_events import Event
 from crazyflie_reports.bag_vehicles import Rows, Vehicle
 from crazyflie_reports.flight_record import CONTROL_FIELDS, STATE_FIELDS, FlightRecord, Series
 
-PAUSE = 1.0
-"""Without thrust for longer than this, s, a flight is over."""
-
-LIFT = 0.1
-"""A vehicle of which only poses are known flies this high above the lowest, m."""
-
-MARGIN = 1.0
-"""What is shown of the time before and after a flight, s."""
+PAUSE = 1.0  #: Without thrust for longer than this, s, a flight is over.
+LIFT = 0.1  #: A vehicle of which only poses are known flies this high above the lowest, m.
+MARGIN = 1.0  #: What is shown of the time before and after a flight, s.
 
 PHASES = {
     FlightStatus.UNKNOWN: "unknown",

@@ -21,8 +21,7 @@ from crazyflie_reports.bag_topics import (
     transform_row,
 )
 
-POSE_PERIOD = 0.009
-"""Of transforms, which may come at 1 kHz, one in this time is kept, s."""
+POSE_PERIOD = 0.009  #: Of transforms, which may come at 1 kHz, one in this time is kept, s.
 
 _BUFFER = 8192  # Numbers.
 

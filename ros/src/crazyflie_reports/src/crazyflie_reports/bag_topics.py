@@ -103,6 +103,7 @@ ROLES = (
     Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
 )
 
+#: Types that are not series, with the names of their topics below a namespace.
 EVENT_TYPES = {
     "crazyflie_msgs/FlightStatus": r".*flight_status",
     "crazyflie_msgs/FilterStatus": r".*filter_status",
@@ -113,15 +114,14 @@ EVENT_TYPES = {
     "tf2_msgs/TFMessage": r"tf",
     "tf/tfMessage": r"tf",
 }
-"""Types that are not series, with the names of their topics below a namespace."""
 
+#: Numbers behind the header: these frequent messages are decoded without an object.
 FLOATS = {
     "crazyflie_msgs/ControlStamped": 4,
     "crazyflie_msgs/PositionVelocityStateStamped": 6,
     "crazyflie_msgs/PositionVelocityYawStateStamped": 7,
     "crazyflie_msgs/FullStateStamped": 12,
 }
-"""Numbers behind the header: these frequent messages are decoded without an object."""
 
 _HEADER = struct.Struct("<III")
 

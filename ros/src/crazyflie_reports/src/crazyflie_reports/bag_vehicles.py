@@ -14,8 +14,7 @@ Rows = NDArray[np.float64]
 
 _TIME, _STAMP, _NUMBER, _FIRST = 0, 1, 2, 3  # Columns of a spool.
 
-OTHER_CLOCK = 10.0
-"""Stamps that are further from the time of recording, s, are another clock's."""
+OTHER_CLOCK = 10.0  #: Stamps that are further from the time of recording, s, are another clock's.
 
 
 @dataclass

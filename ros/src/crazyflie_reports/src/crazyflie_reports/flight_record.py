@@ -10,11 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 STATE_FIELDS = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
 CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
 
-GROUND_TOLERANCE = 0.01
-"""A vehicle below this height stands on the ground, m."""
-
-AT_POINT = 0.001
-"""References closer to a point than this lead to it, m."""
+GROUND_TOLERANCE = 0.01  #: A vehicle below this height stands on the ground, m.
+AT_POINT = 0.001  #: References closer to a point than this lead to it, m.
 
 
 class Series:

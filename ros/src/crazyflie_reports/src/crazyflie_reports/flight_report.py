@@ -5,17 +5,10 @@ from dataclasses import dataclass
 
 from crazyflie_reports.flight_record import GROUND_TOLERANCE, FlightRecord
 
-HOVER_TOLERANCE = 0.01
-"""Largest distance from the hover point of a good flight, m."""
-
-HOVER_WINDOW = 5.0
-"""Time before the end of the hover from which its error is taken, s."""
-
-OVERSHOOT_LIMIT = 0.1
-"""How far a good flight may rise above the hover point, m."""
-
-TOUCHDOWN_LIMIT = 0.5
-"""Fastest touchdown of a good flight, m/s."""
+HOVER_TOLERANCE = 0.01  #: Largest distance from the hover point of a good flight, m.
+HOVER_WINDOW = 5.0  #: Time before the end of the hover from which its error is taken, s.
+OVERSHOOT_LIMIT = 0.1  #: How far a good flight may rise above the hover point, m.
+TOUCHDOWN_LIMIT = 0.5  #: Fastest touchdown of a good flight, m/s.
 
 
 @dataclass(frozen=True)

@@ -15,11 +15,12 @@ import rosgraph
 
 from crazyflie_utils.testing.launching import roslaunch
 
+#: Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them.
 Registrations = list[tuple[str, list[str]]]
-"""Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them."""
 
 HIDDEN_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf_static")
 HIDDEN_NODES = {"/rosout"}
+#: Nodes of the software example.
 EXAMPLE = {
     "/simulator",
     "/state_estimator",
@@ -28,13 +29,12 @@ EXAMPLE = {
     "/takeoff_control_filter",
     "/robot_base_link_publisher",
 }
-"""Nodes of the software example."""
 
 _LIMIT = 60.0
 
+#: A graph that has not changed for this long, in s, is complete: nodes register their topics one by
+#: one.
 _QUIET = 2.0
-"""A graph that has not changed for this long, in s, is complete: nodes register their
-topics one by one."""
 
 
 def dot(published: Registrations, subscribed: Registrations) -> str:

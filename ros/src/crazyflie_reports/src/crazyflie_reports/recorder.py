@@ -17,16 +17,15 @@ import roslib.packages
 import rosparam
 import rospkg
 
+#: Regular expression of what is recorded: what examples and drivers document, without images.
 TOPICS = (
     r"/tf(_static)?|/diagnostics|/rosout|/flights|(/.*)?/("
     r"(full_)?state|state/full_state|ref(/.*)?|ref_descent|control/(lqr|takeoff|merged|final)|in_flight(_.*)?"
     r"|pose|goal|cmd_[a-z_]+|external_(pose|position)|battery|rssi|imu|connected|status|vehicle_status"
     r"|parameter_updates)"
 )
-"""Regular expression of what is recorded: what examples and drivers document, without images."""
 
-MAX_SIZE = 1024
-"""Of a bag, MB; then the next one begins."""
+MAX_SIZE = 1024  #: Of a bag, MB; then the next one begins.
 
 PARAMETERS = "parameters.yaml"
 

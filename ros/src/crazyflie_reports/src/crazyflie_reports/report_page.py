@@ -14,14 +14,10 @@ from crazyflie_reports.figures import Figure
 
 Array = NDArray[np.float64]
 
+#: Of a curve at most, at least, and about what all flights share.
 MOST_POINTS, LEAST_POINTS, ALL_POINTS = 1000, 100, 40_000
-"""Of a curve at most, at least, and about what all flights share."""
-
-FRAME_PERIOD = 0.04
-"""From one pose of the replay to the next, where points are enough, s."""
-
-MAX_EVENTS = 300
-"""That a flight's list shows."""
+FRAME_PERIOD = 0.04  #: From one pose of the replay to the next, where points are enough, s.
+MAX_EVENTS = 300  #: That a flight's list shows.
 
 
 def points_of(vehicles: int) -> int:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+#: Time of a measurement (s), position (m), quaternion (x, y, z, w).
 Pose = tuple[float, Triple, Quaternion]
-"""Time of a measurement (s), position (m), quaternion (x, y, z, w)."""
 
 
 class MotionCapture:

@@ -24,14 +24,11 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.vectors import to_tuple
 
+#: Longest time that is integrated at once, s; more, after a jump of the clock, is skipped.
 MAX_CATCH_UP = 1.0
-"""Longest time that is integrated at once, s; more, after a jump of the clock, is skipped."""
-
+#: Poses of the last so many seconds are broadcast late when the machine was busy.
 MAX_LATENESS = 0.1
-"""Poses of the last so many seconds are broadcast late when the machine was busy."""
-
-IDLE_PERIOD = 0.1
-"""Period at which a simulator without pose consumers checks for them, s."""
+IDLE_PERIOD = 0.1  #: Period at which a simulator without pose consumers checks for them, s.
 
 
 class MotionCaptureParameters(Parameters):

@@ -28,11 +28,8 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple
 
-REPORT_PERIOD = 1.0
-"""Of the diagnostics, s; REP 107 wants one report a second."""
-
-SILENCE_PERIOD = 0.1
-"""Period at which an estimator that acts on arrival checks for silence, s."""
+REPORT_PERIOD = 1.0  #: Of the diagnostics, s; REP 107 wants one report a second.
+SILENCE_PERIOD = 0.1  #: Period at which an estimator that acts on arrival checks for silence, s.
 
 
 class StateEstimatorNode(Node):

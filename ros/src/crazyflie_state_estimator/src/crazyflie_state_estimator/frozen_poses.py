@@ -9,24 +9,18 @@ import math
 
 from crazyflie_state_estimator.control_response import Departure, ResponseMonitor, Vector
 
+#: So far above that place a pose that repeats is none on the ground, m: that repeats, too.
 CLEAR = 0.01
-"""So far above that place a pose that repeats is none on the ground, m: that repeats, too."""
 
+#: On the ground a vehicle may need so much acceleration upwards more than nominal, m/s^2; what is
+#: commanded beyond that lifts any, when it has made so much speed, m/s.
 HEAVY, LIFTING = 3.0, 0.3
-"""On the ground a vehicle may need so much acceleration upwards more than nominal, m/s^2; what is
-commanded beyond that lifts any, when it has made so much speed, m/s."""
 
+#: A vehicle whose last motion was smaller than this, m, has come to rest gradually.
 _ROUNDING = 1e-6
-"""A vehicle whose last motion was smaller than this, m, has come to rest gradually."""
-
-LIFTED = 0.04
-"""So far above the place where its motors were off last, a vehicle flies, m."""
-
-_LEFT = 0.03
-"""A camera that has gone on shows the vehicle further away than this, m, ..."""
-
-_CONFIRMATION = 3
-"""... in so many poses in a row."""
+LIFTED = 0.04  #: So far above the place where its motors were off last, a vehicle flies, m.
+_LEFT = 0.03  #: A camera that has gone on shows the vehicle further away than this, m, ...
+_CONFIRMATION = 3  #: ... in so many poses in a row.
 
 
 class FrozenPoseMonitor:

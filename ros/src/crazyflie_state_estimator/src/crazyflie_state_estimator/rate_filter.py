@@ -5,11 +5,10 @@ from collections.abc import Sequence
 
 from typing_extensions import override
 
+#: One number for each axis. Of so few, plain floats are several times quicker than arrays.
 Components = Sequence[float]
-"""One number for each axis. Of so few, plain floats are several times quicker than arrays."""
-
+#: No source of poses is so quick, s: stamps that are nearer to each other are bad ones.
 LEAST_STEP = 0.0005
-"""No source of poses is so quick, s: stamps that are nearer to each other are bad ones."""
 
 
 class RateFilter(ABC):

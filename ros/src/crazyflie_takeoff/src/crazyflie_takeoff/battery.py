@@ -13,14 +13,9 @@ class Charge(enum.Enum):
     CRITICAL = enum.auto()
 
 
-MAX_VOLTAGE_AGE = 5.0
-"""A voltage that is older does not count, s; the driver sends one a second."""
-
-_LONGEST_STEP = 1.5
-"""Voltages that are further apart count as this far, s."""
-
-_NOT_LOWER = -math.inf
-"""How long a voltage has been lower that is not, s."""
+MAX_VOLTAGE_AGE = 5.0  #: A voltage that is older does not count, s; the driver sends one a second.
+_LONGEST_STEP = 1.5  #: Voltages that are further apart count as this far, s.
+_NOT_LOWER = -math.inf  #: How long a voltage has been lower that is not, s.
 
 
 class Battery:

@@ -3,11 +3,9 @@
 import math
 from collections import deque
 
+#: A node that takes the place of one that sent less than this before, s, overlaps with it.
 OVERLAP = 0.5
-"""A node that takes the place of one that sent less than this before, s, overlaps with it."""
-
-MEMORY = 5.0
-"""An overlap is forgotten after this, s."""
+MEMORY = 5.0  #: An overlap is forgotten after this, s.
 
 
 class Callers:

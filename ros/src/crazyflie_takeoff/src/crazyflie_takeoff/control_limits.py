@@ -8,37 +8,24 @@ from crazyflie_takeoff.limits import Debounce
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import Setpoint, limited
 
-CLIMB_RESPONSE = 0.1
-"""Time constant at which a climb approaches its limit, s."""
-
-CLIMB_BRAKING = 4.0
-"""Deceleration below the highest place, m/s^2."""
-
-RETURN_RATE = 0.5
-"""At which a vehicle above the highest place comes back, 1/s."""
-
-LANDING_CLIMB = 0.5
-"""Climb of a vehicle that is to land, m/s."""
-
-CLIMB_TIMEOUT = 2.0
-"""Controls that ask for too much climb for longer than this end the flight, s."""
-
+CLIMB_RESPONSE = 0.1  #: Time constant at which a climb approaches its limit, s.
+CLIMB_BRAKING = 4.0  #: Deceleration below the highest place, m/s^2.
+RETURN_RATE = 0.5  #: At which a vehicle above the highest place comes back, 1/s.
+LANDING_CLIMB = 0.5  #: Climb of a vehicle that is to land, m/s.
+CLIMB_TIMEOUT = 2.0  #: Controls that ask for too much climb for longer than this end the flight, s.
+#: By which a control may change the speed while the filter does not run, m/s.
 MAX_SPEED_CHANGE = 0.5
-"""By which a control may change the speed while the filter does not run, m/s."""
 
+#: A filter that has not run for longer than this, s, keeps the vehicle's z_dot itself within
+#: `MAX_SPEED_CHANGE`: controls that are made of states from before the gap add up.
 BUSY_GAP = 0.2
-"""A filter that has not run for longer than this, s, keeps the vehicle's z_dot itself within
-`MAX_SPEED_CHANGE`: controls that are made of states from before the gap add up."""
 
+#: A filter that has not run in so much of its time, in gaps longer than `BUSY_GAP`, cannot see a
+#: vehicle fly; averaged over the latter, s.
 STARVED_SHARE, STARVATION_MEMORY = 0.5, 3.0
-"""A filter that has not run in so much of its time, in gaps longer than `BUSY_GAP`, cannot see a
-vehicle fly; averaged over the latter, s."""
 
-LONGEST_GAP = 1.0
-"""Of a filter that runs, s; a clock that steps further was set."""
-
-GAP_MEMORY = 2.0
-"""Time constant with which a gap is forgotten, s."""
+LONGEST_GAP = 1.0  #: Of a filter that runs, s; a clock that steps further was set.
+GAP_MEMORY = 2.0  #: Time constant with which a gap is forgotten, s.
 
 
 def in_range(control: Setpoint, lowest: float) -> Setpoint:

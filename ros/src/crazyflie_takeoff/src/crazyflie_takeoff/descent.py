@@ -2,12 +2,11 @@
 
 from crazyflie_takeoff.motion import Position
 
-DESCENT_MARGIN = 3.0
-"""How much longer than calculated a descent may take, s."""
+DESCENT_MARGIN = 3.0  #: How much longer than calculated a descent may take, s.
 
+#: How far below the ground a descent's reference goes, m, so that the vehicle meets the ground with
+#: its speed also when it hangs above the reference.
 PRESS_DEPTH = 0.3
-"""How far below the ground a descent's reference goes, m, so that the vehicle
-meets the ground with its speed also when it hangs above the reference."""
 
 
 class Descent:

@@ -4,8 +4,7 @@ import math
 
 from crazyflie_model.supervisor import SupervisorState
 
-MAX_CONNECTION_AGE = 3.0
-"""An older message does not count, s: the driver sends one every second."""
+MAX_CONNECTION_AGE = 3.0  #: An older message does not count, s: the driver sends one every second.
 
 
 class DriverConnection:

@@ -22,15 +22,12 @@ from crazyflie_takeoff.server_table import (
 from crazyflie_takeoff.transition_table import find, step
 from crazyflie_utils.refusal import RefusalError
 
-RAMP_RATE = 5.0
-"""How fast the thrust of a landing goes down from hover, m/s^2 per s."""
-
-ZERO_THRUST_PERIOD = 0.1
-"""Period at which zero thrust is repeated on the ground, s."""
-
+RAMP_RATE = 5.0  #: How fast the thrust of a landing goes down from hover, m/s^2 per s.
+ZERO_THRUST_PERIOD = 0.1  #: Period at which zero thrust is repeated on the ground, s.
+#: A descent that has to end within a time takes at least this, s, however late it is.
 SHORTEST_DESCENT = 1.0
-"""A descent that has to end within a time takes at least this, s, however late it is."""
 
+#: Why a takeoff or a landing is refused.
 REFUSALS = {
     None: "the state of the flight is not known yet",
     FlightState.ON_GROUND: "the vehicle is on the ground",
@@ -39,7 +36,6 @@ REFUSALS = {
     FlightState.DESCENDING: "a landing is under way",
     FlightState.LANDING: "a landing is under way",
 }
-"""Why a takeoff or a landing is refused."""
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,11 @@ from crazyflie_takeoff.control_limits import ClimbLimit, RunGaps
 from crazyflie_takeoff.limits import Debounce, Limits, Walls
 from crazyflie_takeoff.motion import MAX_STATE_AGE, Motion
 
-HANDOVER = 3
-"""So many changes of the controller are a handover from one to the other."""
-
+HANDOVER = 3  #: So many changes of the controller are a handover from one to the other.
+#: How long a limit has to be exceeded, s: a single measurement that is wrong is no crash.
 CRASH_DURATION = 0.1
-"""How long a limit has to be exceeded, s: a single measurement that is wrong is no crash."""
-
-DESCENT_TIMEOUT = 1.5
-"""How long a vehicle that is to land may stay up, s."""
-
-PROGRESS = 0.02
-"""Less than this below where it was highest is no descent, m."""
+DESCENT_TIMEOUT = 1.5  #: How long a vehicle that is to land may stay up, s.
+PROGRESS = 0.02  #: Less than this below where it was highest is no descent, m.
 
 
 class DescentWatch:

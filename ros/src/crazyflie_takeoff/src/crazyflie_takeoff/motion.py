@@ -3,18 +3,10 @@
 import math
 from typing import NamedTuple
 
-MAX_STATE_AGE = 0.2
-"""A state that is older does not count, s."""
-
-MAX_POSITION_AGE = 0.5
-"""A position that is older is not used by the server, s."""
-
-DRIFT = 0.1
-"""How fast the age that is taken for usual may grow, s/s."""
-
-
-Position = tuple[float, float, float]
-"""x, y, z in m, fixed frame, z up."""
+MAX_STATE_AGE = 0.2  #: A state that is older does not count, s.
+MAX_POSITION_AGE = 0.5  #: A position that is older is not used by the server, s.
+DRIFT = 0.1  #: How fast the age that is taken for usual may grow, s/s.
+Position = tuple[float, float, float]  #: x, y, z in m, fixed frame, z up.
 
 
 class Motion(NamedTuple):

@@ -7,8 +7,7 @@ from std_msgs.msg import String
 
 from crazyflie_utils.topics import Topics
 
-TOPIC = "/flights"
-"""Topic of nodes that start and end flights, latched."""
+TOPIC = "/flights"  #: Topic of nodes that start and end flights, latched.
 
 _IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
 

@@ -24,11 +24,9 @@ from crazyflie_utils.ros1.master_watch import MasterWatch
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.shutdown import FLUSH_TIME, Shutdown, catch_signals, exit_at_once, fail
 
-_MASTER_LIMIT = 10.0
-"""How long, in s, a node waits for a ROS master."""
-
+_MASTER_LIMIT = 10.0  #: How long, in s, a node waits for a ROS master.
+#: How long, in s, a thread that has something to do waits for another that computes.
 _SWITCH_INTERVAL = 0.0005
-"""How long, in s, a thread that has something to do waits for another that computes."""
 
 
 def run(node_class: type | str, default_name: str) -> None:

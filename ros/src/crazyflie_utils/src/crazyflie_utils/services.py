@@ -10,8 +10,8 @@ from typing_extensions import override
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.transport import ServiceError
 
+#: The `NodeHandle` of the node that offers or calls the service; its module imports this one.
 Handle = Any
-"""The `NodeHandle` of the node that offers or calls the service; its module imports this one."""
 
 
 def serve(

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from crazyflie_utils.messages import shown
 
-MAX_SIZE = 10_000_000
-"""Bytes of a file of text; longer ones are something else."""
+MAX_SIZE = 10_000_000  #: Bytes of a file of text; longer ones are something else.
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 

@@ -7,14 +7,9 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any
 
-Address = tuple[str, int]
-"""Host and port."""
-
-_BURST = 256
-"""Datagrams taken in at one time, so that a flood does not stop everything else."""
-
-_STOP_LIMIT = 2.0
-"""How long `Server.stop` waits for the thread, s."""
+Address = tuple[str, int]  #: Host and port.
+_BURST = 256  #: Datagrams taken in at one time, so that a flood does not stop everything else.
+_STOP_LIMIT = 2.0  #: How long `Server.stop` waits for the thread, s.
 
 
 class Server(ABC):

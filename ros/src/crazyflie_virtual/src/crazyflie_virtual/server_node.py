@@ -9,8 +9,7 @@ from crazyflie_utils.node import Node
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters
 from crazyflie_virtual.server import Server
 
-_POLL_PERIOD = 0.5
-"""How often the switches are read, s."""
+_POLL_PERIOD = 0.5  #: How often the switches are read, s.
 
 
 class ServerNode(Node):

@@ -13,8 +13,7 @@ from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.localization import DECK, NONE
 from crazyflie_virtual.observer import DEFAULT_PORT
 
-FIRST_PORT = 19850
-"""UDP port of the first vehicle: clients scan from here to 19859."""
+FIRST_PORT = 19850  #: UDP port of the first vehicle: clients scan from here to 19859.
 
 _FRACTION = Number(minimum=-0.5, maximum=1.0)
 _PROBABILITY = Number(minimum=0.0, maximum=1.0)

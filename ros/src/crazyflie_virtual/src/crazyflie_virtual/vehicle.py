@@ -12,17 +12,16 @@ from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_world import world_file
 
+#: Of the link port: packets that the radio chip answers itself, also while the microcontroller is
+#: off.
 _RADIO_CHANNEL = 3
-"""Of the link port: packets that the radio chip answers itself, also while the
-microcontroller is off."""
 
 _RADIO_COMMAND = 0xFE
 _ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
 
 _BATTERY_STEPS = 10
 
-_RESTART_TIME = 1.0
-"""Time of a restart after a failed assertion, s: assumed."""
+_RESTART_TIME = 1.0  #: Time of a restart after a failed assertion, s: assumed.
 
 _LOGGER = logging.getLogger(__name__)
 

@@ -15,17 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from crazyflie_utils.parameters.types import ListOf, Number
 from crazyflie_world.paths import Path, Position
 
-Colour = tuple[float, float, float]
-"""Red, green, blue, each from 0 to 1."""
-
-COLOUR = ListOf(Number(minimum=0.0, maximum=1.0), 3)
-"""Type of a parameter that is a `Colour`."""
-
-Vectors = NDArray[np.float64]
-"""Shape (..., 3)."""
-
+Colour = tuple[float, float, float]  #: Red, green, blue, each from 0 to 1.
+COLOUR = ListOf(Number(minimum=0.0, maximum=1.0), 3)  #: Type of a parameter that is a `Colour`.
+Vectors = NDArray[np.float64]  #: Shape (..., 3).
+#: Distances at which rays enter and leave, shape (...,); the first is larger where they miss.
 Interval = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Distances at which rays enter and leave, shape (...,); the first is larger where they miss."""
 
 WALL_COLOUR = (0.85, 0.85, 0.8)
 

@@ -12,12 +12,8 @@ from crazyflie_utils.parameters.types import ListOf, Number, Text
 from crazyflie_world.paths import Position
 from crazyflie_world.shapes import COLOUR, Box, Colour, Shape, cast
 
-FLOOR = "floor"
-"""Name of the floor among the solids."""
-
-
-TEXTURES = ("plain", "checkers", "speckles")
-"""Of floors."""
+FLOOR = "floor"  #: Name of the floor among the solids.
+TEXTURES = ("plain", "checkers", "speckles")  #: Of floors.
 
 
 class Floor(Parameters):

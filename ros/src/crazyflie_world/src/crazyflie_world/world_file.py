@@ -126,17 +126,16 @@ class WorldParameters(Parameters):
     floor: Floor = group(Floor, "floor")
 
 
+#: Objects that may move, by their type.
 OBJECTS: dict[str, type[_ObjectParameters]] = {
     "box": BoxParameters,
     "cylinder": CylinderParameters,
     "ball": BallParameters,
 }
-"""Objects that may move, by their type."""
 
 WALL = "wall"
 
-PATHS: dict[str, type[Path]] = {"circle": Circle, "waypoints": Waypoints}
-"""Paths, by their type."""
+PATHS: dict[str, type[Path]] = {"circle": Circle, "waypoints": Waypoints}  #: Paths, by their type.
 
 
 class WorldFile(ParameterType):

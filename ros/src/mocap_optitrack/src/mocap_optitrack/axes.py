@@ -4,11 +4,8 @@ import math
 
 from mocap_optitrack.frames import Quaternion, Vector3
 
-UP_AXES = ("z", "y")
-"""Axes that may point up in a stream."""
-
-_NORM_TOLERANCE = 0.01
-"""How far the norm of a measured quaternion may be from 1."""
+UP_AXES = ("z", "y")  #: Axes that may point up in a stream.
+_NORM_TOLERANCE = 0.01  #: How far the norm of a measured quaternion may be from 1.
 
 
 def to_z_up(up_axis: str, position: Vector3, quaternion: Quaternion) -> tuple[Vector3, Quaternion]:

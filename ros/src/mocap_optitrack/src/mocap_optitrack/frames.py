@@ -2,11 +2,8 @@
 
 from typing import NamedTuple
 
-Vector3 = tuple[float, float, float]
-"""x, y, z."""
-
-Quaternion = tuple[float, float, float, float]
-"""(x, y, z, w)."""
+Vector3 = tuple[float, float, float]  #: x, y, z.
+Quaternion = tuple[float, float, float, float]  #: (x, y, z, w).
 
 
 class Body(NamedTuple):

@@ -9,15 +9,14 @@ from typing import NamedTuple
 from mocap_optitrack.bodies import Body as ConfiguredBody
 from mocap_optitrack.frames import Body
 
-OK, WARN, ERROR = range(3)
-"""Levels, as in diagnostic_msgs/DiagnosticStatus."""
+OK, WARN, ERROR = range(3)  #: Levels, as in diagnostic_msgs/DiagnosticStatus.
 
+#: How long a body may be missing before that is a fault: nothing is seen in the first moments of a
+#: stream, s.
 _GRACE = 2.0
-"""How long a body may be missing before that is a fault: nothing is seen in the
-first moments of a stream, s."""
 
+#: Bodies that are not configured and are remembered, so that a message can name them.
 _MOST_OTHERS = 10
-"""Bodies that are not configured and are remembered, so that a message can name them."""
 
 _TWO_SERVERS = "the server's clock keeps jumping: do two servers send to the same address?"
 

@@ -17,11 +17,8 @@ from mocap_optitrack.arrival_times import ArrivalTimes
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.source import Source, SourceError
 
-SYSTEMS = ("vicon", "qualisys", "vrpn")
-"""What the package can do beside NatNet."""
-
-_MARGIN = 2.0
-"""Added to the worker's own limit of connecting, s."""
+SYSTEMS = ("vicon", "qualisys", "vrpn")  #: What the package can do beside NatNet.
+_MARGIN = 2.0  #: Added to the worker's own limit of connecting, s.
 
 _CHUNK = 65536
 

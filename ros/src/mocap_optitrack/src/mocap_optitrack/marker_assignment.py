@@ -7,9 +7,9 @@ from scipy.optimize import linear_sum_assignment
 
 from mocap_optitrack.marker_motion import UNSEEN_COST, MarkerMotion, Point
 
+#: By how much the second-best assignment has to cost more: it is less likely by exp(-3), which is 1
+#: in 20.
 _AMBIGUITY = 6.0
-"""By how much the second-best assignment has to cost more: it is less likely by exp(-3), which
-is 1 in 20."""
 
 _IMPOSSIBLE = 1e6
 

@@ -8,25 +8,19 @@ import numpy.typing as npt
 
 from mocap_optitrack.frames import Vector3
 
-Point = npt.NDArray[np.float64]
-"""x, y, z in m, z up."""
+Point = npt.NDArray[np.float64]  #: x, y, z in m, z up.
+GATE = 4.0  #: Standard deviations: of three normal variables together, 1 in 1000 is farther away.
 
-GATE = 4.0
-"""Standard deviations: of three normal variables together, 1 in 1000 is farther away."""
-
+#: Of a marker along each axis, m^2. OptiTrack tells less than 0.3 mm; a marker that is seen in part
+#: by some cameras is off by more.
 _MEASUREMENT_VARIANCE = 0.002**2
-"""Of a marker along each axis, m^2. OptiTrack tells less than 0.3 mm; a marker that is seen in
-part by some cameras is off by more."""
 
+#: Of `MarkerMotion.costs`: -2 log(0.1 * 0.1 / m^3 * (2 pi _MEASUREMENT_VARIANCE)^1.5), for a marker
+#: that is missing in one frame of ten, and one reflection in 10 m^3.
 UNSEEN_COST = 40.0
-"""Of `MarkerMotion.costs`: -2 log(0.1 * 0.1 / m^3 * (2 pi _MEASUREMENT_VARIANCE)^1.5), for a marker
-that is missing in one frame of ten, and one reflection in 10 m^3."""
 
-_FIRST_SPEED_VARIANCE = 1.0
-"""Of a marker that has been seen once, m^2/s^2."""
-
-_BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5
-"""Noise of two measurements, m."""
+_FIRST_SPEED_VARIANCE = 1.0  #: Of a marker that has been seen once, m^2/s^2.
+_BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5  #: Noise of two measurements, m.
 
 
 class MotionLimits(NamedTuple):

@@ -25,12 +25,11 @@ KEEP_ALIVE = NatNetClient.NAT_KEEPALIVE
 
 _HEADER = struct.Struct("<HH")
 
-_INFO_SIZE = 264
-"""Bytes of a server's name and versions, which natnet decodes."""
+_INFO_SIZE = 264  #: Bytes of a server's name and versions, which natnet decodes.
 
+#: What servers from 3.0 on add: ticks per second of their clock, data port, whether they send to a
+#: group, and the group.
 _CONNECTION = struct.Struct("<QHB4B")
-"""What servers from 3.0 on add: ticks per second of their clock, data port, whether
-they send to a group, and the group."""
 
 
 class DecodeError(Exception):

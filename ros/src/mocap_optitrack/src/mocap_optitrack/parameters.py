@@ -26,8 +26,7 @@ from mocap_optitrack.bodies import (
 )
 from mocap_optitrack.library_source import SYSTEMS
 
-NATNET = "natnet"
-"""Backend of OptiTrack; the others are `library_source.SYSTEMS`."""
+NATNET = "natnet"  #: Backend of OptiTrack; the others are `library_source.SYSTEMS`.
 
 _PORT = Integer(1, 65535)
 

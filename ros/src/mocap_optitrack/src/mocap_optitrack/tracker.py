@@ -11,9 +11,9 @@ from mocap_optitrack.frames import Frame, Quaternion, Vector3
 from mocap_optitrack.health import Event, Health
 from mocap_optitrack.marker_tracker import MarkerTracker
 
+#: By how much a stamp may be ahead of its arrival, s: the offset of the server's clock is known to
+#: a millisecond or two.
 _LEAD = 0.005
-"""By how much a stamp may be ahead of its arrival, s: the offset of the server's clock is
-known to a millisecond or two."""
 
 _EVENTS = {
     FrameOrder.OLD: Event.REPEATED,
@@ -23,8 +23,7 @@ _EVENTS = {
 
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
-_RESET = 1.0
-"""By how much local time steps back when a simulation is reset, at least, s."""
+_RESET = 1.0  #: By how much local time steps back when a simulation is reset, at least, s.
 
 
 class BodyPose(NamedTuple):

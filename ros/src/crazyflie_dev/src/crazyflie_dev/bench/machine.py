@@ -6,11 +6,8 @@ import numpy as np
 
 from crazyflie_dev.bench.row import Row
 
-PERIOD = 0.01
-"""Of the loop, s: that of the controls."""
-
-COUNT = 500
-"""How many periods are measured."""
+PERIOD = 0.01  #: Of the loop, s: that of the controls.
+COUNT = 500  #: How many periods are measured.
 
 
 def _longest_periods():

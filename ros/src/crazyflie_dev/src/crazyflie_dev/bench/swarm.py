@@ -15,21 +15,16 @@ from crazyflie_dev.bench import graph
 from crazyflie_dev.bench.row import NotMeasuredError, Row
 from crazyflie_utils.testing.launching import roslaunch
 
-DURATION = 20.0
-"""For how long it is measured, s."""
-
+DURATION = 20.0  #: For how long it is measured, s.
+#: The 99th percentile of the periods of a control that is to come every 10 ms, ms.
 LONGEST_PERIOD = 12.0
-"""The 99th percentile of the periods of a control that is to come every 10 ms, ms."""
 
 _NUMBERS = range(10, 200, 10)
 
 _START_LIMIT = 180.0
 
-_POSITION_TIME = 3.0
-"""From the service of takeoff to its call, s: vehicles first need a position."""
-
-_SETTLING = 2.0
-"""From the end of the takeoff on, s."""
+_POSITION_TIME = 3.0  #: From the service of takeoff to its call, s: vehicles first need a position.
+_SETTLING = 2.0  #: From the end of the takeoff on, s.
 
 
 @dataclass(frozen=True)

@@ -23,18 +23,14 @@ from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece, VelocityWorld
 from crazyflie_model.angles import quaternion_from_rpy
 
-_WORLD = "world"
-"""The fixed frame, unless the script's parameter ~frames/fixed says otherwise."""
-
-_TF_LIMIT = 10.0
-"""Longest time until a position, or a voltage, is received, s."""
-
+_WORLD = "world"  #: The fixed frame, unless the script's parameter ~frames/fixed says otherwise.
+_TF_LIMIT = 10.0  #: Longest time until a position, or a voltage, is received, s.
+#: Of a position, s: tf keeps the last one of a vehicle that is not tracked any more.
 _MAX_POSITION_AGE = 0.5
-"""Of a position, s: tf keeps the last one of a vehicle that is not tracked any more."""
 
+#: Namespace, below a vehicle's name, of crazyflie_mission_api's high_level_node, which offers the
+#: driver's services for a vehicle that a controller of this workspace flies.
 _COMMANDER = "high_level"
-"""Namespace, below a vehicle's name, of crazyflie_mission_api's high_level_node, which offers the
-driver's services for a vehicle that a controller of this workspace flies."""
 
 _SETPOINTS = {
     "cmd_full_state": FullState,

@@ -14,11 +14,9 @@ from crazyflie_utils.messages import shortened, shown
 from crazyflie_utils.parameters.types import TEXT, ParameterType
 from crazyflie_utils.text_input import TextFileError, number_from_text, read_text
 
+#: Of a line in a file: duration, then the coefficients of x, y, z and yaw.
 COLUMNS = 1 + 4 * COEFFICIENTS
-"""Of a line in a file: duration, then the coefficients of x, y, z and yaw."""
-
-_GAP = 0.01
-"""How far apart two pieces may be where they meet, m or rad."""
+_GAP = 0.01  #: How far apart two pieces may be where they meet, m or rad.
 
 
 class TrajectoryError(ValueError):

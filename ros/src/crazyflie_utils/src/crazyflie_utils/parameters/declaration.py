@@ -15,8 +15,7 @@ from typing import Any, Self, dataclass_transform
 from crazyflie_utils.messages import shown
 from crazyflie_utils.parameters.types import ParameterType
 
-REQUIRED = dataclasses.MISSING
-"""Default of a parameter that has none."""
+REQUIRED = dataclasses.MISSING  #: Default of a parameter that has none.
 
 _KEY = "declaration"
 

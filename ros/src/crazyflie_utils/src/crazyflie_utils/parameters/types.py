@@ -226,8 +226,8 @@ class ListOf(ParameterType):
 FINITE = Number()
 POSITIVE = Number(above=0.0)
 DURATION = Number(unit="s", minimum=0.0)
+#: A period of a node: with shorter ones it would do nothing else than to be late.
 TIME_STEP = Number(unit="s", minimum=1e-4)
-"""A period of a node: with shorter ones it would do nothing else than to be late."""
 METRES = Number(unit="m")
 BOOLEAN = Boolean()
 TEXT = Text()

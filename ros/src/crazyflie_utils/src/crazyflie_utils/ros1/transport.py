@@ -27,9 +27,9 @@ from crazyflie_utils.transport import (
     Transport,
 )
 
+#: Messages kept for a listener that does not keep up: a simulation that runs as fast as it can
+#: fills a short queue faster than the listener gets its turn.
 _QUEUE_SIZE = 100
-"""Messages kept for a listener that does not keep up: a simulation that runs as fast as it
-can fills a short queue faster than the listener gets its turn."""
 
 
 class _RosPublisher(ExternalPublisher):

@@ -19,8 +19,8 @@ from crazyflie_utils.transport import (
 
 Deliver = Callable[[Any], None]
 
+#: Messages that wait for a frozen process on one connection; of later ones the last counts.
 _MAX_WAITING = 100
-"""Messages that wait for a frozen process on one connection; of later ones the last counts."""
 
 
 class FakeGraph:

@@ -17,27 +17,17 @@ import tf2_py
 from crazyflie_utils.tf.buffer import Buffer
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose, entries
 
-_HISTORY = 100
-"""Poses of a frame that are kept for the moment when tf2 is begun."""
+_HISTORY = 100  #: Poses of a frame that are kept for the moment when tf2 is begun.
+_NORM_TOLERANCE = 0.01  #: How far tf2 lets the squared norm of a quaternion be from 1.
 
-_NORM_TOLERANCE = 0.01
-"""How far tf2 lets the squared norm of a quaternion be from 1."""
-
+#: A stamp that is older than the last one of its frame by less than this, ns, came by a slower way;
+#: the present pose is still the younger one.
 _STEP_BACK = 100_000_000
-"""A stamp that is older than the last one of its frame by less than this, ns, came by a slower
-way; the present pose is still the younger one."""
 
-_STEPS_BACK = 3
-"""So many of them in a row, and the source's clock has been set back."""
-
-_MAX_FRAMES = 1000
-"""Names of frames that are known, and frames that are kept for later."""
-
-_MAX_BYTES = 1024
-"""Of a transform that is kept for later."""
-
-_ONE = b"\x01\0\0\0"
-"""The length of a message with one transform."""
+_STEPS_BACK = 3  #: So many of them in a row, and the source's clock has been set back.
+_MAX_FRAMES = 1000  #: Names of frames that are known, and frames that are kept for later.
+_MAX_BYTES = 1024  #: Of a transform that is kept for later.
+_ONE = b"\x01\0\0\0"  #: The length of a message with one transform.
 
 
 class _Frame:

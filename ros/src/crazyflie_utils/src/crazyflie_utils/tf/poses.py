@@ -20,8 +20,8 @@ _HEADER = struct.Struct("<4I")  # Sequence number, s, ns, length of the parent's
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<3I")
 
+#: Pairs of frames whose names are kept as they are on the wire, and the other way round.
 _MAX_NAMES = 1000
-"""Pairs of frames whose names are kept as they are on the wire, and the other way round."""
 
 
 class StampedPose(NamedTuple):

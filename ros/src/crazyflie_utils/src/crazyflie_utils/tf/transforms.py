@@ -12,11 +12,10 @@ from crazyflie_utils.tf.frame_tree import FrameTree
 from crazyflie_utils.tf.poses import PoseCodec, RawTransforms, StampedPose
 from crazyflie_utils.topics import Subscriber, Topics
 
+#: How far a stamp may be ahead of now, s. tf's static_transform_publisher stamps 0.1 s ahead.
 MAX_FUTURE_STAMP = 0.2
-"""How far a stamp may be ahead of now, s. tf's static_transform_publisher stamps 0.1 s ahead."""
-
+#: The same in simulated time: pose and /clock come by different ways.
 MAX_FUTURE_STAMP_SIMULATED = 2.0
-"""The same in simulated time: pose and /clock come by different ways."""
 
 
 class _Listener:

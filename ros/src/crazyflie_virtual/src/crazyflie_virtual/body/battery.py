@@ -2,27 +2,20 @@
 
 import bisect
 
-_CAPACITY = 900.0
-"""Charge of the stock battery, C: 250 mAh [Bitcraze, data sheet]."""
-
-_RESISTANCE = 0.14
-"""Of cell and leads, ohm: about 0.3 V of sag at hover, as vehicles log it."""
-
-_HOVER_CURRENT = 2.1
-"""A: the 7 minutes of flight of the data sheet."""
-
-_IDLE_CURRENT = 0.12
-"""Of the electronics, A."""
+_CAPACITY = 900.0  #: Charge of the stock battery, C: 250 mAh [Bitcraze, data sheet].
+_RESISTANCE = 0.14  #: Of cell and leads, ohm: about 0.3 V of sag at hover, as vehicles log it.
+_HOVER_CURRENT = 2.1  #: A: the 7 minutes of flight of the data sheet.
+_IDLE_CURRENT = 0.12  #: Of the electronics, A.
 
 _CHARGES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+#: Open-circuit voltage, V, over state of charge; the firmware's table, which is of the stock
+#: battery, and 4.2 V when full.
 OPEN_CIRCUIT_VOLTAGES = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10, 4.20)
-"""Open-circuit voltage, V, over state of charge; the firmware's table, which is of the stock
-battery, and 4.2 V when full."""
 
 FULL_VOLTAGE = OPEN_CIRCUIT_VOLTAGES[-1]
 
+#: State of charge at which the voltage in flight is low (3.2 V) but not yet critical (3.0 V).
 LOW_CHARGE = 0.055
-"""State of charge at which the voltage in flight is low (3.2 V) but not yet critical (3.0 V)."""
 
 
 class Battery:

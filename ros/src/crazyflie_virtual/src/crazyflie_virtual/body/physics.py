@@ -11,8 +11,7 @@ from crazyflie_virtual.body.battery import FULL_VOLTAGE
 from crazyflie_virtual.body.feet import tip
 from crazyflie_world.world import World
 
-STEP = PERIOD
-"""Step of the integration, s: that of the firmware's attitude controller."""
+STEP = PERIOD  #: Step of the integration, s: that of the firmware's attitude controller.
 
 
 class MotorCommands(NamedTuple):
@@ -26,8 +25,7 @@ class MotorCommands(NamedTuple):
 
 OFF = MotorCommands(0.0, 0.0, 0.0, 0.0)
 
-_OVERTURNING = 0.5
-"""Cosine of the tilt on the ground beyond which a vehicle lies on its back."""
+_OVERTURNING = 0.5  #: Cosine of the tilt on the ground beyond which a vehicle lies on its back.
 
 
 class Physics:

@@ -6,27 +6,18 @@ import random
 from crazyflie_model.angles import Quaternion, Triple, rotate_back
 from crazyflie_model.units import GRAVITY
 
+#: Standard deviation of a sample, deg/s: the BMI088's noise density, 0.014 deg/s/sqrt(Hz) [data
+#: sheet], in the firmware's bandwidth of about 50 Hz.
 _GYRO_NOISE = 0.1
-"""Standard deviation of a sample, deg/s: the BMI088's noise density, 0.014 deg/s/sqrt(Hz)
-[data sheet], in the firmware's bandwidth of about 50 Hz."""
 
+#: Standard deviation of a sample, g: 190 ug/sqrt(Hz) [data sheet] in about 100 Hz.
 _ACCELEROMETER_NOISE = 0.002
-"""Standard deviation of a sample, g: 190 ug/sqrt(Hz) [data sheet] in about 100 Hz."""
-
-_BAROMETER_NOISE = 0.05
-"""Standard deviation of the height, m."""
-
-_ACCELEROMETER_RANGE = 24.0
-"""g."""
-
-_GYRO_RANGE = 2000.0
-"""deg/s."""
-
+_BAROMETER_NOISE = 0.05  #: Standard deviation of the height, m.
+_ACCELEROMETER_RANGE = 24.0  #: g.
+_GYRO_RANGE = 2000.0  #: deg/s.
+#: Magnetic field, gauss, fixed frame: central Europe, with x to the north.
 _FIELD = (0.2, 0.0, -0.43)
-"""Magnetic field, gauss, fixed frame: central Europe, with x to the north."""
-
-_SEA_LEVEL_PRESSURE = 1013.25
-"""mbar."""
+_SEA_LEVEL_PRESSURE = 1013.25  #: mbar.
 
 _NOISE_SAMPLES = 8191
 

@@ -3,8 +3,8 @@
 from crazyflie_virtual.firmware.planner import Planner
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
 
+#: Priorities, named as in the firmware.
 PRIORITY_DISABLE, PRIORITY_HIGHLEVEL, PRIORITY_CRTP = 0, 1, 2
-"""Priorities, named as in the firmware."""
 
 
 class Commander:

@@ -12,13 +12,11 @@ from crazyflie_model.polynomials import PolynomialPiece, bezier
 _START = struct.Struct("<4h")
 _HEADER = struct.Struct("<BH")
 
-_POINTS = (0, 1, 3, 7)
-"""Control points that are stored for each type of curve: all but the first."""
+_POINTS = (0, 1, 3, 7)  #: Control points that are stored for each type of curve: all but the first.
 
 _MILLI = 1e-3
 _TENTH_DEGREE = math.pi / 1800.0
-_UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)
-"""Of x, y, z and yaw: m and rad."""
+_UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)  #: Of x, y, z and yaw: m and rad.
 
 
 def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:

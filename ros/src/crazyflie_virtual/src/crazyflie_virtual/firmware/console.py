@@ -5,14 +5,9 @@ from collections.abc import Callable, Hashable
 
 from crazyflie_virtual.link.crtp import MAX_DATA
 
-Warn = Callable[[Hashable, str], bool]
-"""See `Console.warn`."""
-
-_BUFFER_SIZE = 100
-"""Packets kept until a client is connected: the latest."""
-
-_WARNING_PERIOD = 1.0
-"""Between two warnings of one kind, s."""
+Warn = Callable[[Hashable, str], bool]  #: See `Console.warn`.
+_BUFFER_SIZE = 100  #: Packets kept until a client is connected: the latest.
+_WARNING_PERIOD = 1.0  #: Between two warnings of one kind, s.
 
 
 class Console:

@@ -20,11 +20,10 @@ from crazyflie_virtual.link.statistics import LinkStatistics
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.memories import MemoryTester
 
+#: The first protocol in which the supervisor has a port and reports the high-level commander.
 SUPERVISOR_PROTOCOL = 12
-"""The first protocol in which the supervisor has a port and reports the high-level commander."""
-
+#: Steps between two updates of position controller and high-level commander: 100 Hz.
 POSITION_STEPS = 5
-"""Steps between two updates of position controller and high-level commander: 100 Hz."""
 
 _SUPERVISOR_STEPS = 20
 _STARTING_UPDATES = 4

@@ -9,17 +9,10 @@ from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_virtual.body.physics import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 
-DECK, NONE = "deck", "none"
-"""Positioning systems."""
-
-EXTERNAL_AGE = 0.5
-"""The deck measures only when there was no external measurement for so long, s."""
-
-_DECK_POSITION_DEVIATION = 0.003
-"""m."""
-
-_DECK_ATTITUDE_DEVIATION = 0.003
-"""rad."""
+DECK, NONE = "deck", "none"  #: Positioning systems.
+EXTERNAL_AGE = 0.5  #: The deck measures only when there was no external measurement for so long, s.
+_DECK_POSITION_DEVIATION = 0.003  #: m.
+_DECK_ATTITUDE_DEVIATION = 0.003  #: rad.
 
 
 class Localization:

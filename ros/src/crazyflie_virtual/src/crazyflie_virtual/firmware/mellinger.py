@@ -17,8 +17,7 @@ from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.pid import constrain
 from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Estimate, Setpoint
 
-TORQUE_LIMIT = 32000.0
-"""Largest output about an axis, PWM."""
+TORQUE_LIMIT = 32000.0  #: Largest output about an axis, PWM.
 
 _AXES: tuple[Triple, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -12,29 +12,15 @@ from crazyflie_model.trajectory import Trajectory
 from crazyflie_virtual.firmware.compressed_trajectory import read_compressed
 from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, Estimate, Modes, Setpoint
 
-MEMORY_SIZE = 4096
-"""Bytes of the trajectory memory."""
-
-DEFINITIONS = 31
-"""Trajectories that can be defined at one time."""
-
-IN_MEMORY = 1
-"""The location of trajectories."""
-
-POLYNOMIALS, COMPRESSED = 0, 1
-"""Types of trajectories."""
-
-REFUSED = 1
-"""Returned by a command that the state does not permit."""
-
-_MIN_DURATION = 0.01
-"""Of a plan, s."""
-
+MEMORY_SIZE = 4096  #: Bytes of the trajectory memory.
+DEFINITIONS = 31  #: Trajectories that can be defined at one time.
+IN_MEMORY = 1  #: The location of trajectories.
+POLYNOMIALS, COMPRESSED = 0, 1  #: Types of trajectories.
+REFUSED = 1  #: Returned by a command that the state does not permit.
+_MIN_DURATION = 0.01  #: Of a plan, s.
+#: Result of the firmware's arithmetic for a plan with infinite numbers.
 _NOT_A_NUMBER = PolynomialPiece(1.0, *[(math.nan,)] * 4)
-"""Result of the firmware's arithmetic for a plan with infinite numbers."""
-
-_MIN_SPEED = 0.001
-"""Of a climb, m/s: clients may set the speed to 0."""
+_MIN_SPEED = 0.001  #: Of a climb, m/s: clients may set the speed to 0.
 
 _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 
@@ -42,16 +28,13 @@ _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 class TrajectoryState(Enum):
     """States of the planner; names as the firmware's TRAJECTORY_STATE."""
 
-    IDLE = 0
-    """Holds the motors off."""
+    IDLE = 0  #: Holds the motors off.
     FLYING = 1
     LANDING = 2
-    DISABLED = 3
-    """Gives no setpoints: a command contained a number that is not finite."""
+    DISABLED = 3  #: Gives no setpoints: a command contained a number that is not finite.
 
 
-ACTIVE = (TrajectoryState.FLYING, TrajectoryState.LANDING)
-"""States with setpoints."""
+ACTIVE = (TrajectoryState.FLYING, TrajectoryState.LANDING)  #: States with setpoints.
 
 
 class Planner:

@@ -13,14 +13,10 @@ from crazyflie_model.pid import Gains
 from crazyflie_virtual.firmware.pid import FirmwarePid, constrain
 from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Setpoint
 
-DT = 0.01
-"""Time between two updates, s."""
-
+DT = 0.01  #: Time between two updates, s.
+#: How much of a limit the integral may go beyond it, so that it can leave it again.
 _OVERHEAD = 1.1
-"""How much of a limit the integral may go beyond it, so that it can leave it again."""
-
-_THRUST_SCALE = 1000.0
-"""PWM per unit of the climb controller's output."""
+_THRUST_SCALE = 1000.0  #: PWM per unit of the climb controller's output.
 
 
 class PositionController:

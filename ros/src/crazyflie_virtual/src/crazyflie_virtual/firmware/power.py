@@ -2,14 +2,10 @@
 
 from crazyflie_virtual.body.battery import OPEN_CIRCUIT_VOLTAGES
 
-ON_BATTERY, LOW = 0, 3
-"""States; 1 and 2, charging and charged, do not occur."""
-
-_LOW_AFTER = 5.0
-"""Time of low voltage until the state `LOW`, s."""
-
+ON_BATTERY, LOW = 0, 3  #: States; 1 and 2, charging and charged, do not occur.
+_LOW_AFTER = 5.0  #: Time of low voltage until the state `LOW`, s.
+#: Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C].
 _LEVELS = OPEN_CIRCUIT_VOLTAGES[:-1]
-"""Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C]."""
 
 
 class PowerMonitor:

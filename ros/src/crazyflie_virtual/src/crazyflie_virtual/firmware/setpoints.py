@@ -12,8 +12,7 @@ from crazyflie_virtual.firmware.commander import PRIORITY_DISABLE
 from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, VELOCITY, Modes, Setpoint
 from crazyflie_virtual.quaternions import decompress_quaternion
 
-_LEAST_THRUST = 1000
-"""Of an attitude setpoint, PWM: less is none."""
+_LEAST_THRUST = 1000  #: Of an attitude setpoint, PWM: less is none.
 
 _RATE_MODE = 0
 
@@ -182,6 +181,7 @@ def _manual(data):
     return _with_tilt(setpoint, roll, bool(is_rate), pitch, bool(is_rate))
 
 
+#: Type -> decoder. 1, 2 and 5 are 8, 9 and 10 of older clients.
 _DECODERS: dict[int, Callable[[bytes], Setpoint]] = {
     0: _stop,
     1: _VELOCITY_WORLD.decode_clockwise,
@@ -195,4 +195,3 @@ _DECODERS: dict[int, Callable[[bytes], Setpoint]] = {
     10: _HOVER.decode,
     11: _manual,
 }
-"""Type -> decoder. 1, 2 and 5 are 8, 9 and 10 of older clients."""

@@ -19,12 +19,8 @@ from crazyflie_virtual.firmware.states import (
     Setpoint,
 )
 
-IDLE_THRUST = 7000
-"""Of vehicles that the client arms, with brushless motors, PWM."""
-
-
-DEFAULT, PID, MELLINGER = 0, 1, 2
-"""Numbers of controllers; the default one is `PID`."""
+IDLE_THRUST = 7000  #: Of vehicles that the client arms, with brushless motors, PWM.
+DEFAULT, PID, MELLINGER = 0, 1, 2  #: Numbers of controllers; the default one is `PID`.
 
 
 class MotorOverride:

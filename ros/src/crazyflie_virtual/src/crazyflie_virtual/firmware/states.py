@@ -13,12 +13,10 @@ from typing import NamedTuple
 from crazyflie_model.angles import Quaternion
 from crazyflie_virtual.quaternions import compress_quaternion
 
+#: Modes of a setpoint's axis: not controlled, to this value, at this rate.
 DISABLED, ABSOLUTE, VELOCITY = 0, 1, 2
-"""Modes of a setpoint's axis: not controlled, to this value, at this rate."""
-
-
+#: Position, velocity and acceleration of setpoint and estimate.
 MOTION = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
-"""Position, velocity and acceleration of setpoint and estimate."""
 
 
 class Modes(NamedTuple):

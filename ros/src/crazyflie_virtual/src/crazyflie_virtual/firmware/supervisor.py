@@ -8,17 +8,12 @@ from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.states import Setpoint
 from crazyflie_virtual.firmware.supervisor_states import Condition, State, next_state
 
-EMERGENCY_WATCHDOG = 1.0
-"""Longest time between watchdog messages, after the first one, s."""
-
-_LANDED_AFTER = 2.0
-"""How long the motors are off until the vehicle is not flying, s."""
-
+EMERGENCY_WATCHDOG = 1.0  #: Longest time between watchdog messages, after the first one, s.
+_LANDED_AFTER = 2.0  #: How long the motors are off until the vehicle is not flying, s.
+#: Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s.
 _TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
-"""Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s."""
-
+#: Accelerometer, g, below which in all axes the vehicle is falling and not tumbled.
 _FREE_FALL = 0.1
-"""Accelerometer, g, below which in all axes the vehicle is falling and not tumbled."""
 
 _RUNNING = (State.READY_TO_FLY, State.FLYING, State.LANDED, State.WARNING_LEVEL_OUT)
 _ARMED = (*_RUNNING, State.ARMING)

@@ -7,8 +7,7 @@ from random import Random
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.server import Address
 
-Item = tuple[bytes, Address]
-"""Datagram, and its sender or receiver."""
+Item = tuple[bytes, Address]  #: Datagram, and its sender or receiver.
 
 
 class Channel:

@@ -3,11 +3,8 @@
 from enum import IntEnum
 from typing import NamedTuple
 
-MAX_DATA = 30
-"""Bytes that a packet holds beside its header."""
-
-_RESERVED = 3 << 2
-"""Bits of the header that are set, but in broadcast packets."""
+MAX_DATA = 30  #: Bytes that a packet holds beside its header.
+_RESERVED = 3 << 2  #: Bits of the header that are set, but in broadcast packets.
 
 
 class Port(IntEnum):

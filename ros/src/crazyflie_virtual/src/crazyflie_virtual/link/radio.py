@@ -12,23 +12,14 @@ vehicle (syslink, 1 Mbit/s).
 
 from dataclasses import dataclass
 
-BIT_RATE = 2e6
-"""bit/s on air, of radio://.../2M."""
-
-TURNAROUND = 130e-6
-"""Of a transceiver, from standby or reception to transmission, s."""
-
+BIT_RATE = 2e6  #: bit/s on air, of radio://.../2M.
+TURNAROUND = 130e-6  #: Of a transceiver, from standby or reception to transmission, s.
+#: Of an acknowledged packet with its USB transfers, without setup requests, s.
 ROUND_TRIP = 1.0 / 1370
-"""Of an acknowledged packet with its USB transfers, without setup requests, s."""
-
-SETUP_REQUEST = 2.5e-3 / 3
-"""A USB control transfer that changes address or acknowledgement, s."""
-
+SETUP_REQUEST = 2.5e-3 / 3  #: A USB control transfer that changes address or acknowledgement, s.
+#: From one broadcast to the next, s: 37 bytes of 10 bits on the vehicle's serial line.
 BROADCAST_GAP = 0.5e-3
-"""From one broadcast to the next, s: 37 bytes of 10 bits on the vehicle's serial line."""
-
-_OVERHEAD_BITS = 8 * (1 + 5 + 2) + 9
-"""Preamble, address, check sum; packet control field."""
+_OVERHEAD_BITS = 8 * (1 + 5 + 2) + 9  #: Preamble, address, check sum; packet control field.
 
 
 def air_time(data: int) -> float:

@@ -14,14 +14,10 @@ from crazyflie_virtual.server import Address, Server, open_socket, received, sen
 from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 
-_TICK = 0.005
-"""How long the vehicle may be behind the clock when nothing happens, s."""
-
+_TICK = 0.005  #: How long the vehicle may be behind the clock when nothing happens, s.
+#: What is simulated at once, s; beyond that the vehicle loses time instead of its link.
 _GREATEST_LAG = 0.25
-"""What is simulated at once, s; beyond that the vehicle loses time instead of its link."""
-
-_NULL = b"\xff"
-"""What a scanner sends: it is no client."""
+_NULL = b"\xff"  #: What a scanner sends: it is no client.
 
 
 class VehicleServer(Server):

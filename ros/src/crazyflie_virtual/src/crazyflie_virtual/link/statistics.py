@@ -1,7 +1,6 @@
 """Packets counted."""
 
-_ACTIVE = 2.0
-"""How long after the last packet the client counts as connected, s."""
+_ACTIVE = 2.0  #: How long after the last packet the client counts as connected, s.
 
 
 class LinkStatistics:

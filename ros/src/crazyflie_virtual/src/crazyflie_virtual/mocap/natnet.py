@@ -19,15 +19,13 @@ UNRECOGNIZED = 100
 
 VERSIONS = ("2.9", "3.1", "4.1")
 
-CLOCK_FREQUENCY = 1_000_000_000
-"""Ticks per second of the server's clock."""
+CLOCK_FREQUENCY = 1_000_000_000  #: Ticks per second of the server's clock.
 
 _RIGID_BODY = 1
 _TRACKED = 1
 _NO_PARENT = -1
 _POINT_CLOUD_SOLVED, _UNLABELLED = 0x02, 0x10
-_MARKER_SIZE = 0.0095
-"""Diameter of a marker, m."""
+_MARKER_SIZE = 0.0095  #: Diameter of a marker, m.
 _HEADER = struct.Struct("<HH")
 
 

@@ -9,14 +9,9 @@ from crazyflie_virtual.mocap.natnet import BodyPose
 from crazyflie_virtual.observer import Observation
 from crazyflie_virtual.quaternions import turned
 
-OCCLUSION = 0.3
-"""Longest time for which a vehicle is hidden, s."""
-
-_GHOST_MARGIN = 0.3
-"""How far from the vehicles reflections may be, m."""
-
-_STALE = 0.5
-"""How long after the last observation a body counts as gone, s."""
+OCCLUSION = 0.3  #: Longest time for which a vehicle is hidden, s.
+_GHOST_MARGIN = 0.3  #: How far from the vehicles reflections may be, m.
+_STALE = 0.5  #: How long after the last observation a body counts as gone, s.
 
 
 @dataclass

@@ -16,11 +16,8 @@ from crazyflie_virtual.mocap.settings import MocapSettings
 from crazyflie_virtual.observer import decode
 from crazyflie_virtual.server import Address, Server, open_socket, received, send
 
-_CLIENT_LIMIT = 5.0
-"""How long after its last message a client is sent frames, s."""
-
-_LONGEST_WAIT = 0.1
-"""s."""
+_CLIENT_LIMIT = 5.0  #: How long after its last message a client is sent frames, s.
+_LONGEST_WAIT = 0.1  #: s.
 
 
 class MocapServer(Server):

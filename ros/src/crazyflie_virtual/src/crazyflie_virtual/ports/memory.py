@@ -11,8 +11,7 @@ from crazyflie_virtual.tables.memories import Memory
 _INFO, _READ, _WRITE = 0, 1, 2
 _COUNT, _DETAILS = 1, 2
 
-_MOST = 24
-"""Bytes read at once."""
+_MOST = 24  #: Bytes read at once.
 
 
 class MemoryPort:

@@ -15,14 +15,9 @@ _TABLE, _READ, _WRITE, _MISC = 0, 1, 2, 3
 _SET_BY_NAME, _EXTENDED_TYPE, _STORE, _STATE, _CLEAR = 0, 2, 3, 4, 5
 _DEFAULT, _EXTENDED_TYPE_2, _DEFAULT_2 = 6, 7, 8
 
-_WORD = 4
-"""Bytes of a request in which the answer to a write has the value as it is."""
-
-_PERSISTENT = 1
-"""The only extended type."""
-
-_EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40
-"""Flags beside the type's code."""
+_WORD = 4  #: Bytes of a request in which the answer to a write has the value as it is.
+_PERSISTENT = 1  #: The only extended type.
+_EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40  #: Flags beside the type's code.
 
 _NO_ENTRY = bytes([errno.ENOENT])
 

@@ -10,8 +10,7 @@ from crazyflie_virtual.firmware.states import MOTION
 from crazyflie_virtual.tables.number_types import FLOAT, I8, I16, I32, U8, U16, U32, NumberType
 from crazyflie_virtual.tables.toc import pid_paths
 
-Read = Callable[[Firmware], float]
-"""Returns a value."""
+Read = Callable[[Firmware], float]  #: Returns a value.
 
 
 class LogVariable(NamedTuple):
@@ -63,9 +62,9 @@ _POSITION_OUTPUTS = ("p", "i", "d", "ff")
 
 _RADIAN = math.pi / 180.0
 _MILLIRADIAN = 1000.0 * _RADIAN
-_STANDARD_GRAVITY = 9810.0
-"""mm/s^2."""
+_STANDARD_GRAVITY = 9810.0  #: mm/s^2.
 
+#: Group -> (name, type, value).
 _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
     "stateEstimate": _rows(FLOAT, **_of("estimate", *MOTION, *_ANGLES, *_QUATERNION)),
     "stateEstimateZ": [
@@ -202,4 +201,3 @@ _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
     "memTst": _rows(U32, errCntW="memory_tester.errors"),
     "crtp": _rows(U16, rxRate="link_statistics.received_rate", txRate="link_statistics.sent_rate"),
 }
-"""Group -> (name, type, value)."""

@@ -6,22 +6,17 @@ from collections.abc import Iterable
 from typing_extensions import override
 
 EEPROM, ONE_WIRE, LED_RING, TRAJECTORY, LIGHTHOUSE = 0x00, 0x01, 0x10, 0x12, 0x14
-TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19
-"""Types."""
+TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19  #: Types.
 
 NO_SERIAL = bytes(8)
 
-EEPROM_SERIAL = bytes(7) + b"\x50"
-"""Its I2C address takes the place of a serial number."""
+EEPROM_SERIAL = bytes(7) + b"\x50"  #: Its I2C address takes the place of a serial number.
 
 _TESTER_SIZE = 4096
 _EEPROM_SIZE = 8191
 
-LED_RING_SIZE = 24
-"""Twelve colours of 16 bits."""
-
-LED_TIMINGS_SIZE = 40
-"""Ten steps of 4 bytes."""
+LED_RING_SIZE = 24  #: Twelve colours of 16 bits.
+LED_TIMINGS_SIZE = 40  #: Ten steps of 4 bytes.
 
 
 class Memory:
@@ -105,8 +100,7 @@ class LighthouseMemory(Memory):
         Page -> content, which outlives a restart.
     """
 
-    STATIONS = 4
-    """As many as the firmware is built for unless it is configured otherwise."""
+    STATIONS = 4  #: As many as the firmware is built for unless it is configured otherwise.
 
     _CALIBRATION_PAGE = 16
     _PAGE_SIZE = 0x100

@@ -12,8 +12,8 @@ from crazyflie_virtual.firmware.stabilizer import DEFAULT, MELLINGER
 from crazyflie_virtual.tables.number_types import FLOAT, I8, U8, U16, U32, NumberType
 from crazyflie_virtual.tables.toc import pid_paths
 
+#: Those of the firmware's parameters, which stores also what is no number.
 NO_LIMITS = (-math.inf, math.inf)
-"""Those of the firmware's parameters, which stores also what is no number."""
 
 
 class ParameterSpec(NamedTuple):
@@ -65,6 +65,8 @@ _MELLINGER = (
     *("i_range_m_xy", "i_range_m_z"),
 )
 
+#: Group -> rows, as `ParameterSpec` without the group. The group "virtual" is not the firmware's:
+#: its parameters are the fault switches.
 _GROUPS = {
     "stabilizer": [
         *_rows(U8, estimator=2),
@@ -242,5 +244,3 @@ _GROUPS = {
         *_limited(U8, 0, 4, motorFailure="faults.motor_failure"),
     ],
 }
-"""Group -> rows, as `ParameterSpec` without the group. The group "virtual" is not the
-firmware's: its parameters are the fault switches."""

@@ -51,14 +51,6 @@ class Soak:
         Of the faults, and of everything else that is random.
     **arguments
         Of sw_hover.launch.
-
-    Attributes
-    ----------
-    watch : Watch
-    faults : collections.Counter
-        Fault -> how often.
-    refused, answered : int
-        Number of takeoffs that were refused, and of those that were not.
     """
 
     def __init__(self, seed: int, **arguments: object):
@@ -74,7 +66,8 @@ class Soak:
         )
         self.random = Random(seed)
         self.watch = Watch(self.graph)
-        self.faults: Counter[str] = Counter()
+        self.faults: Counter[str] = Counter()  #: Fault -> how often.
+        #: Number of takeoffs that were refused, and of those that were not.
         self.refused = self.answered = 0
         self._flight = Flight(self.graph, self.random, self.start)
         self.watch.begin()

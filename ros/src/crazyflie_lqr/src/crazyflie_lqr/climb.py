@@ -26,15 +26,6 @@ ARRIVAL_DISTANCE, ARRIVAL_SPEED = 0.05, 0.1
 class Climb:
     """The way up of one takeoff.
 
-    Attributes
-    ----------
-    disturbance : float
-        What accelerates the vehicle beside thrust and nominal weight, m/s^2, upwards.
-    z, z_dot, z_ddot : float
-        Reference, m, m/s and m/s^2.
-    has_arrived : bool
-        The vehicle is at its goal and the reference, too.
-
     Parameters
     ----------
     limit : float
@@ -42,9 +33,10 @@ class Climb:
     """
 
     def __init__(self, limit: float):
+        #: What accelerates the vehicle beside thrust and nominal weight, m/s^2, upwards.
         self.disturbance = 0.0
-        self.z = self.z_dot = self.z_ddot = 0.0
-        self.has_arrived = False
+        self.z = self.z_dot = self.z_ddot = 0.0  #: Reference, m, m/s and m/s^2.
+        self.has_arrived = False  #: The vehicle is at its goal and the reference, too.
         self._limit = limit
         self._last_z_dot: float | None = None
         self._elapsed = 0.0

@@ -44,24 +44,15 @@ class Event:
 
 
 class EventLog:
-    """Events, collected from messages in the order of their times.
-
-    Attributes
-    ----------
-    events : list of Event
-    dropped : int
-        Those beyond `MAX_EVENTS`.
-    flight_states : dict
-        By namespace, times (s) and states of the flight (constants of FlightStatus).
-    links : dict
-        By namespace, one after the other: time (s), share of answered pings, and setpoints that
-        were not sent so far.
-    """
+    """Events, collected from messages in the order of their times."""
 
     def __init__(self) -> None:
         self.events: list[Event] = []
-        self.dropped = 0
+        self.dropped = 0  #: Those beyond `MAX_EVENTS`.
+        #: By namespace, times (s) and states of the flight (constants of FlightStatus).
         self.flight_states: dict[str, list[tuple[float, int]]] = defaultdict(list)
+        #: By namespace, one after the other: time (s), share of answered pings, and setpoints that
+        #: were not sent so far.
         self.links: dict[str, array[float]] = defaultdict(lambda: array("d"))
         self._last: dict[Any, Any] = {}
         self._latest: dict[tuple[str, Kind, str], tuple[float, Event]] = {}

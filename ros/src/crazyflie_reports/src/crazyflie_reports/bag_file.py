@@ -53,13 +53,6 @@ class BagFile:
     ----------
     path : Path
 
-    Attributes
-    ----------
-    connections : list of Connection
-        Those that have been met so far.
-    interruption : str
-        Why reading has ended early; empty if it has not.
-
     Raises
     ------
     BagError
@@ -68,8 +61,8 @@ class BagFile:
 
     def __init__(self, path: Path):
         self._path = path
-        self.connections: list[Connection] = []
-        self.interruption = ""
+        self.connections: list[Connection] = []  #: Those that have been met so far.
+        self.interruption = ""  #: Why reading has ended early; empty if it has not.
         self._by_id: dict[bytes, Connection] = {}
         try:
             with path.open("rb") as file:

@@ -38,18 +38,12 @@ class Spool:
         Of a file that is made when it is needed.
     fields : tuple of str
         What a row has behind these three.
-
-    Attributes
-    ----------
-    fields : tuple of str
-    count : int
-        Of rows.
     """
 
     def __init__(self, path: Path, fields: tuple[str, ...]):
         self._path, self.fields = path, fields
         self._buffer = array("d")
-        self.count = 0
+        self.count = 0  #: Of rows.
         self.last_time = float("-inf")
 
     def append(self, time: float, stamp: float, number: int, row: Sequence[float]) -> None:

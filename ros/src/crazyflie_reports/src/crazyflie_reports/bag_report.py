@@ -40,16 +40,10 @@ def flights_of(log: bag_log.BagLog) -> Iterator[Flight]:
 
 
 class Report:
-    """A report on recordings, which grows with each that is added.
-
-    Attributes
-    ----------
-    recordings : list of dict
-        As `report_page.page` takes them.
-    """
+    """A report on recordings, which grows with each that is added."""
 
     def __init__(self) -> None:
-        self.recordings: list[dict[str, Any]] = []
+        self.recordings: list[dict[str, Any]] = []  #: As `report_page.page` takes them.
         self._flights: list[tuple[dict[str, Any], list[Figure]]] = []
 
     def add(self, log: bag_log.BagLog) -> None:

@@ -91,19 +91,13 @@ class SimulatorNode(Node):
     """Fly a vehicle on the controls of a topic and broadcast its pose to tf.
 
     A subclass defines the vehicle's model in `make_dynamics`.
-
-    Attributes
-    ----------
-    parameters_type : type
-        A subclass of `SimulatorParameters`, where a model has parameters of its own.
-    max_tilt : float
-        See `SimulatedVehicle`; for models that can turn over.
     """
 
     needed_in_flight = True
 
+    #: A subclass of `SimulatorParameters`, where a model has parameters of its own.
     parameters_type: type[SimulatorParameters] = SimulatorParameters
-    max_tilt = math.inf
+    max_tilt = math.inf  #: See `SimulatedVehicle`; for models that can turn over.
 
     def __init__(self) -> None:
         self._ticks = 0

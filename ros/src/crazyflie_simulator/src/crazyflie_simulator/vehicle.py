@@ -37,10 +37,6 @@ class SimulatedVehicle:
     max_tilt : float, optional
         A vehicle that is tilted more than this, rad, has crashed: its motors stay off until
         `recover`. By default none does.
-
-    Attributes
-    ----------
-    has_crashed : bool
     """
 
     def __init__(

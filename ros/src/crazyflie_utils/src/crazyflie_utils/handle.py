@@ -34,45 +34,32 @@ class NodeHandle:
     process : ProcessContext
     name : str
         Absolute name of the node, such as /simulator.
-
-    Attributes
-    ----------
-    is_closed : bool
-        Whether `close` was called.
-    info, warn, error : callable
-        See `NodeLog`.
-    time, stamp, nanoseconds : callable
-        Seconds for intervals, ROS time for headers; see `SteadyClock` and `SimulatedClock`.
-    clock_publisher, next_event : callable
-        For the node that publishes /clock; see `ClockSource`.
-    broadcast_transforms, broadcast_static_transforms, listen_to_transforms, listen_to_poses, \
-    has_pose_consumers, rejected_transforms : callable
-        See `Transforms`.
-    service_nodes, report_fault : callable
-        See `Transport.service_nodes`, which waits for the master, and `FaultHandler.report`.
     """
 
     def __init__(self, process: ProcessContext, name: str):
         self.name = name
-        self.is_closed = False
+        self.is_closed = False  #: Whether `close` was called.
         self._process = process
         self._submit = process.executor.submit
         self._undo: list[Callable[[], None]] = []
         self._latest: list[LatestMessage] = []
         log = NodeLog(process.transport, name)
-        self.info, self.warn, self.error = log.info, log.warn, log.error
+        self.info, self.warn, self.error = log.info, log.warn, log.error  #: See `NodeLog`.
         self._faults = FaultHandler(log)
-        self.report_fault = self._faults.report
+        self.report_fault = self._faults.report  #: See `FaultHandler.report`.
         clock = process.clock
+        #: Seconds for intervals, ROS time for headers; see `SteadyClock` and `SimulatedClock`.
         self.time, self.stamp, self.nanoseconds = clock.time, clock.stamp, clock.nanoseconds
         source = process.clock_source
+        #: For the node that publishes /clock; see `ClockSource`.
         self.clock_publisher, self.next_event = source.publisher, source.next_event
         tf = process.transforms
-        self.broadcast_transforms = tf.broadcaster
+        self.broadcast_transforms = tf.broadcaster  #: These six: see `Transforms`.
         self.broadcast_static_transforms = tf.static_broadcaster
         self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
         self.has_pose_consumers = tf.has_pose_consumers
         self.rejected_transforms = tf.rejected_by_reason
+        #: See `Transport.service_nodes`, which waits for the master.
         self.service_nodes = process.transport.service_nodes
 
     def child(self) -> "NodeHandle":

@@ -51,18 +51,12 @@ def catch_signals() -> list[int]:
 
 
 class Shutdown:
-    """What a process with nodes, by absolute name, does before rospy closes its connections.
-
-    Attributes
-    ----------
-    is_stuck : bool
-        Whether a callback has not returned.
-    """
+    """What a process with nodes, by absolute name, does before rospy closes its connections."""
 
     def __init__(self, process: Process, nodes: dict[str, Node]):
         self._process = process
         self._nodes = nodes
-        self.is_stuck = False
+        self.is_stuck = False  #: Whether a callback has not returned.
         needed = [name for name, node in nodes.items() if node.needed_in_flight]
         self._flights = Flights(process.topics, needed) if needed else None
 

@@ -33,20 +33,12 @@ class VirtualVehicle:
     ------
     ParameterError
         The world file is missing or wrong.
-
-    Attributes
-    ----------
-    physics : Physics
-        The true state.
-    battery : Battery
-    faults : FaultSwitches
-    board : Board or None
-        None while the microcontroller is off.
     """
 
     def __init__(self, settings: VehicleSettings):
         self._settings = settings
         self.faults = settings.switches()
+        #: The true state.
         self.physics = Physics(
             (settings.init_x, settings.init_y, 0.0),
             settings.init_yaw,
@@ -61,7 +53,7 @@ class VirtualVehicle:
         self._is_dead = False
         self._failure = ""
         self._restart_time = math.inf
-        self.board: Board | None = None
+        self.board: Board | None = None  #: None while the microcontroller is off.
         self._turn_on()
 
     @property

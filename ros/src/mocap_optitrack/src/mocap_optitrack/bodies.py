@@ -143,22 +143,14 @@ class SingleMarker(Body):
 
 
 class RigidBodyDictionary(ParameterType):
-    """The dictionary ``rigid_bodies``; a refusal names all that is wrong with it.
-
-    Attributes
-    ----------
-    key : str
-        The dictionary's name.
-    entry_type, body_type : type
-        Of an entry's parameters, and of what it becomes.
-    outputs : tuple of str
-        An entry has one of these parameters at least.
-    """
+    """The dictionary ``rigid_bodies``; a refusal names all that is wrong with it."""
 
     label = "dictionary"
-    key = "rigid_bodies"
+    key = "rigid_bodies"  #: The dictionary's name.
+    #: entry_type, body_type: Of an entry's parameters, and of what it becomes.
     entry_type: type[OutputParameters] = RigidBodyParameters
     body_type: type[Body] = RigidBody
+    #: An entry has one of these parameters at least.
     outputs: tuple[str, ...] = ("pose", "pose2d", "child_frame_id")
 
     @override

@@ -50,11 +50,6 @@ class Health:
         Gaps longer than this are a fault, s.
     now : float
         s.
-
-    Attributes
-    ----------
-    stale_after : float
-        For the reports to come.
     """
 
     _longest_gap: float
@@ -62,7 +57,7 @@ class Health:
     def __init__(self, bodies: Sequence[ConfiguredBody], stale_after: float, now: float):
         self._bodies = {body.key: _BodyCount() for body in bodies}
         self._labels = {body.key: body.component for body in bodies}
-        self.stale_after = stale_after
+        self.stale_after = stale_after  #: For the reports to come.
         self._server: str | None = None
         self._failure = "not connected so far"
         self._silence = "no frames"

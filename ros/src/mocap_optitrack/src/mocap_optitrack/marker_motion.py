@@ -45,24 +45,13 @@ class MarkerMotion:
     position : (3,) array
         m.
     limits : MotionLimits
-
-    Attributes
-    ----------
-    time : float
-        Of the last measurement, s.
-    position, velocity : (3,) array
-        Estimates at that time, m and m/s.
-    measured : (3,) array
-        The last measurement, m.
-    limits : MotionLimits
-        From the next prediction on.
     """
 
     def __init__(self, time: float, position: Point, limits: MotionLimits):
-        self.time = time
-        self.position = self.measured = position
-        self.velocity = np.zeros(3)
-        self.limits = limits
+        self.time = time  #: Of the last measurement, s.
+        self.measured = position  #: The last measurement, m.
+        self.position, self.velocity = position, np.zeros(3)  #: Estimates at that time, m and m/s.
+        self.limits = limits  #: From the next prediction on.
         self._covariance = (_MEASUREMENT_VARIANCE, 0.0, _FIRST_SPEED_VARIANCE)
 
     def variance(self, time: float) -> float:

@@ -56,11 +56,6 @@ class Tracker:
         Of a `MarkerTracker` of single markers, s.
     log : callable
         Likewise.
-
-    Attributes
-    ----------
-    stale_after : float
-        For the frames to come.
     """
 
     def __init__(
@@ -79,7 +74,7 @@ class Tracker:
         self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
         self._by_name = {body.name: body for body in bodies if body.name is not None}
         self._up_axis = up_axis
-        self.stale_after = stale_after
+        self.stale_after = stale_after  #: For the frames to come.
         self._health = health
         self._newest = self._arrival = -math.inf
         self._clock = ClockOffset()

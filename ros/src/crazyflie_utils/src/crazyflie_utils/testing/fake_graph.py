@@ -32,22 +32,14 @@ class FakeGraph:
         Full name to raw value, for all processes.
     start : float
         Time at the beginning, s.
-
-    Attributes
-    ----------
-    time : float
-        Now, s.
-    faults : dict of str to callable
-        What a fault makes of the messages on a topic: ``fault(message)`` returns those
-        that arrive in its place.
-    log : list of (str, str)
-        Level and text of what nodes have logged.
     """
 
     def __init__(self, parameters: dict[str, object], start: float = 100.0):
-        self.time = start
+        self.time = start  #: Now, s.
+        #: What a fault makes of the messages on a topic: ``fault(message)`` returns those that
+        #: arrive in its place.
         self.faults: dict[str, Callable[[Any], list[Any]]] = {}
-        self.log: list[tuple[str, str]] = []
+        self.log: list[tuple[str, str]] = []  #: Level and text of what nodes have logged.
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
         self._listeners: dict[str, list[Deliver]] = {}

@@ -54,13 +54,6 @@ class FrameTree:
         How far the stamp of a transform may be ahead of now, s.
     on_new : callable
         ``on_new(pose)`` is called with every pose that is the latest of its frame.
-
-    Attributes
-    ----------
-    rejected : collections.Counter
-        How many transforms were dropped, by reason.
-    followed : set of str
-        Frames that are decoded.
     """
 
     def __init__(
@@ -70,8 +63,8 @@ class FrameTree:
         ahead: float,
         on_new: Callable[[StampedPose], None],
     ):
-        self.rejected: Counter[str] = Counter()
-        self.followed: set[str] = set()
+        self.rejected: Counter[str] = Counter()  #: How many transforms were dropped, by reason.
+        self.followed: set[str] = set()  #: Frames that are decoded.
         self._codec = codec
         self._warn = warn
         self._ahead = round(ahead * 1e9)

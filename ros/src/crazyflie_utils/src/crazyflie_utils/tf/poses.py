@@ -63,19 +63,13 @@ class StampedPose(NamedTuple):
 
 
 class RawTransforms(TFMessage):
-    """A tf2_msgs/TFMessage as it is on the wire, decoded when it is asked for its transforms.
-
-    Attributes
-    ----------
-    raw : bytes
-        The serialized message.
-    """
+    """A tf2_msgs/TFMessage as it is on the wire, decoded when it is asked for its transforms."""
 
     __slots__ = ("raw",)
     lossless = True
 
     def __init__(self) -> None:
-        self.raw = _LENGTH.pack(0)
+        self.raw = _LENGTH.pack(0)  #: The serialized message.
 
     def deserialize(self, data: bytes) -> "RawTransforms":
         """Keep the serialized message."""

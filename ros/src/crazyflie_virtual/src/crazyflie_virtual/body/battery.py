@@ -25,20 +25,12 @@ class Battery:
     ----------
     charge : float
         State of charge at the beginning, 0 to 1.
-
-    Attributes
-    ----------
-    charge : float
-    voltage : float
-        Under the load of the last step, V.
-    current : float
-        A.
     """
 
     def __init__(self, charge: float = 1.0):
         self.charge = charge
-        self.current = _IDLE_CURRENT
-        self.voltage = open_circuit_voltage(charge)
+        self.current = _IDLE_CURRENT  #: A.
+        self.voltage = open_circuit_voltage(charge)  #: Under the load of the last step, V.
 
     def step(self, dt: float, load: float) -> None:
         """Drain for ``dt`` (s).

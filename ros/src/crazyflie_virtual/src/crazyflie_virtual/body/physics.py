@@ -40,15 +40,6 @@ class Physics:
     mass_error, thrust_error : float
         How much more mass and thrust the vehicle has than it should, as a
         fraction.
-
-    Attributes
-    ----------
-    specific_force : tuple, 3 components
-        What an accelerometer feels, m/s^2, body frame.
-    world : World or None
-        What is around it; None for the ground alone, which is also all that it comes to rest on.
-    is_overturned : bool
-        Came down on its back: lies there until `put_upright`.
     """
 
     def __init__(
@@ -63,9 +54,11 @@ class Physics:
         x[6:10] = [0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]
         x[13:17] = [0.0] * 4
         self._x = x
+        #: What an accelerometer feels, m/s^2, body frame.
         self.specific_force: Triple = (0.0, 0.0, GRAVITY)
+        #: What is around it; None for the ground alone, which is also all that it comes to rest on.
         self.world: World | None = None
-        self.is_overturned = False
+        self.is_overturned = False  #: Came down on its back: lies there until `put_upright`.
 
     @property
     def position(self) -> Triple:

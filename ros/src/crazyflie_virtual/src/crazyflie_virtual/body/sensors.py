@@ -31,17 +31,6 @@ class Sensors:
         Whether there is any.
     seed : int
         Of the noise.
-
-    Attributes
-    ----------
-    gyro_x, gyro_y, gyro_z : float
-        deg/s, body frame (forward-left-up).
-    acc_x, acc_y, acc_z : float
-        g, body frame; (0, 0, 1) at rest.
-    mag_x, mag_y, mag_z : float
-        gauss, body frame.
-    asl, pressure, temperature : float
-        Height above sea level in m, mbar, degrees Celsius.
     """
 
     def __init__(self, noise: bool = True, seed: int = 0):
@@ -50,9 +39,10 @@ class Sensors:
         # controllers; a prime number of samples does not repeat in step.
         self._noise = [source.gauss(0.0, 1.0) if noise else 0.0 for _ in range(_NOISE_SAMPLES)]
         self._next = 0
-        self.gyro_x = self.gyro_y = self.gyro_z = 0.0
-        self.acc_x, self.acc_y, self.acc_z = 0.0, 0.0, 1.0
-        self.mag_x, self.mag_y, self.mag_z = _FIELD
+        self.gyro_x = self.gyro_y = self.gyro_z = 0.0  #: deg/s, body frame (forward-left-up).
+        self.acc_x, self.acc_y, self.acc_z = 0.0, 0.0, 1.0  #: g, body frame; (0, 0, 1) at rest.
+        self.mag_x, self.mag_y, self.mag_z = _FIELD  #: gauss, body frame.
+        #: asl, pressure, temperature: Height above sea level in m, mbar, degrees Celsius.
         self.asl = 0.0
         self.pressure = _SEA_LEVEL_PRESSURE
         self.temperature = 25.0

@@ -40,17 +40,11 @@ class Estimator:
     ----------
     estimate : Estimate
         Updated in place.
-
-    Attributes
-    ----------
-    initial_x, initial_y, initial_z, initial_yaw : float
-        Pose after `reset`, m and rad.
-    variance_position, variance_velocity, variance_attitude : float
-        m^2, m^2/s^2, rad^2.
     """
 
     def __init__(self, estimate: Estimate):
         self._estimate = estimate
+        #: Pose after `reset`, m and rad.
         self.initial_x = self.initial_y = self.initial_z = self.initial_yaw = 0.0
         self._sums = [0.0] * 6
         self._samples = 0

@@ -45,18 +45,6 @@ class Firmware:
         The assertion that has caused this restart. The firmware then does not
         pass its self test: it answers the client and does not fly (system.c of
         the firmware) until the power is switched off and on.
-
-    Attributes
-    ----------
-    time : float
-        Since the start, s.
-    setpoint : Setpoint
-        Input of the controllers.
-    info : SupervisorState
-        State of supervisor and high-level commander at the supervisor's last
-        update, as clients see it.
-    is_started : bool
-        Whether the self test has passed.
     """
 
     def __init__(
@@ -70,7 +58,7 @@ class Firmware:
         self.faults = faults
         self.protocol = settings.protocol
         self._steps = 0
-        self.time = 0.0
+        self.time = 0.0  #: Since the start, s.
         self.console = Console(lambda: self.time)
         self.warn = self.console.warn
         self.estimate = Estimate()
@@ -87,13 +75,15 @@ class Firmware:
         self.power = PowerMonitor()
         self.link_statistics = LinkStatistics()
         self.memory_tester = MemoryTester()
-        self.setpoint = Setpoint()
+        self.setpoint = Setpoint()  #: Input of the controllers.
         self.reset_estimation = 0
+        #: State of supervisor and high-level commander at the supervisor's last update, as clients
+        #: see it.
         self.info = SupervisorState(0)
         self._warned_state: State | None = None
         self.console.write_line("SYS: ----------------------------")
         self.console.write_line("SYS: Virtual Crazyflie 2.1 is up and running!")
-        self.is_started = not failure
+        self.is_started = not failure  #: Whether the self test has passed.
         if failure:
             self.console.write_line("SYS: The system resumed after a failed assert [WARNING]")
             self.console.write_line(f"SYS: {failure}; no flight before power is off and on")

@@ -25,25 +25,19 @@ class Localization:
         Measured by the deck.
     has_deck : bool
         Whether the vehicle carries a positioning deck.
-
-    Attributes
-    ----------
-    x, y, z, qx, qy, qz, qw : float
-        Last external measurement, m; for the log.
-    time : float or None
-        When it came, s.
-    position_deviation, attitude_deviation : float
-        Standard deviations that external measurements are taken to have, m and rad.
     """
 
     def __init__(self, estimator: Estimator, physics: Physics, has_deck: bool):
         self._estimator = estimator
         self._physics = physics
         self.has_deck = has_deck
+        #: x, y, z, qx, qy, qz, qw: Last external measurement, m; for the log.
         self.x = self.y = self.z = 0.0
         self.qx = self.qy = self.qz = 0.0
         self.qw = 1.0
-        self.time: float | None = None
+        self.time: float | None = None  #: When it came, s.
+        #: position_deviation, attitude_deviation: Standard deviations that external measurements
+        #: are taken to have, m and rad.
         self.position_deviation = 0.01
         self.attitude_deviation = 0.0045
 

@@ -18,22 +18,17 @@ class FirmwarePid:
         Output per desired value.
     output_limit : float
         Of the output's magnitude; 0 for none.
-
-    Attributes
-    ----------
-    kp, ki, kd, kff, limit : float
-        Present gains.
-    desired, out_p, out_i, out_d, out_ff : float
-        Of the last update, for the log.
     """
 
     def __init__(self, gains: Gains, dt: float, kff: float = 0.0, output_limit: float = 0.0):
+        #: kp, ki, kd, kff, limit: Present gains.
         self.kp, self.ki, self.kd, self.kff = gains.kp, gains.ki, gains.kd, kff
         self.limit = gains.limit
         self.output_limit = output_limit
         self._dt = dt
         self._integral = 0.0
         self._last: float | None = None
+        #: desired, out_p, out_i, out_d, out_ff: Of the last update, for the log.
         self.desired = 0.0
         self.out_p = self.out_i = self.out_d = self.out_ff = 0.0
 

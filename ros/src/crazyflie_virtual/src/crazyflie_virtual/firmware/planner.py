@@ -41,26 +41,14 @@ class Planner:
     """Plans trajectories and evaluates them.
 
     Commands return 0 or an error number.
-
-    Attributes
-    ----------
-    memory : bytearray
-        Pieces of trajectories, uploaded by the client.
-    state : TrajectoryState
-    blocked : bool
-        Whether the vehicle cannot fly, and plans are refused.
-    takeoff_speed, landing_speed : float
-        Default of commands, m/s.
-    groups : int
-        Groups of vehicles that this one belongs to, a bit each.
     """
 
     def __init__(self) -> None:
-        self.memory = bytearray(MEMORY_SIZE)
+        self.memory = bytearray(MEMORY_SIZE)  #: Pieces of trajectories, uploaded by the client.
         self.state = TrajectoryState.IDLE
-        self.blocked = False
-        self.takeoff_speed = self.landing_speed = 0.5
-        self.groups = 0
+        self.blocked = False  #: Whether the vehicle cannot fly, and plans are refused.
+        self.takeoff_speed = self.landing_speed = 0.5  #: Default of commands, m/s.
+        self.groups = 0  #: Groups of vehicles that this one belongs to, a bit each.
         self._definitions: dict[int, tuple[int, int, int, int]] = {}
         self._trajectory: Trajectory | None = None
         self._begin = 0.0

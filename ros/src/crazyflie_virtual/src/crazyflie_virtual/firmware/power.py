@@ -9,24 +9,14 @@ _LEVELS = OPEN_CIRCUIT_VOLTAGES[:-1]
 
 
 class PowerMonitor:
-    """Watches the voltage.
-
-    Attributes
-    ----------
-    voltage : float
-        V.
-    level : int
-        Charge as the firmware estimates it from the voltage, %.
-    state : int
-        `ON_BATTERY` or `LOW`.
-    low_voltage, critical_voltage : float
-        V. The second has no effect: the default build does not switch off.
-    """
+    """Watches the voltage."""
 
     def __init__(self) -> None:
-        self.voltage = 4.1
-        self.level = 90
-        self.state = ON_BATTERY
+        self.voltage = 4.1  #: V.
+        self.level = 90  #: Charge as the firmware estimates it from the voltage, %.
+        self.state = ON_BATTERY  #: `ON_BATTERY` or `LOW`.
+        #: low_voltage, critical_voltage: V. The second has no effect: the default build does not
+        #: switch off.
         self.low_voltage, self.critical_voltage = 3.2, 3.0
         self._good_time: float | None = None
 

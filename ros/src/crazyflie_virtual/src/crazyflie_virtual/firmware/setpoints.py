@@ -26,16 +26,11 @@ class AttitudeDecoder:
     """Attitude setpoints, port 3, and their thrust lock.
 
     Thrust counts only after one setpoint without thrust has come.
-
-    Attributes
-    ----------
-    roll_mode, pitch_mode, yaw_mode : int
-        Whether roll and pitch are angles (1) or rates (0); the yaw rate is a
-        rate always.
-    is_locked : bool
     """
 
     def __init__(self) -> None:
+        #: roll_mode, pitch_mode, yaw_mode: Whether roll and pitch are angles (1) or rates (0); the
+        #: yaw rate is a rate always.
         self.roll_mode = self.pitch_mode = 1
         self.yaw_mode = _RATE_MODE
         self.is_locked = True

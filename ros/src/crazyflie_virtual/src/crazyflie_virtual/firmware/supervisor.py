@@ -30,18 +30,6 @@ class Supervisor:
     auto_arm : bool
         Arm when the checks have passed, as a Crazyflie 2.1 does; otherwise
         the client arms, as with brushless motors.
-
-    Attributes
-    ----------
-    state : State
-    is_armed, is_tumbled, is_crashed : bool
-    emergency_stop : int
-        Parameter stabilizer.stop: not 0 stops the motors.
-    tumble_check : int
-        0 for none.
-    preflight_timeout, landed_timeout : int
-        ms after which a vehicle is disarmed when it does not take off, and
-        after landing. With automatic arming it cannot fly for four updates then.
     """
 
     def __init__(self, write_line: Callable[[str], None], auto_arm: bool = True):
@@ -49,8 +37,10 @@ class Supervisor:
         self.auto_arm = auto_arm
         self.state = State.PRE_FL_CHECKS_NOT_PASSED
         self.is_armed = self.is_tumbled = self.is_crashed = False
-        self.emergency_stop = 0
-        self.tumble_check = 1
+        self.emergency_stop = 0  #: Parameter stabilizer.stop: not 0 stops the motors.
+        self.tumble_check = 1  #: 0 for none.
+        #: preflight_timeout, landed_timeout: ms after which a vehicle is disarmed when it does not
+        #: take off, and after landing. With automatic arming it cannot fly for four updates then.
         self.preflight_timeout, self.landed_timeout = 30000, 3000
         self._emergency = False
         self._watchdog_time: float | None = None

@@ -29,12 +29,6 @@ class VehicleServer(Server):
     warn : callable
         ``warn(text)`` is called when the vehicle cannot keep up with the clock.
 
-    Attributes
-    ----------
-    vehicle : VirtualVehicle
-    address : tuple of str and int
-        Host and port.
-
     Raises
     ------
     OSError
@@ -44,7 +38,7 @@ class VehicleServer(Server):
     def __init__(self, settings: VehicleSettings, warn: Callable[[str], None] = lambda text: None):
         self._socket = open_socket(settings.host, settings.port)
         super().__init__(self._socket)
-        self.address = self._socket.getsockname()
+        self.address = self._socket.getsockname()  #: Host and port.
         self._warn = warn
         self.vehicle = VirtualVehicle(settings)
         self.switches = self.vehicle.faults

@@ -29,14 +29,6 @@ class MocapServer(Server):
     warn : callable, optional
         Not used: the server does not fall behind.
 
-    Attributes
-    ----------
-    address : tuple of str and int
-        Host and port for commands.
-    observer_port : int
-        Where the vehicles' true poses arrive.
-    switches : MocapSwitches
-
     Raises
     ------
     OSError
@@ -59,7 +51,8 @@ class MocapServer(Server):
             self._commands.close()
             raise
         super().__init__(self._commands, self._observations)
-        self.address = self._commands.getsockname()
+        self.address = self._commands.getsockname()  #: Host and port for commands.
+        #: Where the vehicles' true poses arrive.
         self.observer_port = self._observations.getsockname()[1]
         if settings.multicast:
             interface = socket.inet_aton(settings.host)

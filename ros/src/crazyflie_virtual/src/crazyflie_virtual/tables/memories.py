@@ -60,17 +60,11 @@ class Memory:
 
 
 class MemoryTester(Memory):
-    """A memory that holds its addresses; what is written is compared with them.
-
-    Attributes
-    ----------
-    errors : int
-        Bytes that were not as they should have been.
-    """
+    """A memory that holds its addresses; what is written is compared with them."""
 
     def __init__(self) -> None:
         super().__init__(TESTER, bytes(address & 0xFF for address in range(_TESTER_SIZE)))
-        self.errors = 0
+        self.errors = 0  #: Bytes that were not as they should have been.
 
     @property
     def reset_writes(self) -> int:

@@ -37,16 +37,9 @@ class Estimator(ABC):
     def update(
         cls, memory: Vector[Any], dt: Any, position: Vector[Any], parameters: Sequence[Any]
     ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
-        """Return memory, position (m) and velocity (m/s) after the next position.
+        """Return memory, position (m) and velocity (m/s) after the next position (3 components, m).
 
-        Parameters
-        ----------
-        memory : list
-        dt : float or ndarray
-            Since the last position, s, positive.
-        position : list, 3 components
-            m.
-        parameters : sequence
+        ``dt`` is the time since the last one, s, positive.
         """
 
 
@@ -74,12 +67,7 @@ class Kalman(Estimator):
     """See `crazyflie_state_estimator.kalman.ConstantAccelerationFilter`; without the control.
 
     Memory: position (3), velocity (3), acceleration (3), and the covariance that the axes share,
-    upper half by rows (6).
-
-    Raises
-    ------
-    ValueError
-        One of them is not positive.
+    upper half by rows (6). ValueError: one of the deviations is not positive.
     """
 
     #: Float or ndarray, shape (n,). Standard deviation of the poses' coordinates, m.

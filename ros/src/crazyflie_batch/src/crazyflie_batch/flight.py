@@ -135,11 +135,7 @@ def run_controller(
 ) -> Components:
     """Return the memory after estimator and controller have processed a pose, if one has arrived.
 
-    Parameters
-    ----------
-    pose : list, `POSE_DIM` components
-    tick : float or ndarray
-        At which it was measured.
+    The pose has `POSE_DIM` components and was measured at ``tick``.
     """
     *position, yaw, has_arrived = pose
     (stamp,), (control_stamp,) = memory["stamp"], memory["control_stamp"]

@@ -10,12 +10,7 @@ _CALCULATES = ("crazyflie_batch.symbols", "crazyflie_model.elementwise", "numpy"
 
 @contextmanager
 def naming_the_formula() -> Iterator[None]:
-    """Put the name, file and line of the formula before what is wrong with it.
-
-    Raises
-    ------
-    TypeError
-    """
+    """Put the name, file and line of the formula before what is wrong with it: a TypeError."""
     try:
         yield
     except (AttributeError, TypeError, ValueError) as error:

@@ -79,10 +79,7 @@ _compiling = threading.Lock()
 def program(plan: Plan) -> "ArrayProgram | MachineCode":
     """Return the program of a plan, made once in a process for all threads.
 
-    Raises
-    ------
-    TypeError
-        A formula cannot be traced; the text names it.
+    TypeError: a formula cannot be traced; the text names it.
     """
     with _compiling:
         return _program(plan)

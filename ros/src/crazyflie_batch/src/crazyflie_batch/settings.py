@@ -166,13 +166,7 @@ class Settings:
 
 
 def read_settings(path: str | Path) -> Settings:
-    """Return the settings in a file.
-
-    Raises
-    ------
-    ParameterError
-        Names all errors with file and line.
-    """
+    """Return the settings in a file; `ParameterError` names all errors with file and line."""
     file = load(path)
     run = file.read(RunParameters, besides=("vehicle", "sweep"))
     vehicle = file["vehicle"].read(FlightParameters) if "vehicle" in file else _DEFAULTS

@@ -51,17 +51,8 @@ def quadrotor(
 ) -> Model:
     """Return `crazyflie_model.stabilized_quadrotor.StabilizedQuadrotor`.
 
-    Parameters
-    ----------
-    mass_error, thrust_error : float or array_like, shape (n,)
-        > -1
-    wind : array_like, shape (3,) or (n, 3)
-        Velocity of the air, m/s, constant.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of its range.
+    The errors are fractions > -1, floats or of shape (n,); the wind is the air's velocity, m/s,
+    constant, of shape (3,) or (n, 3). ValueError: an argument is out of its range.
     """
     check_above("mass_error", mass_error, -1.0)
     check_above("thrust_error", thrust_error, -1.0)
@@ -88,12 +79,7 @@ def _make_quadrotor(mass_error, thrust_error, wind_x, wind_y, wind_z):
 class Controller:
     """`crazyflie_lqr.linear_feedback.IntegralStateFeedback` for every vehicle, in flight.
 
-    Each array may have one more axis in front, of length n.
-
-    Raises
-    ------
-    ValueError
-        A limit is negative.
+    Each array may have one more axis in front, of length n. ValueError: a limit is negative.
     """
 
     K: ArrayLike  #: Shape (4, 7).
@@ -110,10 +96,7 @@ class Controller:
 class Measurement:
     """`crazyflie_simulator.motion_capture.MotionCapture` for every vehicle.
 
-    Raises
-    ------
-    ValueError
-        An argument is out of its range.
+    ValueError: an argument is out of its range.
     """
 
     #: position_noise, attitude_noise, latency, dropout: Float or array_like, shape (n,). In m, rad,

@@ -82,13 +82,7 @@ def circles(graph: Graph) -> list[list[str]]:
 
 
 def floors(graph: Graph) -> list[list[str]]:
-    """Return the names by floor, the lowest first.
-
-    Raises
-    ------
-    graphlib.CycleError
-        The graph has a circle.
-    """
+    """Return the names by floor, the lowest first; graphlib.CycleError for a circle."""
     height: dict[str, int] = {}
     for name in graphlib.TopologicalSorter(graph).static_order():
         height[name] = max((height[each] + 1 for each in graph[name]), default=0)

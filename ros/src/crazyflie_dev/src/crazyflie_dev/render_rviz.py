@@ -115,12 +115,7 @@ class Scene:
 def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
     """Fly to the hover; write what RViz shows into a PNG file, the output of roslaunch into a log.
 
-    Raises
-    ------
-    DisplayError
-        RViz has not drawn what it should.
-    FlightError
-        The vehicle does not hover.
+    `DisplayError`: RViz has not drawn what it should; `FlightError`: the vehicle does not hover.
     """
     description = Path(rospkg.RosPack().get_path("crazyflie_description"))
     with virtual_display(*SCREEN) as display:

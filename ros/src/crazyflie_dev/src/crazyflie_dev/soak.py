@@ -45,12 +45,8 @@ _STRAY = 1.5
 class Soak:
     """Flights one after the other, with a fault in each.
 
-    Parameters
-    ----------
-    seed : int
-        Of the faults, and of everything else that is random.
-    **arguments
-        Of sw_hover.launch.
+    ``seed`` decides the faults and everything else that is random; the other arguments are those of
+    sw_hover.launch.
     """
 
     def __init__(self, seed: int, **arguments: object):
@@ -189,14 +185,7 @@ class _Fault:
 def soak(duration: float, seed: int, progress: bool = False, **arguments: object) -> dict[str, Any]:
     """Fly for ``duration`` (s, simulated) and return what was seen, as JSON knows it.
 
-    Parameters
-    ----------
-    duration : float
-    seed : int
-    progress : bool
-        Whether to show a bar on the terminal.
-    **arguments
-        Of sw_hover.launch.
+    ``progress`` shows a bar on the terminal; see `Soak` for the other arguments.
     """
     began = time.monotonic()
     run = Soak(seed, **arguments)

@@ -73,10 +73,7 @@ _PERIOD = 100_000
 def limited(pids: list[int], quota: float) -> Iterator[None]:
     """Give processes together a quota of a core, by control groups of version 1 or 2.
 
-    Raises
-    ------
-    OSError
-        The system does not allow it, by permission or since there is no controller of the CPU.
+    OSError: the system does not allow it, by permission or without a controller of the CPU.
     """
     has_version_1 = (_GROUPS / "cpu").is_dir()
     parent = _GROUPS / "cpu" if has_version_1 else _GROUPS

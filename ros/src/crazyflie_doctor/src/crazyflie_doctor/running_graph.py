@@ -57,10 +57,7 @@ def _limited():
 def graph() -> Graph:
     """Ask the master and all nodes, many at a time.
 
-    Raises
-    ------
-    OSError, rosgraph.MasterException
-        The master does not answer.
+    OSError or rosgraph.MasterException: the master does not answer.
     """
     with _limited():
         return _graph(rosgraph.Master(_NAME))

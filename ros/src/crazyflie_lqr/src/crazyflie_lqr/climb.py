@@ -24,13 +24,7 @@ ARRIVAL_DISTANCE, ARRIVAL_SPEED = 0.05, 0.1
 
 
 class Climb:
-    """The way up of one takeoff.
-
-    Parameters
-    ----------
-    limit : float
-        Largest disturbance that is believed in, m/s^2.
-    """
+    """The way up of one takeoff; ``limit`` is the largest disturbance believed in, m/s^2."""
 
     def __init__(self, limit: float):
         #: What accelerates the vehicle beside thrust and nominal weight, m/s^2, upwards.
@@ -49,16 +43,9 @@ class Climb:
     def advance(self, dt: float, z: float, z_dot: float, goal: float, excess: float) -> None:
         """Advance to the next state.
 
-        Parameters
-        ----------
-        dt : float
-            Since the last state, s; not used with the first one.
-        z, z_dot : float
-            Height and speed of the vehicle, m and m/s.
-        goal : float
-            Height to climb to, m.
-        excess : float
-            Thrust since the last state, less that of the reference control, m/s^2.
+        It comes ``dt`` s after the last one (not used with the first), at height ``z`` (m) and
+        speed ``z_dot`` (m/s); ``goal`` is the height to climb to (m), ``excess`` the thrust since
+        the last state, less that of the reference control (m/s^2).
         """
         if self._last_z_dot is None:
             self.z, self.z_dot = z, z_dot

@@ -63,25 +63,12 @@ def integrate(
     k: Number,
     limit: Number,
 ) -> Number:
-    """Return the integral of the position error along an axis after ``dt``, m s.
+    """Return the integral of the position error along an axis after ``dt`` (s), m s.
 
     Does not grow while it drives the control further into its limit (conditional integration:
-    Astrom and Hagglund, Advanced PID Control, 2006, 3.5).
-
-    Parameters
-    ----------
-    axis : int
-        0, 1 or 2: x, y or z in the heading frame.
-    integral : float or ndarray
-        Before, m s.
-    error : float or ndarray
-        m.
-    dt : float or ndarray
-        Since the last state, s.
-    linear : sequence, 4 components
-        Of `linear_control`.
-    k, limit : float or ndarray
-        Gain and largest absolute value of this integral; see `linear_feedback`.
+    Astrom and Hagglund, Advanced PID Control, 2006, 3.5). The axis is 0, 1 or 2: x, y or z in the
+    heading frame; ``error`` is in m, ``linear`` the control of `linear_control`; ``k`` and
+    ``limit`` are gain and largest absolute value of this integral, see `linear_feedback`.
     """
     grown = clip(integral + error * dt, -limit, limit)
     low, high = LIMITS[INTEGRATED[axis]]

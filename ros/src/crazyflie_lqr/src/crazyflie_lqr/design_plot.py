@@ -25,12 +25,7 @@ def step_responses(
 ) -> tuple[NDArray[np.float64], Responses, Responses]:
     """Return what follows a unit step of the reference in x, y, z and yaw, each alone.
 
-    Returns
-    -------
-    time : ndarray, shape (n,)
-        s.
-    states, controls : dict
-        How each output moves, in m or rad; and the control that moves it.
+    That is: the times (s), how each output moves (m or rad), and the control that moves it.
     """
     slowest = -design.poles.real.max()
     duration = min(8.0 / slowest, 60.0)

@@ -33,13 +33,8 @@ class Margins:
 def loop_response(design: Design, loop: int) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Return the frequency response of one loop (of a control) broken at the plant's input.
 
-    Returns
-    -------
-    frequency : ndarray, shape (n,)
-        rad/s; for a sampled design up to half its sample rate.
-    response : ndarray of complex, shape (n,)
-        Loop transfer function L of the negative feedback: unstable where L
-        turns about -1.
+    That is: frequencies (rad/s; for a sampled design up to half its sample rate), and at each the
+    loop transfer function L of the negative feedback: unstable where L turns about -1.
     """
     system = _broken_loop(design, loop)
     speed = np.abs(design.poles)

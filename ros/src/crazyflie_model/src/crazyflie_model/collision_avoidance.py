@@ -47,14 +47,8 @@ class CollisionAvoidance:
     ) -> tuple[Array, Array]:
         """Return the position (m) and velocity (m/s) to track instead of a goal and its velocity.
 
-        Parameters
-        ----------
-        position : (3,) array
-            Of the vehicle, m.
-        others : (n, 3) array
-            Positions of other vehicles, m.
-        goal, velocity : (3,) array
-            m, m/s. A velocity of 0 means a goal to stop at.
+        A velocity of 0 means a goal to stop at. ``others`` are the positions of n other vehicles,
+        shape (n, 3), m.
         """
         cell = _Cell(self.settings, position, others)
         wanted = goal - position

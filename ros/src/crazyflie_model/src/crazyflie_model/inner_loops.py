@@ -56,25 +56,12 @@ def update(
     attitude: tuple[Number, Number, Number],
     rates: Vector[Number],
 ) -> tuple[Vector[Number], Vector[Number]]:
-    """Return memory and motor commands after one sample.
+    """Return memory and motor commands (PWM, of motors 1 to 4) after one sample.
 
-    Without thrust the motors are off and the loops begin anew.
-
-    Parameters
-    ----------
-    memory : list, 9 components
-        What was returned `PERIOD` ago.
-    setpoint : list, 4 components
-        Roll, pitch in rad, yaw rate in rad/s, thrust in m/s^2.
-    attitude : tuple, 3 components
-        Roll, pitch, yaw of `angles.zyx_from_quaternion`, rad.
-    rates : list, 3 components
-        Body rates, rad/s.
-
-    Returns
-    -------
-    tuple of Vector
-        Memory, 9 components, and the commands of motors 1 to 4, PWM.
+    Without thrust the motors are off and the loops begin anew. ``memory`` is what was returned
+    `PERIOD` ago; ``setpoint`` is roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2;
+    ``attitude`` is roll, pitch and yaw of `angles.zyx_from_quaternion`, rad; ``rates`` are the
+    body's, rad/s.
     """
     roll_i, pitch_i, yaw_i, p_i, q_i, r_i, p_before, q_before, heading = memory
     roll_set, pitch_set, yaw_dot_set, thrust = setpoint

@@ -23,18 +23,9 @@ def terms(
 ) -> tuple[Number, Number, Number, Number]:
     """Return the proportional, integral and derivative part of the output, and the integral.
 
-    Parameters
-    ----------
-    gains : Gains
-        Or any object with its attributes.
-    error : float or ndarray
-        Desired minus measured value.
-    integral : float or ndarray
-        Of the error, as returned by the last update.
-    slope : float or ndarray
-        Rate of change of the measurement.
-    dt : float
-        Time between two updates, s.
+    ``error`` is the desired minus the measured value, ``integral`` the error's, as returned by the
+    last update ``dt`` s ago, ``slope`` the rate of change of the measurement. Any object with the
+    attributes of `Gains` does.
     """
     integral = clip(integral + error * dt, -gains.limit, gains.limit)
     return gains.kp * error, gains.ki * integral, -gains.kd * slope, integral

@@ -42,13 +42,8 @@ def evaluate(
 def hermite(start: ArrayLike, end: ArrayLike, duration: float) -> tuple[float, ...]:
     """Return the coefficients, the constant first, of the polynomial between two ends.
 
-    Parameters
-    ----------
-    start, end : array_like, shape (n,)
-        Value and derivatives by time; four at both ends make a polynomial of the
-        7th degree.
-    duration : float
-        Time between them, s, > 0.
+    An end is value and derivatives by time; four at both make a polynomial of the 7th degree.
+    ``duration`` is the time between them, s, > 0.
     """
     from scipy.interpolate import BPoly
 

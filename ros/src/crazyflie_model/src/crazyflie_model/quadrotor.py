@@ -165,19 +165,11 @@ class Airframe:
     def step(
         self, t: float, x: Vector[Number], rotor_speeds: Vector[Number], wind: Triple, dt: float
     ) -> Vector[Number]:
-        """Return the state one step later, with the quaternion of norm 1, on or above ground.
+        """Return the state (17 components) ``dt`` s later, with the quaternion of norm 1.
 
-        Parameters
-        ----------
-        t : float
-            Time at the beginning of the step, s.
-        x : list, 17 components
-        rotor_speeds : list, 4 components
-            Commanded, rad/s; limited to what the motors can do.
-        wind : tuple, 3 components
-            Velocity of the air in the fixed frame, m/s.
-        dt : float
-            Step, s.
+        The vehicle stays on or above the ground. ``t`` is the time at the beginning, s;
+        ``rotor_speeds`` are commanded, rad/s, and limited to what the motors can do; ``wind`` is
+        the velocity of the air in the fixed frame, m/s.
         """
         top = self.parameters.max_rotor_speed
         commands: Vector[Number] = [clip(speed, 0.0, top) for speed in rotor_speeds]

@@ -169,16 +169,7 @@ class EventLog:
 
 
 def concerning(events: list[Event], name: str, others: set[str]) -> Iterator[Event]:
-    """Yield the events of a vehicle, and those that are no other vehicle's.
-
-    Parameters
-    ----------
-    events : list of Event
-    name : str
-        The vehicle's namespace.
-    others : set of str
-        The namespaces of all other vehicles.
-    """
+    """Yield the events of a vehicle, and those that are no other vehicle's, by namespaces."""
     for event in events:
         words = {
             word.split("/")[0] for word in re.findall(r"[\w/]+", event.text.replace(" /", " "))

@@ -49,14 +49,7 @@ class Connection:
 class BagFile:
     """A bag file that is read once, from its beginning.
 
-    Parameters
-    ----------
-    path : Path
-
-    Raises
-    ------
-    BagError
-        There is no such file, or it is not a bag of format 2.0.
+    `BagError`: there is no such file, or it is not a bag of format 2.0.
     """
 
     def __init__(self, path: Path):

@@ -66,18 +66,11 @@ def flights(
     events: list[Event],
     end: float,
 ) -> Iterator[Flight]:
-    """Yield the flights of a vehicle.
+    """Yield the flights of a vehicle, from the events that concern it.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    states : list
-        Times (s) and states of its flight, as the takeoff server has published them; where there
-        are none, the phases follow from in_flight, thrust and height.
-    events : list of Event
-        That concern the vehicle.
-    end : float
-        Of the recording, s.
+    ``states`` are times (s) and states of its flight, as the takeoff server has published them;
+    where there are none, the phases follow from in_flight, thrust and height. ``end`` is that of
+    the recording, s.
     """
     known = _phases(sorted(states), end) if states else _guessed(vehicle)
     lasting = (phases for phases in known if phases[-1].end > phases[0].start)

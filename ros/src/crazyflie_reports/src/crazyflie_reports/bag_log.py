@@ -27,17 +27,10 @@ _BUFFER = 8192  # Numbers.
 
 
 class Spool:
-    """Rows of numbers, of which only the newest are in memory.
+    """Rows of numbers, of which only the newest are in memory, and the others in a file.
 
     Each begins with the time of recording (s), the stamp (s; 0 without one) and the number in
-    sequence.
-
-    Parameters
-    ----------
-    path : Path
-        Of a file that is made when it is needed.
-    fields : tuple of str
-        What a row has behind these three.
+    sequence; then it has ``fields``. The file is made when it is needed.
     """
 
     def __init__(self, path: Path, fields: tuple[str, ...]):
@@ -93,10 +86,7 @@ class BagLog:
 def files_of(path: Path) -> list[Path]:
     """Return the files of a recording: those of a folder in their order, or the file itself.
 
-    Raises
-    ------
-    BagError
-        There is no such file or folder, or no bag in the folder.
+    `BagError`: there is no such file or folder, or no bag in the folder.
     """
     if path.is_file():
         return [path]
@@ -120,23 +110,11 @@ def read(
     names: dict[str, str] | None = None,
     progress: Callable[[int], Any] = lambda size: None,
 ) -> BagLog:
-    """Read a recording.
+    """Read a recording: a bag, or a folder of bags that follow each other.
 
-    Parameters
-    ----------
-    path : Path
-        Of a bag, or of a folder of bags that follow each other.
-    folder : Path
-        Where series that are too long for memory are kept as long as the log is used.
-    names : dict, optional
-        By role, a regular expression of topics in place of the documented ones.
-    progress : callable, optional
-        Called with numbers of bytes.
-
-    Raises
-    ------
-    BagError
-        It cannot be read, or has none of the topics.
+    Series that are too long for memory are kept in ``folder`` as long as the log is used. ``names``
+    has, by role, regular expressions of topics in place of the documented ones; ``progress`` is
+    called with numbers of bytes. `BagError`: it cannot be read, or has none of the topics.
     """
     log = BagLog(path.name)
     reader = _Reader(log, folder, names or {})

@@ -144,16 +144,7 @@ class TopicError(Exception):
 def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
     """Return how a connection is read; None if a report does not need it.
 
-    Parameters
-    ----------
-    connection : Connection
-    names : dict
-        By role, a regular expression of names in place of the documented ones.
-
-    Raises
-    ------
-    TopicError
-        Its type has another definition here.
+    For ``names`` see `bag_log.read`. `TopicError`: its type has another definition here.
     """
     for role in ROLES:
         namespace = _namespace(connection.topic, names.get(role.name, role.topics))

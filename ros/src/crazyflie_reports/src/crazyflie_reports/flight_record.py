@@ -132,10 +132,7 @@ class FlightRecord:
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
         """Return mean and maximum distance (m) from a point for ``duration`` s until `hover_end`.
 
-        Raises
-        ------
-        ValueError
-            No state was recorded in that time.
+        ValueError: no state was recorded in that time.
         """
         times, errors = self._hover(point)
         errors = errors[times >= self.hover_end(point) - duration]
@@ -146,12 +143,8 @@ class FlightRecord:
     def touchdown_speed(self) -> float:
         """Return the downward speed at which the vehicle met the ground (m/s).
 
-        The fastest of the last tenth of a second above `GROUND_TOLERANCE`.
-
-        Raises
-        ------
-        ValueError
-            It did not come down.
+        The fastest of the last tenth of a second above `GROUND_TOLERANCE`. ValueError: it did not
+        come down.
         """
         times, heights = self.state.times, self.state.column("z")
         descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))

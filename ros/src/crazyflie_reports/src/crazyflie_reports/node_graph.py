@@ -61,10 +61,7 @@ def dot(published: Registrations, subscribed: Registrations) -> str:
 def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
     """Return publications and subscriptions once all ``expected`` nodes have registered theirs.
 
-    Raises
-    ------
-    TimeoutError
-        They are not, after some time.
+    TimeoutError: they are not, after some time.
     """
     master = rosgraph.Master("/node_graph")
     deadline = time.monotonic() + _LIMIT
@@ -85,10 +82,7 @@ def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
 def example_graph() -> tuple[Registrations, Registrations]:
     """Launch the software example, and return its publications and subscriptions.
 
-    Raises
-    ------
-    TimeoutError
-        Not all nodes are there after some time.
+    TimeoutError: not all nodes are there after some time.
     """
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "sw_hover.log"

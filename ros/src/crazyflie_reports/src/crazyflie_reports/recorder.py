@@ -33,14 +33,8 @@ PARAMETERS = "parameters.yaml"
 def record(folder: Path, topics: str, ros_arguments: list[str]) -> int:
     """Record until the process is told to stop; say what there is then; return the exit status.
 
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    topics : str
-        Regular expression.
-    ros_arguments : list of str
-        For the recording node: its name, remappings.
+    The folder is made if it is not there; ``topics`` is a regular expression; the arguments for the
+    recording node are its name and remappings.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rosparam.dump_params(str(folder / PARAMETERS), "/")

@@ -21,12 +21,8 @@ Pose = tuple[float, Triple, Quaternion]
 class MotionCapture:
     """Poses as they are measured: with noise, some of them late, some never.
 
-    All attributes may be changed at any time.
-
-    Parameters
-    ----------
-    seed : int or sequence of int
-        The same seed gives the same errors to the same poses.
+    All attributes may be changed at any time. The same ``seed`` gives the same errors to the same
+    poses.
     """
 
     def __init__(

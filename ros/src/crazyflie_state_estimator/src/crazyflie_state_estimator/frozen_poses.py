@@ -26,17 +26,8 @@ _CONFIRMATION = 3  #: ... in so many poses in a row.
 class FrozenPoseMonitor:
     """Detects poses that have stopped being those of the vehicle.
 
-    Parameters
-    ----------
-    knows_control : bool
-        Whether the acceleration that the control commands is known. If it is not, only poses
-        that repeat to the last bit are detected, above the lowest one that was seen.
-
-    Attributes
-    ----------
-    departure : Departure or None
-        Where the vehicle is instead of the last pose, if that is the first one that does not
-        respond to the control.
+    Where the acceleration that the control commands is not known, only poses that repeat to the
+    last bit are detected, above the lowest one that was seen.
     """
 
     def __init__(self, knows_control: bool):
@@ -59,6 +50,8 @@ class FrozenPoseMonitor:
         self._time = 0.0
         self._place: Vector | None = None
         self._outside = 0
+        #: Where the vehicle is instead of the last pose, if that is the first one that does not
+        #: respond to the control.
         self.departure: Departure | None = None
         self._response.reset()
 
@@ -67,14 +60,9 @@ class FrozenPoseMonitor:
     ) -> bool:
         """Take a pose; return whether it is not the vehicle's.
 
-        Parameters
-        ----------
-        time : float
-            Its stamp, s, later than the one before.
-        position, rotation : sequence, 3 and 4 components
-            m, fixed frame, and quaternion.
-        acceleration : sequence, 3 components, or None
-            Of the control, m/s^2, fixed frame; None while it is unknown or not that of flight.
+        Its stamp ``time`` (s) is later than the one before; position (m, fixed frame) and rotation
+        (quaternion). ``acceleration`` is the control's, m/s^2, fixed frame; None while it is
+        unknown or not that of flight.
         """
         self.departure = None
         if self._ground is None or (self._knows_control and acceleration is None):

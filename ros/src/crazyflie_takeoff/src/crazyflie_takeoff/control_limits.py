@@ -29,14 +29,9 @@ GAP_MEMORY = 2.0  #: Time constant with which a gap is forgotten, s.
 
 
 def in_range(control: Setpoint, lowest: float) -> Setpoint:
-    """Return a control with roll, pitch, yaw rate and thrust within their ranges.
+    """Return a finite control with roll, pitch, yaw rate and thrust within their ranges.
 
-    Parameters
-    ----------
-    control : Setpoint
-        Finite.
-    lowest : float
-        Least thrust, m/s^2: `MIN_THRUST` in flight.
+    ``lowest`` is the least thrust, m/s^2: `MIN_THRUST` in flight.
     """
     return Setpoint(
         limited(control.roll, MAX_TILT),
@@ -68,16 +63,8 @@ class ClimbLimit:
     ) -> float:
         """Return the thrust that is passed on, m/s^2.
 
-        Parameters
-        ----------
-        thrust, hover : float
-            What is asked for, and what carries the weight, m/s^2.
-        motion : Motion or None
-            None when it is not known.
-        highest : float
-            z that is not to be exceeded, m.
-        is_landing : bool
-            Whether the vehicle is to come down.
+        ``thrust`` is asked for, ``hover`` carries the weight, m/s^2; z is not to exceed ``highest``
+        (m); without a known motion nothing is limited.
         """
         self._complaint = ""
         if motion is None:
@@ -141,15 +128,9 @@ class RunGaps:
     ) -> Setpoint:
         """Return what is passed on of a control.
 
-        Parameters
-        ----------
-        control : Setpoint
-        hover : float
-            Thrust of hover, m/s^2.
-        climb : float
-            z_dot, m/s, which may be ended within a gap; 0 if it is not known.
-        is_ramp : bool
-            Whether it may be of a landing's ramp: then only what is above hover is limited.
+        ``hover`` is the thrust that carries the weight, m/s^2; ``climb`` is z_dot, m/s, which may
+        be ended within a gap; 0 if it is not known. Of a control that may be of a landing's ramp
+        (``is_ramp``), only what is above hover is limited.
         """
         if self._longest <= 0.0:
             return control

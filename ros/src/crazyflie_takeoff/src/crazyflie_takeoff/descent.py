@@ -10,20 +10,9 @@ PRESS_DEPTH = 0.3
 
 
 class Descent:
-    """A reference that sinks at a constant speed.
+    """A reference that sinks at a constant speed (m/s) to the ground (z, m).
 
-    Times are s since the landing began.
-
-    Parameters
-    ----------
-    begin : float
-        When it is at ``position``, s.
-    position : tuple of float
-        m.
-    ground : float
-        z of the ground, m.
-    speed : float
-        m/s.
+    Times are s since the landing began; at ``begin`` it is at ``position`` (m).
     """
 
     def __init__(self, begin: float, position: Position, ground: float, speed: float):

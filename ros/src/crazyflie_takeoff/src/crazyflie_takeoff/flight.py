@@ -91,27 +91,17 @@ class FlightStateMachine:
         self.state = step(TABLE, self.state, event, self._context)
 
     def request(self, event: Event) -> None:
-        """Take the transition of an event.
-
-        Raises
-        ------
-        RefusalError
-            The present state has none.
-        """
+        """Take the transition of an event; `RefusalError` if the present state has none."""
         if not self.accepts(event):
             raise RefusalError(REFUSALS[self.flight_state])
         self.handle(event)
 
     def recover(self, position: Position | None, ground: float) -> None:
-        """Conclude the state of the flight from the filter's report and the position.
+        """Conclude the state of the flight from the filter's report and the measured position (m).
 
-        Parameters
-        ----------
-        position : tuple of float or None
-            Measured x, y, z, m.
-        ground : float
-            Height (z) of the ground that the former server has noted, m. If the filter remembers
-            no flight, it may be of another launch, and the ground is taken to be at z = 0.
+        ``ground`` is the height (z) of the ground that the former server has noted, m. If the
+        filter remembers no flight, it may be of another launch, and the ground is taken to be at z
+        = 0.
         """
         remembered = self.filter.remembered
         self._context.measured = position

@@ -102,12 +102,7 @@ class Delay:
     def excess(self, stamp: float, now: float) -> float:
         """Return how much older than usual the data of a message are, s.
 
-        Parameters
-        ----------
-        stamp : float
-            Of the data, s; zero, or the same again, has no age.
-        now : float
-            By the same clock, s.
+        ``stamp`` and ``now`` are by one clock, s; a stamp of zero, or the same again, has no age.
         """
         if stamp == 0.0 or stamp == self._stamp:
             return 0.0

@@ -88,15 +88,9 @@ class HoverThrust:
         return limited(self._thrust - self._acceleration, HOVER_RANGE * GRAVITY, GRAVITY)
 
     def update(self, step: float, control: Setpoint, speed: float | None) -> None:
-        """Take a control that flies the vehicle.
+        """Take a control that flies the vehicle, ``step`` s after the last one.
 
-        Parameters
-        ----------
-        step : float
-            Since the last one, s.
-        control : Setpoint
-        speed : float or None
-            Measured z_dot, m/s.
+        ``speed`` is the measured z_dot, m/s, or None.
         """
         share = step / (AVERAGING + step)
         vertical = control.thrust * math.cos(control.roll) * math.cos(control.pitch)
@@ -138,16 +132,10 @@ class SafeControl:
         return self._velocity[2]
 
     def advance(self, step: float, measured: Motion | None, sinks: bool) -> Setpoint:
-        """Return the next control.
+        """Return the next control, ``step`` s after the last one.
 
-        Parameters
-        ----------
-        step : float
-            Since the last one, s.
-        measured : Motion or None
-            The latest one; the same object again is one that has been taken already.
-        sinks : bool
-            Whether the vehicle is to come down.
+        ``measured`` is the latest motion; the same object again is one that has been taken already.
+        ``sinks`` is whether the vehicle is to come down.
         """
         self._reckon(step)
         offset = self._offset(measured)

@@ -19,11 +19,7 @@ from crazyflie_utils.transport import Transport
 class ProcessContext:
     """One executor, one clock, one set of topics, one tf buffer.
 
-    Parameters
-    ----------
-    transport : Transport
-    use_sim_time : bool
-        Use simulated time, which stands still until it is set.
+    With ``use_sim_time`` the clock is simulated time, which stands still until it is set.
     """
 
     def __init__(self, transport: Transport, use_sim_time: bool):

@@ -28,12 +28,7 @@ class NodeHandle:
 
     Callbacks run one at a time, also those of several nodes in a process. One that raises is logged
     once with its traceback, `on_fault` has the node made safe, and it will be called again.
-
-    Parameters
-    ----------
-    process : ProcessContext
-    name : str
-        Absolute name of the node, such as /simulator.
+    ``name`` is the node's absolute name, such as /simulator.
     """
 
     def __init__(self, process: ProcessContext, name: str):
@@ -85,13 +80,8 @@ class NodeHandle:
     def load(self, parameters: type[P], on_change: Callable[[P], None] | None = None) -> P:
         """Return the node's own (private) parameters; `ParameterError` about all that is wrong.
 
-        Parameters
-        ----------
-        parameters : type
-            Subclass of `Parameters`.
-        on_change : callable, optional
-            Offers the live ones to dynamic_reconfigure: ``on_change(parameters)`` is called with
-            all of them, checked, after some were changed. It may raise `ParameterError` to refuse.
+        ``on_change(parameters)`` offers the live ones to dynamic_reconfigure: it is called with all
+        of them, checked, after some were changed. It may raise `ParameterError` to refuse.
         """
         source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
         loaded = parameters.read(source.get, source.full_name)
@@ -132,15 +122,10 @@ class NodeHandle:
     ) -> Subscriber:
         """Have ``callback(message)`` called for each message, which is shared: never change it.
 
-        Parameters
-        ----------
-        finite : str, optional
-            A field of the message, such as "control", whose numbers must be finite.
-            Other messages are dropped with a warning, and
-        on_invalid : callable, optional
-            is called instead, without arguments.
-        latest_only : bool, optional
-            Only the latest message is delivered, before the node's next timer or service call.
+        ``finite`` is a field of the message, such as "control", whose numbers must be finite: other
+        messages are dropped with a warning, and ``on_invalid()`` is called instead. With
+        ``latest_only`` only the latest message is delivered, before the node's next timer or
+        service call.
         """
         name = self.resolve(topic)
         if finite:

@@ -13,13 +13,7 @@ _STOP_LIMIT = 2.0  #: How long `Server.stop` waits for the thread, s.
 
 
 class Server(ABC):
-    """A server in real time.
-
-    Parameters
-    ----------
-    sockets : socket
-        Closed by `stop`.
-    """
+    """A server in real time; `stop` closes its sockets."""
 
     switches: Any  #: Its attributes are the live fields of the settings.
 
@@ -56,13 +50,7 @@ class Server(ABC):
 
 
 def open_socket(host: str, port: int) -> socket.socket:
-    """Return a non-blocking UDP socket on a port; 0 for a free one.
-
-    Raises
-    ------
-    OSError
-        The text names host and port.
-    """
+    """Return a non-blocking UDP socket on a port, 0 for a free one; OSError names host and port."""
     result = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         result.bind((host, port))

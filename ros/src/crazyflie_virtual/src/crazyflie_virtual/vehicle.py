@@ -29,10 +29,7 @@ _LOGGER = logging.getLogger(__name__)
 class VirtualVehicle:
     """Body, battery, radio chip and microcontroller.
 
-    Raises
-    ------
-    ParameterError
-        The world file is missing or wrong.
+    `ParameterError`: the world file is missing or wrong.
     """
 
     def __init__(self, settings: VehicleSettings):
@@ -85,13 +82,7 @@ class VirtualVehicle:
             return []
 
     def advance_to(self, time: float) -> list[bytes]:
-        """Advance to the last whole step before ``time`` (s).
-
-        Returns
-        -------
-        list of bytes
-            Datagrams for the client that answer no request.
-        """
+        """Advance to the last whole step before ``time`` (s); return unasked datagrams."""
         datagrams = []
         for _ in range(math.floor(time / STEP + 1e-6) - self._steps):
             datagrams += self._step()

@@ -40,19 +40,10 @@ class Shape:
         raise NotImplementedError
 
     def interval(self, origins: Vectors, directions: Vectors) -> Interval:
-        """Return how far along rays the shape begins and ends.
+        """Return how far along rays the shape begins and ends, in lengths of the directions.
 
-        Parameters
-        ----------
-        origins : ndarray, shape (..., 3)
-            In the world's frame, m.
-        directions : ndarray, shape (..., 3)
-            None of them 0.
-
-        Returns
-        -------
-        tuple of ndarray, shape (...,)
-            In lengths of the directions; both are negative for what is behind the origin.
+        Origins (m) and directions, of shape (..., 3), are in the world's frame; no direction is 0.
+        Both distances are negative for what is behind the origin.
         """
         raise NotImplementedError
 
@@ -148,21 +139,11 @@ def wall(
 def cast(
     shapes: tuple[Shape, ...], origins: ArrayLike, directions: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return what rays meet first, and how far away it is.
+    """Return how far away what rays meet first is, m, and its index; infinite and -1 for nothing.
 
-    Parameters
-    ----------
-    shapes : tuple of Shape
-    origins, directions : array_like, shape (..., 3)
-        Of the rays, in the world's frame; one origin may serve all. Directions have the
-        length 1, or else distances are in their lengths.
-
-    Returns
-    -------
-    distances : ndarray, shape (...,)
-        m; infinite where nothing is met, 0 within a shape.
-    indices : ndarray of int, shape (...,)
-        Into ``shapes``; -1 where nothing is met.
+    Origins and directions, of shape (..., 3), are in the world's frame; one origin may serve all.
+    Directions have the length 1, or else distances are in their lengths. Within a shape the
+    distance is 0.
     """
     origins, directions = np.broadcast_arrays(
         np.asarray(origins, dtype=float), np.asarray(directions, dtype=float)

@@ -157,10 +157,7 @@ class WorldFile(ParameterType):
 def load(path: str | FilePath) -> World:
     """Return the world in a file.
 
-    Raises
-    ------
-    ParameterError
-        About everything that is wrong in it: file, line and what was expected.
+    `ParameterError` is about everything that is wrong in it: file, line and what was expected.
     """
     file = yaml_file.load(path)
     settings = file.read(WorldParameters, besides=("objects",))

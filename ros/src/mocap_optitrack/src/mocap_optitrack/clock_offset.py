@@ -67,12 +67,8 @@ class ClockOffset:
     def update(self, sent: float, arrival: float) -> FrameOrder:
         """Process a message and return what it is.
 
-        Parameters
-        ----------
-        sent : float
-            s of the server's clock.
-        arrival : float
-            s of the local clock; never before that of the last message.
+        It was sent at a time of the server's clock, s, and arrived at one of the local clock, never
+        before the last message.
         """
         difference = arrival - sent
         order = self._classify(sent, difference)
@@ -101,10 +97,7 @@ class ClockOffset:
     def to_local(self, moment: float) -> float:
         """Return a moment of the server's clock (s) by the local clock (s).
 
-        Raises
-        ------
-        ValueError
-            Not enough messages have come; see `is_settled`.
+        ValueError: not enough messages have come; see `is_settled`.
         """
         if self._offset is None:
             raise ValueError("the offset of the server's clock has not settled yet")

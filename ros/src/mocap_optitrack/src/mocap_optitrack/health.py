@@ -41,16 +41,7 @@ class Status(NamedTuple):
 
 
 class Health:
-    """Counts what happens between two reports.
-
-    Parameters
-    ----------
-    bodies : sequence of bodies.Body
-    stale_after : float
-        Gaps longer than this are a fault, s.
-    now : float
-        s.
-    """
+    """Counts what happens between two reports; ``now`` is the time at the beginning, s."""
 
     _longest_gap: float
 

@@ -34,17 +34,10 @@ class MotionLimits(NamedTuple):
 class MarkerMotion:
     """Constant-velocity Kalman filter of a marker; its three axes have one covariance.
 
-    The acceleration is constant from one measurement to the next, and independent of that
-    before (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
-    Navigation, 2001, section 6.3.2, discrete white noise acceleration).
-
-    Parameters
-    ----------
-    time : float
-        Of the first measurement, s.
-    position : (3,) array
-        m.
-    limits : MotionLimits
+    The acceleration is constant from one measurement to the next, and independent of that before
+    (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
+    section 6.3.2, discrete white noise acceleration). The first measurement was made at ``time``
+    (s), of a ``position`` (3,) in m.
     """
 
     def __init__(self, time: float, position: Point, limits: MotionLimits):

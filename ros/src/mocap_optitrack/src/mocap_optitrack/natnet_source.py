@@ -32,17 +32,10 @@ _ALL_INTERFACES = "0.0.0.0"
 class NatNetSource(Source):
     """A NatNet server, unicast or multicast as the server has it.
 
-    UDP is not authenticated, and every machine in the network can send to the ports. Only
-    datagrams from the server's address count: the configured one, else that of the first
-    server that answers, else that of the first frame of the group.
-
-    Parameters
-    ----------
-    parameters : NatNetParameters
-    clock : callable
-        Returns the local time, s.
-    warn : callable
-        Called with a text about every datagram that is dropped.
+    UDP is not authenticated, and every machine in the network can send to the ports. Only datagrams
+    from the server's address count: the configured one, else that of the first server that answers,
+    else that of the first frame of the group. ``clock()`` returns the local time, s; ``warn(text)``
+    is called about every datagram that is dropped.
     """
 
     def __init__(

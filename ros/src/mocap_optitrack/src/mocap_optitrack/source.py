@@ -28,21 +28,13 @@ class Source(ABC):
 
     @abstractmethod
     def open(self) -> str:
-        """Connect, within a few seconds, and return to what.
-
-        Raises
-        ------
-        SourceError
-        """
+        """Connect, within a few seconds, and return to what; or raise `SourceError`."""
 
     @abstractmethod
     def read(self, limit: float) -> Frame | None:
         """Return the next frame; None if there is none within ``limit`` seconds or so.
 
-        Raises
-        ------
-        SourceError
-            The connection has ended.
+        `SourceError`: the connection has ended.
         """
 
     @property

@@ -38,24 +38,11 @@ class BodyPose(NamedTuple):
 class Tracker:
     """Finds the configured bodies in frames and drops what is invalid or stale.
 
-    A frame counts once: one that is not newer than the last one is dropped. So is one
-    that is older than ``stale_after`` on arrival, or from the future, or from another
-    server's clock. Of a frame, bodies are dropped that were not tracked or whose pose
-    is none.
-
-    Parameters
-    ----------
-    bodies : sequence of Body
-    up_axis : str
-        Of the stream; see `axes.UP_AXES`.
-    stale_after : float
-        s.
-    health : Health
-        Counts what happens.
-    hold_time : float
-        Of a `MarkerTracker` of single markers, s.
-    log : callable
-        Likewise.
+    A frame counts once: one that is not newer than the last one is dropped. So is one that is older
+    than ``stale_after`` (s) on arrival, or from the future, or from another server's clock. Of a
+    frame, bodies are dropped that were not tracked or whose pose is none. ``up_axis`` is the
+    stream's, see `axes.UP_AXES`; ``health`` counts what happens; ``hold_time`` (s) and ``log`` are
+    those of a `MarkerTracker`.
     """
 
     def __init__(

@@ -57,15 +57,9 @@ class Crazyflie:
     """A vehicle of the driver, or a simulated one; the constructor blocks until it is there.
 
     A command returns when the vehicle has received it, not when it has been carried out. Every
-    method raises `rospy.ServiceException` when the driver refuses.
-
-    Parameters
-    ----------
-    prefix : str
-        The vehicle's namespace, its tf_prefix.
-    tf : str or tf.TransformListener or tf2_ros.Buffer
-        For `position` only: the vehicle's tf frame; or a listener or buffer, which is asked for
-        the frame ``prefix``.
+    method raises `rospy.ServiceException` when the driver refuses. ``prefix`` is the vehicle's
+    namespace, its tf_prefix; ``tf`` is for `position` only: the vehicle's tf frame, or a
+    tf.TransformListener or tf2_ros.Buffer, which is asked for the frame ``prefix``.
     """
 
     # The names of arguments, here and below, are those of scripts that exist.

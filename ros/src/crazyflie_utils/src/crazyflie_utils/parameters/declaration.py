@@ -92,17 +92,9 @@ class Parameters:
     def read(cls, get: Callable[[str], Any], full_name: Callable[[str], str] = str) -> Self:
         """Return the parameters that a source holds, all of them checked.
 
-        Parameters
-        ----------
-        get : callable
-            ``get(name)`` returns the raw value of a parameter, or raises KeyError.
-        full_name : callable
-            ``full_name(name)`` is how messages call it.
-
-        Raises
-        ------
-        ParameterError
-            About everything that is missing or not what is expected.
+        ``get(name)`` returns the raw value of a parameter, or raises KeyError; ``full_name(name)``
+        is how messages call it. `ParameterError` is about everything that is missing or not what is
+        expected.
         """
         values: dict[str, Any] = {}
         complaints: list[str] = []

@@ -25,11 +25,8 @@ P = TypeVar("P", bound=Parameters)
 def load(path: str | Path) -> "Entry":
     """Return the content of a file, which is a mapping.
 
-    Raises
-    ------
-    ParameterError
-        It cannot be read, is no YAML, no mapping, has a key twice, or is larger than a file of
-        settings can be: see `yaml_loader`.
+    `ParameterError`: it cannot be read, is no YAML, no mapping, has a key twice, or is larger than
+    a file of settings can be, see `yaml_loader`.
     """
     try:
         text = read_text(path, MAX_SIZE)

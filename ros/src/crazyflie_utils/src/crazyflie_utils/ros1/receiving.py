@@ -146,13 +146,8 @@ class Inbox:
 def harden(connection: Any, report: Report, limits_rate: bool) -> None:
     """Have one connection to a publisher, which is not connected yet, receive by an `Inbox`.
 
-    Parameters
-    ----------
-    connection : rospy.impl.tcpros_base.TCPROSTransport
-    report : callable
-    limits_rate : bool
-        Decode only the last message of every 5 ms in a flood of more than `MAX_RATE`; all of them,
-        every 5 ms, of a message type with the attribute ``lossless``.
+    With ``limits_rate`` only the last message of every 5 ms is decoded in a flood of more than
+    `MAX_RATE`; all of them, every 5 ms, of a message type with the attribute ``lossless``.
     """
     inbox: list[Inbox] = []
 

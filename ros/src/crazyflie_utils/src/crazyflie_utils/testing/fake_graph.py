@@ -26,12 +26,8 @@ _MAX_WAITING = 100
 class FakeGraph:
     """Processes with a node each, and the connections between them.
 
-    Parameters
-    ----------
-    parameters : dict
-        Full name to raw value, for all processes.
-    start : float
-        Time at the beginning, s.
+    ``parameters`` are those of all processes, full name to raw value; ``start`` is the time at the
+    beginning, s.
     """
 
     def __init__(self, parameters: dict[str, object], start: float = 100.0):
@@ -48,13 +44,7 @@ class FakeGraph:
     # The processes.
 
     def start(self, name: str, node: Node) -> None:
-        """Start a process with one node.
-
-        Raises
-        ------
-        RuntimeError
-            The node could not be initialized.
-        """
+        """Start a process with one node; RuntimeError if the node could not be initialized."""
         process = self._processes[name] = _GraphProcess(name, self, self._parameters)
         if not process.launch(node, name):
             raise RuntimeError(f"{name} was not initialized: {self.log[-1:]}")

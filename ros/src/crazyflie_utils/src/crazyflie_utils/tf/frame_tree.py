@@ -44,16 +44,9 @@ class _Frame:
 class FrameTree:
     """Frames, their poses and parents. Not for several threads at once.
 
-    Parameters
-    ----------
-    codec : PoseCodec
-    warn : callable
-        ``warn(text, key)`` is called about every transform that is dropped; with the same key
-        it is for the same reason.
-    ahead : float
-        How far the stamp of a transform may be ahead of now, s.
-    on_new : callable
-        ``on_new(pose)`` is called with every pose that is the latest of its frame.
+    ``warn(text, key)`` is called about every transform that is dropped; with the same key it is for
+    the same reason. ``ahead`` is how far the stamp of a transform may be ahead of now, s.
+    ``on_new(pose)`` is called with every pose that is the latest of its frame.
     """
 
     def __init__(
@@ -94,10 +87,7 @@ class FrameTree:
     def lookup(self, target: str, source: str, stamp: int = 0) -> StampedPose:
         """Return the pose of frame ``source`` in ``target`` at a ROS time (ns), or the latest.
 
-        Raises
-        ------
-        TransformError
-            A frame is unknown, the two are not connected, or not at that time.
+        `TransformError`: a frame is unknown, the two are not connected, or not at that time.
         """
         # tf2 need not begin as long as it would know no answer.
         for name in (target, source):

@@ -96,10 +96,7 @@ class PoseCodec:
     def decode(self, raw: bytes, start: int, end: int) -> StampedPose:
         """Return what is between two places of a serialized message, as `entries` names them.
 
-        Raises
-        ------
-        UnicodeDecodeError
-            A name is no text.
+        UnicodeDecodeError: a name is no text.
         """
         _, seconds, nanoseconds, length = _HEADER.unpack_from(raw, start)
         names = raw[start + _HEADER.size - _LENGTH.size : end - _POSE.size]
@@ -134,10 +131,7 @@ class PoseCodec:
 def entries(raw: bytes) -> Iterator[tuple[bytes, int, int]]:
     """Yield child frame, start and end of every transform of a serialized TFMessage.
 
-    Raises
-    ------
-    struct.error, ValueError
-        It is shorter than it says.
+    struct.error or ValueError: it is shorter than it says.
     """
     (count,) = _LENGTH.unpack_from(raw)
     start = _LENGTH.size

@@ -19,13 +19,7 @@ LOW_CHARGE = 0.055
 
 
 class Battery:
-    """One lithium-polymer cell.
-
-    Parameters
-    ----------
-    charge : float
-        State of charge at the beginning, 0 to 1.
-    """
+    """One lithium-polymer cell; ``charge`` is the state of charge, 0 to 1."""
 
     def __init__(self, charge: float = 1.0):
         self.charge = charge
@@ -35,12 +29,8 @@ class Battery:
     def step(self, dt: float, load: float) -> None:
         """Drain for ``dt`` (s).
 
-        Parameters
-        ----------
-        dt : float
-        load : float
-            Mean of the third powers of the rotor speeds over the hover speed's:
-            the power of a rotor goes with the third power of its speed.
+        ``load`` is the mean of the third powers of the rotor speeds over the hover speed's: the
+        power of a rotor goes with the third power of its speed.
         """
         self.current = _IDLE_CURRENT + _HOVER_CURRENT * load
         self.charge = max(0.0, self.charge - self.current * dt / _CAPACITY)

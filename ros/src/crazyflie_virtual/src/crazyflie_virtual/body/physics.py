@@ -29,17 +29,9 @@ _OVERTURNING = 0.5  #: Cosine of the tilt on the ground beyond which a vehicle l
 
 
 class Physics:
-    """Rigid body, four motors, ground.
+    """Rigid body, four motors, ground; it begins at a position (m) and heading (rad).
 
-    Parameters
-    ----------
-    position : sequence, 3 components
-        m.
-    yaw : float
-        rad.
-    mass_error, thrust_error : float
-        How much more mass and thrust the vehicle has than it should, as a
-        fraction.
+    The errors are how much more mass and thrust the vehicle has than it should, as a fraction.
     """
 
     def __init__(

@@ -22,13 +22,7 @@ _DIRECTIONS: dict[str, Triple] = {
 class RangingSensors:
     """Distances, mm, as whole numbers; 0 where there is no sensor.
 
-    Parameters
-    ----------
-    physics : Physics
-    has_multiranger : bool
-        Whether there are sensors to all sides and up.
-    has_flow_deck : bool
-        Whether there is one down.
+    A multiranger has sensors to all sides and up, a flow deck has one down.
     """
 
     def __init__(self, physics: Physics, has_multiranger: bool, has_flow_deck: bool):

@@ -23,15 +23,7 @@ _NOISE_SAMPLES = 8191
 
 
 class Sensors:
-    """What the vehicle measures of itself.
-
-    Parameters
-    ----------
-    noise : bool
-        Whether there is any.
-    seed : int
-        Of the noise.
-    """
+    """What the vehicle measures of itself, with noise or without; ``seed`` is the noise's."""
 
     def __init__(self, noise: bool = True, seed: int = 0):
         source = random.Random(seed)
@@ -48,15 +40,7 @@ class Sensors:
         self.temperature = 25.0
 
     def sample_inertial(self, rates: Triple, specific_force: Triple) -> None:
-        """Measure.
-
-        Parameters
-        ----------
-        rates : tuple, 3 components
-            Body rates, rad/s.
-        specific_force : tuple, 3 components
-            Acceleration without gravity's, m/s^2, body frame.
-        """
+        """Measure body rates, rad/s, and acceleration without gravity's, m/s^2, body frame."""
         start = self._next
         self._next = start + 6 if start + 12 <= _NOISE_SAMPLES else (start + 6) % 7
         n = self._noise[start : start + 6]

@@ -56,17 +56,9 @@ class AttitudeController:
         )
 
     def outputs(self, rates: Triple, gyro: Triple) -> Triple:
-        """Return the outputs about roll, pitch and yaw that lead to body rates.
+        """Return the outputs about roll, pitch and yaw that lead to body rates, PWM.
 
-        Parameters
-        ----------
-        rates, gyro : tuple, 3 components
-            Desired and measured, deg/s, pitch in the firmware's sign.
-
-        Returns
-        -------
-        tuple of float
-            PWM.
+        Rates desired and measured (``gyro``) are in deg/s, pitch in the firmware's sign.
         """
         return (
             _or_zero(self.roll_rate.update(rates[0], gyro[0])),

@@ -34,13 +34,7 @@ _REVERSION_TIME = 10.0
 
 
 class Estimator:
-    """Estimate of position, velocity and attitude.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        Updated in place.
-    """
+    """Estimate of position, velocity and attitude, updated in place."""
 
     def __init__(self, estimate: Estimate):
         self._estimate = estimate

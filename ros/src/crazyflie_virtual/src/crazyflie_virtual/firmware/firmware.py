@@ -34,17 +34,10 @@ _POSITION_PERIOD = POSITION_STEPS * STEP
 class Firmware:
     """From packets to motor commands.
 
-    Parameters
-    ----------
-    physics : Physics
-        Measured by the sensors.
-    faults : FaultSwitches
-        Also firmware parameters of the group ``virtual``.
-    settings : VehicleSettings
-    failure : str
-        The assertion that has caused this restart. The firmware then does not
-        pass its self test: it answers the client and does not fly (system.c of
-        the firmware) until the power is switched off and on.
+    The sensors measure ``physics``; ``faults`` are also firmware parameters of the group
+    ``virtual``. ``failure`` is the assertion that has caused this restart: the firmware then does
+    not pass its self test; it answers the client and does not fly (system.c of the firmware) until
+    the power is switched off and on.
     """
 
     def __init__(

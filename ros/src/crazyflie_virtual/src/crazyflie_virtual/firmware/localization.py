@@ -16,16 +16,7 @@ _DECK_ATTITUDE_DEVIATION = 0.003  #: rad.
 
 
 class Localization:
-    """Corrects the estimator.
-
-    Parameters
-    ----------
-    estimator : Estimator
-    physics : Physics
-        Measured by the deck.
-    has_deck : bool
-        Whether the vehicle carries a positioning deck.
-    """
+    """Corrects the estimator by external measurements, and by those of a positioning deck."""
 
     def __init__(self, estimator: Estimator, physics: Physics, has_deck: bool):
         self._estimator = estimator

@@ -8,16 +8,9 @@ from crazyflie_model.pid import Gains, terms
 class FirmwarePid:
     """PID with feed-forward; the derivative is that of the measurement.
 
-    Parameters
-    ----------
-    gains : Gains
-        To begin with: a client may change them.
-    dt : float
-        Time between two updates, s.
-    kff : float
-        Output per desired value.
-    output_limit : float
-        Of the output's magnitude; 0 for none.
+    ``gains`` hold to begin with: a client may change them. ``dt`` is the time between two updates,
+    s; ``kff`` the output per desired value; ``output_limit`` that of the output's magnitude, 0 for
+    none.
     """
 
     def __init__(self, gains: Gains, dt: float, kff: float = 0.0, output_limit: float = 0.0):
@@ -38,14 +31,7 @@ class FirmwarePid:
         self._last = None
 
     def update(self, desired: float, measured: float, error: float | None = None) -> float:
-        """Return the output.
-
-        Parameters
-        ----------
-        desired, measured : float
-        error : float, optional
-            In the place of their difference, where it has to be wrapped.
-        """
+        """Return the output; ``error`` replaces a difference that has to be wrapped."""
         self.desired = desired
         if error is None:
             error = desired - measured

@@ -164,15 +164,8 @@ class Planner:
     def define(self, trajectory_id: int, location: int, kind: int, offset: int, pieces: int) -> int:
         """Define where a trajectory is; whether there is one shows at its start.
 
-        Parameters
-        ----------
-        trajectory_id : int
-        location, kind : int
-            Only `IN_MEMORY`, and `POLYNOMIALS` or `COMPRESSED`, can be flown.
-        offset : int
-            In the memory, bytes.
-        pieces : int
-            Without meaning for one that is compressed.
+        Only `IN_MEMORY`, and `POLYNOMIALS` or `COMPRESSED`, can be flown. The offset in the memory
+        is in bytes; ``pieces`` has no meaning for one that is compressed.
         """
         if trajectory_id >= DEFINITIONS:
             return errno.ENOEXEC

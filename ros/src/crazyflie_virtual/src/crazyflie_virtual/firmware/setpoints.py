@@ -38,15 +38,9 @@ class AttitudeDecoder:
     def decode(self, data: bytes, priority: int, time: float) -> Setpoint | None:
         """Return the setpoint; None when the packet is not one.
 
-        Parameters
-        ----------
-        data : bytes
-            Roll, pitch in deg or deg/s, yaw rate in deg/s, clockwise positive,
-            thrust in PWM.
-        priority : int
-            Of the present setpoint: the lock closes where there is none.
-        time : float
-            s.
+        The packet has roll and pitch in deg or deg/s, yaw rate in deg/s, clockwise positive, and
+        thrust in PWM. ``priority`` is that of the present setpoint: the lock closes where there is
+        none.
         """
         # The firmware does not check the size, and would continue with what an
         # earlier packet has left in the memory behind a short one.
@@ -67,19 +61,9 @@ class AttitudeDecoder:
 
 
 def decode_generic(data: bytes, time: float) -> Setpoint | None:
-    """Return a generic setpoint, port 7; None for a type that there is not.
+    """Return a generic setpoint, port 7, of type and payload; None for a type that there is not.
 
-    Parameters
-    ----------
-    data : bytes
-        Type and payload.
-    time : float
-        s.
-
-    Raises
-    ------
-    FirmwareAssertionError
-        For a payload of a wrong size.
+    `FirmwareAssertionError`: the payload has a wrong size.
     """
     decoder = _DECODERS.get(data[0]) if data else None
     if decoder is None:

@@ -39,13 +39,7 @@ class MotorOverride:
 
 
 class Stabilizer:
-    """The controllers of one vehicle.
-
-    Parameters
-    ----------
-    idle_thrust : int
-        To begin with.
-    """
+    """The controllers of one vehicle."""
 
     def __init__(self, idle_thrust: int = 0) -> None:
         self.controller = PID  #: `DEFAULT`, `PID` or `MELLINGER`.
@@ -73,14 +67,8 @@ class Stabilizer:
     ) -> MotorCommands:
         """Return the motor commands.
 
-        Parameters
-        ----------
-        setpoint, estimate, sensors
-            Inputs of the controllers.
-        with_position : bool
-            Whether the position controller runs in this step.
-        may_run : bool
-            Whether the supervisor lets motors run.
+        The position controller runs in a step ``with_position``; ``may_run`` is whether the
+        supervisor lets motors run.
         """
         if self.controller != self._last_controller:
             self._last_controller = self.controller

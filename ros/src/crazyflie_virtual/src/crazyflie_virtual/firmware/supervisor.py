@@ -21,15 +21,10 @@ _IN_AIR = (State.FLYING, State.WARNING_LEVEL_OUT)
 
 
 class Supervisor:
-    """Decides whether the motors may run.
+    """Decides whether the motors may run; ``write_line(text)`` prints on the console.
 
-    Parameters
-    ----------
-    write_line : callable
-        ``write_line(text)`` prints on the console.
-    auto_arm : bool
-        Arm when the checks have passed, as a Crazyflie 2.1 does; otherwise
-        the client arms, as with brushless motors.
+    With ``auto_arm`` it arms when the checks have passed, as a Crazyflie 2.1 does; otherwise the
+    client arms, as with brushless motors.
     """
 
     def __init__(self, write_line: Callable[[str], None], auto_arm: bool = True):
@@ -100,16 +95,9 @@ class Supervisor:
         self._watchdog_time = time
 
     def update(self, time: float, sensors: Sensors, setpoint_age: float, motors_run: bool) -> None:
-        """Update the state at ``time`` (s).
+        """Update the state at ``time`` (s), with a setpoint of some age (s).
 
-        Parameters
-        ----------
-        time : float
-        sensors : Sensors
-        setpoint_age : float
-            s.
-        motors_run : bool
-            Whether any motor is commanded more than idle.
+        ``motors_run`` is whether any motor is commanded more than idle.
         """
         if motors_run:
             self._thrust_time = time

@@ -11,14 +11,7 @@ Item = tuple[bytes, Address]  #: Datagram, and its sender or receiver.
 
 
 class Channel:
-    """Datagrams on their way.
-
-    Parameters
-    ----------
-    faults : FaultSwitches
-    random : random.Random
-        Decides what is lost.
-    """
+    """Datagrams on their way; ``random`` decides which are lost."""
 
     def __init__(self, faults: FaultSwitches, random: Random):
         self._faults = faults

@@ -32,13 +32,7 @@ class Packet(NamedTuple):
     data: bytes  #: At most `MAX_DATA`.
 
     def encode(self) -> bytes:
-        """Return the packet as a datagram.
-
-        Raises
-        ------
-        ValueError
-            There is too much data for one packet.
-        """
+        """Return the packet as a datagram; ValueError if there is too much data for one."""
         if len(self.data) > MAX_DATA:
             raise ValueError(f"a packet holds {MAX_DATA} bytes, got {len(self.data)}")
         return bytes([self.port << 4 | _RESERVED | self.channel]) + self.data

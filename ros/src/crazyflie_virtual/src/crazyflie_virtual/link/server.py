@@ -21,18 +21,9 @@ _NULL = b"\xff"  #: What a scanner sends: it is no client.
 
 
 class VehicleServer(Server):
-    """A vehicle behind a socket.
+    """A vehicle behind a socket; OSError if the port is taken.
 
-    Parameters
-    ----------
-    settings : VehicleSettings
-    warn : callable
-        ``warn(text)`` is called when the vehicle cannot keep up with the clock.
-
-    Raises
-    ------
-    OSError
-        The port is taken.
+    ``warn(text)`` is called when the vehicle cannot keep up with the clock.
     """
 
     def __init__(self, settings: VehicleSettings, warn: Callable[[str], None] = lambda text: None):

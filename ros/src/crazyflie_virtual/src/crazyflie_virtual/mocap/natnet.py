@@ -48,13 +48,7 @@ def parse(datagram: bytes) -> tuple[int, bytes] | None:
 
 
 class Encoder:
-    """Writes the messages of one version.
-
-    Parameters
-    ----------
-    version : str
-        One of `VERSIONS`.
-    """
+    """Writes the messages of one version, of `VERSIONS`."""
 
     def __init__(self, version: str):
         self._parts = tuple(int(part) for part in version.split("."))
@@ -103,17 +97,9 @@ class Encoder:
     ) -> bytes:
         """Return a frame.
 
-        Parameters
-        ----------
-        number : int
-            Of the frame.
-        bodies : sequence of BodyPose
-        exposure, received, sent : float
-            Middle of the cameras' exposure, arrival of their data, dispatch of the frame; s
-            of the server's clock.
-        markers : sequence of tuple
-            Markers of no rigid body, m. Motive sends them twice: as other markers, and flagged
-            as unlabelled among the labelled ones.
+        Middle of the cameras' exposure, arrival of their data and dispatch of the frame are s of
+        the server's clock. ``markers`` are those of no rigid body, m; Motive sends them twice: as
+        other markers, and flagged as unlabelled among the labelled ones.
         """
         rigid_bodies = b"".join(self._rigid_body(body) for body in bodies)
         others = b"".join(struct.pack("<3f", *marker) for marker in markers)

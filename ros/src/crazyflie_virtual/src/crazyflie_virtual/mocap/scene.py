@@ -40,17 +40,9 @@ def is_listed(body_id: int, text: str) -> bool:
 class Scene:
     """Rigid bodies, as observed last.
 
-    Parameters
-    ----------
-    switches : MocapSwitches
-    position_noise, attitude_noise : float
-        Standard deviations along and about each axis, m and rad.
-    seed : int
-    single_markers : str
-        Numbers of the vehicles with one marker, separated by commas; or "all". They are no rigid
-        bodies.
-    rate : float
-        Frames per second.
+    The noise is in standard deviations along and about each axis, m and rad. ``single_markers`` are
+    numbers of the vehicles with one marker, separated by commas, or "all": they are no rigid
+    bodies. ``rate`` is in frames per second.
     """
 
     def __init__(

@@ -21,18 +21,9 @@ _LONGEST_WAIT = 0.1  #: s.
 
 
 class MocapServer(Server):
-    """Streams what a `Scene` shows.
+    """Streams what a `Scene` shows; OSError if a port is taken, or an address is none.
 
-    Parameters
-    ----------
-    settings : MocapSettings
-    warn : callable, optional
-        Not used: the server does not fall behind.
-
-    Raises
-    ------
-    OSError
-        A port is taken, or an address is none.
+    ``warn`` is not used: the server does not fall behind.
     """
 
     def __init__(self, settings: MocapSettings, warn: Callable[[str], None] | None = None):

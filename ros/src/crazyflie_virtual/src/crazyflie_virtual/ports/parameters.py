@@ -47,13 +47,7 @@ class Parameter:
         return self._owner is not None
 
     def set(self, value: float) -> None:
-        """Change the value.
-
-        Raises
-        ------
-        ValueError
-            It is out of its limits; the text says so.
-        """
+        """Change the value; ValueError if it is out of its limits."""
         low, high = self.spec.limits
         if not low <= value <= high and self.spec.limits != NO_LIMITS:
             raise ValueError(f"is {low:g} to {high:g}, not {value:g}")
@@ -74,11 +68,7 @@ class Parameter:
 class ParameterPort:
     """Reads and writes parameters, and stores the persistent ones.
 
-    Parameters
-    ----------
-    firmware : Firmware
-    stored : dict
-        Full name -> value; outlives a restart of the vehicle. Applied at once.
+    What is ``stored``, by full name, outlives a restart of the vehicle; it is applied at once.
     """
 
     def __init__(self, firmware: Firmware, stored: dict[str, float]):

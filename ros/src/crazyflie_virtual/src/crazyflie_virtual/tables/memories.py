@@ -20,17 +20,9 @@ LED_TIMINGS_SIZE = 40  #: Ten steps of 4 bytes.
 
 
 class Memory:
-    """One memory.
+    """One memory with a serial number of 8 bytes; one of type bytes cannot be written.
 
-    Parameters
-    ----------
-    memory_type : int
-    buffer : bytes or bytearray
-        The content; bytes cannot be written.
-    serial : bytes
-        8 bytes.
-    size : int, optional
-        What clients see, bytes; that of the buffer by default.
+    ``size`` is what clients see, bytes; that of the buffer by default.
     """
 
     def __init__(
@@ -88,10 +80,7 @@ class MemoryTester(Memory):
 class LighthouseMemory(Memory):
     """Geometry and calibration of base stations; kept, but nothing is located with them.
 
-    Parameters
-    ----------
-    stored : dict
-        Page -> content, which outlives a restart.
+    What is ``stored``, by page, outlives a restart.
     """
 
     STATIONS = 4  #: As many as the firmware is built for unless it is configured otherwise.
@@ -151,13 +140,7 @@ def memories(
 ) -> list[Memory]:
     """Return all memories in the order of their numbers.
 
-    Parameters
-    ----------
-    eeprom, trajectories : bytearray
-    tester : MemoryTester
-    lighthouse : LighthouseMemory
-    one_wire : iterable of (bytes, bytearray)
-        Serial number and content of the decks' memories.
+    ``one_wire`` has serial number and content of the decks' memories.
     """
     return [
         Memory(EEPROM, eeprom, EEPROM_SERIAL),

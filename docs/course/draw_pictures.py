@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import rosgraph
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 from PIL import Image
 
 from crazyflie_dev.render_rviz import background_of, crop_to_scene
@@ -74,6 +75,33 @@ def draw_figure_eight(path: Path, log: Path) -> None:
     axes.invert_xaxis()
     axes.set(xlabel="y (m)", ylabel="x (m)", aspect="equal")
     axes.grid(alpha=0.3)
+    figure.savefig(path, dpi=90)
+
+
+def draw_lanes(path: Path, _log: Path) -> None:
+    """Draw the lanes of lesson 6, and the oscillator's velocity along one of them."""
+    sys.path.insert(0, str(COURSE / "solutions" / "6" / "my_sweep" / "src"))
+    from my_sweep.lanes import corners
+    from my_sweep.oscillator import velocity
+    from my_sweep.sweep_node import AREA, WIDTH
+
+    figure = Figure(figsize=(8, 3.4), layout="constrained")
+    plan, graph = figure.subplots(1, 2)
+    lanes = np.array([(0.0, 0.0), *corners(AREA, WIDTH)])
+    plan.add_patch(Rectangle((-1.5, -1.5), 3.0, 3.0, color="0.93"))
+    arrow = {"arrowstyle": "-|>", "color": "C0"}
+    for p, q in zip(lanes, lanes[1:], strict=False):
+        plan.plot(*zip(p, q, strict=True), color="C0")
+        plan.annotate("", (0.4 * p + 0.6 * q), (0.6 * p + 0.4 * q), arrowprops=arrow)
+    plan.plot(0.0, 0.0, "o", color="C2")
+    plan.annotate("take off", (0.0, 0.0), (6, 6), textcoords="offset points")
+    plan.plot(*lanes[-1], "s", color="C3")
+    plan.annotate("land", lanes[-1], (-30, 8), textcoords="offset points")
+    plan.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="the path, seen from above")
+    x = np.linspace(2.0, 9.0, 100)
+    graph.plot(x, [velocity(value) for value in x])
+    graph.set(xlabel="x of the service", ylabel="vel", title="what the service answers")
+    graph.grid(alpha=0.3)
     figure.savefig(path, dpi=90)
 
 
@@ -176,6 +204,7 @@ def draw_pole(path: Path, log: Path) -> None:
 
 PICTURES = {
     "figure_eight": draw_figure_eight,
+    "lanes": draw_lanes,
     "sweep": draw_sweep,
     "pole": draw_pole,
     "steps": draw_steps,

@@ -5,7 +5,6 @@ import math
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from crazyflie_driver import battery
-from crazyflie_driver.flight_state import NOT_FLYABLE
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import VehicleStatus
 
@@ -32,7 +31,7 @@ def findings(status: VehicleStatus) -> list[tuple[int, str]]:
     if status.link != VehicleStatus.CONNECTED:
         level = warn if status.link == VehicleStatus.CONNECTING else error
         found.append((level, status.link_text))
-    faults = SupervisorState(status.supervisor) & NOT_FLYABLE
+    faults = SupervisorState(status.supervisor).faults
     if faults:
         found.append((error, f"cannot fly: {faults.words()}"))
     if status.battery >= VehicleStatus.BATTERY_LOW:
@@ -54,8 +53,8 @@ def words(status: VehicleStatus) -> str:
         return _EMERGENCY
     if status.link != VehicleStatus.CONNECTED:
         return f"{LINK_NAMES[status.link]}: {status.link_text}"
-    if state & NOT_FLYABLE:
-        text = f"cannot fly: {(state & NOT_FLYABLE).words()}; restart the vehicle"
+    if state.faults:
+        text = f"cannot fly: {state.faults.words()}; restart the vehicle"
     elif SupervisorState.FLYING in state:
         text = "flying: on " + ("setpoints" if status.is_streamed else "high-level commands")
     elif not status.has_supervisor:

@@ -6,7 +6,7 @@ import model_flight
 import numpy as np
 import pytest
 import rospkg
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
@@ -29,7 +29,6 @@ def test_places():
     assert len({tuple(place) for place in ring.round(6).tolist()}) == 8
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_no_two_vehicles_meet_on_simultaneous_straight_moves(seed):
     # CAPT: with starts and goals a apart, at least a / sqrt(2).

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
@@ -73,7 +73,6 @@ def test_the_times_make_the_snap_less_than_even_ones():
     assert y.max() < 0.25
 
 
-@settings(max_examples=25, deadline=None)
 @given(
     st.lists(
         st.tuples(*[st.floats(-3.0, 3.0)] * 2, st.floats(0.5, 2.0), st.floats(-3.0, 3.0)),

@@ -2,7 +2,7 @@
 
 import pytest
 from filter_flight import DESCENDING, FLYING, LIMITS, ON_GROUND, TIMEOUTS, Flight, G, level
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from crazyflie_model.limits import MIN_THRUST
@@ -118,7 +118,6 @@ EVENTS = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
 @given(EVENTS)
 @example([DESCENDING, (0.0, 1.0), "commanded"])
 @example(["toggle", (0.0, 0.0), (0.0, -2.0), 6, 0.5])

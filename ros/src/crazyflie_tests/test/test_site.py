@@ -48,7 +48,8 @@ def test_transitions_between_two_states_share_an_arrow():
 
 
 def test_a_flowchart_is_a_graph():
-    page = "```mermaid\nflowchart LR\n  a([node]) --> t[/topic/] -- label --> s{{service}}\n  t --> a\n```"
+    chart = "flowchart LR\n  a([node]) --> t[/topic/] -- label --> s{{service}}\n  t --> a\n"
+    page = f"```mermaid\n{chart}```"
     lines = site_pages.draw_diagrams(f"before\n{page}\nafter").splitlines()
     assert lines[:4] == ["before", "```{graphviz}", "digraph {", "rankdir=LR;"]
     assert '"a" [shape=ellipse, label="node"];' in lines

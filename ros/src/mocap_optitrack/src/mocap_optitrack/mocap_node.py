@@ -57,12 +57,7 @@ class MocapNode(Node):
         self._stamp = genpy.Time()
         self._health = Health(bodies, stale_after, handle.time())
         self._tracker = Tracker(
-            bodies,
-            parameters.up_axis,
-            stale_after,
-            self._health,
-            parameters.hold_time,
-            handle.warn,
+            bodies, parameters.up_axis, stale_after, self._health, parameters.hold_time, handle.warn
         )
         self._poses = {
             body.key: handle.publisher(_private(body.parameters.pose), PoseStamped)

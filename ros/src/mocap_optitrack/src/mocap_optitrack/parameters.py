@@ -7,14 +7,7 @@ from dataclasses import dataclass
 from typing_extensions import override
 
 from crazyflie_utils.parameters.declaration import Parameters, group, parameter
-from crazyflie_utils.parameters.types import (
-    DURATION,
-    TEXT,
-    TIME_STEP,
-    Integer,
-    ParameterType,
-    Text,
-)
+from crazyflie_utils.parameters.types import DURATION, TEXT, TIME_STEP, Integer, ParameterType, Text
 from mocap_optitrack.axes import UP_AXES
 from mocap_optitrack.bodies import (
     Bodies,

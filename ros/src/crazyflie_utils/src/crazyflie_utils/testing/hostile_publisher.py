@@ -42,11 +42,7 @@ class HostilePublisher:
     """
 
     def __init__(
-        self,
-        topic: str,
-        message_type: type[genpy.Message],
-        md5sum: str = "",
-        is_ready: bool = True,
+        self, topic: str, message_type: type[genpy.Message], md5sum: str = "", is_ready: bool = True
     ):
         self.is_ready = is_ready
         self._topic = topic

@@ -46,7 +46,6 @@ class Address(ParameterType):
         return value
 
     def __str__(self) -> str:
-        """Return what is expected."""
         if self.multicast:
             return f"a multicast address, {self.range}"
         return "an IP address such as 192.168.1.20"
@@ -69,7 +68,6 @@ class StreamVersion(ParameterType):
         return f"{major}.{minor}"
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return "a NatNet version from 2.0 on, such as 3.1 or [3, 1, 0, 0]"
 
 

@@ -69,9 +69,7 @@ def quadrotor(
 
 def _make_quadrotor(mass_error, thrust_error, wind_x, wind_y, wind_z):
     return StabilizedQuadrotor(
-        mass_error=mass_error,
-        thrust_error=thrust_error,
-        wind=lambda t: (wind_x, wind_y, wind_z),
+        mass_error=mass_error, thrust_error=thrust_error, wind=lambda t: (wind_x, wind_y, wind_z)
     )
 
 

@@ -112,10 +112,14 @@ def text_of(levels: list[list[str]]) -> str:
 
 
 def dot_of(graph: Graph) -> str:
-    """Return the picture in the language of graphviz; arrows lead to what is needed."""
+    """Return the picture in the language of graphviz; arrows lead to what is needed.
+
+    Names are without "crazyflie_", with which a page would be too narrow to read them.
+    """
     lines = ["digraph {", '  node [shape=box, fontname="Helvetica", fontsize=11];']
     for names in floors(graph):
-        lines.append("  { rank=same; " + " ".join(f'"{name}";' for name in names) + " }")
+        boxes = (f'"{name}" [label="{name.removeprefix("crazyflie_")}"];' for name in names)
+        lines.append("  { rank=same; " + " ".join(boxes) + " }")
     lines += [f'  "{name}" -> "{needed}";' for name, needed in edges(direct(graph))]
     return "\n".join([*lines, "}"]) + "\n"
 

@@ -61,10 +61,7 @@ class Flight:
 
 
 def flights(
-    vehicle: Vehicle,
-    states: list[tuple[float, int]],
-    events: list[Event],
-    end: float,
+    vehicle: Vehicle, states: list[tuple[float, int]], events: list[Event], end: float
 ) -> Iterator[Flight]:
     """Yield the flights of a vehicle, from the events that concern it.
 

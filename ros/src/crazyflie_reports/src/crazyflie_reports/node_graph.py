@@ -43,10 +43,7 @@ def dot(published: Registrations, subscribed: Registrations) -> str:
         {topic: set(nodes) - HIDDEN_NODES for topic, nodes in part if topic not in HIDDEN_TOPICS}
         for part in (published, subscribed)
     )
-    lines = [
-        "digraph {",
-        '  rankdir=LR; bgcolor=white; node [fontname="Helvetica", fontsize=11];',
-    ]
+    lines = ["digraph {", '  rankdir=LR; bgcolor=white; node [fontname="Helvetica", fontsize=11];']
     nodes: set[str] = set()
     edges = []
     for topic in sorted(sources.keys() & sinks.keys()):

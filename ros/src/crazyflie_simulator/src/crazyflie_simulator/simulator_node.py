@@ -50,10 +50,7 @@ class MotionCaptureParameters(Parameters):
         live=True,
     )
     dropout: float = parameter(
-        Number(minimum=0.0, maximum=1.0),
-        "probability that a pose is not broadcast",
-        0.0,
-        live=True,
+        Number(minimum=0.0, maximum=1.0), "probability that a pose is not broadcast", 0.0, live=True
     )
 
 

@@ -54,12 +54,7 @@ class ClimbLimit:
         self._debounce = Debounce(CLIMB_TIMEOUT)
 
     def apply(
-        self,
-        thrust: float,
-        hover: float,
-        motion: Motion | None,
-        highest: float,
-        is_landing: bool,
+        self, thrust: float, hover: float, motion: Motion | None, highest: float, is_landing: bool
     ) -> float:
         """Return the thrust that is passed on, m/s^2.
 

@@ -110,11 +110,7 @@ class SafeControl:
     """
 
     def __init__(
-        self,
-        hover: float,
-        motion: Motion | None,
-        age: float = 0.0,
-        control: Setpoint = MOTORS_OFF,
+        self, hover: float, motion: Motion | None, age: float = 0.0, control: Setpoint = MOTORS_OFF
     ):
         self._hover = hover
         self._control = control

@@ -120,12 +120,7 @@ class SafeFilter(Generic[Control]):
         return self.relay.takeoff(time, control, setpoint)
 
     def commanded(
-        self,
-        time: float,
-        control: Control,
-        setpoint: Setpoint,
-        caller: str = "",
-        age: float = 0.0,
+        self, time: float, control: Control, setpoint: Setpoint, caller: str = "", age: float = 0.0
     ) -> Control | Setpoint | None:
         """Return what to pass on when a commanded control has come; see `takeoff`.
 

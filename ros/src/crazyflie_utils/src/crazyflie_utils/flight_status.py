@@ -9,10 +9,7 @@ from crazyflie_utils.handle import NodeHandle
 
 
 def subscribe(
-    handle: NodeHandle,
-    topic: str,
-    text_topic: str | None,
-    callback: Callable[[FlightStatus], None],
+    handle: NodeHandle, topic: str, text_topic: str | None, callback: Callable[[FlightStatus], None]
 ) -> None:
     """Have ``callback(status)`` called for each flight status on a topic.
 

@@ -183,7 +183,6 @@ class RigidBodyDictionary(ParameterType):
         return Bodies(bodies, unknown)
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return (
             "a dictionary of number or name of a body: {pose, pose2d, child_frame_id, "
             "parent_frame_id}"

@@ -7,14 +7,7 @@ from dataclasses import dataclass
 from typing_extensions import override
 
 from crazyflie_utils.parameters.declaration import Parameters, group, parameter
-from crazyflie_utils.parameters.types import (
-    DURATION,
-    TEXT,
-    TIME_STEP,
-    Integer,
-    ParameterType,
-    Text,
-)
+from crazyflie_utils.parameters.types import DURATION, TEXT, TIME_STEP, Integer, ParameterType, Text
 from mocap_optitrack.axes import UP_AXES
 from mocap_optitrack.bodies import (
     Bodies,
@@ -53,7 +46,6 @@ class Address(ParameterType):
         return value
 
     def __str__(self) -> str:
-        """Return what is expected."""
         if self.multicast:
             return f"a multicast address, {self.range}"
         return "an IP address such as 192.168.1.20"
@@ -76,7 +68,6 @@ class StreamVersion(ParameterType):
         return f"{major}.{minor}"
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return "a NatNet version from 2.0 on, such as 3.1 or [3, 1, 0, 0]"
 
 

@@ -20,6 +20,4 @@ def _longest_periods():
     return float(np.percentile(np.diff(moments), 99)) * 1e3
 
 
-ROWS = [
-    Row("machine", "an empty loop of 10 ms, p99 of the period", "ms", _longest_periods),
-]
+ROWS = [Row("machine", "an empty loop of 10 ms, p99 of the period", "ms", _longest_periods)]

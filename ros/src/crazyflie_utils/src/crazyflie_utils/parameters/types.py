@@ -1,6 +1,7 @@
 """Types of parameters: what a value may be, and in words (``str(type)``) what is expected."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -221,6 +222,22 @@ class ListOf(ParameterType):
     def __str__(self) -> str:
         count = "a list" if self.length is None else f"a list of {self.length}"
         return f"{count}, each entry {self.entry}"
+
+
+@dataclass(frozen=True)
+class File(ParameterType):
+    """The path of a file; its value is what ``load(path)`` returns, which raises what is wrong."""
+
+    load: Callable[[str], Any]
+    content: str  #: For messages, such as "a world file".
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> Any:
+        return self.load(TEXT(value))
+
+    def __str__(self) -> str:
+        return f"the path of {self.content}"
 
 
 FINITE = Number()

@@ -11,11 +11,7 @@ import genpy
 
 from crazyflie_utils.node import Node
 from crazyflie_utils.testing.fake_process import FakeProcess, FakeSubscriber, FakeTransport
-from crazyflie_utils.transport import (
-    ExternalPublisher,
-    ExternalSubscriber,
-    ServiceError,
-)
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError
 
 Deliver = Callable[[Any], None]
 

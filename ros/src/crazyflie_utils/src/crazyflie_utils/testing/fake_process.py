@@ -15,12 +15,7 @@ from crazyflie_utils.clock import SimulatedClock
 from crazyflie_utils.node import Node
 from crazyflie_utils.process import Process
 from crazyflie_utils.timers import Timer
-from crazyflie_utils.transport import (
-    ExternalPublisher,
-    ExternalSubscriber,
-    ServiceError,
-    Transport,
-)
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
 
 
 class _Record(ExternalPublisher):

@@ -7,14 +7,7 @@ modes, parameters and log variables.
 """
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.inner_loops import (
-    HEADING,
-    HEADING_RATE,
-    OUTPUT_LIMIT,
-    PERIOD,
-    TILT,
-    TILT_RATE,
-)
+from crazyflie_model.inner_loops import HEADING, HEADING_RATE, OUTPUT_LIMIT, PERIOD, TILT, TILT_RATE
 from crazyflie_virtual.firmware.pid import FirmwarePid
 from crazyflie_virtual.firmware.states import Estimate
 

@@ -41,11 +41,7 @@ class Firmware:
     """
 
     def __init__(
-        self,
-        physics: Physics,
-        faults: FaultSwitches,
-        settings: VehicleSettings,
-        failure: str = "",
+        self, physics: Physics, faults: FaultSwitches, settings: VehicleSettings, failure: str = ""
     ):
         self._physics = physics
         self.faults = faults

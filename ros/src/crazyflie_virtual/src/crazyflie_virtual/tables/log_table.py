@@ -106,9 +106,7 @@ _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
     "radio": [
         *_rows(U8, rssi=40, isConnected="link_statistics.is_connected"),
         *_rows(
-            U16,
-            numRxBc="link_statistics.received_broadcasts",
-            numRxUc="link_statistics.received",
+            U16, numRxBc="link_statistics.received_broadcasts", numRxUc="link_statistics.received"
         ),
     ],
     "motor": [

@@ -21,8 +21,8 @@ class Table:
         ]
         self._limits = limits
         self._index = {(group, name): i for i, (group, name, _) in enumerate(entries)}
+        #: Changes with the table: clients keep tables by it.
         self.crc = zlib.crc32(b"".join(self._items))
-        """Changes with the table: clients keep tables by it."""
 
     def index(self, group: str, name: str) -> int | None:
         """Return the number of an entry; None when there is none."""

@@ -12,6 +12,8 @@ from crazyflie_utils.parameters.types import (
     TEXT,
     TIME_STEP,
     Integer,
+    ListOf,
+    Number,
     ParameterType,
     Text,
 )
@@ -152,6 +154,11 @@ class MocapParameters(Parameters):
         "poses that are older on arrival are dropped, longer gaps are reported",
         0.2,
         live=True,
+    )
+    rate_limits: tuple[float, float] | None = parameter(
+        ListOf(Number("Hz", minimum=0.0), 2),
+        "with fewer frames a second than the first, or more than the second, the diagnostics warn",
+        None,
     )
     natnet: NatNetParameters = group(NatNetParameters, "optitrack_config")
     library: LibraryParameters = group(LibraryParameters, "motioncapture_config")

@@ -41,11 +41,21 @@ class Status(NamedTuple):
 
 
 class Health:
-    """Counts what happens between two reports; ``now`` is the time at the beginning, s."""
+    """Counts what happens between two reports; ``now`` is the time at the beginning, s.
+
+    Fewer frames a second than the first of ``rate_limits``, or more than the second, are a fault.
+    """
 
     _longest_gap: float
 
-    def __init__(self, bodies: Sequence[ConfiguredBody], stale_after: float, now: float):
+    def __init__(
+        self,
+        bodies: Sequence[ConfiguredBody],
+        stale_after: float,
+        now: float,
+        rate_limits: tuple[float, float] | None = None,
+    ):
+        self._rate_limits = rate_limits or (0.0, math.inf)
         self._bodies = {body.key: _BodyCount() for body in bodies}
         self._labels = {body.key: body.component for body in bodies}
         self.stale_after = stale_after  #: For the reports to come.
@@ -140,10 +150,10 @@ class Health:
             mean = math.fsum(self._latencies) / frames
             values["latency, mean (ms)"] = _milliseconds(mean)
             values["latency, maximum (ms)"] = _milliseconds(max(self._latencies))
-        level, message = self._stream_assessment(values, gap)
+        level, message = self._stream_assessment(values, gap, rate)
         return Status("stream", level, message, values)
 
-    def _stream_assessment(self, values, gap):
+    def _stream_assessment(self, values, gap, rate):
         if self._server is None:
             return ERROR, self._failure
         foreign = self._events[Event.FOREIGN]
@@ -159,6 +169,10 @@ class Health:
             return WARN, _TWO_SERVERS
         if gap > self.stale_after:
             return WARN, f"gaps of up to {values['longest gap (ms)']} ms"
+        low, high = self._rate_limits
+        is_whole = self._stream_begin <= self._begin
+        if is_whole and not low <= rate <= high:
+            return WARN, f"{rate:.1f} frames per second; expected {low:g} to {high:g}"
         return OK, (
             f"{values['rate (Hz)']} frames per second, {values['latency, mean (ms)']} ms old"
         )

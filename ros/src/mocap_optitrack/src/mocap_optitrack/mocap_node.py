@@ -55,7 +55,7 @@ class MocapNode(Node):
         bodies, stale_after = parameters.bodies, parameters.stale_after
         self._server = ""
         self._stamp = genpy.Time()
-        self._health = Health(bodies, stale_after, handle.time())
+        self._health = Health(bodies, stale_after, handle.time(), parameters.rate_limits)
         self._tracker = Tracker(
             bodies, parameters.up_axis, stale_after, self._health, parameters.hold_time, handle.warn
         )

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 from typing_extensions import override
 
 from crazyflie_utils.parameters.declaration import Parameters, group, parameter
-from crazyflie_utils.parameters.types import DURATION, TEXT, TIME_STEP, Integer, ParameterType, Text
+from crazyflie_utils.parameters.types import (
+    DURATION,
+    TEXT,
+    TIME_STEP,
+    Integer,
+    ListOf,
+    Number,
+    ParameterType,
+    Text,
+)
 from mocap_optitrack.axes import UP_AXES
 from mocap_optitrack.bodies import (
     Bodies,
@@ -142,6 +151,11 @@ class MocapParameters(Parameters):
         "poses that are older on arrival are dropped, longer gaps are reported",
         0.2,
         live=True,
+    )
+    rate_limits: tuple[float, float] | None = parameter(
+        ListOf(Number("Hz", minimum=0.0), 2),
+        "with fewer frames a second than the first, or more than the second, the diagnostics warn",
+        None,
     )
     natnet: NatNetParameters = group(NatNetParameters, "optitrack_config")
     library: LibraryParameters = group(LibraryParameters, "motioncapture_config")

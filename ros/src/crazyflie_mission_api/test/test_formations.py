@@ -42,6 +42,13 @@ def test_no_two_vehicles_meet_on_simultaneous_straight_moves(seed):
         assert pdist(starts + s * (ends - starts)).min() > 1.0 / np.sqrt(2.0) - 1e-9
 
 
+def test_a_way_up_counts_less_than_one_to_the_side():
+    # By 1 m to the side each, or by 1.5 m up and down, which is as 0.75 m to the side.
+    places = {"low": (0.0, 0.0, 0.5), "high": (1.0, 0.0, 2.0)}
+    goals = np.array([(1.0, 0.0, 0.5), (0.0, 0.0, 2.0)])
+    assert assign(places, goals) == {"low": (0.0, 0.0, 2.0), "high": (1.0, 0.0, 0.5)}
+
+
 @pytest.mark.parametrize("n", [1, 7])
 def test_the_lattice_of_any_number(n):
     example = runpy.run_path(f"{EXAMPLES}/lattice.py")

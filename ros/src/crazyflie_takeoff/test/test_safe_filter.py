@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from crazyflie_model.limits import MIN_THRUST
 from crazyflie_takeoff.filter_states import FilterState
 from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.limits import Debounce
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import (
     MAX_SAFE_TILT,
@@ -46,6 +47,15 @@ def test_one_measurement_that_is_wrong_is_no_crash():
         flight.run(0.05)
         flight.run(0.05)
     assert flight.filter.state is FilterState.PASSING
+
+
+def test_complaints_that_come_and_go_do_not_add_up():
+    debounce = Debounce(0.1)
+    for _ in range(20):
+        assert debounce.advance(0.09, "far away") == ""
+        assert debounce.advance(0.01, "") == ""
+    assert debounce.advance(0.09, "far away") == ""
+    assert debounce.advance(0.02, "far away") == "far away"
 
 
 def test_within_half_a_metre_of_the_wall_the_geofence_is_at_work():

@@ -1,0 +1,38 @@
+"""ROS interface of the dashboard."""
+
+from typing_extensions import override
+
+from crazyflie_dashboard.access import Access, AccessError, expect_free_port, is_loopback, new_token
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
+from crazyflie_utils.parameters.types import Integer, Text
+
+
+class DashboardParameters(Parameters):
+    """Parameters of `DashboardNode`."""
+
+    host: str = parameter(Text(), "address that the page listens on", "127.0.0.1")
+    port: int = parameter(Integer(1, 65535), "of the page", 8642)
+    token: str = parameter(
+        Text(may_be_empty=True),
+        "what a page has to know if `host` is not this computer's own; made anew if empty",
+        "",
+    )
+
+
+class DashboardNode(Node):
+    """Show vehicles in a browser, and command them."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        parameters = handle.load(DashboardParameters)
+        token = parameters.token or ("" if is_loopback(parameters.host) else new_token())
+        try:
+            self._access = Access(parameters.host, parameters.port, token)
+            expect_free_port(parameters.host, parameters.port)
+        except AccessError as error:
+            raise ParameterError(f"{handle.name}: {error}") from None
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        # Not into the log: the token is for those who see this terminal.
+        print(f"the dashboard is at {self._access.url}", flush=True)

@@ -93,6 +93,7 @@ class GraphModel:
         self._lines = 0
         self._seen: dict[str, float] = {}
         self._poll_at = 0.0
+        self._known_frames = 0
         self._is_polling = False
 
     def begin(self) -> None:
@@ -139,6 +140,8 @@ class GraphModel:
                 lambda done: self._parent.submit(self._on_graph, done, began)
             )
         self._frames.update()
+        if len(self._frames.poses) != self._known_frames:
+            self._find_frames()
         self.scene = self._make_scene()
 
     def _on_graph(self, done: "Future[Graph]", began: float) -> None:
@@ -178,10 +181,14 @@ class GraphModel:
             self.models.pop(name).close()
         self.models = {v.name: self.models[v.name] for v in found} | self.models
         for model in self.models.values():
-            frame = frame_of(model.vehicle, self._frames, len(self.models) == 1)
-            model.follow_frame(frame)
             model.kind = self._diagnostics.kind(model.vehicle)
+        self._find_frames()
         self.watch(set(self.plots))
+
+    def _find_frames(self):
+        self._known_frames = len(self._frames.poses)
+        for model in self.models.values():
+            model.follow_frame(frame_of(model.vehicle, self._frames, len(self.models) == 1))
 
     def _row_taker(self, name):
         def take(role, row):

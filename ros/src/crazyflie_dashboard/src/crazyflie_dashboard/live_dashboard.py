@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any
 
 from typing_extensions import override
@@ -44,6 +44,8 @@ class LiveDashboard(Dashboard):
         With missions and trajectories.
     clock : callable
         time.monotonic, by which commands grow old.
+    workers : concurrent.futures.Executor, optional
+        Its threads may wait.
     """
 
     def __init__(
@@ -53,10 +55,11 @@ class LiveDashboard(Dashboard):
         is_answering: Callable[[str], bool],
         folders: list[str],
         clock: Callable[[], float] = time.monotonic,
+        workers: Executor | None = None,
     ):
         self.pages = PageControl()
         self._handle, self._folders, self._clock = handle, folders, clock
-        self._workers = ThreadPoolExecutor(8, "dashboard")
+        self._workers = workers or ThreadPoolExecutor(8, "dashboard")
         self._model = GraphModel(handle, self._workers, read_graph, clock)
         self._actions = Actions(handle, self._workers, clock, is_answering)
         self._parameters = LiveParameters(handle, self._workers, self._model)

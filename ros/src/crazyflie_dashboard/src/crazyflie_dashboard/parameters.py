@@ -1,6 +1,7 @@
 """Parameters that may be changed while nodes run, and those of firmware."""
 
 import ast
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -86,7 +87,7 @@ def parsed(parameter: ParameterInfo, text: str) -> bool | int | float | str:
         raise RefusalError(f"{where} {kinds[parameter.kind]}") from None
     low, high = parameter.minimum, parameter.maximum
     if parameter.kind in ("int", "float") and not (
-        (low is None or value >= low) and (high is None or value <= high) and value - value == 0
+        (low is None or value >= low) and (high is None or value <= high) and math.isfinite(value)
     ):
         raise RefusalError(f"{where} {_range(low, high)} {parameter.unit}".rstrip())
     if parameter.choices and value not in parameter.choices:
@@ -113,7 +114,7 @@ def _range(low, high):
 
 
 def _finite(value):
-    return value if value is not None and value - value == 0 and abs(value) < 1e300 else None
+    return value if value is not None and abs(value) < 1e300 else None
 
 
 def _choices(text):

@@ -35,6 +35,9 @@ _FILTER_WORDS = {
 }
 _ON_GROUND = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
 
+_FRAME_TIMEOUT = 3.0
+"""For so long, s, a vehicle without a frame may get one: its topics cost more."""
+
 _LOGS: dict[str, tuple[Any, Callable[[Any], list[float]]]] = {
     "crazyflie_driver/GenericLogData": (GenericLogData, lambda message: list(message.values)),
     "std_msgs/Float32": (Float32, lambda message: [message.data]),
@@ -72,6 +75,8 @@ class VehicleModel:
         self._handle, self._time, self._on_row = handle, time, on_row
         self._watched: NodeHandle | None = None
         self._references: NodeHandle | None = None
+        self._poses: NodeHandle | None = None
+        self._since = time()
         self._rows: dict[str, Any] = {}
         self._arrivals: dict[str, float] = {}
         self._counts: Counter[str] = Counter()
@@ -87,10 +92,15 @@ class VehicleModel:
 
     def follow_frame(self, frame: str | None) -> None:
         """Take poses from a frame of /tf; without one, from the vehicle's topic."""
-        if frame is None and self.frame is None and "pose" not in self._rows:
-            self._rows["pose"] = None
-            self._subscribe(self._handle, "pose" if "pose" in self.vehicle.topics else "state")
         self.frame = frame
+        if frame is not None and self._poses is not None:
+            self._poses.close()
+            self._poses = None
+            self._forget("pose")
+        is_late = self._time() - self._since > _FRAME_TIMEOUT
+        if frame is None and self._poses is None and is_late:
+            self._poses = self._handle.child()
+            self._subscribe(self._poses, "pose" if "pose" in self.vehicle.topics else "state")
 
     def watch(self, is_watched: bool, topics: Mapping[str, str]) -> None:
         """Begin or end to receive what comes often: states, controls, what the driver logs.
@@ -130,6 +140,8 @@ class VehicleModel:
         """Receive nothing any more."""
         self.watch(False, {})
         self.show_reference(False)
+        if self._poses is not None:
+            self._poses.close()
         self._handle.close()
 
     def snapshot(self, frames: Frames, fixed: str) -> VehicleSnapshot:

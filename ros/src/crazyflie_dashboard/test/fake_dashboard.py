@@ -161,8 +161,11 @@ class FakeDashboard(Dashboard):
         elif command.action is Action.EMERGENCY:
             self.change(name, is_in_flight=False, is_emergency=True, state="emergency")
 
+    def parameter_owners(self):
+        return ("/cf1/controller", "cf1")
+
     def parameters(self, owner=None):
-        if owner is not None:
+        if owner == "cf1":
             return done(
                 tuple(
                     ParameterInfo(owner, f"group{k % 9}.value{k}", "int", k, is_firmware=True)
@@ -200,10 +203,13 @@ class FakeDashboard(Dashboard):
         return done("landed")
 
     def stop_mission(self, page, clicked):
-        pass
+        return done(None)
 
     def watch_image(self, page, topic):
-        pass
+        return done(None)
+
+    def examine(self):
+        return done(None)
 
     def image(self, page):
         return None

@@ -78,12 +78,22 @@ class Browser:
         """Wait until a text is seen."""
         wait_for(lambda: text in self.text(selector), f"{text!r} in {selector}")
 
+    def button(self, text):
+        """Return a button by its text."""
+        spans = f".//span[normalize-space(.)='{text}']"
+        path = f"//button[{spans} or normalize-space(.)='{text}']"
+        return self.driver.find_element(By.XPATH, path)
+
     def press(self, text):
         """Click a button by its text."""
-        button = f"//button[normalize-space(.)='{text}' or .//span[normalize-space(.)='{text}']]"
-        wait_for(
-            lambda: self.driver.find_element(By.XPATH, button).click() or True, f"button {text}"
-        )
+        wait_for(lambda: self.button(text).click() or True, f"button {text}")
+
+    def select(self, label, option):
+        """Choose an option of a list."""
+        field = f"//label[contains(@class,'q-field')][.//*[text()='{label}']]"
+        wait_for(lambda: self.driver.find_element(By.XPATH, field).click() or True, label)
+        item = f"//*[contains(@class,'q-menu')]//*[contains(@class,'q-item')]//*[text()='{option}']"
+        wait_for(lambda: self.driver.find_element(By.XPATH, item).click() or True, option)
 
     def tab(self, name):
         """Choose a panel."""

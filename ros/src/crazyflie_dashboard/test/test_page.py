@@ -167,6 +167,53 @@ def test_a_click_that_has_waited_moves_nothing(browser, server, driver):
     assert server.dashboard.commands == []
 
 
+def test_parameters_right_and_wrong(browser, server):
+    browser.tab("Parameters")
+    browser.select("node or vehicle", "/cf1/controller")
+    row = '.parameter[data-name="K/gain"]'
+    browser.has("float · 1/s · 0 to 2 · gain of the height", row)
+    browser.enter(f"{row} input", "0.75\n")
+    browser.has("is 0.75 now", row)
+    browser.enter(f"{row} input", "7\n")
+    browser.has("K/gain is 7; expected 0 to 2 1/s", row)
+    browser.enter(f"{row} input", "much\n")
+    browser.has("K/gain is 'much'; expected a number", row)
+    assert server.dashboard.gain.value == 0.75
+    browser.select("node or vehicle", "cf1")
+    browser.has("300 of 300 parameters; the first 50 are shown")
+    browser.enter(".search input", "value123")
+    browser.has("1 of 300 parameters")
+
+
+def test_a_mission_flies_after_its_dry_run_has_passed(browser, server):
+    browser.take_control()
+    browser.choose("cf1")
+    browser.tab("Missions")
+    browser.select("mission or trajectory", "eight.csv")
+    browser.press("Dry run")
+    browser.has("cf1 and cf2 come as near as 0.1 m at 3.2 s")
+    assert not browser.button("Fly").is_enabled()
+    browser.select("mission or trajectory", "square.py: flies a square")
+    browser.press("Dry run")
+    browser.has("The dry run has passed: 12.0 s, all land")
+    wait_for(lambda: browser.button("Fly").is_enabled(), "Fly can be pressed")
+    browser.press("Fly")
+    browser.has("square.py: flies a square: landed")
+    assert server.dashboard.flown == ["/missions/square.py"]
+
+
+def test_messages_and_plots(browser):
+    browser.tab("Messages")
+    browser.has("cf2 has a weak link")
+    browser.has("move the antenna")
+    browser.has("<b>link</b> at 40 %")
+    browser.tab("Plots")
+    wait_for(lambda: browser.find(".chart canvas"), "plots")
+    browser.press("Stop")
+    browser.has("height, m", ".q-table")
+    browser.has("0.599", ".q-table")  # The height has risen by so much.
+
+
 def test_an_old_browser_is_told_so(browser, driver, server):
     script = {"source": "delete HTMLScriptElement.supports"}
     added = driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)

@@ -62,7 +62,9 @@ def _numbers(element, attribute):
 
 
 class SceneView(
-    Element, component="scene_view.js", esm={"dashboard-objects": str(FOLDER / "objects")}
+    Element,
+    component="scene_view.js",  # type: ignore[call-arg]
+    esm={"dashboard-objects": str(FOLDER / "objects")},
 ):
     """The scene in one page."""
 

@@ -43,15 +43,17 @@ class Session:
         client.on_disconnect(self._disconnect)
         client.on_delete(self._disconnect)
 
-    def _connect(self):
+    def _connect(self) -> None:
         self._disconnect()
         loop = asyncio.get_running_loop()
-        self.page = self.dashboard.pages.open(
-            lambda text: loop.call_soon_threadsafe(self.say, text, "warning")
-        )
+
+        def tell(text: str) -> None:
+            loop.call_soon_threadsafe(self.say, text, "warning")
+
+        self.page = self.dashboard.pages.open(tell)
         self.dashboard.watch(self.page, self.watched)
 
-    def _disconnect(self):
+    def _disconnect(self) -> None:
         page, self.page = self.page, 0
         if page:
             self.dashboard.pages.close(page)
@@ -89,6 +91,15 @@ class Session:
         except RefusalError as error:
             self.say(str(error), "negative")
             return None
+
+    async def succeeds(self, future: "Future[None]") -> bool:
+        """Wait for something without a result; False after showing why it was refused."""
+        try:
+            await asyncio.wrap_future(future)
+        except RefusalError as error:
+            self.say(str(error), "negative")
+            return False
+        return True
 
     async def command(
         self, action: Action, names: Iterable[str], clicked: float, **details: Any

@@ -1,31 +1,18 @@
 """Cards of the vehicles, and what the chosen ones can be told."""
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from nicegui import ui
-from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
+from crazyflie_dashboard.page.component import Cards
 from crazyflie_dashboard.page.scene_view import SceneView, condition
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
 
 LOOKS = ("ground", "flight", "stale", "emergency")
-
-
-class Cards(Element, component="cards.js"):
-    """A card for each vehicle."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._props["vehicles"] = []
-
-    def show(self, cards: list[dict[str, Any]]) -> None:
-        """Show these cards, if they are others than before."""
-        if self._props["vehicles"] != cards:
-            self._props["vehicles"] = cards
-            self.update()
 
 
 class VehiclesPanel:
@@ -58,7 +45,7 @@ class VehiclesPanel:
         scene_view.on("choose", self._choose)
         scene_view.on("goal", self._set_goal)
 
-    def _button(self, text, handler):
+    def _button(self, text: str, handler: Callable[..., Any]) -> ui.button:
         return ui.button(text).props("unelevated").on("click", handler, js_handler=CLICKED)
 
     def refresh(self, scene: Scene) -> None:
@@ -67,36 +54,36 @@ class VehiclesPanel:
         self._choice.text = f"{len(names)} of {len(scene.vehicles)} chosen"
         self._cards.show([card(each, each.name in names) for each in scene.vehicles.values()])
 
-    def _choose(self, event: GenericEventArguments):
+    def _choose(self, event: GenericEventArguments) -> None:
         self._session.choose([event.args["name"]], event.args["add"])
 
-    async def _act(self, event: GenericEventArguments):
+    async def _act(self, event: GenericEventArguments) -> None:
         details = {}
         if (action := Action(event.args["action"])) is Action.TAKEOFF:
             details["height"] = self._height.value or 1.0
         await self._session.command(action, [event.args["name"]], event.args["clicked"], **details)
 
-    async def _take_off(self, event: GenericEventArguments):
+    async def _take_off(self, event: GenericEventArguments) -> None:
         names = self._session.chosen_names
         height = self._height.value or 1.0
         await self._session.command(Action.TAKEOFF, names, event.args, height=height)
 
-    async def _land(self, event: GenericEventArguments):
+    async def _land(self, event: GenericEventArguments) -> None:
         await self._session.command(Action.LAND, self._session.chosen_names, event.args)
 
-    def _set_goal(self, event: GenericEventArguments):
+    def _set_goal(self, event: GenericEventArguments) -> None:
         x, y, z = self._goal
         x.value, y.value = round(event.args["x"], 2), round(event.args["y"], 2)
         if z.value is None:
             z.value = self._height.value or 1.0
 
-    def _draw_goal(self):
+    def _draw_goal(self) -> None:
         x, y, z = (field.value for field in self._goal)
         is_set = None not in (x, y, z)
         yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
         self._scene_view.show_goal({"x": x, "y": y, "z": z, "yaw": yaw} if is_set else None)
 
-    async def _go(self, event: GenericEventArguments):
+    async def _go(self, event: GenericEventArguments) -> None:
         goal = [field.value for field in self._goal]
         if None in goal:
             self._session.say("go to: click on the floor, or type x, y and z", "warning")
@@ -109,7 +96,7 @@ class VehiclesPanel:
             await self._session.command(Action.GO_TO, (), event.args)
 
 
-def formation(vehicles: list[VehicleSnapshot], goal) -> dict[str, tuple[float, float, float]]:
+def formation(vehicles: list[VehicleSnapshot], goal: Sequence[float]) -> dict[str, tuple[float, float, float]]:
     """Return where each vehicle goes, m, so that their middle comes to the goal.
 
     A vehicle whose position is not known goes nowhere, since it could hit another one.
@@ -159,6 +146,8 @@ def _age(age: float | None) -> str:
     return "now" if age < 0.3 else f"{age:.1f} s ago" if age < 10 else f"{age:.0f} s ago"
 
 
-def _number(label, value=None, minimum=None, maximum=None):
+def _number(
+    label: str, value: float | None = None, minimum: float | None = None, maximum: float | None = None
+) -> ui.number:
     field = ui.number(label, value=value, min=minimum, max=maximum, step=0.1)
     return field.props("dense outlined hide-bottom-space").classes("number")

@@ -12,6 +12,8 @@ from urllib.parse import urlsplit
 
 MIN_TOKEN_LENGTH = 16
 
+COOKIE = "dashboard_token"
+
 _LISTENING = "0A"
 """Of a socket in /proc/net/tcp."""
 
@@ -65,7 +67,7 @@ class Access:
         headers : dict
             Of the HTTP request, also of one that opens a websocket.
         token : str or None
-            Of its address or cookie.
+            Of its address; by default of its cookie `COOKIE`.
         """
         fields = {name.lower(): value for name, value in headers.items()}
         host, origin = fields.get("host", ""), fields.get("origin")
@@ -78,7 +80,8 @@ class Access:
             f"{scheme}://{host.lower()}" for scheme in ("http", "https")
         }:
             return f"the Origin is {origin!r}; expected that of the page"
-        if self.token and not hmac.compare_digest(self.token.encode(), (token or "").encode()):
+        token = token or _cookie(fields.get("cookie", ""))
+        if self.token and not hmac.compare_digest(self.token.encode(), token.encode()):
             return "the token is missing or wrong; it was printed when the dashboard began"
         return ""
 
@@ -92,6 +95,11 @@ class Access:
             return False
         # From elsewhere the computer may have any name, and the token decides.
         return bool(name) and (not is_loopback(self.host) or is_loopback(name))
+
+
+def _cookie(text: str) -> str:
+    found = [each.strip().partition("=") for each in text.split(";")]
+    return next((value for name, _, value in found if name == COOKIE), "")
 
 
 def is_loopback(host: str) -> bool:

@@ -19,12 +19,14 @@ class PageControl:
 
     Attributes
     ----------
-    on_empty, on_first : callable
-        Called without arguments when the last page has gone, or the first one has come.
+    on_first, on_close, on_empty : callable
+        ``on_first()`` is called when the first page has come, ``on_close(page)`` when one has gone,
+        and then ``on_empty()`` if it was the last.
     """
 
     def __init__(self) -> None:
         self.on_first: Callable[[], None] = lambda: None
+        self.on_close: Callable[[int], None] = lambda page: None
         self.on_empty: Callable[[], None] = lambda: None
         self._lock = threading.RLock()
         self._numbers = itertools.count(1)
@@ -48,7 +50,10 @@ class PageControl:
         """Take note that a page is gone; its control with it."""
         with self._lock:
             self.release(page)
-            is_last = self._tell.pop(page, None) is not None and not self._tell
+            if self._tell.pop(page, None) is None:
+                return
+            is_last = not self._tell
+        self.on_close(page)
         if is_last:
             self.on_empty()
 

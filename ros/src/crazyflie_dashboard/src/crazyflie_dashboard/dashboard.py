@@ -157,8 +157,15 @@ class Dashboard(ABC):
         """
 
     @abstractmethod
+    def parameter_owners(self) -> tuple[str, ...]:
+        """Return nodes with live parameters, and vehicles with those of firmware."""
+
+    @abstractmethod
     def parameters(self, owner: str | None = None) -> "Future[tuple[ParameterInfo, ...]]":
-        """Return the live parameters of all nodes; or those of a vehicle's firmware."""
+        """Return the live parameters of a node or of a vehicle's firmware; of all nodes.
+
+        For many vehicles those of one owner are much quicker.
+        """
 
     @abstractmethod
     def set_parameter(
@@ -183,11 +190,15 @@ class Dashboard(ABC):
         """Fly a mission after its dry run has passed; the future is done when it has ended."""
 
     @abstractmethod
-    def stop_mission(self, page: int, clicked: float) -> None:
+    def stop_mission(self, page: int, clicked: float) -> "Future[None]":
         """End the mission that flies; its vehicles land."""
 
     @abstractmethod
-    def watch_image(self, page: int, topic: str | None) -> None:
+    def examine(self) -> "Future[None]":
+        """Have the doctor look the graph over: its sentences are in the scene, 10 s later."""
+
+    @abstractmethod
+    def watch_image(self, page: int, topic: str | None) -> "Future[None]":
         """Choose the camera that a page shows."""
 
     @abstractmethod

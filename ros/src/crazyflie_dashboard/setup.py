@@ -5,6 +5,8 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["crazyflie_dashboard", "crazyflie_dashboard.page"], package_dir={"": "src"}
+        packages=["crazyflie_dashboard", "crazyflie_dashboard.page"],
+        package_dir={"": "src"},
+        package_data={"crazyflie_dashboard.page": ["*.js", "*.css", "*.html", "objects/*.js"]},
     )
 )

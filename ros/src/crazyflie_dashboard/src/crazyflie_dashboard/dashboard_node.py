@@ -50,9 +50,16 @@ class DashboardNode(Node):
             partial(master.is_answering, handle.name),
             folders,
         )
+        # NiceGUI takes a second to import: not for what only reads the parameters' declaration.
+        from crazyflie_dashboard.page import open_page
+
+        self._page = open_page(
+            self._dashboard, self._access, self._parameters.host, self._parameters.port
+        )
         # Not into the log: the token is for those who see this terminal.
         print(f"the dashboard is at {self._access.url}", flush=True)
 
     @override
     def shutdown(self) -> None:
+        self._page.close()
         self._dashboard.close()

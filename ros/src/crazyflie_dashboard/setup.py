@@ -1,0 +1,12 @@
+"""Tells catkin where the Python modules are."""
+
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
+
+setup(
+    **generate_distutils_setup(
+        packages=["crazyflie_dashboard", "crazyflie_dashboard.page"],
+        package_dir={"": "src"},
+        package_data={"crazyflie_dashboard.page": ["*.js", "*.css", "*.html", "objects/*.js"]},
+    )
+)

@@ -1,0 +1,159 @@
+"""Which requests the page answers: its own pages', and with a token those of other computers."""
+
+import contextlib
+import hmac
+import ipaddress
+import os
+import secrets
+import socket
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from urllib.parse import urlsplit
+
+MIN_TOKEN_LENGTH = 16
+
+COOKIE = "dashboard_token"
+
+_LISTENING = "0A"
+"""Of a socket in /proc/net/tcp."""
+
+
+class AccessError(Exception):
+    """The page cannot be offered at this address; the text says why."""
+
+
+class Access:
+    """Decides about requests of one page.
+
+    A page from another origin in the same browser is refused by its Origin, one whose name was made
+    to resolve to this computer (DNS rebinding) by its Host.
+
+    Parameters
+    ----------
+    host : str
+        Address or name that is listened on.
+    port : int
+    token : str, optional
+        Needed unless ``host`` is this computer's own.
+
+    Raises
+    ------
+    AccessError
+        The address needs a token, and there is none or a short one.
+    """
+
+    def __init__(self, host: str, port: int, token: str = ""):
+        self.host, self.port, self.token = host, port, token
+        if token and len(token) < MIN_TOKEN_LENGTH:
+            raise AccessError(
+                f"the token has {len(token)} characters; expected at least {MIN_TOKEN_LENGTH}"
+            )
+        if not token and not is_loopback(host):
+            raise AccessError(f"host is {host}, which other computers reach; expected a token")
+
+    @property
+    def url(self) -> str:
+        """Address of the page, with its token."""
+        # Not an address that a browser can open.
+        host = socket.gethostname() if self.host in ("0.0.0.0", "::", "") else self.host
+        host = f"[{host}]" if ":" in host else host
+        return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
+
+    def refusal(self, headers: Mapping[str, str], token: str | None = None) -> str:
+        """Return why a request is refused; "" if it is not.
+
+        Parameters
+        ----------
+        headers : dict
+            Of the HTTP request, also of one that opens a websocket.
+        token : str or None
+            Of its address; by default of its cookie `COOKIE`.
+        """
+        fields = {name.lower(): value for name, value in headers.items()}
+        host, origin = fields.get("host", ""), fields.get("origin")
+        if not self._is_own_host(host):
+            return f"the Host is {host!r}; expected that of the page"
+        is_websocket = fields.get("upgrade", "").lower() == "websocket"
+        if origin is None and is_websocket:
+            return "a websocket without an Origin; expected that of the page"
+        if origin is not None and origin.lower() not in {
+            f"{scheme}://{host.lower()}" for scheme in ("http", "https")
+        }:
+            return f"the Origin is {origin!r}; expected that of the page"
+        token = token or _cookie(fields.get("cookie", ""))
+        if self.token and not hmac.compare_digest(self.token.encode(), token.encode()):
+            return "the token is missing or wrong; it was printed when the dashboard began"
+        return ""
+
+    def _is_own_host(self, text):
+        try:
+            parts = urlsplit(f"//{text}")
+            name, port = parts.hostname or "", parts.port or 80
+        except ValueError:
+            return False
+        if port != self.port:
+            return False
+        # From elsewhere the computer may have any name, and the token decides.
+        return bool(name) and (not is_loopback(self.host) or is_loopback(name))
+
+
+def _cookie(text: str) -> str:
+    found = [each.strip().partition("=") for each in text.split(";")]
+    return next((value for name, _, value in found if name == COOKIE), "")
+
+
+def is_loopback(host: str) -> bool:
+    """Tell whether an address or name is this computer's own, which no other one reaches."""
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host.strip("[]")).is_loopback
+    except ValueError:
+        return False
+
+
+def new_token() -> str:
+    """Return a token that cannot be guessed."""
+    return secrets.token_urlsafe(MIN_TOKEN_LENGTH)
+
+
+def expect_free_port(host: str, port: int) -> None:
+    """Raise `AccessError` if a port is in use, with the process that uses it, and a free one."""
+    try:
+        _bind(host, port)
+    except OSError as error:
+        with contextlib.suppress(OSError):
+            free = _bind(host, 0)
+            user = next(_users(port), "a process of another user")
+            raise AccessError(
+                f"port {port} of {host} is in use by {user}; expected a free one, such as "
+                f"port:={free}"
+            ) from error
+        raise AccessError(
+            f"host is {host}: {error}; expected an address of this computer"
+        ) from None
+
+
+def _bind(host, port):
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as listener:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((host, port))
+        listener.listen()
+        return listener.getsockname()[1]
+
+
+def _users(port: int) -> Iterator[str]:
+    """Yield the processes that listen on a TCP port, as far as this user may know them."""
+    inodes = set()
+    for table in (Path("/proc/net/tcp"), Path("/proc/net/tcp6")):
+        rows = table.read_text().splitlines()[1:] if table.exists() else []
+        for row in map(str.split, rows):
+            if row[3] == _LISTENING and int(row[1].rpartition(":")[2], 16) == port:
+                inodes.add(f"socket:[{row[9]}]")
+    for process in Path("/proc").glob("[0-9]*"):
+        # It may end meanwhile, or be another user's.
+        with contextlib.suppress(OSError):
+            if any(os.readlink(each) in inodes for each in (process / "fd").iterdir()):
+                command = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode().strip()
+                yield f"process {process.name} ({command[:80]})"

@@ -1,0 +1,77 @@
+"""Answers of services, and what they say in words."""
+
+import ast
+import contextlib
+import re
+from collections.abc import Mapping
+from concurrent.futures import Future
+from functools import partial
+from typing import Any
+
+from crazyflie_dashboard.dashboard import Outcome
+from crazyflie_utils import ServiceError
+from crazyflie_utils.refusal import RefusalError
+
+
+def settle(done: "Future[Any]", outcome: "Future[Any]") -> None:
+    """Give ``outcome`` a service's answer; one with ``success`` false is a refusal."""
+    error = done.exception()
+    if error is None and getattr(done.result(), "success", True) is False:
+        error = ServiceError(done.result().message)
+    if error is not None:
+        outcome.set_exception(error)
+    else:
+        outcome.set_result(done.result())
+
+
+def words(error: BaseException) -> str:
+    """Return what a service has answered, without what rospy says around it."""
+    text = str(error) or repr(error)
+    text = re.sub(r"^service \[[^]]*\] responded with an error: ", "", text)
+    if text.startswith(("b'", 'b"')):
+        with contextlib.suppress(ValueError, SyntaxError):
+            text = ast.literal_eval(text).decode(errors="replace")
+    return text.removeprefix("service cannot process request: ")
+
+
+def failed(text: str) -> "Future[Any]":
+    """Return a future that has failed with `RefusalError`."""
+    future: Future[Any] = Future()
+    future.set_exception(RefusalError(text))
+    return future
+
+
+def any_of(answers: "list[Future[Any]]") -> "Future[Any]":
+    """Return the first answer that is no refusal; the refusals if there is none."""
+    outcome: Future[Any] = Future()
+    texts: list[str] = []
+
+    def note(done):
+        error = done.exception()
+        if error is not None:
+            texts.append(words(error))
+        with contextlib.suppress(Exception):
+            if error is None:
+                outcome.set_result(done.result())
+            elif len(texts) == len(answers):
+                outcome.set_exception(ServiceError("; ".join(texts)))
+
+    for answer in answers:
+        answer.add_done_callback(note)
+    return outcome
+
+
+def gathered(answers: "Mapping[str, Future[Any]]") -> "Future[tuple[Outcome, ...]]":
+    """Return the outcomes of all vehicles, when the last one has answered."""
+    outcomes: Future[tuple[Outcome, ...]] = Future()
+    texts: dict[str, str] = {}
+
+    def note(name, done):
+        error = done.exception()
+        texts[name] = "" if error is None else words(error)
+        if len(texts) == len(answers):
+            outcomes.set_result(tuple(Outcome(each, texts[each]) for each in answers))
+
+    for name, answer in answers.items():
+        answer.add_done_callback(partial(note, name))
+    return outcomes

@@ -1,0 +1,131 @@
+"""Which of the pages that are open may command vehicles: one at a time."""
+
+import itertools
+import threading
+from collections.abc import Callable
+
+from crazyflie_utils.refusal import RefusalError
+
+
+class ControlError(RefusalError):
+    """A page may not do what it asked for; the text says why."""
+
+
+class PageControl:
+    """Pages that are open, and the one that has control. For any thread.
+
+    A page that is loaded again, or has lost its connection, is a new page and has no control until
+    it takes it. That a page goes changes nothing else.
+
+    Attributes
+    ----------
+    on_first, on_close, on_empty : callable
+        ``on_first()`` is called when the first page has come, ``on_close(page)`` when one has gone,
+        and then ``on_empty()`` if it was the last.
+    """
+
+    def __init__(self) -> None:
+        self.on_first: Callable[[], None] = lambda: None
+        self.on_close: Callable[[int], None] = lambda page: None
+        self.on_empty: Callable[[], None] = lambda: None
+        self._lock = threading.RLock()
+        self._numbers = itertools.count(1)
+        self._tell: dict[int, Callable[[str], None]] = {}
+        self._controller: int | None = None
+
+    def open(self, tell: Callable[[str], None]) -> int:
+        """Take note of a new page; return its number.
+
+        ``tell(text)`` is called, from any thread, when another page takes or gives up control.
+        """
+        with self._lock:
+            page = next(self._numbers)
+            self._tell[page] = tell
+            is_first = len(self._tell) == 1
+        if is_first:
+            self.on_first()
+        return page
+
+    def close(self, page: int) -> None:
+        """Take note that a page is gone; its control with it."""
+        with self._lock:
+            self.release(page)
+            if self._tell.pop(page, None) is None:
+                return
+            is_last = not self._tell
+        self.on_close(page)
+        if is_last:
+            self.on_empty()
+
+    def take(self, page: int) -> None:
+        """Give a page control if no other has it.
+
+        Raises
+        ------
+        ControlError
+            Another page has it: the operator is to confirm `take_over`.
+        """
+        with self._lock:
+            self._expect_open(page)
+            if self._controller not in (None, page):
+                raise ControlError(
+                    f"page {self._controller} has control; taking over is possible, and both pages "
+                    "will say so"
+                )
+            is_new, self._controller = self._controller is None, page
+        if is_new:
+            self._tell_others(page, f"page {page} has control")
+
+    def take_over(self, page: int) -> None:
+        """Give a page control, whichever has it; both, and all others, are told."""
+        with self._lock:
+            self._expect_open(page)
+            before, self._controller = self._controller, page
+        if before == page:
+            return
+        if before is not None:
+            self._say(before, f"page {page} has taken over control: this page only looks now")
+            self._say(page, f"this page has taken over control from page {before}")
+        self._tell_others(page, f"page {page} has control", besides=before)
+
+    def release(self, page: int) -> None:
+        """Give up control, if the page has it."""
+        with self._lock:
+            if self._controller != page:
+                return
+            self._controller = None
+        self._tell_others(page, f"page {page} has given up control: no page has it")
+
+    def expect_control(self, page: int) -> None:
+        """Raise `ControlError` unless a page has control."""
+        with self._lock:
+            self._expect_open(page)
+            if self._controller != page:
+                has = "no page" if self._controller is None else f"page {self._controller}"
+                raise ControlError(f"this page only looks: {has} has control; take it first")
+
+    @property
+    def controller(self) -> int | None:
+        """Number of the page that has control."""
+        return self._controller
+
+    @property
+    def pages(self) -> tuple[int, ...]:
+        """Numbers of the pages that are open."""
+        with self._lock:
+            return tuple(self._tell)
+
+    def _expect_open(self, page):
+        if page not in self._tell:
+            raise ControlError(f"page {page} is closed; load it again")
+
+    def _tell_others(self, page, text, besides=None):
+        for other in self.pages:
+            if other not in (page, besides):
+                self._say(other, text)
+
+    def _say(self, page, text):
+        # The page may have gone meanwhile.
+        tell = self._tell.get(page)
+        if tell is not None:
+            tell(text)

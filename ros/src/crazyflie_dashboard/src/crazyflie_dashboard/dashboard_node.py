@@ -1,0 +1,65 @@
+"""ROS interface of the dashboard."""
+
+from functools import partial
+
+from typing_extensions import override
+
+from crazyflie_dashboard import master
+from crazyflie_dashboard.access import Access, AccessError, expect_free_port, is_loopback, new_token
+from crazyflie_dashboard.live_dashboard import LiveDashboard
+from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
+from crazyflie_utils.parameters.types import Integer, Text
+
+
+class DashboardParameters(Parameters):
+    """Parameters of `DashboardNode`."""
+
+    host: str = parameter(Text(), "address that the page listens on", "127.0.0.1")
+    port: int = parameter(Integer(1, 65535), "of the page", 8642)
+    token: str = parameter(
+        Text(may_be_empty=True),
+        "what a page has to know if `host` is not this computer's own; made anew if empty",
+        "",
+    )
+    folders: str = parameter(
+        Text(may_be_empty=True),
+        "with mission scripts and trajectories (CSV), one colon between two",
+        "",
+    )
+
+
+class DashboardNode(Node):
+    """Show vehicles in a browser, and command them."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        parameters = self._parameters = handle.load(DashboardParameters)
+        token = parameters.token or ("" if is_loopback(parameters.host) else new_token())
+        try:
+            self._access = Access(parameters.host, parameters.port, token)
+            expect_free_port(parameters.host, parameters.port)
+        except AccessError as error:
+            raise ParameterError(f"{handle.name}: {error}") from None
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        folders = [path for path in self._parameters.folders.split(":") if path]
+        self._dashboard = LiveDashboard(
+            handle,
+            lambda: master.read(handle.name),
+            partial(master.is_answering, handle.name),
+            folders,
+        )
+        # NiceGUI takes a second to import: not for what only reads the parameters' declaration.
+        from crazyflie_dashboard.page import open_page
+
+        self._page = open_page(
+            self._dashboard, self._access, self._parameters.host, self._parameters.port
+        )
+        # Not into the log: the token is for those who see this terminal.
+        print(f"the dashboard is at {self._access.url}", flush=True)
+
+    @override
+    def shutdown(self) -> None:
+        self._page.close()
+        self._dashboard.close()

@@ -1,0 +1,175 @@
+"""Which vehicles there are on a graph, by topics and services, and what they can be told."""
+
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+from crazyflie_dashboard.snapshot import Action
+from crazyflie_reports.bag_topics import ROLES
+
+_STATUS = {
+    "flight_status": (r"in_flight_flight_status|flight_status", "crazyflie_msgs/FlightStatus"),
+    "filter_status": (r"in_flight_filter_status|filter_status", "crazyflie_msgs/FilterStatus"),
+    "flight_state": (r"in_flight_state", "std_msgs/String"),
+    "vehicle_status": (r"vehicle_status", "crazyflie_msgs/VehicleStatus"),
+}
+"""Beside the roles of recordings: names below the vehicle's namespace, and types."""
+
+_NO_VEHICLES = {"all", "high_level"}
+"""Last names of namespaces that have services of vehicles, and are none."""
+
+
+class Request(Enum):
+    """How a service is called; the value is its type."""
+
+    EMPTY = "std_srvs/Empty"
+    SET_BOOL = "std_srvs/SetBool"
+    TAKEOFF = "crazyflie_driver/Takeoff"
+    LAND = "crazyflie_driver/Land"
+    GO_TO = "crazyflie_driver/GoTo"
+
+
+@dataclass(frozen=True)
+class Service:
+    """A service that carries out an action.
+
+    With ``needs_commander`` the vehicle has none for it yet: its `HighLevelNode` is to be started.
+    """
+
+    name: str
+    request: Request
+    needs_commander: bool = False
+
+
+@dataclass(frozen=True)
+class Graph:
+    """What the master says.
+
+    ``topics`` and ``types`` are topic -> type, of those that are published and of all; ``services``
+    service -> its node.
+    """
+
+    topics: Mapping[str, str] = field(default_factory=dict)
+    types: Mapping[str, str] = field(default_factory=dict)
+    services: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Vehicle:
+    """A vehicle on the graph.
+
+    Attributes
+    ----------
+    namespace : str
+        Absolute, without a slash at its end: "" or /cf1.
+    driver : str
+        That of its driver, which is another one in the hardware example.
+    topics : dict
+        Role -> topic and type.
+    services : dict
+        `Action` -> services that are called for it, all of them.
+    has_driver : bool
+        A driver connects it.
+    """
+
+    namespace: str
+    driver: str = ""
+    topics: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    services: Mapping[Action, tuple[Service, ...]] = field(default_factory=dict)
+    has_driver: bool = False
+
+    @property
+    def name(self) -> str:
+        """Without a slash in front; "/" without a namespace."""
+        return self.namespace.strip("/") or "/"
+
+    @property
+    def commander(self) -> str:
+        """Name of its `HighLevelNode`, if it has one."""
+        return f"{self.namespace}/high_level"
+
+
+def vehicles(graph: Graph) -> list[Vehicle]:
+    """Return the vehicles of a graph, cf10 after cf9.
+
+    A vehicle is a namespace with states, controls, or the status of a driver; without any, one with
+    poses.
+    """
+    topics = _by_namespace(graph.topics)
+
+    def having(*roles):
+        return {name for name, found in topics.items() if any(role in found for role in roles)}
+
+    flown, driven = having("state", "final_control"), having("cmd_vel", "vehicle_status", "battery")
+    driven |= {
+        name.removesuffix("/upload_trajectory")
+        for name in graph.services
+        if name.endswith("/upload_trajectory") and name.split("/")[-2] not in _NO_VEHICLES
+    }
+    # In the hardware example only the driver has a namespace.
+    is_shared = flown == {""} and len(driven - {""}) == 1
+    drivers = {"": next(iter(driven - {""}))} if is_shared else {}
+    namespaces = flown if is_shared else flown | driven
+    namespaces = namespaces or having("pose")
+    return [
+        _vehicle(name, drivers.get(name, name), topics, graph.services, name in driven | {*drivers})
+        for name in sorted(namespaces, key=_natural)
+    ]
+
+
+def _natural(name):
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
+
+
+def _by_namespace(topics: Mapping[str, str]) -> dict[str, dict[str, tuple[str, str]]]:
+    """Return role -> topic and type, by namespace."""
+    found: dict[str, dict[str, tuple[str, str]]] = defaultdict(dict)
+    known = [(role.name, role.topics, set(role.rows)) for role in ROLES]
+    known += [(role, names, {kind}) for role, (names, kind) in _STATUS.items()]
+    patterns = [(role, re.compile(rf"(.*)/(?:{names})"), kinds) for role, names, kinds in known]
+    for topic, kind in sorted(topics.items()):
+        for role, pattern, kinds in patterns:
+            if kind in kinds and (match := pattern.fullmatch(topic)):
+                found[match[1]].setdefault(role, (topic, kind))
+    return found
+
+
+def _vehicle(top, driver, topics, services, has_driver):
+    merged = {**topics.get(driver, {}), **topics.get(top, {})}
+    found: dict[Action, tuple[Service, ...]] = {}
+    for action, candidates in _candidates(top, driver, services):
+        there = tuple(each for each in candidates if each.name in services)
+        if there and action not in found:
+            found[action] = there
+    if Action.GO_TO not in found and {f"{top}/takeoff", f"{top}/land"} <= services.keys():
+        go_to = Service(f"{top}/high_level/go_to", Request.GO_TO, needs_commander=True)
+        found[Action.GO_TO] = (go_to,)
+    return Vehicle(top, driver, merged, found, has_driver)
+
+
+def _candidates(
+    top: str, driver: str, services: Mapping[str, str]
+) -> Iterator[tuple[Action, Iterable[Service]]]:
+    """Yield what may carry out an action, the best first; each of a row is called."""
+    commander = f"{top}/high_level"
+    flights = [commander]
+    node = services.get(f"{driver}/upload_trajectory")
+    if node is not None and services.get(f"{driver}/takeoff") == node:
+        flights.append(driver)
+    for place in flights:
+        yield Action.TAKEOFF, [Service(f"{place}/takeoff", Request.TAKEOFF)]
+        yield Action.LAND, [Service(f"{place}/land", Request.LAND)]
+        yield Action.GO_TO, [Service(f"{place}/go_to", Request.GO_TO)]
+    if driver not in flights or driver != top:
+        yield Action.TAKEOFF, [Service(f"{top}/takeoff", Request.EMPTY)]
+        yield Action.LAND, [Service(f"{top}/land", Request.EMPTY)]
+        yield Action.GO_TO, [Service(f"{top}/go_to", Request.GO_TO)]
+    stops = dict.fromkeys((f"{top}/emergency", f"{driver}/emergency"))
+    yield Action.EMERGENCY, [Service(name, Request.EMPTY) for name in stops]
+    yield Action.RESET, [Service(f"{top}/emergency_reset", Request.EMPTY)]
+    yield Action.REBOOT, [Service(f"{driver}/reboot", Request.EMPTY)]
+    yield Action.RECOVER, [Service(f"{driver}/recover", Request.EMPTY)]
+    yield Action.ARM, [Service(f"{driver}/arm", Request.SET_BOOL)]
+    yield Action.DISARM, [Service(f"{driver}/arm", Request.SET_BOOL)]

@@ -1,0 +1,239 @@
+"""The running graph as a `Scene`: vehicles that come and go, the world, log and diagnostics.
+
+Nothing is subscribed to, and the master is not asked, while no page is open.
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import Executor, Future
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rosgraph_msgs.msg import Log
+from visualization_msgs.msg import MarkerArray
+
+from crazyflie_dashboard.discovery import Graph, Vehicle, vehicles
+from crazyflie_dashboard.frames import Frames
+from crazyflie_dashboard.page_state import IMAGES
+from crazyflie_dashboard.plots import VehiclePlots
+from crazyflie_dashboard.scene_parts import WORLD_MARKERS, Diagnostics, log_line, solids
+from crazyflie_dashboard.snapshot import Frame, LogLine, Scene, Sentence, Triple
+from crazyflie_dashboard.vehicle_model import VehicleModel, frame_of
+from crazyflie_utils import NodeHandle
+from crazyflie_utils.tf.poses import RawTransforms
+
+SCENE_PERIOD = 0.05
+"""From one scene to the next, s."""
+
+_POLL_PERIOD = 2.0
+"""From one look at the master to the next, s; longer where it takes long:"""
+
+_POLL_SHARE = 0.02
+"""of the time at most."""
+
+_FORGET_AFTER = 30.0
+"""A vehicle whose topics are gone is shown for so long, s."""
+
+_MAX_REFERENCES = 10
+"""With more vehicles the references of watched ones are shown only."""
+
+_MAX_LINES = 500
+"""Of the log."""
+
+
+class GraphModel:
+    """What is known of the graph. Not for several threads at once, except ``scene`` and ``graph``.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    workers : concurrent.futures.Executor
+        Its threads may wait for the master.
+    read_graph : callable
+        Returns the `Graph`; it may wait.
+
+    Attributes
+    ----------
+    scene : Scene
+        The newest one.
+    graph : Graph
+        The newest one.
+    models : dict of str to VehicleModel
+        By name of the vehicle.
+    plots : dict of str to VehiclePlots
+        Of watched vehicles.
+    paths, sentences, missions
+        Parts of the scene that are set from outside.
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        workers: Executor,
+        read_graph: Callable[[], Graph],
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        self.scene = Scene()
+        self.graph = Graph()
+        self.models: dict[str, VehicleModel] = {}
+        self.plots: dict[str, VehiclePlots] = {}
+        self.paths: Mapping[str, tuple[Triple, ...]] = {}
+        self.sentences: tuple[Sentence, ...] = ()
+        self.missions: Callable[[], tuple[str, ...]] = tuple
+        self.fence: tuple[Triple, Triple] | None = None
+        self._parent, self._workers, self._read_graph = handle, workers, read_graph
+        self._clock = clock
+        self._handle: NodeHandle | None = None
+        self._frames = Frames(clock, handle.nanoseconds)
+        self._diagnostics = Diagnostics(clock)
+        self._markers: dict[str, Any] = {}
+        self._subscribed: set[str] = set()
+        self._log: deque[LogLine] = deque(maxlen=_MAX_LINES)
+        self._lines = 0
+        self._seen: dict[str, float] = {}
+        self._poll_at = 0.0
+        self._known_frames = 0
+        self._is_polling = False
+
+    def begin(self) -> None:
+        """Begin to look at the graph: a page is open."""
+        if self._handle is not None:
+            return
+        handle = self._handle = self._parent.child()
+        self._frames = Frames(self._clock, handle.nanoseconds)
+        self._poll_at = 0.0
+        for topic in ("/tf", "/tf_static"):
+            handle.subscribe(topic, RawTransforms, lambda message: self._frames.read(message.raw))
+        handle.subscribe("/rosout_agg", Log, self._on_log)
+        handle.subscribe("/diagnostics", DiagnosticArray, self._diagnostics.take)
+        handle.timer(SCENE_PERIOD, self._on_timer, steady=True)
+
+    def end(self) -> None:
+        """Forget the graph: no page is open."""
+        if self._handle is None:
+            return
+        for model in self.models.values():
+            model.close()
+        self._handle.close()
+        self._handle = None
+        for known in (self.models, self.plots, self._seen, self._markers):
+            known.clear()
+        self._subscribed.clear()
+        self.scene, self.graph = Scene(), Graph()
+
+    def watch(self, names: set[str]) -> None:
+        """Receive what comes often for these vehicles only."""
+        for name in self.plots.keys() - names:
+            del self.plots[name]
+        for name, model in self.models.items():
+            if name in names and name not in self.plots:
+                self.plots[name] = VehiclePlots(self._clock)
+            model.watch(name in names, self.graph.topics)
+            model.show_reference(name in names or len(self.models) <= _MAX_REFERENCES)
+
+    def _on_timer(self):
+        if self._clock() >= self._poll_at and not self._is_polling:
+            self._is_polling = True
+            began = self._clock()
+            self._workers.submit(self._read_graph).add_done_callback(
+                lambda done: self._parent.submit(self._on_graph, done, began)
+            )
+        self._frames.update()
+        if len(self._frames.poses) != self._known_frames:
+            self._find_frames()
+        self.scene = self._make_scene()
+
+    def _on_graph(self, done: "Future[Graph]", began: float) -> None:
+        self._is_polling = False
+        now = self._clock()
+        self._poll_at = now + max(_POLL_PERIOD, (now - began) / _POLL_SHARE)
+        if self._handle is None:
+            return
+        # Without a master what is known is shown, and grows old.
+        if done.exception() is not None:
+            self._parent.warn(f"no graph: {done.exception()}", throttle=60.0)
+            return
+        self.graph = done.result()
+        self._update_vehicles(vehicles(self.graph), now)
+        for topic, kind in self.graph.topics.items():
+            if topic.endswith(WORLD_MARKERS) and topic not in self._subscribed:
+                if kind == MarkerArray._type:
+                    self._subscribed.add(topic)
+                    self._handle.subscribe(topic, MarkerArray, self._on_markers)
+
+    def _update_vehicles(self, found: list[Vehicle], now: float) -> None:
+        for vehicle in found:
+            name = vehicle.name
+            self._seen[name] = now
+            model = self.models.get(name)
+            if model is not None and model.vehicle == vehicle:
+                continue
+            if model is not None and model.vehicle.topics == vehicle.topics:
+                model.vehicle = vehicle
+                continue
+            if model is not None:
+                model.close()
+            self.models[name] = VehicleModel(
+                self._parent.child(), vehicle, self._clock, self._row_taker(name)
+            )
+        for name in [n for n in self.models if now - self._seen[n] > _FORGET_AFTER]:
+            self.models.pop(name).close()
+        self.models = {v.name: self.models[v.name] for v in found} | self.models
+        for model in self.models.values():
+            model.kind = self._diagnostics.kind(model.vehicle)
+        self._find_frames()
+        self.watch(set(self.plots))
+
+    def _find_frames(self):
+        self._known_frames = len(self._frames.poses)
+        for model in self.models.values():
+            model.follow_frame(frame_of(model.vehicle, self._frames, len(self.models) == 1))
+
+    def _row_taker(self, name):
+        def take(role, row):
+            plots = self.plots.get(name)
+            if plots is not None:
+                plots.take(role, row)
+
+        return take
+
+    def _on_log(self, message):
+        self._lines += 1
+        self._log.append(log_line(self._lines, message))
+
+    def _on_markers(self, message):
+        self._markers[message._connection_header["topic"]] = message.markers
+
+    def _make_scene(self) -> Scene:
+        frames = self._frames
+        own = {model.frame for model in self.models.values()} - {None}
+        roots = [frames.root(str(frame)) for frame in own or frames.poses]
+        fixed = max(sorted(set(roots)), key=roots.count, default="world")
+        snapshots = {name: model.snapshot(frames, fixed) for name, model in self.models.items()}
+        for name, plots in self.plots.items():
+            if name in snapshots:
+                has_state = "state" in self.models[name].vehicle.topics
+                plots.take_pose(snapshots[name], has_state)
+        others = []
+        for name in frames.poses.keys() - own:
+            pose = frames.in_fixed(name, fixed)
+            if pose is not None and frames.poses[name].parent not in own:
+                others.append(Frame(name, *pose, frames.age(name)))
+        return Scene(
+            time=self._parent.nanoseconds() * 1e-9,
+            fixed_frame=fixed,
+            vehicles=snapshots,
+            solids=solids(self._markers, frames, fixed, self.scene.solids),
+            fence=self.fence,
+            frames=tuple(others),
+            paths=self.paths,
+            sentences=self._diagnostics.sentences() + self.sentences,
+            log=tuple(self._log) if self._lines != _last(self.scene.log) else self.scene.log,
+            images=tuple(sorted(t for t, kind in self.graph.topics.items() if kind in IMAGES)),
+            missions=self.missions(),
+        )
+
+
+def _last(log):
+    return log[-1].number if log else 0

@@ -1,0 +1,245 @@
+"""The dashboard of the running graph."""
+
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from typing import Any
+
+from typing_extensions import override
+
+from crazyflie_dashboard import missions
+from crazyflie_dashboard.actions import Actions, Target
+from crazyflie_dashboard.control import PageControl
+from crazyflie_dashboard.dashboard import (
+    MAX_COMMAND_AGE,
+    Command,
+    Dashboard,
+    DryRunResult,
+    MissionFile,
+    Outcome,
+    ParameterInfo,
+    Series,
+)
+from crazyflie_dashboard.discovery import Graph
+from crazyflie_dashboard.doctor_report import examine
+from crazyflie_dashboard.graph_model import GraphModel
+from crazyflie_dashboard.live_parameters import LiveParameters
+from crazyflie_dashboard.page_state import PageState
+from crazyflie_dashboard.snapshot import Action, Scene
+from crazyflie_utils import NodeHandle
+from crazyflie_utils.refusal import RefusalError
+
+
+class LiveDashboard(Dashboard):
+    """The graph, as pages see and command it: what they ask for is done in the node's turn.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+    read_graph : callable
+        Returns the `Graph`; it may wait.
+    is_answering : callable
+        ``is_answering(service)``; it may wait.
+    folders : list of str
+        With missions and trajectories.
+    clock : callable
+        time.monotonic, by which commands grow old.
+    workers : concurrent.futures.Executor, optional
+        Its threads may wait.
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        read_graph: Callable[[], Graph],
+        is_answering: Callable[[str], bool],
+        folders: list[str],
+        clock: Callable[[], float] = time.monotonic,
+        workers: Executor | None = None,
+    ):
+        self.pages = PageControl()
+        self._handle, self._folders, self._clock = handle, folders, clock
+        self._workers = workers or ThreadPoolExecutor(8, "dashboard")
+        self._model = GraphModel(handle, self._workers, read_graph, clock)
+        self._actions = Actions(handle, self._workers, clock, is_answering)
+        self._parameters = LiveParameters(handle, self._workers, self._model)
+        self._missions = missions.Missions()
+        self._model.missions = lambda: self._missions.running
+        self._open: dict[int, PageState] = {}
+        self.pages.on_first = lambda: handle.submit(self._model.begin)
+        self.pages.on_close = lambda page: handle.submit(self._close, page)
+        self.pages.on_empty = lambda: handle.submit(self._model.end)
+
+    def close(self) -> None:
+        """End what was begun here and flies nothing."""
+        self._actions.close()
+        self._workers.shutdown(wait=False, cancel_futures=True)
+
+    @override
+    def scene(self) -> Scene:
+        return self._model.scene
+
+    @override
+    def watch(self, page: int, vehicle: str | None) -> None:
+        def do():
+            self._page(page).vehicle = vehicle
+            self._update_watched()
+
+        self._handle.submit(do)
+
+    @override
+    def plots(self, page: int) -> tuple[Series, ...]:
+        state = self._open.get(page)
+        if state is None:
+            return ()
+        plots = self._model.plots.get(state.vehicle or "")
+        return (plots.series() if plots is not None else ()) + state.series()
+
+    @override
+    def add_field(self, page: int, path: str) -> "Future[None]":
+        return self._do(lambda: self._page(page).add_field(path, self._model.graph.topics))
+
+    @override
+    def remove_field(self, page: int, path: str) -> None:
+        self._handle.submit(lambda: self._page(page).remove_field(path))
+
+    @override
+    def command(self, page: int, command: Command) -> "Future[tuple[Outcome, ...]]":
+        def do():
+            if command.action != Action.EMERGENCY:
+                self.pages.expect_control(page)
+            now = self._model.scene.vehicles
+            targets = {
+                name: Target(model.vehicle, now[name])
+                for name, model in self._model.models.items()
+                if name in now
+            }
+            return self._actions.carry_out(command, targets, self._model.graph)
+
+        return self._do(do)
+
+    @override
+    def parameter_owners(self) -> tuple[str, ...]:
+        return self._parameters.owners()
+
+    @override
+    def parameters(self, owner: str | None = None) -> "Future[tuple[ParameterInfo, ...]]":
+        return self._do(self._parameters.of, owner)
+
+    @override
+    def set_parameter(
+        self, page: int, parameter: ParameterInfo, text: str
+    ) -> "Future[ParameterInfo]":
+        def do():
+            self.pages.expect_control(page)
+            return self._parameters.set(parameter, text)
+
+        return self._do(do)
+
+    @override
+    def mission_files(self) -> tuple[MissionFile, ...]:
+        return missions.listed(self._folders)
+
+    @override
+    def dry_run(
+        self, page: int, mission: MissionFile, vehicles: tuple[str, ...]
+    ) -> "Future[DryRunResult]":
+        def show(done):
+            if done.exception() is None:
+                self._model.paths = dict(done.result().paths)
+
+        def do():
+            self.pages.expect_control(page)
+            result = self._missions.dry_run(mission, vehicles)
+            result.add_done_callback(lambda done: self._handle.submit(show, done))
+            return result
+
+        return self._do(do)
+
+    @override
+    def fly(
+        self, page: int, mission: MissionFile, vehicles: tuple[str, ...], clicked: float
+    ) -> "Future[str]":
+        def do():
+            self._expect(page, clicked)
+            return self._missions.fly(mission, vehicles)
+
+        return self._do(do)
+
+    @override
+    def stop_mission(self, page: int, clicked: float) -> "Future[None]":
+        def do():
+            self._expect(page, clicked)
+            self._missions.stop()
+
+        return self._do(do)
+
+    @override
+    def examine(self) -> "Future[None]":
+        def show(sentences):
+            self._model.sentences = sentences
+
+        def work():
+            self._handle.submit(show, examine())
+
+        return self._workers.submit(work)
+
+    @override
+    def watch_image(self, page: int, topic: str | None) -> "Future[None]":
+        return self._do(lambda: self._page(page).watch_image(topic, self._model.graph.topics))
+
+    @override
+    def image(self, page: int) -> bytes | None:
+        state = self._open.get(page)
+        return None if state is None else state.image
+
+    # In the node's turn.
+
+    def _do(self, work: Callable[..., Any], *arguments: Any) -> "Future[Any]":
+        """Have work done in its turn; the future has its result, or that of its future."""
+        outcome: Future[Any] = Future()
+
+        def copy(done):
+            error = done.exception()
+            if error is not None:
+                outcome.set_exception(error)
+            else:
+                outcome.set_result(done.result())
+
+        def run():
+            try:
+                result = work(*arguments)
+            except Exception as error:
+                outcome.set_exception(error)
+                return
+            if isinstance(result, Future):
+                result.add_done_callback(copy)
+            else:
+                outcome.set_result(result)
+
+        self._handle.submit(run)
+        return outcome
+
+    def _page(self, number):
+        if number not in self.pages.pages:
+            raise RefusalError(f"page {number} is closed; load it again")
+        return self._open.setdefault(number, PageState(self._handle, self._clock))
+
+    def _close(self, number):
+        page = self._open.pop(number, None)
+        if page is not None:
+            page.close()
+            self._update_watched()
+
+    def _update_watched(self):
+        chosen = {page.vehicle for page in self._open.values()}
+        self._model.watch({name for name in self._model.models if name in chosen})
+
+    def _expect(self, page, clicked):
+        self.pages.expect_control(page)
+        age = self._clock() - clicked
+        if not -0.1 <= age <= MAX_COMMAND_AGE:
+            raise RefusalError(
+                f"the command is {age:.1f} s old; expected at most {MAX_COMMAND_AGE:g} s; "
+                "nothing was done"
+            )

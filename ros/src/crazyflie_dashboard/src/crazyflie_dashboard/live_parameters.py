@@ -1,0 +1,159 @@
+"""Parameters of the running graph: of nodes by dynamic_reconfigure, of firmware by the driver."""
+
+from concurrent.futures import Executor, Future
+from functools import partial
+from typing import Any
+
+from dynamic_reconfigure.msg import Config, ConfigDescription
+from dynamic_reconfigure.srv import Reconfigure
+from typing_extensions import override
+
+from crazyflie_dashboard.answers import words
+from crazyflie_dashboard.dashboard import ParameterInfo
+from crazyflie_dashboard.graph_model import GraphModel
+from crazyflie_dashboard.parameters import confirmed, described, of_firmware, parsed, request
+from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
+from crazyflie_utils import NodeHandle, ParameterError
+from crazyflie_utils.parameters.types import ParameterType
+from crazyflie_utils.refusal import RefusalError
+
+_TIMEOUT = 3.0
+"""Of what a node has latched, s of the machine's clock."""
+
+_CALL_TIMEOUT = 5.0
+"""Of a change, s."""
+
+_SERVICE = "/set_parameters"
+
+
+class _Raw(ParameterType):
+    label = "any"
+
+    @override
+    def __call__(self, value: Any) -> Any:
+        return value
+
+
+class LiveParameters:
+    """Reads and sets parameters; see `Dashboard.parameters`."""
+
+    def __init__(self, handle: NodeHandle, workers: Executor, model: GraphModel):
+        self._handle, self._workers, self._model = handle, workers, model
+
+    def owners(self) -> tuple[str, ...]:
+        """Return nodes with live parameters, and vehicles with firmware."""
+        services = self._model.graph.services
+        nodes = [name.removesuffix(_SERVICE) for name in services if name.endswith(_SERVICE)]
+        return (*self._firmware(), *sorted(nodes))
+
+    def of(self, owner: str | None) -> "Future[tuple[ParameterInfo, ...]]":
+        """Return the parameters of a node or of a vehicle's firmware; of all nodes."""
+        owners = self.owners()
+        if owner is not None and owner not in owners:
+            raise RefusalError(
+                f"{owner} has no live parameters; expected one of {', '.join(owners)}"
+            )
+        if owner in self._firmware():
+            return self._workers.submit(self._read_firmware, owner)
+        nodes = [owner] if owner else [each for each in owners if each not in self._firmware()]
+        return self._of_nodes(nodes)
+
+    def set(self, parameter: ParameterInfo, text: str) -> "Future[ParameterInfo]":
+        """Set a parameter to what was typed; the result has the value that came back."""
+        value = parsed(parameter, text)
+        outcome: Future[ParameterInfo] = Future()
+        if parameter.is_firmware:
+            if parameter.owner not in self._firmware():
+                raise RefusalError(f"{parameter.owner} has no driver; expected one")
+            top, name = self._firmware()[parameter.owner], parameter.name.replace(".", "/")
+            self._workers.submit(self._handle.set_param, f"{top}/{name}", value).add_done_callback(
+                lambda _: self._handle.submit(self._update_firmware, parameter, top, name, outcome)
+            )
+            return outcome
+        service = f"{parameter.owner}{_SERVICE}"
+        answer = self._handle.call_service(
+            service, Reconfigure, request(parameter, value), _CALL_TIMEOUT
+        )
+
+        def confirm(done):
+            if done.exception() is not None:
+                outcome.set_exception(RefusalError(words(done.exception())))
+            else:
+                outcome.set_result(confirmed(parameter, done.result().config))
+
+        answer.add_done_callback(confirm)
+        return outcome
+
+    def _firmware(self):
+        """Return the namespaces of drivers, by vehicle."""
+        services = self._model.graph.services
+        drivers = {name: model.vehicle.driver for name, model in self._model.models.items()}
+        return {name: top for name, top in drivers.items() if f"{top}/update_params" in services}
+
+    def _read_firmware(self, owner):
+        tree = self._handle.get_param(self._firmware()[owner] or "/", _Raw(), {})
+        return tuple(of_firmware(owner, tree if isinstance(tree, dict) else {}))
+
+    def _update_firmware(self, parameter, top, name, outcome):
+        def read(done):
+            refusal = done.exception()
+            if refusal is not None:
+                # As the firmware has it, and not as it was typed.
+                self._handle.set_param(f"{top}/{name}", parameter.value)
+                raise RefusalError(words(refusal))
+            value = self._handle.get_param(f"{top}/{name}", _Raw())
+            return ParameterInfo(**{**vars(parameter), "value": value})
+
+        def finish(done):
+            error = done.exception()
+            if isinstance(error, ParameterError):
+                error = RefusalError(str(error))
+            if error is not None:
+                outcome.set_exception(error)
+            else:
+                outcome.set_result(done.result())
+
+        answer = self._handle.call_service(
+            f"{top}/update_params", UpdateParams, UpdateParamsRequest([name]), _CALL_TIMEOUT
+        )
+        answer.add_done_callback(
+            lambda done: self._workers.submit(read, done).add_done_callback(finish)
+        )
+
+    def _of_nodes(self, nodes):
+        outcome: Future[tuple[ParameterInfo, ...]] = Future()
+        handle = self._handle.child()
+        descriptions: dict[str, Any] = {}
+        configs: dict[str, Any] = {}
+
+        def finish():
+            if outcome.done():
+                return
+            handle.close()
+            both = [node for node in nodes if node in descriptions and node in configs]
+            outcome.set_result(
+                tuple(
+                    p for node in both for p in described(node, descriptions[node], configs[node])
+                )
+            )
+
+        def note(known, node, message):
+            known[node] = message
+            if len(descriptions) == len(configs) == len(nodes):
+                finish()
+
+        for node in nodes:
+            handle.subscribe(
+                f"{node}/parameter_descriptions",
+                ConfigDescription,
+                partial(note, descriptions, node),
+            )
+            handle.subscribe(
+                f"{node}/parameter_updates",
+                Config,
+                partial(note, configs, node),
+            )
+        handle.timer(_TIMEOUT, finish, steady=True)
+        if not nodes:
+            finish()
+        return outcome

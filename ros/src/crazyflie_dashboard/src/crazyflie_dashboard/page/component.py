@@ -1,0 +1,38 @@
+"""A part of the page that is drawn by a component of this folder from one list."""
+
+from typing import Any
+
+from nicegui.element import Element
+
+
+class ListView(Element):
+    """Shows a list; it is sent when it has changed."""
+
+    prop: str
+    """Name of the component's property."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._props[self.prop] = []
+
+    def show(self, items: list[Any]) -> None:
+        """Show these items."""
+        if self._props[self.prop] != items:
+            self._props[self.prop] = items
+            self.update()
+
+
+class Cards(ListView, component="cards.js"):  # type: ignore[call-arg]
+    """A card for each vehicle."""
+
+    prop = "vehicles"
+
+
+class Lines(ListView, component="lines.js"):  # type: ignore[call-arg]
+    """Lines: key, look, what has said it, text, and what to do."""
+
+    prop = "lines"
+
+    def __init__(self, nothing: str) -> None:
+        super().__init__()
+        self._props["nothing"] = nothing

@@ -1,0 +1,65 @@
+"""Lets only requests in that may see the page, and tells browsers what the page may load."""
+
+from http.cookies import SimpleCookie
+from urllib.parse import parse_qs
+
+from starlette.responses import PlainTextResponse, RedirectResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from crazyflie_dashboard.access import Access
+
+COOKIE = "dashboard_token"
+
+HEADERS = (
+    # Nothing from the internet, no frame around the page (a click could be meant for another one).
+    (
+        b"content-security-policy",
+        b"default-src 'self' data: blob: 'unsafe-inline' 'unsafe-eval'; frame-ancestors 'none'; "
+        b"base-uri 'none'; form-action 'none'",
+    ),
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"same-origin"),
+)
+
+
+class Gate:
+    """ASGI application around another one: refuses requests and websockets as `Access` decides.
+
+    A token in the address becomes a cookie, so that it does not stay in the address bar.
+    """
+
+    def __init__(self, app: ASGIApp, access: Access):
+        self.app = app
+        self._access = access
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self.app(scope, receive, send)
+            return
+        headers = {
+            name.decode("latin-1"): text.decode("latin-1") for name, text in scope["headers"]
+        }
+        given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
+        cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
+        refusal = self._access.refusal(headers, given or (cookie.value if cookie else None))
+        if refusal and scope["type"] == "websocket":
+            await receive()
+            await send({"type": "websocket.close", "code": 1008, "reason": refusal[:120]})
+        elif refusal:
+            await PlainTextResponse(f"Refused: {refusal}.\n", 403)(scope, receive, send)
+        elif given and scope["type"] == "http":
+            answer = RedirectResponse(scope["path"], 303)
+            answer.set_cookie(COOKIE, given, httponly=True, samesite="strict")
+            await answer(scope, receive, send)
+        else:
+            await self.app(scope, receive, _with_headers(send))
+
+
+def _with_headers(send: Send) -> Send:
+    async def sender(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            message["headers"] = [*message.get("headers", ()), *HEADERS]
+        await send(message)
+
+    return sender

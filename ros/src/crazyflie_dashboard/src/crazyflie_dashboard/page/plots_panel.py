@@ -1,0 +1,192 @@
+"""Plots of the last minute of one vehicle, that can be stopped and measured."""
+
+import math
+from collections.abc import Iterable
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from crazyflie_dashboard.dashboard import Series
+from crazyflie_dashboard.page.session import Session
+from crazyflie_dashboard.snapshot import Scene
+
+SPAN = 60.0
+"""Time that is shown, s."""
+
+MAX_POINTS = 300
+"""Points of one line: more than the plot has pixels to show would only be sent."""
+
+HEIGHT, GAP, TOP = 105, 34, 26
+"""Of one plot, and the space between two and above the first, px."""
+
+COLORS = ["#4ea1ff", "#35c98a", "#ffb545", "#ff6b6b", "#b58cff", "#5fd3e0"]
+
+NAME_STYLES = {f"c{i}": {"color": color, "fontSize": 11} for i, color in enumerate(COLORS)}
+
+
+class PlotsPanel:
+    """One plot for each unit, one below the other, on the same time."""
+
+    def __init__(self, session: Session):
+        self._session = session
+        self._series: tuple[Series, ...] = ()
+        self._window = (-SPAN, 0.0)
+        with ui.element("div").classes("tools"):
+            self._name = ui.label().classes("choice")
+            self._run = ui.button("Stop", on_click=self._turn).props("outline dense icon=pause")
+        with ui.element("div").classes("tools"):
+            self._field = ui.input("another field, as /cf1/pose/pose/position/x")
+            self._field.props("dense outlined").classes("number")
+            ui.button("Add", on_click=self._add).props("outline")
+        self._chart = ui.echart({"series": []}, theme=None).classes("chart")
+        self._chart.on("chart:datazoom", self._zoom, ["batch", "start", "end"])
+        self._figures = ui.table(
+            columns=[
+                {"name": name, "label": name, "field": name, "align": "left" if k == 0 else "right"}
+                for k, name in enumerate(("name", "change", "min", "mean", "max", "deviation"))
+            ],
+            rows=[],
+            row_key="name",
+        ).props("dense flat")
+        self._figures.set_visibility(False)
+
+    @property
+    def is_stopped(self) -> bool:
+        """Whether the plots stand still."""
+        return self._figures.visible
+
+    def refresh(self, scene: Scene) -> None:
+        """Draw the newest numbers, unless stopped."""
+        if self.is_stopped:
+            return
+        self._name.text = self._session.watched or "Choose a vehicle to see its plots"
+        self._series = self._session.dashboard.plots(self._session.page)
+        self._draw()
+
+    def _draw(self) -> None:
+        options = chart(self._series, self.is_stopped)
+        self._chart.style(f"height: {options.pop('height')}px")
+        self._chart.options.clear()
+        self._chart.options.update(options)
+        self._chart.update()
+
+    def _turn(self) -> None:
+        self._figures.set_visibility(not self.is_stopped)
+        self._run.text = "Run" if self.is_stopped else "Stop"
+        self._run.props(f"icon={'play_arrow' if self.is_stopped else 'pause'}")
+        self._window = (-SPAN, 0.0)
+        self._draw()
+        self._measure()
+
+    def _zoom(self, event: GenericEventArguments) -> None:
+        part = (event.args.get("batch") or [event.args])[0]
+        self._window = tuple(SPAN * (part[end] / 100 - 1) for end in ("start", "end"))
+        self._measure()
+
+    def _measure(self) -> None:
+        self._figures.rows = [
+            row for each in self._series if (row := figures(each, *self._window)) is not None
+        ]
+        self._figures.update()
+
+    async def _add(self) -> None:
+        path = (self._field.value or "").strip()
+        done = self._session.dashboard.add_field(self._session.page, path)
+        if await self._session.succeeds(done):
+            self._field.value = ""
+
+
+def figures(series: Series, start: float, end: float) -> dict[str, str] | None:
+    """Return the figures of a line between two times (s, now is 0); None if there is nothing."""
+    times, values = np.asarray(series.times), np.asarray(series.values, dtype=float)
+    part = values[(times >= start) & (times <= end) & np.isfinite(values)]
+    if not part.size:
+        return None
+    numbers = {
+        "change": part[-1] - part[0],
+        "min": part.min(),
+        "mean": part.mean(),
+        "max": part.max(),
+        "deviation": part.std(),
+    }
+    name = f"{series.name}, {series.unit}" if series.unit else series.name
+    return {"name": name, **{what: f"{number:.3g}" for what, number in numbers.items()}}
+
+
+def points(series: Series) -> list[tuple[float, float | None]]:
+    """Return at most `MAX_POINTS` points of a line; a number that is not finite is a gap."""
+    step = max(1, math.ceil(len(series.times) / MAX_POINTS))
+    pairs = zip(series.times[::step], series.values[::step], strict=True)
+    return [(round(t, 2), float(f"{v:.5g}") if math.isfinite(v) else None) for t, v in pairs]
+
+
+def chart(series: Iterable[Series], can_be_measured: bool) -> dict[str, Any]:
+    """Return the options of ECharts, and the height (px) of all plots."""
+    groups = [list(group) for _, group in groupby(series, key=lambda each: each.unit)]
+    count = len(groups)
+    dim = {"color": "#93a0b2"}
+    lines = [
+        {
+            "name": each.name,
+            "type": "line",
+            "xAxisIndex": k,
+            "yAxisIndex": k,
+            "data": points(each),
+            "showSymbol": False,
+            "lineStyle": {"width": 1.5},
+            "color": COLORS[i % len(COLORS)],
+        }
+        for k, group in enumerate(groups)
+        for i, each in enumerate(group)
+    ]
+    tops = [TOP + k * (HEIGHT + GAP) for k in range(count)]
+    return {
+        "height": TOP + count * (HEIGHT + GAP) + 10,
+        "animation": False,
+        "textStyle": dim,
+        "title": [
+            {
+                # Each name in the color of its line.
+                "text": "  ".join(
+                    f"{{c{i % len(COLORS)}|{each.name}}}" for i, each in enumerate(group)
+                )
+                + f"   {group[0].unit}",
+                "top": top - 20,
+                "left": 40,
+                "textStyle": {**dim, "fontSize": 11, "fontWeight": "normal", "rich": NAME_STYLES},
+            }
+            for top, group in zip(tops, groups, strict=True)
+        ],
+        "tooltip": {"trigger": "axis", "confine": True, "appendToBody": False},
+        "axisPointer": {"link": [{"xAxisIndex": "all"}]},
+        "grid": [{"left": 44, "right": 10, "top": top, "height": HEIGHT} for top in tops],
+        "xAxis": [
+            {
+                "type": "value",
+                "gridIndex": k,
+                "min": -SPAN,
+                "max": 0,
+                "axisLabel": {**dim, "show": k == count - 1, "formatter": "{value} s"},
+                "splitLine": {"lineStyle": {"color": "#2a323e"}},
+            }
+            for k in range(count)
+        ],
+        "yAxis": [
+            {
+                "type": "value",
+                "gridIndex": k,
+                "scale": True,
+                "splitNumber": 3,
+                "axisLabel": {**dim, "fontSize": 10},
+                "splitLine": {"lineStyle": {"color": "#2a323e"}},
+            }
+            for k in range(count)
+        ],
+        "dataZoom": [{"type": "inside", "xAxisIndex": list(range(count))}]
+        if can_be_measured
+        else [],
+        "series": lines,
+    }

@@ -1,0 +1,172 @@
+// The vehicles and what is around them in three dimensions.
+
+import { CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
+import { Goal, Surroundings, Vehicles } from "dashboard-objects";
+
+const CLICK = 5;  // A pointer that has moved further, px, has turned the view.
+
+export default {
+  template: `<div class="scene"><canvas></canvas><div class="labels"></div>
+    <div class="no-webgl" style="display:none"></div></div>`,
+
+  props: { model: Array },
+
+  mounted() {
+    this.canvas = this.$el.children[0];
+    try {
+      this.renderer = new THREE.WebGLRenderer({ antialias: true, canvas: this.canvas });
+    } catch (error) {
+      this.$el.children[2].textContent =
+        "This browser offers no WebGL 2: the scene cannot be drawn. All else works.";
+      this.$el.children[2].style.display = "";
+      return;
+    }
+    this.labels = new CSS2DRenderer({ element: this.$el.children[1] });
+    this.scene = new THREE.Scene();
+    this.scene.background = new THREE.Color("#0e1218");
+    this.camera = new THREE.PerspectiveCamera(45, 1, 0.02, 500);
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.set(-2.6, -3.2, 2.6);
+    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls.target.set(0, 0, 0.4);
+    this.controls.maxPolarAngle = 1.55;
+    const sun = new THREE.DirectionalLight("#ffffff", 1.6);
+    sun.position.set(3, -5, 8);
+    const floor = new THREE.Mesh(new THREE.CircleGeometry(14, 64),
+      new THREE.MeshBasicMaterial({ color: "#1b222c" }));
+    floor.position.z = -0.004;
+    const grid = new THREE.GridHelper(20, 20, "#56657a", "#2f3947").rotateX(Math.PI / 2);
+    this.surroundings = new Surroundings();
+    this.goal = new Goal();
+    this.scene.add(new THREE.HemisphereLight("#ffffff", "#30343c", 2.2), sun, floor, grid,
+      new THREE.AxesHelper(0.3), this.surroundings, this.goal);
+    this.setVehicles([]);
+    this.listen();
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(this.$el);
+    this.controls.addEventListener("change", () => { this.isOld = true; });
+    this.renderer.setAnimationLoop((time) => this.draw(time / 1000));
+    this.$emit("ready");
+  },
+
+  beforeUnmount() {
+    this.observer?.disconnect();
+    this.renderer?.setAnimationLoop(null);
+    this.renderer?.dispose();
+  },
+
+  methods: {
+    resize() {
+      const { clientWidth: width, clientHeight: height } = this.$el;
+      this.renderer.setSize(width, height);
+      this.labels.setSize(width, height);
+      this.camera.aspect = width / Math.max(1, height);
+      this.camera.updateProjectionMatrix();
+      this.isOld = true;
+    },
+
+    // Draw what has changed; a scene in which nothing moves costs nothing.
+    draw(time) {
+      const place = this.following && this.vehicles.positionOf(this.following);
+      if (place) {
+        this.camera.position.add(place.clone().sub(this.controls.target));
+        this.controls.target.copy(place);
+      }
+      this.controls.update();
+      if (!this.isOld && !this.vehicles.isTurning) return;
+      this.isOld = false;
+      this.vehicles.place(this.camera, time);
+      this.renderer.render(this.scene, this.camera);
+      this.labels.render(this.scene, this.camera);
+    },
+
+    setVehicles(names) {
+      this.vehicles?.dispose();
+      this.vehicles = new Vehicles(names, this.model);
+      this.scene.add(this.vehicles);
+    },
+
+    // Change the scene; without WebGL there is none.
+    change(act) {
+      if (!this.renderer) return;
+      act();
+      this.isOld = true;
+    },
+    update(poses) { this.change(() => this.vehicles.update(poses)); },
+    setNames(names) { this.change(() => this.setVehicles(names)); },
+    setWorld(solids, fence) { this.change(() => this.surroundings.setWorld(solids, fence)); },
+    setPaths(paths) { this.change(() => this.surroundings.setPaths(paths)); },
+    setFrames(frames) { this.change(() => this.surroundings.setFrames(frames)); },
+    setGoal(goal) { this.change(() => this.goal.show(goal)); },
+
+    // Look from above, at all, or follow the vehicle of a name until another view is chosen.
+    look(view, name) {
+      if (!this.renderer) return;
+      const followed = view === "follow" ? this.vehicles.positionOf(name) : null;
+      if (view === "follow" && !followed) return;
+      this.following = followed ? name : null;
+      const box = new THREE.Box3(new THREE.Vector3(-1, -1, 0), new THREE.Vector3(1, 1, 1));
+      for (const each of this.vehicles.names) {
+        const place = this.vehicles.positionOf(each);
+        if (place) box.expandByPoint(place);
+      }
+      const target = followed ?? box.getCenter(new THREE.Vector3());
+      const far = followed ? 1.5 : box.getSize(new THREE.Vector3()).length();
+      const way = view === "above" ? [0, -0.001, 1.3] : [-0.6, -0.9, 0.7];
+      this.controls.target.copy(target);
+      this.camera.position.copy(target).add(new THREE.Vector3(...way).multiplyScalar(far));
+    },
+
+    ray(event) {
+      const { left, top, width, height } = this.canvas.getBoundingClientRect();
+      const caster = new THREE.Raycaster();
+      caster.setFromCamera(new THREE.Vector2((event.clientX - left) / width * 2 - 1,
+        1 - (event.clientY - top) / height * 2), this.camera);
+      return caster;
+    },
+
+    pointAt(event, height) {
+      const plane = new THREE.Plane(new THREE.Vector3(0, 0, 1), -height);
+      return this.ray(event).ray.intersectPlane(plane, new THREE.Vector3());
+    },
+
+    // A click on a vehicle chooses it, one on the floor sets the goal, whose handle can be dragged.
+    listen() {
+      let start = null, isDragging = false;
+      const on = (name, act) => this.$el.addEventListener(name, act, { capture: true });
+      const tell = ({ x, y }) => this.$emit("goal", { x, y });
+      on("pointerdown", (event) => {
+        start = [event.clientX, event.clientY];
+        isDragging = this.goal.visible && this.ray(event).intersectObject(this.goal.handle).length > 0;
+        if (isDragging) event.stopPropagation();  // The view is not to turn.
+      });
+      on("pointermove", (event) => {
+        const place = isDragging && this.pointAt(event, this.goal.height);
+        if (place) this.change(() => this.goal.moveTo(place.x, place.y));
+      });
+      on("pointerup", (event) => {
+        if (start === null || event.button !== 0) return;
+        const isClick = Math.hypot(event.clientX - start[0], event.clientY - start[1]) < CLICK;
+        start = null;
+        if (isDragging) {
+          isDragging = false;
+          tell(this.goal.position);
+        } else if (isClick) {
+          const hit = this.ray(event).intersectObject(this.vehicles.body)[0];
+          const place = this.pointAt(event, 0);
+          if (hit) {
+            this.$emit("choose", { name: this.vehicles.names[hit.instanceId],
+              add: event.ctrlKey || event.shiftKey });
+          } else if (place) tell(place);
+        }
+      });
+    },
+
+    // Return where a point (m) is in the window, px.
+    screen(x, y, z) {
+      const place = new THREE.Vector3(x, y, z).project(this.camera);
+      const { left, top, width, height } = this.canvas.getBoundingClientRect();
+      return [left + (place.x + 1) / 2 * width, top + (1 - place.y) / 2 * height];
+    },
+  },
+};

@@ -1,0 +1,83 @@
+"""Serves the page from a thread of its own."""
+
+import logging
+import socket
+import threading
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI
+from nicegui import Client, ui
+
+from crazyflie_dashboard.access import Access
+from crazyflie_dashboard.dashboard import Dashboard
+from crazyflie_dashboard.page.gate import Gate
+from crazyflie_dashboard.page.view import View
+
+FOLDER = Path(__file__).parent
+HEAD = (FOLDER / "head.html").read_text() + (
+    f"<style>{(FOLDER / 'dashboard.css').read_text()}</style>"
+)
+"""Styles, the clock of clicks, the emergency key, and a sentence for browsers that are too old."""
+
+CLOSING_TIME = 3.0
+"""Longest time, s, that the server has to end."""
+
+
+class Page:
+    """The server of the page; one in a process, since NiceGUI has one application in a process.
+
+    Raises
+    ------
+    OSError
+        The address cannot be listened on.
+    """
+
+    def __init__(self, dashboard: Dashboard, access: Access, host: str, port: int):
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._listener = socket.create_server((host, port), family=family)
+        application = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+        Client.shared_head_html = HEAD
+
+        # Without a history of messages a page that has lost its connection is loaded anew.
+        ui.page("/", title="Crazyflie mission control")(lambda: View(dashboard))
+        ui.run_with(
+            application,
+            dark=True,
+            tailwind=False,
+            binding_refresh_interval=None,
+            message_history_length=0,
+            show_welcome_message=False,
+        )
+        logging.getLogger("nicegui").setLevel(logging.WARNING)
+        config = uvicorn.Config(
+            Gate(application, access),
+            log_level="warning",
+            access_log=False,
+            ws="wsproto",
+            ws_per_message_deflate=False,
+            server_header=False,
+            timeout_graceful_shutdown=1,
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(
+            target=self._server.run, kwargs={"sockets": [self._listener]}, daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Serve no longer; pages that are open say that the connection is lost."""
+        self._server.should_exit = True
+        self._thread.join(CLOSING_TIME)
+        self._listener.close()
+
+
+def open_page(dashboard: Dashboard, access: Access, host: str, port: int) -> Page:
+    """Serve the page at an address until `Page.close`.
+
+    Raises
+    ------
+    OSError
+        The address cannot be listened on.
+    """
+    return Page(dashboard, access, host, port)

@@ -1,0 +1,134 @@
+"""One page that is open: its number, the vehicles chosen in it, and how it asks for things."""
+
+import asyncio
+from collections.abc import Iterable
+from concurrent.futures import Future
+from typing import Any, TypeVar
+
+from nicegui import Client, ui
+
+from crazyflie_dashboard.dashboard import Command, Dashboard
+from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
+from crazyflie_utils.refusal import RefusalError
+
+CLICKED = "(event) => emit(clickTime(event))"
+"""Handler in the browser that sends when a click was; see head.html."""
+
+REFUSAL_TIME = 12000
+"""Time for which a refusal is shown, ms."""
+
+Result = TypeVar("Result")
+
+
+class Session:
+    """One page that is open.
+
+    Attributes
+    ----------
+    page : int
+        Its number; 0 while it has no connection. A page that connects again is a new one.
+    chosen : set of str
+        Names of the vehicles that its buttons are for.
+    watched : str or None
+        The vehicle that was chosen last: its plots are shown.
+    """
+
+    def __init__(self, dashboard: Dashboard, client: Client):
+        self.dashboard = dashboard
+        self.page = 0
+        self.chosen: set[str] = set()
+        self.watched: str | None = None
+        self._client = client
+        client.on_connect(self._connect)
+        client.on_disconnect(self._disconnect)
+        client.on_delete(self._disconnect)
+
+    def _connect(self) -> None:
+        self._disconnect()
+        loop = asyncio.get_running_loop()
+
+        def tell(text: str) -> None:
+            loop.call_soon_threadsafe(self.say, text, "warning")
+
+        self.page = self.dashboard.pages.open(tell)
+        self.dashboard.watch(self.page, self.watched)
+
+    def _disconnect(self) -> None:
+        page, self.page = self.page, 0
+        if page:
+            self.dashboard.pages.close(page)
+
+    def say(self, text: str, kind: str = "info") -> None:
+        """Show a text for a while: "positive", "info", "warning" or "negative"."""
+        timeout = REFUSAL_TIME if kind in ("negative", "warning") else 5000
+        with self._client:
+            ui.notify(
+                text, type=kind, position="bottom-left", timeout=timeout, close_button="close"
+            )
+
+    @property
+    def vehicles(self) -> dict[str, VehicleSnapshot]:
+        """The vehicles that there are, by name."""
+        return dict(self.dashboard.scene().vehicles)
+
+    @property
+    def chosen_names(self) -> tuple[str, ...]:
+        """Names of the chosen vehicles that are still there, in the order in which they are shown."""
+        return tuple(name for name in self.vehicles if name in self.chosen)
+
+    def choose(self, names: Iterable[str], is_added: bool = False) -> None:
+        """Choose vehicles; with ``is_added`` turn the choice of these and leave the others."""
+        names = list(names)
+        self.chosen = self.chosen ^ set(names) if is_added else set(names)
+        if names:
+            self.watched = names[-1]
+            self.dashboard.watch(self.page, self.watched)
+
+    async def result(self, future: "Future[Result]") -> Result | None:
+        """Wait for what was asked for; None after showing why it was refused."""
+        try:
+            return await asyncio.wrap_future(future)
+        except RefusalError as error:
+            self.say(str(error), "negative")
+            return None
+
+    async def succeeds(self, future: "Future[None]") -> bool:
+        """Wait for something without a result; False after showing why it was refused."""
+        try:
+            await asyncio.wrap_future(future)
+        except RefusalError as error:
+            self.say(str(error), "negative")
+            return False
+        return True
+
+    async def command(
+        self, action: Action, names: Iterable[str], clicked: float, **details: Any
+    ) -> None:
+        """Command vehicles, and show each refusal."""
+        names = tuple(names)
+        if not names:
+            self.say(f"{action.value}: choose a vehicle first", "warning")
+            return
+        try:
+            future = self.dashboard.command(self.page, Command(action, names, clicked, **details))
+        except RefusalError as error:
+            self.say(str(error), "negative")
+            return
+        for outcome in await self.result(future) or ():
+            if outcome.text:
+                self.say(f"{outcome.vehicle}: {outcome.text}", "negative")
+
+    async def take_control(self) -> None:
+        """Take control; ask whether to take it over if another page has it."""
+        pages = self.dashboard.pages
+        try:
+            pages.take(self.page)
+        except RefusalError as error:
+            with self._client, ui.dialog() as dialog, ui.card():
+                ui.label(f"{str(error)[0].upper()}{str(error)[1:]}.")
+                with ui.row():
+                    ui.button("Take over", color="warning", on_click=lambda: dialog.submit(True))
+                    ui.button("Only look", on_click=lambda: dialog.submit(False)).props("flat")
+            if await dialog and self.page:
+                pages.take_over(self.page)
+            dialog.delete()

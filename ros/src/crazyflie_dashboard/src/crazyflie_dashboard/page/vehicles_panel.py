@@ -1,0 +1,153 @@
+"""Cards of the vehicles, and what the chosen ones can be told."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from nicegui import ui
+from nicegui.events import GenericEventArguments
+
+from crazyflie_dashboard.page.component import Cards
+from crazyflie_dashboard.page.scene_view import SceneView, condition
+from crazyflie_dashboard.page.session import CLICKED, Session
+from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
+
+LOOKS = ("ground", "flight", "stale", "emergency")
+
+
+class VehiclesPanel:
+    """Buttons for the chosen vehicles, where they are to go, and the cards."""
+
+    def __init__(self, session: Session, scene_view: SceneView):
+        self._session = session
+        self._scene_view = scene_view
+        with ui.element("div").classes("tools"):
+            self._choice = ui.label().classes("choice")
+            ui.button("All", on_click=lambda: session.choose(session.vehicles)).props("flat dense")
+            ui.button("None", on_click=lambda: session.choose(())).props("flat dense")
+        with ui.element("div").classes("tools"):
+            self._button("Take off", self._take_off).props("icon=flight_takeoff color=positive")
+            self._height = _number("height, m", 1.0, 0.1, 3.0)
+            self._button("Land", self._land).props("icon=flight_land color=primary")
+        with ui.element("div").classes("tools goal"):
+            self._goal = [_number(f"{axis}, m") for axis in "xyz"]
+            self._yaw = _number("yaw, °")
+            self._button("Go", self._go).props("icon=near_me color=accent")
+        for field in (*self._goal, self._yaw):
+            field.on_value_change(self._draw_goal)
+        ui.label(
+            "Click on the floor to set a goal, drag its handle, then press Go. Several vehicles keep "
+            "their formation."
+        ).classes("hint")
+        self._cards = Cards()
+        self._cards.on("choose", self._choose)
+        self._cards.on("act", self._act)
+        scene_view.on("choose", self._choose)
+        scene_view.on("goal", self._set_goal)
+
+    def _button(self, text: str, handler: Callable[..., Any]) -> ui.button:
+        return ui.button(text).props("unelevated").on("click", handler, js_handler=CLICKED)
+
+    def refresh(self, scene: Scene) -> None:
+        """Show what has become of the vehicles."""
+        names = self._session.chosen_names
+        self._choice.text = f"{len(names)} of {len(scene.vehicles)} chosen"
+        self._cards.show([card(each, each.name in names) for each in scene.vehicles.values()])
+
+    def _choose(self, event: GenericEventArguments) -> None:
+        self._session.choose([event.args["name"]], event.args["add"])
+
+    async def _act(self, event: GenericEventArguments) -> None:
+        details = {}
+        if (action := Action(event.args["action"])) is Action.TAKEOFF:
+            details["height"] = self._height.value or 1.0
+        await self._session.command(action, [event.args["name"]], event.args["clicked"], **details)
+
+    async def _take_off(self, event: GenericEventArguments) -> None:
+        names = self._session.chosen_names
+        height = self._height.value or 1.0
+        await self._session.command(Action.TAKEOFF, names, event.args, height=height)
+
+    async def _land(self, event: GenericEventArguments) -> None:
+        await self._session.command(Action.LAND, self._session.chosen_names, event.args)
+
+    def _set_goal(self, event: GenericEventArguments) -> None:
+        x, y, z = self._goal
+        x.value, y.value = round(event.args["x"], 2), round(event.args["y"], 2)
+        if z.value is None:
+            z.value = self._height.value or 1.0
+
+    def _draw_goal(self) -> None:
+        x, y, z = (field.value for field in self._goal)
+        is_set = None not in (x, y, z)
+        yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
+        self._scene_view.show_goal({"x": x, "y": y, "z": z, "yaw": yaw} if is_set else None)
+
+    async def _go(self, event: GenericEventArguments) -> None:
+        goal = [field.value for field in self._goal]
+        if None in goal:
+            self._session.say("go to: click on the floor, or type x, y and z", "warning")
+            return
+        yaw = None if self._yaw.value is None else math.radians(self._yaw.value)
+        vehicles = [self._session.vehicles[name] for name in self._session.chosen_names]
+        for name, place in formation(vehicles, goal).items():
+            await self._session.command(Action.GO_TO, [name], event.args, goal=place, yaw=yaw)
+        if not vehicles:
+            await self._session.command(Action.GO_TO, (), event.args)
+
+
+def formation(vehicles: list[VehicleSnapshot], goal: Sequence[float]) -> dict[str, tuple[float, float, float]]:
+    """Return where each vehicle goes, m, so that their middle comes to the goal.
+
+    A vehicle whose position is not known goes nowhere, since it could hit another one.
+    """
+    known = {each.name: each.position for each in vehicles if each.position is not None}
+    x, y = (sum(place[k] for place in known.values()) / max(1, len(known)) for k in (0, 1))
+    return {
+        name: (goal[0] + place[0] - x, goal[1] + place[1] - y, goal[2])
+        for name, place in known.items()
+    }
+
+
+def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
+    """Return what cards.js shows of a vehicle; fact: what, value, how it looks."""
+    battery = "" if vehicle.battery is None else f"{vehicle.battery:.2f} V"
+    link = "" if vehicle.link_quality is None else f"{vehicle.link_quality:.0%}"
+    facts = [
+        ["battery", battery, "warn" if vehicle.is_battery_low else ""],
+        ["link", link, "warn" if (vehicle.link_quality or 1.0) < 0.5 else ""],
+        ["pose", _age(vehicle.pose_age), "warn" if vehicle.is_stale else ""],
+        ["control", _age(vehicle.control_age), ""],
+    ]
+    if rates := ", ".join(f"{what} {rate:.0f}" for what, rate in vehicle.rates.items() if rate):
+        facts.append(["rates", f"{rates} Hz", "wide"])
+    if vehicle.position is not None:
+        facts.insert(0, ["position", "{:.2f}  {:.2f}  {:.2f} m".format(*vehicle.position), "wide"])
+    # In the order of the enum: the ordinary ones first.
+    actions = [
+        each.value for each in Action if each in vehicle.actions and each is not Action.GO_TO
+    ]
+    return {
+        "name": vehicle.name,
+        "kind": vehicle.kind.value,
+        "state": "no pose" if vehicle.pose_age is None and vehicle.is_stale else vehicle.state,
+        "reason": vehicle.reason or ("" if vehicle.is_in_flight else vehicle.takeoff_refusal),
+        "look": LOOKS[condition(vehicle)],
+        "facts": [fact for fact in facts if fact[1]],
+        "actions": actions,
+        "chosen": is_chosen,
+    }
+
+
+def _age(age: float | None) -> str:
+    # A card that changes with every hundredth of a second would be sent again all the time.
+    if age is None:
+        return ""
+    return "now" if age < 0.3 else f"{age:.1f} s ago" if age < 10 else f"{age:.0f} s ago"
+
+
+def _number(
+    label: str, value: float | None = None, minimum: float | None = None, maximum: float | None = None
+) -> ui.number:
+    field = ui.number(label, value=value, min=minimum, max=maximum, step=0.1)
+    return field.props("dense outlined hide-bottom-space").classes("number")

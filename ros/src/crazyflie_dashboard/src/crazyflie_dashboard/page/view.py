@@ -1,0 +1,136 @@
+"""What one page consists of, and how it follows the graph."""
+
+import time
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from nicegui import context, ui
+from nicegui.events import GenericEventArguments
+
+from crazyflie_dashboard.dashboard import Dashboard
+from crazyflie_dashboard.page.cameras_panel import CamerasPanel
+from crazyflie_dashboard.page.messages_panel import MessagesPanel
+from crazyflie_dashboard.page.missions_panel import MissionsPanel
+from crazyflie_dashboard.page.parameters_panel import ParametersPanel
+from crazyflie_dashboard.page.plots_panel import PlotsPanel
+from crazyflie_dashboard.page.scene_view import SceneView
+from crazyflie_dashboard.page.session import CLICKED, Session
+from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
+from crazyflie_dashboard.snapshot import Action
+
+SCENE_PERIOD = 0.05
+PANEL_PERIOD = 0.5
+"""Between two updates, s."""
+
+
+class View:
+    """A page: bar, scene, and panels beside it. Built when a browser asks for the page."""
+
+    def __init__(self, dashboard: Dashboard):
+        self._dashboard = dashboard
+        self._session = Session(dashboard, context.client)
+        with ui.element("div").classes("page"):
+            with ui.element("div").classes("bar"):
+                self._build_bar()
+            with ui.element("div").classes("main"):
+                with ui.element("div").classes("stage"):
+                    self._scene_view = SceneView()
+                    self._build_views()
+                with ui.element("div").classes("side"):
+                    self._build_panels()
+        ui.timer(SCENE_PERIOD, self._draw)
+        ui.timer(PANEL_PERIOD, self._refresh)
+
+    def _build_bar(self) -> None:
+        ui.label("Mission control").classes("title")
+        self._summary = ui.label().classes("summary")
+        ui.element("div").classes("space")
+        self._missions = ui.label().classes("summary")
+        self._stop = ui.button("Stop mission").props("unelevated color=warning icon=stop")
+        self._stop.on("click", self._stop_mission, js_handler=CLICKED)
+        self._control = ui.label().classes("control")
+        self._take = ui.button("Take control", on_click=self._take_or_release)
+        self._take.props("outline").classes("take")
+        emergency = ui.button("Emergency").props("unelevated color=negative icon=dangerous")
+        emergency.classes("emergency-all").on("click", self._emergency, js_handler=CLICKED)
+        with emergency:
+            ui.label("Esc Esc").classes("key")
+            ui.tooltip("Stops the motors of all vehicles, also from a page without control")
+
+    def _build_views(self) -> None:
+        with ui.element("div").classes("views"):
+            for text, view, icon in (
+                ("Overview", "all", "zoom_out_map"),
+                ("Above", "above", "vertical_align_bottom"),
+                ("Follow", "follow", "center_focus_strong"),
+            ):
+                button = ui.button(
+                    text, on_click=lambda view=view: self._scene_view.look(view, self._watched())
+                )
+                button.props(f"dense unelevated icon={icon} color=dark")
+
+    def _build_panels(self) -> None:
+        with ui.tabs().props("dense no-caps inline-label") as tabs:
+            for name in self._BUILDERS:
+                ui.tab(name)
+        self._tabs = ui.tab_panels(tabs, value="Vehicles", animated=False, keep_alive=True)
+        self._panels = {}
+        with self._tabs.classes("panels"):
+            for name, build in self._BUILDERS.items():
+                with ui.tab_panel(name):
+                    self._panels[name] = build(self)
+        tabs.on_value_change(self._refresh)
+
+    _BUILDERS: ClassVar[dict[str, Callable[["View"], Any]]] = {
+        "Vehicles": lambda view: VehiclesPanel(view._session, view._scene_view),
+        "Plots": lambda view: PlotsPanel(view._session),
+        "Parameters": lambda view: ParametersPanel(view._session),
+        "Missions": lambda view: MissionsPanel(view._session),
+        "Messages": lambda view: MessagesPanel(view._session),
+        "Cameras": lambda view: CamerasPanel(view._session),
+    }
+
+    def _watched(self) -> str | None:
+        return self._session.watched or next(iter(self._session.vehicles), None)
+
+    def _draw(self) -> None:
+        scene = self._dashboard.scene()
+        self._scene_view.show(scene, self._session.chosen, self._panels["Missions"].paths)
+
+    def _refresh(self) -> None:
+        ui.run_javascript(f"setBeat({time.monotonic()})")
+        scene = self._dashboard.scene()
+        flying = sum(each.is_in_flight for each in scene.vehicles.values())
+        count = len(scene.vehicles)
+        noun = "vehicle" if count == 1 else "vehicles"
+        self._summary.text = f"{count} {noun} · {flying} in flight · frame {scene.fixed_frame}"
+        self._missions.text = " · ".join(scene.missions)
+        self._stop.set_visibility(bool(scene.missions))
+        self._show_control()
+        self._panels[self._tabs.value].refresh(scene)
+
+    def _show_control(self) -> None:
+        page, controller = self._session.page, self._dashboard.pages.controller
+        has = page != 0 and controller == page
+        other = "no page" if controller is None else f"page {controller}"
+        self._control.text = (
+            f"page {page} · you have control" if has else f"page {page} · {other} has control"
+        )
+        self._control.classes(remove="mine other none")
+        self._control.classes("mine" if has else "none" if controller is None else "other")
+        self._take.text = "Give up" if has else "Take control"
+
+    async def _take_or_release(self) -> None:
+        if self._dashboard.pages.controller == self._session.page:
+            self._dashboard.pages.release(self._session.page)
+        else:
+            await self._session.take_control()
+        self._show_control()
+
+    async def _emergency(self, event: GenericEventArguments) -> None:
+        await self._session.command(Action.EMERGENCY, self._session.vehicles, event.args)
+
+    async def _stop_mission(self, event: GenericEventArguments) -> None:
+        await self._session.succeeds(
+            self._dashboard.stop_mission(self._session.page, event.args)
+        )

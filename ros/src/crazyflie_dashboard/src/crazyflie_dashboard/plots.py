@@ -1,0 +1,177 @@
+"""Numbers of the last minute, to be plotted."""
+
+import math
+import re
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import roslib.message
+
+from crazyflie_dashboard.dashboard import Series
+from crazyflie_dashboard.snapshot import VehicleSnapshot
+from crazyflie_model.angles import rpy_from_quaternion
+from crazyflie_utils.refusal import RefusalError
+
+DURATION = 60.0
+"""s."""
+
+_PERIOD = 0.05
+"""From one number that is kept to the next, s."""
+
+_NUMBERS = {"bool", "byte", "char", "time", "duration", "float32", "float64"} | {
+    f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)
+}
+"""Types of fields that can be plotted."""
+
+_MAX_SERIES = 100
+"""Of one vehicle: a log topic may have any number of values."""
+
+
+class Ring:
+    """One plot: (time in s, value), oldest first."""
+
+    def __init__(self, unit: str):
+        self.unit = unit
+        self._points: deque[tuple[float, float]] = deque(maxlen=round(DURATION / _PERIOD))
+
+    def add(self, time: float, value: float) -> None:
+        """Take a number, unless the one before is as good as it."""
+        if not self._points or time - self._points[-1][0] >= 0.9 * _PERIOD:
+            self._points.append((time, value))
+
+    def series(self, name: str, now: float) -> Series:
+        """Return the last minute before ``now``."""
+        points = [(t - now, value) for t, value in self._points if now - t <= DURATION]
+        times, values = zip(*points, strict=True) if points else ((), ())
+        return Series(name, self.unit, times, values)
+
+
+class VehiclePlots:
+    """Plots of one vehicle.
+
+    Parameters
+    ----------
+    time : callable
+        s.
+    """
+
+    def __init__(self, time: Callable[[], float]):
+        self._time = time
+        self._rings: dict[str, Ring] = {}
+        self._reference: tuple[float, ...] | None = None
+
+    def take(self, role: str, row: Any) -> None:
+        """Take a row of a topic, by its role in `bag_topics.ROLES`."""
+        if role == "reference":
+            self._reference = row
+            self._add("reference z", "m", row[2])
+        elif role == "state":
+            for name, unit, value in zip(
+                ("x", "y", "z", "velocity x", "velocity y", "velocity z"),
+                ("m", "m", "m", "m/s", "m/s", "m/s"),
+                row,
+                strict=False,
+            ):
+                self._add(name, unit, value)
+            if self._reference is not None:
+                self._add("error", "m", math.dist(row[:3], self._reference[:3]))
+        elif role in ("final_control", "cmd_vel"):
+            self._add("thrust", "m/s^2", row[3])
+        elif role == "battery":
+            self._add("battery", "V", row[0])
+        elif role.startswith("log "):
+            name = role.removeprefix("log ")
+            for index, value in enumerate(row):
+                self._add(f"{name}[{index}]" if len(row) > 1 else name, "", value)
+
+    def take_pose(self, now: VehicleSnapshot, has_state: bool) -> None:
+        """Take attitude, and without a topic of states position and velocity, of a snapshot."""
+        if now.position is None:
+            return
+        angles = rpy_from_quaternion(*now.rotation)
+        for name, angle in zip(("roll", "pitch", "yaw"), angles, strict=True):
+            self._add(name, "deg", math.degrees(angle))
+        if not has_state:
+            self.take("state", (*now.position, *(now.velocity or ())))
+
+    def series(self) -> tuple[Series, ...]:
+        """Return all plots."""
+        now = self._time()
+        return tuple(ring.series(name, now) for name, ring in self._rings.items())
+
+    def _add(self, name, unit, value):
+        if name not in self._rings:
+            if len(self._rings) >= _MAX_SERIES:
+                return
+            self._rings[name] = Ring(unit)
+        self._rings[name].add(self._time(), value)
+
+
+def split_path(path: str, topics: Mapping[str, str]) -> tuple[str, list[str | int]]:
+    """Return the topic of a path, and names of fields and indices within its messages.
+
+    Parameters
+    ----------
+    path : str
+        As in /cf1/state/state.x or /cf1/log/values[0].
+    topics : dict
+        Topic -> type, of those that there are.
+
+    Raises
+    ------
+    RefusalError
+        There is no such topic, or no field is named.
+    """
+    parts = path.strip().rstrip("/").split("/")
+    for count in range(len(parts), 1, -1):
+        topic = "/".join(parts[:count])
+        if topic in topics:
+            break
+    else:
+        raise RefusalError(f"{path}: no such topic; expected one that is published, then a field")
+    rest = "/".join(parts[count:])
+    fields = re.findall(r"[A-Za-z_]\w*|\[\d+\]", rest)
+    if not fields or "".join(fields) != re.sub(r"[./]", "", rest):
+        raise RefusalError(
+            f"{path}: {rest!r} names no field of {topics[topic]}; expected such as field/other[0]"
+        )
+    return topic, [int(each[1:-1]) if each[0] == "[" else each for each in fields]
+
+
+def expect_field(path: str, message_type: Any, fields: list[str | int]) -> None:
+    """Check that messages of a type have a number where ``fields`` lead.
+
+    Raises
+    ------
+    RefusalError
+        There is no such field, or it is no number.
+    """
+    kind = message_type._type
+    for field in fields:
+        if isinstance(field, int):
+            if not kind.endswith("]"):
+                raise RefusalError(f"{path}: [{field}] of a {kind}; expected a list")
+            kind = kind.rpartition("[")[0]
+            continue
+        found = roslib.message.get_message_class(kind)
+        types = {} if found is None else dict(zip(found.__slots__, found._slot_types, strict=True))
+        if field not in types:
+            known = ", ".join(types) or "no fields"
+            raise RefusalError(f"{path}: there is no {field!r} in {kind}; it has {known}")
+        kind = types[field]
+    if kind not in _NUMBERS:
+        raise RefusalError(f"{path} is a {kind}; expected a number")
+
+
+def number_in(message: Any, fields: list[str | int]) -> float:
+    """Return a number of a message, NaN for an element that a list does not have."""
+    value = message
+    for field in fields:
+        if isinstance(field, str):
+            value = getattr(value, field)
+        elif field < len(value):
+            value = value[field]
+        else:
+            return math.nan
+    return float(value.to_sec() if hasattr(value, "to_sec") else value)

@@ -1,0 +1,215 @@
+"""What the page shows at one moment, as plain data. Texts are those of the graph: never HTML.
+
+Lengths are in m, angles in rad, times in s, in the fixed frame; None is "not known".
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+
+Triple = tuple[float, float, float]
+Rotation = tuple[float, float, float, float]
+
+STALE_AGE = 0.5
+"""A vehicle whose pose is older, s, is stale."""
+
+
+class Kind(Enum):
+    """What a vehicle is."""
+
+    SIMULATED = "simulated"
+    VIRTUAL = "virtual"
+    REAL = "real"
+
+
+class Action(Enum):
+    """What a vehicle can be told; the value is a word for a button."""
+
+    TAKEOFF = "take off"
+    LAND = "land"
+    GO_TO = "go to"
+    EMERGENCY = "emergency"
+    RESET = "reset"
+    REBOOT = "reboot"
+    ARM = "arm"
+    DISARM = "disarm"
+    RECOVER = "recover"
+
+
+@dataclass(frozen=True)
+class Control:
+    """A control: roll, pitch (rad), yaw rate (rad/s), thrust (m/s^2, mass-normalised)."""
+
+    roll: float
+    pitch: float
+    yaw_rate: float
+    thrust: float
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Where a vehicle is to be: position (m), velocity (m/s), yaw (rad; NaN if it has none)."""
+
+    position: Triple
+    velocity: Triple
+    yaw: float
+
+
+@dataclass(frozen=True)
+class VehicleSnapshot:
+    """A vehicle.
+
+    Attributes
+    ----------
+    name : str
+        Its namespace without a slash in front, such as cf1; "/" without a namespace.
+    kind : Kind
+    frame : str or None
+        Of /tf.
+    position, rotation
+        m, and a quaternion (x, y, z, w).
+    velocity : tuple or None
+        m/s.
+    pose_age : float or None
+        s.
+    is_stale : bool
+        The pose is older than `STALE_AGE`, or there is none.
+    reference : Reference or None
+        Of all vehicles if there are few, otherwise of watched ones.
+    control : Control or None
+        Of watched vehicles, as the rates of state and control.
+    control_age : float or None
+        s.
+    state, reason : str
+        State of the flight in words, and why it is what it is; "" for an ordinary one.
+    takeoff_refusal : str
+        Why a takeoff would be refused.
+    is_in_flight : bool
+    is_emergency : bool
+    battery : float or None
+        V.
+    is_battery_low : bool
+    link_quality : float or None
+        0 to 1.
+    rates : dict of str to float
+        Hz, of pose, state, reference, control.
+    actions : frozenset of Action
+        What it offers.
+    """
+
+    name: str
+    kind: Kind = Kind.SIMULATED
+    frame: str | None = None
+    position: Triple | None = None
+    rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
+    velocity: Triple | None = None
+    pose_age: float | None = None
+    is_stale: bool = True
+    reference: Reference | None = None
+    control: Control | None = None
+    control_age: float | None = None
+    state: str = "not known"
+    reason: str = ""
+    takeoff_refusal: str = ""
+    is_in_flight: bool = False
+    is_emergency: bool = False
+    battery: float | None = None
+    is_battery_low: bool = False
+    link_quality: float | None = None
+    rates: Mapping[str, float] = field(default_factory=dict)
+    actions: frozenset[Action] = frozenset()
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A wall, an obstacle, or a part of another display: a box, a cylinder or a ball.
+
+    ``size`` is along its own x, y, z (m); ``colour`` red, green, blue and opacity, 0 to 1.
+    """
+
+    name: str
+    shape: str  # "box", "cylinder" or "ball".
+    position: Triple
+    rotation: Rotation
+    size: Triple
+    colour: tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame of /tf that is no vehicle, such as a rigid body of motion capture."""
+
+    name: str
+    position: Triple
+    rotation: Rotation
+    age: float
+
+
+@dataclass(frozen=True)
+class Sentence:
+    """Something that is not as it should be, and what to do about it.
+
+    ``level`` is "ok", "warn" or "error"; ``source`` is what has said so, "doctor" or the name of a
+    diagnostic.
+    """
+
+    level: str
+    source: str
+    text: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class LogLine:
+    """A line of /rosout, or of a vehicle's console.
+
+    ``level`` is "debug", "info", "warn", "error" or "fatal"; ``number`` rises by one from line to
+    line; ``time`` is ROS time, s.
+    """
+
+    number: int
+    time: float
+    level: str
+    node: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """All that there is at one moment.
+
+    Attributes
+    ----------
+    time : float
+        ROS time, s.
+    fixed_frame : str
+    vehicles : dict of str to VehicleSnapshot
+        By name, in the order in which they are shown.
+    solids : tuple of Solid
+        Changes rarely: compare it by ``is``.
+    fence : tuple of Triple or None
+        Lower and upper corner of the geofence.
+    frames : tuple of Frame
+    paths : dict of str to tuple of Triple
+        Planned trajectories, by the vehicle's name. Changes rarely.
+    sentences : tuple of Sentence
+        Of the doctor and of /diagnostics, errors first.
+    log : tuple of LogLine
+        The newest ones, oldest first.
+    images : tuple of str
+        Topics of cameras.
+    missions : tuple of str
+        What runs, as `missions.Run.text` says.
+    """
+
+    time: float = 0.0
+    fixed_frame: str = "world"
+    vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)
+    solids: tuple[Solid, ...] = ()
+    fence: tuple[Triple, Triple] | None = None
+    frames: tuple[Frame, ...] = ()
+    paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
+    sentences: tuple[Sentence, ...] = ()
+    log: tuple[LogLine, ...] = ()
+    images: tuple[str, ...] = ()
+    missions: tuple[str, ...] = ()

@@ -1,0 +1,297 @@
+"""What is known of one vehicle: its topics become a `VehicleSnapshot`."""
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import roslib.message
+from std_msgs.msg import Float32
+
+from crazyflie_dashboard.discovery import Vehicle
+from crazyflie_dashboard.frames import Frames
+from crazyflie_dashboard.snapshot import STALE_AGE, Control, Kind, Reference, VehicleSnapshot
+from crazyflie_driver.msg import GenericLogData
+from crazyflie_fleet.flight_words import WORDS
+from crazyflie_model.angles import quaternion_from_rpy
+from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
+from crazyflie_reports.bag_topics import FLOATS, ROLES
+from crazyflie_utils import NodeHandle
+from crazyflie_utils.vectors import to_tuple
+
+_ROWS: dict[str, dict[str, Callable[[Any], Any]]] = defaultdict(dict)
+"""Role -> type -> what makes a row of a message."""
+for _role in ROLES:
+    _ROWS[_role.name].update(_role.rows)
+
+_SLOW = ("flight_status", "filter_status", "flight_state", "vehicle_status", "battery")
+_FAST = ("state", "final_control", "cmd_vel")
+
+_FILTER_WORDS = {
+    FilterStatus.HOLDING: "held by the filter",
+    FilterStatus.SINKING: "brought down by the filter",
+    FilterStatus.DOWN: "down, motors off",
+    FilterStatus.EMERGENCY: "emergency, motors off",
+}
+_ON_GROUND = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
+
+_FRAME_TIMEOUT = 3.0
+"""For so long, s, a vehicle without a frame may get one: its topics cost more."""
+
+_LOGS: dict[str, tuple[Any, Callable[[Any], list[float]]]] = {
+    "crazyflie_driver/GenericLogData": (GenericLogData, lambda message: list(message.values)),
+    "std_msgs/Float32": (Float32, lambda message: [message.data]),
+}
+"""Types of the driver's log topics, and their numbers."""
+
+_LOW_BATTERY = 3.2
+"""V, where no driver says what is low; as the fleet's warning."""
+
+
+class VehicleModel:
+    """A vehicle and its topics.
+
+    Parameters
+    ----------
+    handle : NodeHandle
+        Closed when the vehicle goes.
+    vehicle : Vehicle
+    time : callable
+        The machine's time, s.
+    on_row : callable
+        ``on_row(role, row)`` is called with what comes on the topics of a watched vehicle.
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        vehicle: Vehicle,
+        time: Callable[[], float],
+        on_row: Callable[[str, Any], None],
+    ):
+        self.vehicle = vehicle
+        self.kind = Kind.REAL if vehicle.has_driver else Kind.SIMULATED
+        self.frame: str | None = None
+        self._handle, self._time, self._on_row = handle, time, on_row
+        self._watched: NodeHandle | None = None
+        self._references: NodeHandle | None = None
+        self._poses: NodeHandle | None = None
+        self._since = time()
+        self._rows: dict[str, Any] = {}
+        self._arrivals: dict[str, float] = {}
+        self._counts: Counter[str] = Counter()
+        self._rates: dict[str, float] = {}
+        self._counted_since = time()
+        self._status = FlightStatus()
+        self._filter = FilterStatus()
+        self._driver: VehicleStatus | None = None
+        self._text = ""
+        self._battery: float | None = None
+        for role in _SLOW:
+            self._subscribe(handle, role)
+
+    def follow_frame(self, frame: str | None) -> None:
+        """Take poses from a frame of /tf; without one, from the vehicle's topic."""
+        self.frame = frame
+        if frame is not None and self._poses is not None:
+            self._poses.close()
+            self._poses = None
+            self._forget("pose")
+        is_late = self._time() - self._since > _FRAME_TIMEOUT
+        if frame is None and self._poses is None and is_late:
+            self._poses = self._handle.child()
+            self._subscribe(self._poses, "pose" if "pose" in self.vehicle.topics else "state")
+
+    def watch(self, is_watched: bool, topics: Mapping[str, str]) -> None:
+        """Begin or end to receive what comes often: states, controls, what the driver logs.
+
+        ``topics`` are all that are published -> type.
+        """
+        if is_watched == (self._watched is not None):
+            return
+        if self._watched is not None:
+            self._watched.close()
+            self._watched = None
+            self._forget("state", "final_control", "cmd_vel")
+        else:
+            self._watched = self._handle.child()
+            # What is sent to a radio says nothing that the control does not.
+            fast = [role for role in _FAST if role in self.vehicle.topics]
+            for role in fast[:2]:
+                self._subscribe(self._watched, role)
+            for topic, kind in topics.items():
+                folder, _, name = topic.rpartition("/")
+                if folder == self.vehicle.driver and kind in _LOGS and name != "battery":
+                    self._subscribe_log(self._watched, topic, *_LOGS[kind])
+
+    def show_reference(self, is_shown: bool) -> None:
+        """Begin or end to receive references."""
+        if is_shown == (self._references is not None):
+            return
+        if self._references is not None:
+            self._references.close()
+            self._references = None
+            self._forget("reference")
+        else:
+            self._references = self._handle.child()
+            self._subscribe(self._references, "reference")
+
+    def close(self) -> None:
+        """Receive nothing any more."""
+        self.watch(False, {})
+        self.show_reference(False)
+        if self._poses is not None:
+            self._poses.close()
+        self._handle.close()
+
+    def snapshot(self, frames: Frames, fixed: str) -> VehicleSnapshot:
+        """Return what is known now; poses are those in the frame ``fixed``."""
+        self._count_rates()
+        position, rotation, velocity, age = self._pose(frames, fixed)
+        reference, control = self._rows.get("reference"), self._control()
+        control_at = self._arrivals.get("final_control", self._arrivals.get("cmd_vel"))
+        state, reason = self._words()
+        driver = self._driver
+        is_emergency = self._filter.state == FilterStatus.EMERGENCY or (
+            driver is not None and driver.is_emergency
+        )
+        rates = dict(self._rates)
+        if self.frame in frames.poses:
+            rates["pose"] = frames.poses[self.frame].rate
+        return VehicleSnapshot(
+            name=self.vehicle.name,
+            kind=self.kind,
+            frame=self.frame,
+            position=position,
+            rotation=rotation,
+            velocity=velocity,
+            pose_age=age,
+            is_stale=age is None or age > STALE_AGE,
+            reference=reference and Reference(reference[:3], reference[3:6], reference[6]),
+            control=control and Control(*control),
+            control_age=None if control_at is None else self._time() - control_at,
+            state=state,
+            reason=reason,
+            takeoff_refusal=self._status.takeoff_refusal or self._filter.takeoff_refusal,
+            is_in_flight=self._is_in_flight(),
+            is_emergency=is_emergency,
+            battery=self._battery,
+            is_battery_low=self._is_battery_low(),
+            link_quality=None if driver is None else _known(driver.link_quality),
+            rates=rates,
+            actions=frozenset(self.vehicle.services),
+        )
+
+    def _subscribe(self, handle, role):
+        if role not in self.vehicle.topics:
+            return
+        topic, kind = self.vehicle.topics[role]
+        message_type = roslib.message.get_message_class(kind)
+        if message_type is None:
+            return
+        take = getattr(self, f"_on_{role}", None)
+        if take is None:
+            convert = _ROWS[role][kind]
+            is_flat, is_control = kind in FLOATS, "Control" in kind
+
+            def take(message):
+                if is_flat:
+                    message = to_tuple(getattr(message, "control" if is_control else "state"))
+                self._note(role, convert(message))
+
+        handle.subscribe(topic, message_type, take)
+
+    def _subscribe_log(self, handle, topic, message_type, values):
+        name = topic.rpartition("/")[2]
+        on_message = lambda message: self._on_row(f"log {name}", values(message))  # noqa: E731
+        handle.subscribe(topic, message_type, on_message)
+
+    def _note(self, role, row):
+        self._rows[role] = row
+        self._arrivals[role] = self._time()
+        self._counts[role] += 1
+        self._on_row(role, row)
+
+    def _forget(self, *roles):
+        for role in roles:
+            for known in (self._rows, self._arrivals, self._rates, self._counts):
+                known.pop(role, None)
+
+    def _count_rates(self):
+        elapsed = self._time() - self._counted_since
+        if elapsed >= 1.0:
+            self._rates = {role: count / elapsed for role, count in self._counts.items()}
+            self._counts = Counter(dict.fromkeys(self._counts, 0))
+            self._counted_since += elapsed
+
+    def _on_flight_status(self, message):
+        self._status = message
+
+    def _on_filter_status(self, message):
+        self._filter = message
+
+    def _on_flight_state(self, message):
+        self._text = message.data
+
+    def _on_vehicle_status(self, message):
+        self._driver = message
+        self._battery = _known(message.battery_voltage) or self._battery
+
+    def _on_battery(self, message):
+        self._battery = _known(message.data)
+        self._note("battery", (message.data,))
+
+    def _pose(self, frames, fixed):
+        if self.frame is not None:
+            found = frames.in_fixed(self.frame, fixed)
+            if found is None:
+                return None, (0.0, 0.0, 0.0, 1.0), None, None
+            return (*found, frames.poses[self.frame].velocity, frames.age(self.frame))
+        role = "pose" if self._rows.get("pose") else "state"
+        row = self._rows.get(role)
+        if not row:
+            return None, (0.0, 0.0, 0.0, 1.0), None, None
+        attitude = row[3:6] if role == "pose" else (0.0, 0.0, row[6] if row[6] == row[6] else 0.0)
+        velocity = row[3:6] if role == "state" else None
+        age = self._time() - self._arrivals[role]
+        return row[:3], quaternion_from_rpy(*attitude), velocity, age
+
+    def _control(self):
+        return self._rows.get("final_control") or self._rows.get("cmd_vel")
+
+    def _is_in_flight(self):
+        if "flight_status" in self.vehicle.topics:
+            return self._status.state not in _ON_GROUND
+        return self._driver is not None and bool(self._driver.supervisor & VehicleStatus.FLYING)
+
+    def _words(self):
+        """Return state of the flight and why."""
+        driver = self._driver
+        if self._filter.state in _FILTER_WORDS and self._filter.state != FilterStatus.DOWN:
+            return _FILTER_WORDS[self._filter.state], self._filter.reason
+        if self._status.state != FlightStatus.UNKNOWN:
+            words = WORDS[self._status.state]
+            reason = self._status.reason or self._filter.reason or self._status.takeoff_refusal
+            return words, reason
+        if driver is not None:
+            return driver.text or "connected", driver.link_text
+        return self._text or "not known", ""
+
+    def _is_battery_low(self):
+        if self._driver is not None and self._driver.battery != VehicleStatus.BATTERY_UNKNOWN:
+            return self._driver.battery >= VehicleStatus.BATTERY_LOW
+        return self._battery is not None and self._battery < _LOW_BATTERY
+
+
+def _known(number: float) -> float | None:
+    return None if math.isnan(number) else number
+
+
+def frame_of(vehicle: Vehicle, frames: Frames, is_alone: bool) -> str | None:
+    """Return the frame of a vehicle: one that has its name, or the only one that moves."""
+    name = vehicle.namespace.rpartition("/")[2] or vehicle.driver.rpartition("/")[2]
+    named = [each for each in frames.poses if name and name in each.split("/")]
+    moving = [each for each, pose in frames.poses.items() if any(pose.position)]
+    candidates = named or (moving if is_alone else [])
+    # The vehicle's own, and not that of its model.
+    return min(candidates, key=lambda each: (each.endswith("base_link"), len(each)), default=None)

@@ -1,0 +1,215 @@
+"""A dashboard of vehicles that are only numbers, for tests of the page."""
+
+import time
+from concurrent.futures import Future
+from dataclasses import replace
+
+from crazyflie_dashboard.control import ControlError, PageControl
+from crazyflie_dashboard.dashboard import (
+    MAX_COMMAND_AGE,
+    Dashboard,
+    DryRunResult,
+    MissionFile,
+    Outcome,
+    ParameterInfo,
+    Series,
+)
+from crazyflie_dashboard.snapshot import (
+    Action,
+    Frame,
+    LogLine,
+    Reference,
+    Scene,
+    Sentence,
+    Solid,
+    VehicleSnapshot,
+)
+from crazyflie_utils.refusal import RefusalError
+
+ACTIONS = frozenset({Action.TAKEOFF, Action.LAND, Action.GO_TO, Action.EMERGENCY, Action.RESET})
+
+
+def done(result):
+    """Return a future that has a result."""
+    future = Future()
+    future.set_result(result)
+    return future
+
+
+def failed(error):
+    """Return a future that has failed."""
+    future = Future()
+    future.set_exception(error)
+    return future
+
+
+def vehicle(name, x, y=0.0, z=0.0, **details):
+    """Return a vehicle at a place."""
+    known = {
+        "position": (x, y, z),
+        "pose_age": 0.02,
+        "is_stale": False,
+        "state": "on the ground",
+        "battery": 3.97,
+        "link_quality": 0.98,
+        "rates": {"pose": 100.0},
+        "actions": ACTIONS,
+    }
+    return VehicleSnapshot(name, **{**known, **details})
+
+
+class FakeDashboard(Dashboard):
+    """Carries out commands at once, and keeps what it was told."""
+
+    def __init__(self):
+        self.pages = PageControl()
+        self.reset()
+
+    def reset(self):
+        """Begin again with three vehicles on the ground, the third of them stale."""
+        self.commands = []
+        self.flown = []
+        self.refusals = {}
+        self.gain = ParameterInfo(
+            "cf1/controller", "K/gain", "float", 0.5, "1/s", "gain of the height", 0.0, 2.0
+        )
+        stale = vehicle("cf3", 1.0, is_stale=True, pose_age=7.4, state="no pose")
+        self.set_vehicles(vehicle("cf1", -1.0), vehicle("cf2", 0.0), stale)
+
+    def set_vehicles(self, *vehicles, **details):
+        """Show these vehicles."""
+        known = {
+            "fence": ((-2.5, -2.5, 0.0), (2.5, 2.5, 2.2)),
+            "solids": (
+                Solid(
+                    "pole",
+                    "cylinder",
+                    (1.2, 1.2, 0.75),
+                    (0, 0, 0, 1),
+                    (0.2, 0.2, 1.5),
+                    (0.6, 0.7, 0.8, 1.0),
+                ),
+            ),
+            "frames": (Frame("wand", (-1.5, 1.2, 0.3), (0, 0, 0, 1), 0.01),),
+            "sentences": (Sentence("warn", "doctor", "cf2 has a weak link", "move the antenna"),),
+            "log": (
+                LogLine(1, 12.0, "info", "/cf1/takeoff_server", "ready"),
+                LogLine(2, 12.5, "warn", "/cf2/driver", "<b>link</b> at 40 %"),
+            ),
+        }
+        self._scene = Scene(
+            time=1.0, vehicles={each.name: each for each in vehicles}, **{**known, **details}
+        )
+
+    def change(self, name, **details):
+        """Change a vehicle."""
+        vehicles = dict(self._scene.vehicles)
+        vehicles[name] = replace(vehicles[name], **details)
+        self._scene = replace(self._scene, vehicles=vehicles)
+
+    def scene(self):
+        return self._scene
+
+    def watch(self, page, vehicle):
+        self.watched = vehicle
+
+    def plots(self, page):
+        times = tuple(-60 + 0.1 * k for k in range(600))
+        return (
+            Series("height", "m", times, tuple(1 + 0.001 * k for k in range(600))),
+            Series("error", "m", times, tuple(0.1 for _ in range(600))),
+            Series("roll", "rad", times, tuple(0.0 for _ in range(600))),
+            Series("battery", "V", times, tuple(4.0 - 0.0005 * k for k in range(600))),
+        )
+
+    def add_field(self, page, path):
+        if not path.startswith("/"):
+            return failed(RefusalError(f"{path!r} is no topic; expected /topic/field"))
+        return done(None)
+
+    def remove_field(self, page, path):
+        pass
+
+    def command(self, page, command):
+        age = time.monotonic() - command.clicked
+        if command.action is not Action.EMERGENCY:
+            try:
+                self.pages.expect_control(page)
+            except ControlError as error:
+                return failed(error)
+            if age > MAX_COMMAND_AGE:
+                return failed(RefusalError(f"the click is {age:.0f} s old"))
+        self.commands.append(command)
+        outcomes = tuple(Outcome(name, self.refusals.get(name, "")) for name in command.vehicles)
+        for outcome in outcomes:
+            if not outcome.text:
+                self._carry_out(outcome.vehicle, command)
+        return done(outcomes)
+
+    def _carry_out(self, name, command):
+        x, y, _ = self._scene.vehicles[name].position
+        if command.action is Action.TAKEOFF:
+            there = (x, y, command.height)
+            reference = Reference(there, (0, 0, 0), 0.0)
+            self.change(
+                name, position=there, is_in_flight=True, state="hovering", reference=reference
+            )
+        elif command.action is Action.LAND:
+            self.change(name, position=(x, y, 0.0), is_in_flight=False, state="on the ground")
+        elif command.action is Action.GO_TO:
+            self.change(name, position=command.goal)
+        elif command.action is Action.EMERGENCY:
+            self.change(name, is_in_flight=False, is_emergency=True, state="emergency")
+
+    def parameter_owners(self):
+        return ("/cf1/controller", "cf1")
+
+    def parameters(self, owner=None):
+        if owner == "cf1":
+            return done(
+                tuple(
+                    ParameterInfo(owner, f"group{k % 9}.value{k}", "int", k, is_firmware=True)
+                    for k in range(300)
+                )
+            )
+        return done(
+            (self.gain, ParameterInfo("fence", "enabled", "bool", True, help="holds vehicles"))
+        )
+
+    def set_parameter(self, page, parameter, text):
+        try:
+            value = float(text)
+        except ValueError:
+            return failed(RefusalError(f"{parameter.name} is {text!r}; expected a number"))
+        if not 0 <= value <= 2:
+            return failed(RefusalError(f"{parameter.name} is {text}; expected 0 to 2 1/s"))
+        self.gain = replace(self.gain, value=value)
+        return done(self.gain)
+
+    def mission_files(self):
+        return (
+            MissionFile("/missions/square.py", "square.py: flies a square", False),
+            MissionFile("/trajectories/eight.csv", "eight.csv", True),
+        )
+
+    def dry_run(self, page, mission, vehicles):
+        if mission.is_trajectory:
+            return done(DryRunResult(False, "cf1 and cf2 come as near as 0.1 m at 3.2 s"))
+        path = ((0, 0, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1))
+        return done(DryRunResult(True, "12.0 s, all land", 12.0, (("cf1", path),)))
+
+    def fly(self, page, mission, vehicles, clicked):
+        self.flown.append(mission.path)
+        return done("landed")
+
+    def stop_mission(self, page, clicked):
+        return done(None)
+
+    def watch_image(self, page, topic):
+        return done(None)
+
+    def examine(self):
+        return done(None)
+
+    def image(self, page):
+        return None

@@ -1,0 +1,119 @@
+"""A dashboard on a fake process, beside vehicles that are services and poses only."""
+
+from concurrent.futures import Future
+
+from crazyflie_dashboard.dashboard import Command
+from crazyflie_dashboard.discovery import Graph
+from crazyflie_dashboard.live_dashboard import LiveDashboard
+from crazyflie_driver import srv
+from crazyflie_msgs.msg import FlightStatus
+from crazyflie_utils import ServiceError
+from crazyflie_utils.testing.fake_process import FakeProcess
+from crazyflie_utils.tf.poses import PoseCodec, StampedPose
+
+STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
+STATUS = "in_flight_flight_status"
+
+
+class Workers:
+    """An executor whose work is done at once."""
+
+    def submit(self, work, *arguments):
+        done = Future()
+        try:
+            done.set_result(work(*arguments))
+        except Exception as error:
+            done.set_exception(error)
+        return done
+
+    def shutdown(self, **_):
+        pass
+
+
+class FakeFleet:
+    """Vehicles cf1, cf2, ... with high-level services, and a dashboard with one open page.
+
+    Attributes
+    ----------
+    calls : list of (str, request)
+        Services that were called.
+    refusals : dict
+        Service to what it answers.
+    alive : callable
+        ``alive(service)`` tells whether its node answers.
+    """
+
+    def __init__(self, count=3, name="cf{}"):
+        self.process = FakeProcess()
+        self.names = [name.format(k + 1) for k in range(count)]
+        self.calls, self.refusals, self.texts = [], {}, []
+        self.alive = lambda service: True
+        node = self.process.handle("/fleet")
+        self._status = {}
+        for each in self.names:
+            for service, kind in (
+                ("takeoff", srv.Takeoff),
+                ("land", srv.Land),
+                ("go_to", srv.GoTo),
+            ):
+                top = f"/{each}/high_level"
+                node.advertise_service(
+                    f"{top}/{service}", kind, self._answer(f"{top}/{service}", kind)
+                )
+        services = dict.fromkeys(self.process.transport.services, "/fleet")
+        topics = {f"/{each}/state": STATE for each in self.names}
+        topics |= {f"/{each}/{STATUS}": "crazyflie_msgs/FlightStatus" for each in self.names}
+        self.graph = Graph(topics, topics, services)
+        self.dashboard = LiveDashboard(
+            self.process.handle("/dashboard"),
+            lambda: self.graph,
+            lambda service: self.alive(service),
+            [],
+            clock=self.process.clock.time,
+            workers=Workers(),
+        )
+        self.page = self.dashboard.pages.open(self.texts.append)
+        self.stamp = 0
+
+    def _answer(self, service, kind):
+        def answer(request):
+            self.calls.append((service, request))
+            if service in self.refusals:
+                raise ServiceError(self.refusals[service])
+            return kind._response_class()
+
+        return answer
+
+    @property
+    def vehicles(self):
+        return self.dashboard.scene().vehicles
+
+    def send_poses(self, names=None):
+        """Publish a pose of each vehicle on /tf, and let a scene be made."""
+        self.stamp = self.process.clock.nanoseconds()
+        poses = [
+            StampedPose("world", name, self.stamp, (float(k), 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
+            for k, name in enumerate(names or self.names)
+        ]
+        self.process.publish("/tf", PoseCodec().encode(poses))
+        self.process.advance(0.05)
+
+    def find(self):
+        """Have the dashboard find all vehicles, with poses."""
+        self.process.advance(0.1)
+        self.send_poses()
+        self.process.advance(2.1)
+        self.send_poses()
+
+    def report(self, name, state, reason=""):
+        """Publish the state of a flight."""
+        message = FlightStatus(state=state, reason=reason)
+        self.process.publish(f"/{name}/{STATUS}", message)
+        self.process.advance(0.05)
+
+    def command(self, action, names=None, age=0.0, **details):
+        """Give a command; return its outcomes, vehicle to text."""
+        clicked = self.process.clock.time() - age
+        made = Command(action, tuple(self.names if names is None else names), clicked, **details)
+        outcomes = self.dashboard.command(self.page, made).result(0)
+        return {each.vehicle: each.text for each in outcomes}

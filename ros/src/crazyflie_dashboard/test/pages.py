@@ -1,0 +1,156 @@
+"""Headless Chromium and a page of a `FakeDashboard`, for tests."""
+
+import contextlib
+import socket
+import time
+
+from fake_dashboard import FakeDashboard
+from selenium import webdriver
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+
+from crazyflie_dashboard.access import Access
+from crazyflie_dashboard.page import open_page
+
+LONGEST_WAIT = 30.0
+"""s, for what a loaded machine does in one."""
+
+
+def wait_for(condition, what):
+    """Return the first true result of a condition; the page may replace what it looks at."""
+    end = time.monotonic() + LONGEST_WAIT
+    while time.monotonic() < end:
+        with contextlib.suppress(Exception):
+            if result := condition():
+                return result
+        time.sleep(0.05)
+    raise AssertionError(f"not within {LONGEST_WAIT} s: {what}")
+
+
+def free_port():
+    """Return a port on which nothing listens."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
+@contextlib.contextmanager
+def chromium():
+    """Yield a headless Chromium that draws in software."""
+    options = webdriver.ChromeOptions()
+    options.binary_location = "/usr/bin/chromium"
+    for argument in (
+        *("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
+        *("--enable-unsafe-swiftshader", "--window-size=1100,800"),
+    ):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    browser = webdriver.Chrome(service=Service("/usr/bin/chromedriver"), options=options)
+    try:
+        yield browser
+    finally:
+        browser.quit()
+
+
+class Browser:
+    """What an operator does in one window of Chromium."""
+
+    def __init__(self, driver, url):
+        self.driver, self.url = driver, url
+
+    def open(self):
+        """Load the page, and wait until it is drawn."""
+        self.driver.get(self.url)
+        wait_for(lambda: self.driver.execute_script("return window.did_handshake"), "a connection")
+        wait_for(lambda: "page 0" not in self.text(".control"), "a number of the page")
+
+    def find(self, selector):
+        """Return the first element of a CSS selector."""
+        return self.driver.find_element(By.CSS_SELECTOR, selector)
+
+    def text(self, selector="body"):
+        """Return the text that is seen of an element."""
+        return self.find(selector).text
+
+    def has(self, text, selector="body"):
+        """Wait until a text is seen."""
+        wait_for(lambda: text in self.text(selector), f"{text!r} in {selector}")
+
+    def button(self, text):
+        """Return a button by its text."""
+        spans = f".//span[normalize-space(.)='{text}']"
+        path = f"//button[{spans} or normalize-space(.)='{text}']"
+        return self.driver.find_element(By.XPATH, path)
+
+    def press(self, text):
+        """Click a button by its text."""
+        wait_for(lambda: self.button(text).click() or True, f"button {text}")
+
+    def select(self, label, option):
+        """Choose an option of a list."""
+        field = f"//label[contains(@class,'q-field')][.//*[text()='{label}']]"
+        wait_for(lambda: self.driver.find_element(By.XPATH, field).click() or True, label)
+        item = f"//*[contains(@class,'q-menu')]//*[contains(@class,'q-item')]//*[text()='{option}']"
+        wait_for(lambda: self.driver.find_element(By.XPATH, item).click() or True, option)
+
+    def tab(self, name):
+        """Choose a panel."""
+        tab = f"//*[contains(@class,'q-tab__label') and text()='{name}']"
+        wait_for(lambda: self.driver.find_element(By.XPATH, tab).click() or True, f"tab {name}")
+
+    def card(self, name):
+        """Return the selector of a vehicle's card."""
+        return f'.card[data-vehicle="{name}"]'
+
+    def choose(self, *names):
+        """Choose vehicles by the boxes of their cards, beside those that are chosen."""
+        for name in names:
+            wait_for(lambda name=name: self.find(f"{self.card(name)} input").click() or True, name)
+            wait_for(lambda name=name: self.find(f"{self.card(name)}.chosen"), f"{name} chosen")
+
+    def take_control(self):
+        """Press the button, and wait for control."""
+        self.press("Take control")
+        self.has("you have control")
+
+    def click_floor(self, x, y):
+        """Click on the floor, m."""
+        self.click_scene(x, y, 0.0)
+
+    def click_scene(self, x, y, z):
+        """Click on what is at a point of the scene, m."""
+        script = (
+            "const e = document.querySelector('.scene');"
+            "return getElement(e.id.slice(1)).screen(...arguments)"
+        )
+        place = wait_for(lambda: self.driver.execute_script(script, x, y, z), "the scene")
+        scene = self.find(".scene canvas")
+        rect = scene.rect
+        offset = (
+            int(place[0] - rect["x"] - rect["width"] / 2),
+            int(place[1] - rect["y"] - rect["height"] / 2),
+        )
+        ActionChains(self.driver).move_to_element_with_offset(scene, *offset).click().perform()
+
+    def type(self, *keys):
+        """Press keys."""
+        ActionChains(self.driver).send_keys(*keys).perform()
+
+    def enter(self, selector, text):
+        """Replace the text of a field."""
+        field = self.find(selector)
+        field.send_keys(Keys.CONTROL, "a")
+        field.send_keys(text)
+
+
+class Server:
+    """The page of a `FakeDashboard`."""
+
+    def __init__(self, token=""):
+        self.port = free_port()
+        self.dashboard = FakeDashboard()
+        access = Access("127.0.0.1", self.port, token)
+        self.url = f"http://127.0.0.1:{self.port}/"
+        self.page = open_page(self.dashboard, access, "127.0.0.1", self.port)

@@ -1,0 +1,149 @@
+"""Three vehicles as a page sees and commands them: found, flown, refused, stale."""
+
+import os
+import signal
+import time
+from functools import partial
+from xmlrpc.client import ServerProxy
+
+import pytest
+import rosgraph
+
+from crazyflie_dashboard import master
+from crazyflie_dashboard.control import ControlError
+from crazyflie_dashboard.dashboard import Command
+from crazyflie_dashboard.live_dashboard import LiveDashboard
+from crazyflie_dashboard.snapshot import Action, Kind
+from crazyflie_utils.main import ros_process
+from crazyflie_utils.refusal import RefusalError
+from crazyflie_utils.testing.waiting import wait_until
+
+NAMES = ("cf1", "cf2", "cf3")
+LIMIT = 30.0
+
+
+@pytest.fixture(scope="module")
+def dashboard():
+    process = ros_process()
+    handle = process.handle("/dashboard")
+    found = LiveDashboard(
+        handle, partial(master.read, "/dashboard"), partial(master.is_answering, "/dashboard"), []
+    )
+    process.start()
+    yield found
+    found.close()
+    process.stop()
+
+
+@pytest.fixture(scope="module")
+def page(dashboard):
+    number = dashboard.pages.open(lambda text: None)
+    wait_until(lambda: fresh(dashboard) == [*NAMES], "three vehicles", LIMIT)
+    return number
+
+
+@pytest.fixture
+def operator(dashboard, page):
+    dashboard.pages.take(page)
+    yield page
+    dashboard.pages.release(page)
+
+
+def fresh(dashboard):
+    return [name for name, each in dashboard.scene().vehicles.items() if not each.is_stale]
+
+
+def command(dashboard, page, action, names=NAMES, **details):
+    clicked = details.pop("clicked", time.monotonic())
+    made = Command(action, tuple(names), clicked, **details)
+    return {each.vehicle: each.text for each in dashboard.command(page, made).result(LIMIT)}
+
+
+def height(dashboard, name):
+    return dashboard.scene().vehicles[name].position[2]
+
+
+def test_vehicles_are_found(dashboard, page):
+    vehicle = dashboard.scene().vehicles["cf2"]
+    assert vehicle.kind == Kind.SIMULATED
+    assert vehicle.position[2] == pytest.approx(0.0, abs=0.01)
+    wait_until(lambda: dashboard.scene().vehicles["cf2"].state == "on the ground", "a state", LIMIT)
+    expected = {Action.TAKEOFF, Action.LAND, Action.GO_TO, Action.EMERGENCY, Action.RESET}
+    assert vehicle.actions == expected
+
+
+def test_a_page_without_control_only_looks(dashboard, page):
+    with pytest.raises(ControlError, match="no page has control"):
+        command(dashboard, page, Action.TAKEOFF)
+
+
+def test_an_old_command_is_not_carried_out(dashboard, operator):
+    with pytest.raises(RefusalError, match=r"2\.\d s old; expected at most 1 s"):
+        command(dashboard, operator, Action.TAKEOFF, clicked=time.monotonic() - 2.0)
+    assert height(dashboard, "cf1") == pytest.approx(0.0, abs=0.01)
+
+
+def test_refusals_are_the_words_of_the_service(dashboard, operator):
+    refused = command(dashboard, operator, Action.GO_TO, ["cf1"], goal=(0.0, 0.0, 1.0))
+    assert refused == {"cf1": "the vehicle is on the ground; expected it to fly"}
+    refused = command(dashboard, operator, Action.TAKEOFF, ["cf3"], height=0.0)["cf3"]
+    assert refused.startswith("height and duration are 0 m and")
+
+
+def test_vehicles_fly_and_land(dashboard, operator):
+    dashboard.watch(operator, "cf1")
+    assert command(dashboard, operator, Action.TAKEOFF) == dict.fromkeys(NAMES, "")
+    wait_until(lambda: all(height(dashboard, n) > 0.9 for n in NAMES), "all up", LIMIT)
+    x, y, _ = dashboard.scene().vehicles["cf1"].position
+    goal = (x - 0.5, y, 1.2)
+    assert command(dashboard, operator, Action.GO_TO, ["cf1"], goal=goal) == {"cf1": ""}
+    wait_until(
+        lambda: dashboard.scene().vehicles["cf1"].position == pytest.approx(goal, abs=0.05),
+        "cf1 at its goal",
+        LIMIT,
+    )
+    shown = {series.name: series for series in dashboard.plots(operator)}
+    assert max(shown["z"].values) > 1.1
+    assert {"error", "velocity x", "roll", "thrust", "reference z"} <= shown.keys()
+    assert dashboard.scene().vehicles["cf1"].control.thrust == pytest.approx(9.81, abs=3.0)
+    assert command(dashboard, operator, Action.LAND) == dict.fromkeys(NAMES, "")
+    wait_until(lambda: all(height(dashboard, n) < 0.05 for n in NAMES), "all down", LIMIT)
+
+
+def test_fields_of_topics_are_plotted(dashboard, page):
+    dashboard.add_field(page, "/cf2/state/state/z").result(LIMIT)
+    wait_until(lambda: any(s.times for s in dashboard.plots(page) if "cf2" in s.name), limit=LIMIT)
+    with pytest.raises(RefusalError, match="there is no 'zz' in crazyflie_msgs"):
+        dashboard.add_field(page, "/cf2/state/state/zz").result(LIMIT)
+
+
+def test_live_parameters_right_and_wrong(dashboard, operator):
+    assert "/cf1/takeoff_server" in dashboard.parameter_owners()
+    found = dashboard.parameters("/cf1/takeoff_server").result(LIMIT)
+    number = next(each for each in found if each.minimum == 0.0)
+    assert number.help
+
+    def set_to(text):
+        return dashboard.set_parameter(operator, number, text).result(LIMIT)
+
+    assert set_to(f"{number.value * 1.01:.4f}").value == pytest.approx(number.value * 1.01, 1e-3)
+    for wrong, expected in (("much", "a number"), ("-1", "0 to 1 m/s")):
+        with pytest.raises(RefusalError, match=f"{number.name} is .*expected .*{expected}"):
+            set_to(wrong)
+
+
+def test_a_vehicle_whose_poses_stop_is_stale(dashboard, page):
+    uri = rosgraph.Master("/dashboard").lookupNode("/fleet")
+    process = ServerProxy(uri).getPid("/dashboard")[2]
+    os.kill(process, signal.SIGSTOP)
+    try:
+        wait_until(lambda: fresh(dashboard) == [], "stale vehicles", LIMIT)
+        assert dashboard.scene().vehicles["cf1"].pose_age > 0.5
+    finally:
+        os.kill(process, signal.SIGCONT)
+    wait_until(lambda: fresh(dashboard) == [*NAMES], "fresh vehicles", LIMIT)
+
+
+def test_without_a_page_nothing_is_received(dashboard, page):
+    dashboard.pages.close(page)
+    wait_until(lambda: not dashboard.scene().vehicles, "an empty scene", LIMIT)

@@ -1,0 +1,76 @@
+"""Control: one page at a time."""
+
+import pytest
+
+from crazyflie_dashboard.control import ControlError, PageControl
+
+
+class Told:
+    """Pages and what they were told."""
+
+    def __init__(self):
+        self.control = PageControl()
+        self.texts = {}
+
+    def open(self):
+        texts = []
+        page = self.control.open(texts.append)
+        self.texts[page] = texts
+        return page
+
+
+@pytest.fixture
+def told():
+    return Told()
+
+
+def test_a_new_page_only_looks(told):
+    page = told.open()
+    with pytest.raises(ControlError, match="no page has control; take it first"):
+        told.control.expect_control(page)
+
+
+def test_control_is_taken_once(told):
+    one, two = told.open(), told.open()
+    told.control.take(one)
+    told.control.expect_control(one)
+    with pytest.raises(ControlError, match=f"page {one} has control"):
+        told.control.take(two)
+    assert told.control.controller == one
+    assert told.texts[two] == [f"page {one} has control"]
+
+
+def test_both_are_told_of_a_takeover(told):
+    one, two, three = told.open(), told.open(), told.open()
+    told.control.take(one)
+    told.control.take_over(two)
+    with pytest.raises(ControlError):
+        told.control.expect_control(one)
+    assert told.texts[one] == [f"page {two} has taken over control: this page only looks now"]
+    assert told.texts[two][-1] == f"this page has taken over control from page {one}"
+    assert told.texts[three][-1] == f"page {two} has control"
+
+
+def test_a_page_that_is_lost_has_no_control_when_it_comes_back(told):
+    page = told.open()
+    told.control.take(page)
+    told.control.close(page)
+    assert told.control.controller is None
+    again = told.open()
+    assert again != page
+    with pytest.raises(ControlError):
+        told.control.expect_control(again)
+    with pytest.raises(ControlError, match="is closed"):
+        told.control.take(page)
+
+
+def test_the_first_and_the_last_page_are_noticed(told):
+    seen = []
+    told.control.on_first = lambda: seen.append("first")
+    told.control.on_close = lambda page: seen.append(page)
+    told.control.on_empty = lambda: seen.append("empty")
+    one, two = told.open(), told.open()
+    told.control.close(one)
+    told.control.close(two)
+    told.control.close(two)
+    assert seen == ["first", one, two, "empty"]

@@ -1,0 +1,116 @@
+"""Vehicles as a page sees them: found, stale, gone."""
+
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from fake_fleet import FakeFleet
+from geometry_msgs.msg import PoseStamped
+from rosgraph_msgs.msg import Log
+
+from crazyflie_dashboard.discovery import Graph
+from crazyflie_msgs.msg import FlightStatus
+
+
+@pytest.fixture
+def fleet():
+    found = FakeFleet()
+    found.find()
+    return found
+
+
+def test_vehicles_are_where_their_frames_are(fleet):
+    assert list(fleet.vehicles) == ["cf1", "cf2", "cf3"]
+    assert fleet.vehicles["cf3"].position == (2.0, 0.0, 1.0)
+    assert not fleet.vehicles["cf3"].is_stale
+    assert fleet.dashboard.scene().fixed_frame == "world"
+
+
+def test_states_are_words_with_their_reason(fleet):
+    fleet.report("cf1", FlightStatus.LANDING, "no state for 0.5 s")
+    vehicle = fleet.vehicles["cf1"]
+    assert (vehicle.state, vehicle.reason) == ("landing", "no state for 0.5 s")
+    assert vehicle.is_in_flight
+    assert not fleet.vehicles["cf2"].is_in_flight
+
+
+def test_one_of_three_is_stale(fleet):
+    for _ in range(20):
+        fleet.send_poses(["cf1", "cf2"])
+    assert [name for name, each in fleet.vehicles.items() if each.is_stale] == ["cf3"]
+    assert fleet.vehicles["cf3"].pose_age == pytest.approx(1.0, abs=0.2)
+    assert fleet.vehicles["cf3"].position == (2.0, 0.0, 1.0)
+
+
+def test_vehicles_come_and_go(fleet):
+    fleet.graph = Graph({k: v for k, v in fleet.graph.topics.items() if "cf2" not in k})
+    fleet.process.advance(5.0)
+    assert fleet.vehicles["cf2"].is_stale
+    fleet.process.advance(40.0)
+    assert list(fleet.vehicles) == ["cf1", "cf3"]
+
+
+def test_a_master_that_does_not_answer_leaves_the_vehicles_there(fleet):
+    fleet.graph = None  # `vehicles` would raise: as an answer that cannot be read.
+    read = fleet.dashboard._model._read_graph
+    fleet.dashboard._model._read_graph = lambda: (_ for _ in ()).throw(OSError("no master"))
+    fleet.process.advance(5.0)
+    assert list(fleet.vehicles) == ["cf1", "cf2", "cf3"]
+    assert any("no master" in text for text in fleet.process.logged("warn"))
+    fleet.dashboard._model._read_graph = read
+
+
+def test_nothing_is_received_without_a_page():
+    fleet = FakeFleet()
+    fleet.find()
+    assert fleet.process.transport.subscribers["/tf"]
+    fleet.dashboard.pages.close(fleet.page)
+    subscribers = fleet.process.transport.subscribers
+    assert [topic for topic, each in subscribers.items() if each] == ["/clock"]
+    fleet.page = fleet.dashboard.pages.open(fleet.texts.append)
+    fleet.find()
+    assert list(fleet.vehicles) == ["cf1", "cf2", "cf3"]
+
+
+def test_states_and_controls_are_received_of_watched_vehicles_only(fleet):
+    def states():
+        subscribers = fleet.process.transport.subscribers
+        return [name for name in fleet.names if subscribers.get(f"/{name}/state")]
+
+    assert states() == []
+    fleet.dashboard.watch(fleet.page, "cf2")
+    assert states() == ["cf2"]
+    fleet.dashboard.watch(fleet.page, "cf1")
+    assert states() == ["cf1"]
+    fleet.dashboard.pages.close(fleet.page)
+    assert states() == []
+
+
+def test_diagnostics_are_sentences_and_the_log_has_levels(fleet):
+    status = [
+        DiagnosticStatus(DiagnosticStatus.WARN, "driver: cf2", "battery low", "", []),
+        DiagnosticStatus(DiagnosticStatus.ERROR, "driver: cf1", "link lost", "", []),
+        DiagnosticStatus(DiagnosticStatus.OK, "driver: cf3", "connected", "", []),
+    ]
+    fleet.process.publish("/diagnostics", DiagnosticArray(status=status))
+    fleet.process.publish("/rosout_agg", Log(level=Log.WARN, name="/a", msg="<script>alert(1)"))
+    fleet.process.advance(0.05)
+    scene = fleet.dashboard.scene()
+    assert [(each.level, each.text) for each in scene.sentences] == [
+        ("error", "link lost"),
+        ("warn", "battery low"),
+    ]
+    (line,) = scene.log
+    assert (line.level, line.node, line.text) == ("warn", "/a", "<script>alert(1)")
+    fleet.process.advance(11.0)
+    assert fleet.dashboard.scene().sentences == ()
+
+
+def test_without_frames_poses_come_from_the_topics_of_a_vehicle(fleet):
+    fleet.graph = Graph({"/bird/pose": "geometry_msgs/PoseStamped"})
+    fleet.process.advance(8.0)
+    message = PoseStamped()
+    message.pose.position.z = 0.7
+    message.pose.orientation.w = 1.0
+    fleet.process.publish("/bird/pose", message)
+    fleet.process.advance(0.05)
+    assert fleet.vehicles["bird"].position == pytest.approx((0.0, 0.0, 0.7))
+    assert not fleet.vehicles["bird"].is_stale

@@ -1,0 +1,90 @@
+"""Plots: the last minute, and any number of any topic."""
+
+import math
+
+import pytest
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import Imu
+
+from crazyflie_dashboard.plots import Ring, VehiclePlots, expect_field, number_in, split_path
+from crazyflie_dashboard.snapshot import VehicleSnapshot
+from crazyflie_driver.msg import GenericLogData
+from crazyflie_utils.refusal import RefusalError
+
+TOPICS = {"/cf1": "a/B", "/cf1/pose": "geometry_msgs/PoseStamped", "/cf1/imu": "sensor_msgs/Imu"}
+
+
+def test_a_plot_has_twenty_numbers_a_second_of_the_last_minute():
+    ring = Ring("m")
+    for k in range(10000):
+        ring.add(0.01 * k, float(k))
+    series = ring.series("x", 100.0)
+    assert series.times[-1] == pytest.approx(-0.01, abs=0.05)
+    assert -60.0 <= series.times[0] < -59.0
+    assert 1150 <= len(series.times) == len(series.values) <= 1200
+    assert Ring("m").series("x", 0.0).times == ()
+
+
+def test_the_error_is_the_distance_from_the_reference():
+    plots = VehiclePlots(lambda: 5.0)
+    plots.take("reference", (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, math.nan))
+    plots.take("state", (0.3, 0.4, 1.0, 0.0, 0.0, 0.0, 0.0))
+    plots.take("final_control", (0.0, 0.0, 0.0, 9.81))
+    plots.take("log pm", [3.9, 0.5])
+    values = {series.name: (series.values[-1], series.unit) for series in plots.series()}
+    assert values["error"] == (pytest.approx(0.5), "m")
+    assert values["thrust"] == (9.81, "m/s^2")
+    assert values["pm[1]"] == (0.5, "")
+
+
+def test_attitudes_are_in_degrees_and_positions_of_poses_without_states():
+    plots = VehiclePlots(lambda: 5.0)
+    half = math.radians(45.0) / 2.0
+    now = VehicleSnapshot(
+        "cf1", position=(1.0, 2.0, 3.0), rotation=(0.0, 0.0, math.sin(half), math.cos(half))
+    )
+    plots.take_pose(now, has_state=False)
+    values = {series.name: series.values[-1] for series in plots.series()}
+    assert values["yaw"] == pytest.approx(45.0)
+    assert values["z"] == 3.0
+
+
+@pytest.mark.parametrize(
+    ("path", "topic", "fields"),
+    [
+        ("/cf1/pose/pose/position/x", "/cf1/pose", ["pose", "position", "x"]),
+        ("/cf1/pose/pose.position.x", "/cf1/pose", ["pose", "position", "x"]),
+        ("/cf1/imu/orientation_covariance[3]", "/cf1/imu", ["orientation_covariance", 3]),
+    ],
+)
+def test_paths_are_those_of_rostopic(path, topic, fields):
+    assert split_path(path, TOPICS) == (topic, fields)
+
+
+@pytest.mark.parametrize(
+    "path", ["/cf2/pose/x", "", "/", "/cf1/pose", "/cf1/pose/x[", "/cf1/pose/-"]
+)
+def test_paths_that_lead_nowhere_are_refused(path):
+    with pytest.raises(RefusalError, match="expected"):
+        split_path(path, TOPICS)
+
+
+def test_fields_are_checked_by_the_type():
+    expect_field("p", PoseStamped, ["pose", "position", "x"])
+    expect_field("p", PoseStamped, ["header", "stamp"])
+    expect_field("p", Imu, ["orientation_covariance", 3])
+    for fields, text in (
+        (["pose", "height"], "there is no 'height' in geometry_msgs/Pose; it has position, orient"),
+        (["pose", "position"], "is a geometry_msgs/Point; expected a number"),
+        (["pose", 0], "expected a list"),
+        (["header", "frame_id"], "is a string; expected a number"),
+    ):
+        with pytest.raises(RefusalError, match=text):
+            expect_field("p", PoseStamped, fields)
+
+
+def test_numbers_are_found_in_messages():
+    message = GenericLogData(values=[1.0, 2.5])
+    assert number_in(message, ["values", 1]) == 2.5
+    assert math.isnan(number_in(message, ["values", 2]))
+    assert number_in(message, ["header", "stamp"]) == 0.0

@@ -153,7 +153,7 @@ def test_attitude_and_yaw_rate_are_limited(network):
     for topic, caller in ((TAKEOFF, "/server"), (COMMANDED, "/controller")):
         wild._connection_header = {"callerid": caller, "topic": topic}
         network.process("filter").publish(topic, wild)
-        final = network.process("filter").published("/control/final")[-1].control
+        final = network.last_of("filter", "/control/final").control
         assert (final.roll, final.pitch, final.yaw_dot) == (MAX_TILT, -MAX_TILT, -MAX_YAW_RATE)
 
 

@@ -40,6 +40,8 @@ class FakeGraph:
     faults : dict of str to callable
         What a fault makes of the messages on a topic: ``fault(message)`` returns those
         that arrive in its place.
+    unheard : set of (str, str)
+        Process and topic: messages that do not reach this process.
     log : list of (str, str)
         Level and text of what nodes have logged.
     """
@@ -47,6 +49,7 @@ class FakeGraph:
     def __init__(self, parameters: dict[str, object], start: float = 100.0):
         self.time = start
         self.faults: dict[str, Callable[[Any], list[Any]]] = {}
+        self.unheard: set[tuple[str, str]] = set()
         self.log: list[tuple[str, str]] = []
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
@@ -177,7 +180,7 @@ class FakeGraph:
         for arriving in [message] if fault is None else fault(message):
             arriving._connection_header = {"callerid": sender, "topic": topic}
             for name, process in list(self._processes.items()):
-                if name != sender:
+                if name != sender and (name, topic) not in self.unheard:
                     for deliver in tuple(process.transport.subscribers.get(topic, ())):
                         process.receive(deliver, arriving)
 
@@ -254,4 +257,5 @@ class _GraphTransport(FakeTransport):
         return self.graph.call(name, request)
 
     def log(self, level: str, text: str) -> None:
+        super().log(level, text)
         self.graph.log.append((level, text))

@@ -23,7 +23,7 @@ def test_one_on_the_ground_holds_no_vehicle():
 
 def test_the_last_speed_of_one_that_is_not_seen_does_not_count():
     flight = Flight()
-    flight.see("cf2", 1.0, y_dot=-3.0)
+    flight.see("cf2", 1.0, y_dot=-1.6)
     flight.silence("cf2")
     flight.process.advance(1.5)
     flight.see("cf1", 0.2)

@@ -12,7 +12,6 @@ from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.conversions import heading, to_message
-from crazyflie_fleet.flight_words import WORDS
 from crazyflie_mission_api.futures import done, in_turn
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
 from crazyflie_mission_api.mission_vehicle import MissionVehicle
@@ -23,6 +22,7 @@ from crazyflie_model.angles import Triple, quaternion_from_rpy
 from crazyflie_model.trajectory import Pieces
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
 from crazyflie_utils import NodeHandle, ServiceError, TransformError
+from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.parameters.types import FINITE
 
 CALL_TIMEOUT = 60.0

@@ -1,5 +1,7 @@
 """The tables of docs/safety.md name tests that exist, and limits as they are declared."""
 
+import ast
+import functools
 import importlib
 import re
 
@@ -23,10 +25,33 @@ def test_there_are_rows():
     assert len(rows()) > 25
 
 
+@functools.cache
+def functions(path):
+    """Return the functions of a module by name."""
+    body = ast.parse(path.read_text()).body
+    return {each.name: each for each in body if isinstance(each, ast.FunctionDef)}
+
+
+def checks(function):
+    """Tell whether a test can fail: it asserts, expects an error, or calls what may."""
+    nodes = (node for statement in function.body for node in ast.walk(statement))
+    return any(isinstance(node, ast.Assert | ast.With | ast.Call) for node in nodes)
+
+
 @pytest.mark.parametrize("row", rows(), ids=lambda row: row[0][:40])
-def test_every_row_names_a_test_that_exists(row):
-    files = row[-1].split(", ")
-    assert all((TOP / "ros" / "src" / file).is_file() for file in files), files
+def test_every_row_names_test_functions(row):
+    for named in row[-1].split(", "):
+        file, _, name = named.partition("::")
+        path = TOP / "ros" / "src" / file
+        assert path.is_file(), named
+        assert name.startswith("test_"), named
+        assert name in functions(path), named
+        assert checks(functions(path)[name]), named
+
+
+def test_an_empty_test_is_none():
+    empty = ast.parse("def test_nothing():\n    'Fly.'\n    pass\n").body[0]
+    assert not checks(empty)
 
 
 def declared():

@@ -39,30 +39,15 @@ _TCP = "rospy.impl.tcpros_base:"
 
 @dataclass(frozen=True)
 class Patch:
-    """A change of rospy.
+    """A change of rospy."""
 
-    Attributes
-    ----------
-    replaces : str
-        What rospy does.
-    reason : str
-        What is done in its place, and why.
-    gain : str
-        Measured without -> with it, on a machine that did other things, too.
-    without : str
-        What is slower or missing without it, for the log.
-    targets : dict of str to str
-        "module:Class.function" to its parameters and, behind a colon, names that its code uses.
-    versions : str
-        Of rospy, in which it was seen to work.
-    """
-
-    replaces: str
-    reason: str
-    gain: str
-    without: str
+    replaces: str  #: What rospy does.
+    reason: str  #: What is done in its place, and why.
+    gain: str  #: Measured without -> with it, on a machine that did other things, too.
+    without: str  #: What is slower or missing without it, for the log.
+    #: "module:Class.function" to its parameters and, behind a colon, names that its code uses.
     targets: dict[str, str]
-    versions: str = "1.15.15"
+    versions: str = "1.15.15"  #: Of rospy, in which it was seen to work.
 
 
 PATCHES = {

@@ -46,12 +46,14 @@ class DashboardNode(Node):
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        folders = [path for path in self._parameters.folders.split(":") if path] or _examples()
+        folders = [
+            path for path in self._parameters.folders.split(":") if path
+        ] or example_folders()
         self._dashboard = LiveDashboard(
             handle,
             lambda: master.read(handle.name),
             partial(master.is_answering, handle.name),
-            folders,
+            folders or example_folders(),
         )
         # NiceGUI takes a second to import: not for what only reads the parameters' declaration.
         from crazyflie_dashboard.page import open_page
@@ -68,7 +70,7 @@ class DashboardNode(Node):
         self._dashboard.close()
 
 
-def _examples():
+def example_folders() -> list[str]:
     """Return the folders of what this workspace has to fly, as far as it is installed."""
     packages = rospkg.RosPack()
     folders = []

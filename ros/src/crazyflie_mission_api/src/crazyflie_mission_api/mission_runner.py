@@ -14,12 +14,15 @@ from collections.abc import Callable
 from typing import Any
 
 from crazyflie_demo import trajectory_file
-from crazyflie_mission_api import Fleet, MissionError
+from crazyflie_mission_api import Fleet, Limits, MissionError
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 
 _HEIGHT = 1.0
 """Of a trajectory's takeoff, m."""
+
+_LIMITS = Limits(speed=1.5, acceleration=2.5)
+"""Of trajectories in files: they are flown as they are, or not at all."""
 
 _PERIOD = 0.2
 """From one point of a path that is shown to the next, s."""
@@ -41,7 +44,7 @@ def main(arguments: list[str]) -> int:
     try:
         if path.endswith(".csv"):
             pieces = trajectory_file.load(path)
-            with Fleet(names) as fleet:
+            with Fleet(names, limits=_LIMITS) as fleet:
                 fly(fleet, lambda group: _follow(group, pieces))
         else:
             runpy.run_path(path, run_name="__main__")

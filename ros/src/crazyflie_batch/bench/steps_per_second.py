@@ -13,8 +13,7 @@ from pathlib import Path
 from crazyflie_batch import Measurement
 from crazyflie_batch.bench import DURATIONS, MANY, ONE, steps_per_second
 
-GOALS = {ONE: 0.5e6, MANY: 10e6}
-"""Steps per second on two processors."""
+GOALS = {ONE: 0.5e6, MANY: 10e6}  #: Steps per second on two processors.
 
 
 def main() -> None:

@@ -74,7 +74,7 @@ def distance(a, b):
     return np.max(np.abs(a - b) / (1.0 + np.abs(b)))
 
 
-@settings(max_examples=20, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@settings(phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(batches(), st.integers(0, N - 1))
 def test_a_batch_flies_as_one_by_one(batch, index):
     flights = fly(batch, record=True, threads=1)

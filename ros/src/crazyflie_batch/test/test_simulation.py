@@ -40,6 +40,15 @@ def test_outcomes_are_those_of_the_recorded_states():
     assert flights.largest_speed == pytest.approx(speeds.max(axis=0))
 
 
+def test_the_largest_tilt_is_the_one_that_was_commanded():
+    start = [(1.0, 0.0, 1.0), (0.3, -0.2, 1.0)]
+    flights = simulate(near_hover(), CONTROLLER, None, start, 2, duration=1.0, record=True)
+    roll, pitch = flights.controls[..., 0], flights.controls[..., 1]
+    tilt = np.arccos(np.cos(roll) * np.cos(pitch)).max(axis=0)
+    assert flights.largest_tilt == pytest.approx(tilt, abs=1e-6)
+    assert tilt.min() > 0.05
+
+
 @pytest.mark.parametrize("threads", [1, 3])
 def test_a_flight_does_not_depend_on_those_beside_it(threads):
     def fly(n, first):

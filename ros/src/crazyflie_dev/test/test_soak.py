@@ -27,10 +27,13 @@ def result():
     return soak(700.0, seed=7, simulator_dt=POSE_PERIOD)
 
 
+# For minutes of simulated time: a quadrotor flies a shorter soak below.
+@pytest.mark.long
 def test_every_fault_has_its_turn(result):
     assert set(result["faults"]) == {fault.name for fault in FAULTS}
 
 
+@pytest.mark.long
 def test_nothing_makes_the_vehicle_fly_away(result):
     assert result["violations"] == []
     assert result["errors logged"] == 0
@@ -88,7 +91,9 @@ def test_no_node_that_is_killed_in_hover_makes_the_thrust_jump(name):
 
 
 @pytest.mark.parametrize("dynamics", ["near_hover", "quadrotor"])
-@pytest.mark.parametrize("seed", range(1, 5))
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.long) for seed in range(2, 5))]
+)
 def test_nodes_that_hardly_run_do_not_make_the_vehicle_climb(dynamics, seed):
     """On a computer that is too busy, nodes run for 20 to 50 ms and stop for 100 to 600 ms.
 

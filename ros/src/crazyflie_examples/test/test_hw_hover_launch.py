@@ -63,6 +63,23 @@ def test_names_of_one_vehicle_reach_all_nodes(composed):
     assert parameters["/takeoff_server/topics/connected"] == "/cf3/connected"
 
 
+def test_what_dies_in_flight_is_started_again():
+    nodes, parameters = launch_files.expand(LAUNCH / "hw_hover.launch", rviz="false")
+    # A driver that is started again knows no vehicle, and crazyflie_add ends when it has added one.
+    once = {name for name, node in nodes.items() if not node.respawn}
+    assert once == {"/crazyflie_server", "/crazyflie/crazyflie_add"}
+    # The vehicle stops its motors if the driver does not come back.
+    assert parameters["/crazyflie_server/emergency_watchdog"] is True
+    simulated, _ = launch_files.expand(LAUNCH / "sw_geofence.launch", rviz="false")
+    assert {name for name, node in simulated.items() if not node.respawn} == {"/simulator"}
+
+
+def test_the_frame_of_motion_capture_outlives_its_publisher():
+    # What tf2's publisher says is latched, and kept; tf's would have to go on.
+    nodes, _ = launch_files.expand(LAUNCH / "hw_hover.launch", rviz="false")
+    assert nodes["/mocap_robot_publisher"].package == "tf2_ros"
+
+
 def test_takeoff_servers_ask_for_the_driver_where_one_flies():
     of_driver = "takeoff_server/topics/connected"
     _, simulated = launch_files.expand(LAUNCH / "sw_hover.launch", rviz="false")

@@ -78,7 +78,10 @@ def heights(process, duration):
 
 
 @pytest.mark.parametrize("example", [HARDWARE, SOFTWARE], ids=["hardware", "software"])
-@pytest.mark.parametrize(("mass_error", "thrust_error"), [(0.05, -0.05), (0.0, 0.0)])
+@pytest.mark.parametrize(
+    ("mass_error", "thrust_error"),
+    [(0.05, -0.05), pytest.param(0.0, 0.0, marks=pytest.mark.long)],
+)
 def test_no_takeoff_overshoots_also_not_after_30_s_on_the_ground(example, mass_error, thrust_error):
     process = launch(example, mass_error, thrust_error)
     for wait in (0.0, 18.0):

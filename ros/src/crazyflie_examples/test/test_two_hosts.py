@@ -107,6 +107,8 @@ def launched(host, log, fleet, machine, name):
     return running(*command, env=host.environment, stdout=log, stderr=subprocess.STDOUT)
 
 
+# On one host the same fleet flies in swarm.test.
+@pytest.mark.long
 def test_two_hosts_fly_one_fleet(hosts, tmp_path):
     here, there = hosts
     fleet = tmp_path / "fleet.yaml"

@@ -85,9 +85,9 @@ def test_what_has_no_effect_is_remarked_once_a_key(load):
     assert remarks_of(load, text.replace("[0, 1, 0]", "[0, 1, 0]\n    big_quad: false")) == [
         ":13: all/firmware_logging/default_topics/odom is not offered by the driver, and left out",
         ": frequency of a default topic (line 14) has no effect here",
-        ": broadcasts (line 10) has no effect here",
         ": big_quad (line 8) has no effect here",
     ]
+    assert load(text).broadcasts == {"broadcast/repeats": 15, "broadcast/repeat_period": 0.001}
     assert load(text)["cf1"].default_topics == ("battery",)
 
 

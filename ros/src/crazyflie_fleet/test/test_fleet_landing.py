@@ -93,7 +93,15 @@ def empty_the_batteries(tower):
         tower.process.advance(0.25)
 
 
-@pytest.mark.parametrize("end", [end_launch, land_the_upper_ones, empty_the_batteries])
+@pytest.mark.parametrize(
+    "end",
+    [
+        end_launch,
+        # That they land at all is tested in test_group_services.py, and in test_battery.py.
+        pytest.param(land_the_upper_ones, marks=pytest.mark.long),
+        pytest.param(empty_the_batteries, marks=pytest.mark.long),
+    ],
+)
 def test_a_vehicle_that_lands_by_itself_lands_beside_those_beneath_it(end):
     # As near to each other as their buffers allow.
     tower = Tower((0.7, 1.35, 2.0))

@@ -23,6 +23,14 @@ def bench():
     return made
 
 
+def test_a_full_state_has_the_heading_of_its_goal():
+    # A quarter turn to the left: the quaternion's z and w are sin(45 degrees).
+    message = full_state_message(at_rest((0.5, 0.0, 1.0), math.pi / 2.0))
+    q = message.pose.orientation
+    assert (q.x, q.y, q.z, q.w) == pytest.approx((0.0, 0.0, 0.7071068, 0.7071068))
+    assert setpoint_goal(message).yaw == pytest.approx(1.5707963)
+
+
 def test_setpoints_are_followed_until_they_stop(bench):
     goal = Goal((0.5, 0.0, 1.0), (0.2, 0.0, 0.0), (0.0, 0.0, 0.0), 0.3, 0.0)
     assert setpoint_goal(full_state_message(goal)).yaw == pytest.approx(0.3)

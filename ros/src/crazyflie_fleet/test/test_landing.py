@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist, squareform
 
@@ -94,7 +94,6 @@ def test_without_a_free_place_each_lands_where_it_is():
     assert found == [{0: (0, 0)}, {1: (0, 0)}]
 
 
-@settings(max_examples=150, deadline=None)
 @given(st.integers(0, 10**6), st.integers(2, 14))
 def test_no_two_vehicles_meet_from_any_positions(seed, n):
     draw = np.random.default_rng(seed)
@@ -122,7 +121,6 @@ def test_buffers_may_differ():
     assert found == {0: pytest.approx((0.0, 0.0)), 1: pytest.approx((0.5, 0.0))}
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.integers(0, 10**6))
 def test_moves_are_reachable_if_no_vehicle_comes_near(seed):
     draw = np.random.default_rng(seed)

@@ -180,6 +180,27 @@ def test_control_and_acceleration_are_inverse(unit, yaw):
     np.testing.assert_allclose(back, acceleration, atol=1e-9)
 
 
+# With the nose along x, y, -x and -y of the fixed frame: forward is positive pitch, to the right
+# positive roll, each by atan(1.5 / g).
+TILT = 0.15173
+HEADINGS = [
+    (0.0, (0.0, TILT), (-TILT, 0.0)),
+    (math.pi / 2.0, (TILT, 0.0), (0.0, TILT)),
+    (math.pi, (0.0, -TILT), (TILT, 0.0)),
+    (-math.pi / 2.0, (-TILT, 0.0), (0.0, -TILT)),
+]
+
+
+@pytest.mark.parametrize(("yaw", "along_x", "along_y"), HEADINGS)
+def test_tilts_to_where_it_accelerates_at_any_heading(yaw, along_x, along_y):
+    for acceleration, tilt in (((1.5, 0.0, 0.0), along_x), ((0.0, 1.5, 0.0), along_y)):
+        control = control_from_acceleration(np.array(acceleration), yaw, 0.0)
+        assert control[:2] == pytest.approx(tilt, abs=1e-5)
+        thrust = GRAVITY / math.cos(TILT)
+        back = acceleration_from_control(np.array([*tilt, 0.0, thrust]), yaw)
+        assert back == pytest.approx(acceleration, abs=1e-4)
+
+
 @given(VECTOR, VECTOR, YAW, REGULAR)
 def test_control_is_within_limits(unit, velocity, yaw, regular):
     control, _ = FENCE.control(5.0 * inside(unit), 20.0 * velocity, yaw, 3.0 * regular)

@@ -4,7 +4,7 @@ import contextlib
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from test_geofence_node import PARAMETERS, publish_regular, publish_state
 
@@ -18,7 +18,6 @@ STATE = st.tuples(*[st.floats(-5.0, 5.0)] * 6, st.floats(-3.0, 3.0))
 
 
 @pytest.mark.filterwarnings("error")
-@settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(live_changes(GeofenceParameters), STATE), min_size=1, max_size=4), STATE)
 def test_any_live_change_leaves_the_control_sound(changes, at_rest):
     process = FakeProcess()

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_continuous_are, solve_discrete_are, solve_discrete_lyapunov
@@ -56,7 +56,6 @@ def test_sampled_gains_solve_the_discrete_riccati_equation(seed):
 
 
 @given(*[st.floats(0.1, 10.0)] * 6)
-@settings(max_examples=30)
 def test_every_axis_has_its_closed_form(q_p, q_v, r_tilt, q_yaw, r_yaw, r_thrust):
     g = 9.81
     design = design_gains(

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from lift_controller import answer, lifting, publish_flight_state, refer
 
@@ -42,7 +42,6 @@ def sound(u):
 
 
 @pytest.mark.filterwarnings("error")
-@settings(max_examples=150, deadline=None)
 @given(CHANGES)
 def test_any_integrator_and_gains_at_any_moment_of_a_takeoff(changes):
     model = Coupled7D()

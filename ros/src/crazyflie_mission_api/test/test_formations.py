@@ -6,7 +6,7 @@ import model_flight
 import numpy as np
 import pytest
 import rospkg
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import pdist
 
@@ -29,7 +29,6 @@ def test_places():
     assert len({tuple(place) for place in ring.round(6).tolist()}) == 8
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(0, 10**6))
 def test_no_two_vehicles_meet_on_simultaneous_straight_moves(seed):
     # CAPT: with starts and goals a apart, at least a / sqrt(2).
@@ -41,6 +40,13 @@ def test_no_two_vehicles_meet_on_simultaneous_straight_moves(seed):
     ends = np.array([chosen[name] for name in names])
     for s in np.linspace(0.0, 1.0, 21):
         assert pdist(starts + s * (ends - starts)).min() > 1.0 / np.sqrt(2.0) - 1e-9
+
+
+def test_a_way_up_counts_less_than_one_to_the_side():
+    # By 1 m to the side each, or by 1.5 m up and down, which is as 0.75 m to the side.
+    places = {"low": (0.0, 0.0, 0.5), "high": (1.0, 0.0, 2.0)}
+    goals = np.array([(1.0, 0.0, 0.5), (0.0, 0.0, 2.0)])
+    assert assign(places, goals) == {"low": (0.0, 0.0, 2.0), "high": (1.0, 0.0, 0.5)}
 
 
 @pytest.mark.parametrize("n", [1, 7])

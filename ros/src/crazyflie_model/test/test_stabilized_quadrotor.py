@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_model.angles import zyx_from_quaternion
@@ -113,7 +113,6 @@ def test_climbs_from_the_ground_whatever_tilt_is_asked_for_there():
     assert vehicle.state[2] > 0.5
 
 
-@settings(max_examples=30)
 @given(
     controls=st.lists(
         st.tuples(

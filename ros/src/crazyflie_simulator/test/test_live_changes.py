@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from simulators import command, launch, transforms
 
@@ -22,7 +22,6 @@ def numbers(transform):
 
 
 @pytest.mark.filterwarnings("error")
-@settings(max_examples=60, deadline=None)
 @given(st.lists(live_changes(QuadrotorSimulatorParameters), min_size=1, max_size=4))
 def test_any_live_change_leaves_the_vehicle_and_its_poses_finite(changes):
     process = launch(QuadrotorSimulatorNode, **{"init/z": 2.0})

@@ -42,3 +42,14 @@ def test_less_thrust_than_in_flight_is_not_used(thrust):
     control = ControlInput()
     control.command(np.array([0.1, 0.1, 0.0, thrust]), 0.0)
     assert control.acceleration(0.0, 0.0) is None
+
+
+@pytest.mark.parametrize(
+    ("yaw", "direction"), [(0.0, (1.0, 0.0)), (0.5 * np.pi, (0.0, 1.0)), (np.pi, (-1.0, 0.0))]
+)
+def test_it_points_where_the_vehicle_is_tilted_to_at_its_heading(yaw, direction):
+    control = ControlInput()
+    control.command(np.array([0.0, 0.1, 0.0, 10.0]), 0.0)
+    x, y, _ = control.acceleration(yaw, 0.0)
+    # 10 m/s^2 sin(0.1 rad), forward.
+    assert (x, y) == pytest.approx([0.9983 * part for part in direction], abs=1e-3)

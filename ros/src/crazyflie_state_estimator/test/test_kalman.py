@@ -46,7 +46,6 @@ def test_settles_at_the_solution_of_riccatis_equation():
     np.testing.assert_allclose(subject.covariance, settled, rtol=1e-3)
 
 
-@settings(deadline=None, max_examples=50)
 @given(
     st.lists(
         st.tuples(st.floats(0.002, 0.5), st.floats(-1.0, 1.0)),

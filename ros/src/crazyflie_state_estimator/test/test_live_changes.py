@@ -4,7 +4,7 @@ import math
 
 import pytest
 from estimator_helpers import fly, launch, moving
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_state_estimator.estimator_node import KalmanParameters
@@ -13,7 +13,6 @@ from crazyflie_utils.vectors import to_tuple
 
 
 @pytest.mark.filterwarnings("error")
-@settings(max_examples=100, deadline=None)
 @given(st.lists(live_changes(KalmanParameters), min_size=1, max_size=5), st.integers(0, 10))
 def test_any_live_change_leaves_the_state_finite(changes, poses):
     process = launch(**{"filter/type": "kalman"})

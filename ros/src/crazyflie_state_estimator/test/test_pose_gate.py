@@ -2,6 +2,8 @@
 
 from random import Random
 
+import pytest
+
 from crazyflie_state_estimator.pose_gate import Classification, PoseGate
 
 
@@ -21,3 +23,13 @@ def test_wild_poses_are_not_believed_where_the_vehicle_might_be():
         Classification.GOOD,
         Classification.GOOD,
     ]
+
+
+@pytest.mark.parametrize(
+    ("distance", "classification"),
+    [(2.5, Classification.GOOD), (2.6, Classification.BAD)],
+)
+def test_a_vehicle_that_was_away_for_long_has_flown_on_for_half_a_second(distance, classification):
+    gate = PoseGate(5.0)
+    assert gate.classify(0.0, (0.0, 0.0, 1.0)) is Classification.GOOD
+    assert gate.classify(3.0, (distance, 0.0, 1.0)) is classification

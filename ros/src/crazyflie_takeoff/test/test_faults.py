@@ -156,8 +156,10 @@ def test_a_server_that_starts_during_the_descent_leaves_it_alone(network):
     network.vehicle_node.sees = False
     network.advance(1.5)
     network.start_server()
+    started = network.time
+    network.advance_until(lambda: network.vehicle.z < 0.05)
+    assert min(thrusts(network, started)) > 0.5 * G
     until_on_ground(network)
-    assert 0.0 not in thrusts(network, 0.0, "/control/takeoff")[-3:-2] or network.vehicle.z == 0.0
     assert network.vehicle.touchdown_speed < 1.0
 
 

@@ -2,7 +2,7 @@
 
 from random import Random
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_msgs.msg import FilterStatus
@@ -63,7 +63,6 @@ class World:
         ]
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.integers(0))
 def test_whatever_happens_the_table_decides(seed):
     random, world = Random(seed), World()

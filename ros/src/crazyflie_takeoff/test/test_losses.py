@@ -2,7 +2,7 @@
 
 import pytest
 from filter_flight import FLYING, LANDING, LIMITS, ON_GROUND, TAKING_OFF, TIMEOUTS, Flight, G, level
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_takeoff.filter_states import FilterState
@@ -73,7 +73,6 @@ def test_a_blind_descent_lasts_for_the_last_known_height(height):
     assert flight.vehicle.z == 0.0
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.floats(0.3, 2.0), st.floats(0.8 * G, 1.2 * G), st.floats(-0.8, 1.0), st.booleans())
 def test_comes_down_whatever_it_weighs_and_however_it_moved(height, hover, speed, pose):
     flight = Flight(height, hover).run(8.0)

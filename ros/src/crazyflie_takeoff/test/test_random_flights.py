@@ -1,6 +1,6 @@
 """The server's state machine under random events at random times."""
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_takeoff.flight import FlightStateMachine
@@ -18,7 +18,6 @@ TICKS = st.tuples(st.floats(0.0, 2.5), POSITIONS)
 FILTER = st.sampled_from([Event.FILTER_PASSES, Event.FILTER_HOLDS, *TAKEOVERS])
 
 
-@settings(max_examples=200, deadline=None)
 @given(st.lists(CALLS | TICKS, max_size=40), st.sampled_from([PLAN, BARE]))
 def test_flights_that_the_filter_does_not_end(steps, plan):
     """Holds at every tick of every flight."""
@@ -55,7 +54,6 @@ def test_flights_that_the_filter_does_not_end(steps, plan):
     assert flight.state in (ServerState.ON_GROUND, ServerState.FLYING)
 
 
-@settings(max_examples=300, deadline=None)
 @given(
     st.sampled_from([None, *FlightState]),
     POSITIONS,

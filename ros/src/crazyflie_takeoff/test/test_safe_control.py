@@ -1,7 +1,5 @@
 """What the filter flies by itself: thrust of hover, braking."""
 
-import math
-
 import pytest
 from filter_flight import G, level
 
@@ -24,11 +22,15 @@ def test_learns_the_thrust_of_hover_also_from_a_climb():
     assert hover.value == 1.25 * G
 
 
-def test_learns_the_vertical_part_of_a_tilted_thrust():
+@pytest.mark.parametrize(
+    ("roll", "pitch", "vertical"),
+    [(0.2, 0.0, 0.9800666), (0.0, 0.2, 0.9800666), (0.2, -0.1, 0.9751703)],
+)
+def test_learns_the_vertical_part_of_a_tilted_thrust(roll, pitch, vertical):
     tilted = HoverThrust()
     for _ in range(2000):
-        tilted.update(0.01, Setpoint(0.2, 0.0, 0.0, G / math.cos(0.2)), 0.0)
-    assert tilted.value == pytest.approx(G)
+        tilted.update(0.01, Setpoint(roll, pitch, 0.0, G / vertical), 0.0)
+    assert tilted.value == pytest.approx(G, rel=1e-6)
 
 
 def test_a_state_that_is_the_last_one_is_not_taken_again():

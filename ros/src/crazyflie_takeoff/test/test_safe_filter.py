@@ -2,12 +2,13 @@
 
 import pytest
 from filter_flight import DESCENDING, FLYING, LIMITS, ON_GROUND, TIMEOUTS, Flight, G, level
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from crazyflie_model.limits import MIN_THRUST
 from crazyflie_takeoff.filter_states import FilterState
 from crazyflie_takeoff.flight_state import FlightState
+from crazyflie_takeoff.limits import Debounce
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import (
     MAX_SAFE_TILT,
@@ -46,6 +47,15 @@ def test_one_measurement_that_is_wrong_is_no_crash():
         flight.run(0.05)
         flight.run(0.05)
     assert flight.filter.state is FilterState.PASSING
+
+
+def test_complaints_that_come_and_go_do_not_add_up():
+    debounce = Debounce(0.1)
+    for _ in range(20):
+        assert debounce.advance(0.09, "far away") == ""
+        assert debounce.advance(0.01, "") == ""
+    assert debounce.advance(0.09, "far away") == ""
+    assert debounce.advance(0.02, "far away") == "far away"
 
 
 def test_within_half_a_metre_of_the_wall_the_geofence_is_at_work():
@@ -118,7 +128,6 @@ EVENTS = st.lists(
 )
 
 
-@settings(max_examples=300, deadline=None)
 @given(EVENTS)
 @example([DESCENDING, (0.0, 1.0), "commanded"])
 @example(["toggle", (0.0, 0.0), (0.0, -2.0), 6, 0.5])

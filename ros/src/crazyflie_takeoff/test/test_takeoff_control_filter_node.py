@@ -3,10 +3,16 @@
 import math
 
 import pytest
+from dynamic_reconfigure.msg import Config, DoubleParameter
 from std_msgs.msg import Empty
 from takeoff_helpers import FILTER, control
 
-from crazyflie_msgs.msg import FilterStatus, FlightStatus
+from crazyflie_msgs.msg import (
+    FilterStatus,
+    FlightStatus,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_takeoff.flight_state import FlightState
 from crazyflie_takeoff.takeoff_control_filter_node import LISTENING_TIME, TakeoffControlFilterNode
 from crazyflie_utils.testing import FakeProcess
@@ -156,6 +162,44 @@ def test_a_number_that_is_no_flight_state_is_ignored(process):
     assert thrusts(process) == [1.0, 5.0]
     assert "77 on /in_flight_flight_status" in process.logged("warn")[0]
     assert memory(process) == ["unknown", "flying"]
+
+
+BOX = {"min": (-1.0, -2.0, 0.3), "max": (1.5, 2.5, 3.0)}
+
+
+@pytest.mark.parametrize(
+    ("position", "is_outside"),
+    [
+        ((1.9, 2.9, 3.4), False),
+        ((-1.4, -2.4, 1.0), False),
+        # It is open below: a takeoff begins there.
+        ((0.0, 0.0, 0.0), False),
+        ((2.1, 0.0, 1.0), True),
+        ((0.0, 3.1, 1.0), True),
+        ((0.0, 0.0, 3.6), True),
+        ((-1.6, 0.0, 1.0), True),
+        ((0.0, -2.6, 1.0), True),
+    ],
+)
+def test_motors_stop_half_a_metre_outside_each_wall(position, is_outside):
+    process = FakeProcess()
+    topics = {"topics/state": "/state", "topics/box": "/geofence/parameter_updates"}
+    assert process.launch(TakeoffControlFilterNode(), "/filter", {**FILTER, **topics})
+    corners = [
+        DoubleParameter(f"box/{corner}/{axis}", value)
+        for corner, values in BOX.items()
+        for axis, value in zip("xyz", values, strict=True)
+    ]
+    process.publish("/geofence/parameter_updates", Config(doubles=corners))
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    state = PositionVelocityYawState(*position, 0.0, 0.0, 0.0, 0.0)
+    for _ in range(100):
+        process.publish("/state", PositionVelocityYawStateStamped(state=state))
+        process.publish("/control/lqr", control(9.81))
+        process.advance(0.01)
+    status = process.published("/in_flight_filter_status")[-1]
+    assert (status.state == FilterStatus.EMERGENCY) == is_outside
+    assert ("0.60 m outside the geofence" in status.reason) == is_outside
 
 
 def test_whether_there_is_a_controller_is_told_once_a_change():

@@ -1,7 +1,7 @@
 """A landing in closed loop: how fast the vehicle meets the ground."""
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from takeoff_helpers import PointMass, feedback
 
@@ -38,7 +38,6 @@ def land(height, gains, speed=0.3, miscalibration=0.0):
     raise AssertionError("the landing did not end")
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.floats(0.1, 3.0), st.sampled_from([STIFF, SOFT]), st.floats(0.1, 0.3))
 def test_touches_down_below_half_a_metre_per_second(height, gains, speed):
     vehicle, duration = land(height, gains, speed)

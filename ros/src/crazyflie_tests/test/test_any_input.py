@@ -34,10 +34,8 @@ LINES = st.lists(st.text(alphabet="0123456789.-+eE#,; \t\0naif\u0664", max_size=
 CONTENTS = st.binary(max_size=200) | LINES.map(lambda lines: "\n".join(lines).encode())
 """Of a file."""
 
-FEW = settings(max_examples=10, deadline=None, derandomize=True)
-ON_FILES = settings(
-    max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+FEW = settings(max_examples=settings().max_examples // 2)
+ON_FILES = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def declared_classes():

@@ -46,14 +46,37 @@ def in_turns():
 AT_A_TIME = 2
 """So many pages are followed at a time: flights and calls mostly wait."""
 
+QUICK = [
+    TOP / "README.md",
+    TOP / "docs" / "software_example.md",
+    min((TOP / "docs" / "course").glob("[0-9]*.md")),
+]
+"""Pages that are followed in each run of the tests, beside the one of the installation. What the
+others name is tested where it is made, and that they name it rightly, in test_pages.py."""
+
 VIRTUAL_VEHICLE = "virtual_"
 """What pages type that launch it. Its ports can be used by one of them at a time."""
 
 
+def cases():
+    """Return the pages as parameters of a test; most of them are long."""
+    assert set(PAGES_WITH_COMMANDS) >= set(QUICK)
+    return [
+        pytest.param(
+            path,
+            id=str(path.relative_to(TOP)),
+            marks=[] if path in QUICK else pytest.mark.long,
+        )
+        for path in PAGES_WITH_COMMANDS
+    ]
+
+
 @pytest.fixture(scope="module")
-def followed(workspace, tmp_path_factory):
-    """Return the pages, each with a future that is done when it has been followed."""
+def followed(workspace, request, tmp_path_factory):
+    """Return the pages to test, each with a future that is done when it has been followed."""
     ports = threading.Lock()
+    params = [getattr(item, "callspec", None) for item in request.session.items]
+    chosen = [spec.params["path"] for spec in params if spec and "path" in spec.params]
 
     def follow(path):
         page = Page(path)
@@ -74,7 +97,7 @@ def followed(workspace, tmp_path_factory):
         futures = {}
         for pages in in_turns():
             wait(futures.values())
-            futures |= {path: executor.submit(follow, path) for path in pages}
+            futures |= {path: executor.submit(follow, path) for path in pages if path in chosen}
         yield futures
 
 
@@ -84,12 +107,13 @@ def test_commands_of_the_installation(workspace):
         assert (workspace / "ros" / space / "setup.bash").is_file()
 
 
-@pytest.mark.parametrize("path", PAGES_WITH_COMMANDS, ids=lambda path: str(path.relative_to(TOP)))
+@pytest.mark.parametrize("path", cases())
 def test_commands_of_a_page(path, followed):
     # The reader asserts that each command succeeds and prints what the page says; it raises here.
     assert followed[path].result() is None
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("followed")
 def test_the_picture_of_the_graph_shows_the_graph_that_runs(workspace):
     # Whatever graphviz has drawn anew when the page of the graph was tested.

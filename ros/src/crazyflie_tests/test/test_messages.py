@@ -1,4 +1,4 @@
-"""Messages that the manual explains are messages that the code gives."""
+"""Messages that the README of the driver explains are messages that the code gives."""
 
 import ast
 import re
@@ -7,7 +7,7 @@ import pytest
 from pages import Page
 from workspaces import TOP
 
-PAGE = TOP / "docs" / "hardware_example.md"
+PAGE = TOP / "ros" / "src" / "crazyflie_ros" / "crazyflie_driver" / "README.md"
 
 
 def explained():

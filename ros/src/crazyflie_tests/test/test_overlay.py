@@ -40,7 +40,8 @@ def my_workspace(tmp_path):
     return folder
 
 
-@pytest.mark.parametrize("underlay", ["devel", "install"])
+# What is missing in the devel space is missing in the install space.
+@pytest.mark.parametrize("underlay", [pytest.param("devel", marks=pytest.mark.long), "install"])
 def test_controller_of_ones_own_flies(underlay, workspace, my_workspace, shell):
     terminal = shell(my_workspace)
     terminal.run(f"source {workspace}/ros/{underlay}/setup.bash")

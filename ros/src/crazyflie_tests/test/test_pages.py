@@ -133,6 +133,30 @@ def test_links_lead_somewhere(path):
             assert anchor in Page(file).headings, link
 
 
+def links_of(path):
+    """Return the files of the repository to which a page has links, images among them."""
+    prose = CODE_SPAN.sub("", "\n".join(Page(path).prose))
+    targets = {link.partition("#")[0] for link in LINK.findall(prose) if "://" not in link}
+    return {(path.parent / target).resolve() for target in targets if target}
+
+
+def test_links_from_the_first_page_lead_to_every_page():
+    pages = {path.resolve() for path in [*PAGES, *PACKAGE_PAGES]}
+    reached, following = set(), {TOP / "docs" / "README.md"}
+    while following:
+        reached |= following
+        following = (set().union(*map(links_of, following)) & pages) - reached
+    assert {str(path.relative_to(TOP)) for path in pages - reached} == set()
+
+
+def test_every_picture_is_on_a_page():
+    shown = set().union(*map(links_of, [*PAGES, *PACKAGE_PAGES]))
+    pictures = {*(TOP / "docs").glob("**/images/*"), *(TOP / "ros" / "src").glob("**/images/*")}
+    assert {
+        str(path.relative_to(TOP)) for path in pictures - shown if path.suffix != ".py"
+    } == set()
+
+
 @named(PAGES)
 def test_comments_are_understood(path):
     page = Page(path)
@@ -176,7 +200,8 @@ def test_the_launch_file_of_the_software_example_has_its_table():
 @pytest.mark.parametrize("path", find_package_paths(str(TOP / "ros" / "src")))
 def test_every_package_is_named(path):
     readme = Page(TOP / "README.md")
-    assert f"`{path}`" in {row[0] for table in readme.tables for row in table.rows}
+    rows = [row for table in readme.tables for row in table.rows]
+    assert any(row[0].startswith(f"[`{path}`](") for row in rows)
     tree = Page(TOP / "docs" / "organisation.md").blocks[0].text
     assert re.search(rf"^ +{path.rpartition('/')[2]}\b", tree, re.MULTILINE)
 

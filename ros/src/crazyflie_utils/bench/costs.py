@@ -13,11 +13,12 @@ Nothing is asserted: the figures depend on the machine and on its other work.
 import contextlib
 import os
 import queue
-import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
+from pathlib import Path
 
 import rospy
 
@@ -25,6 +26,8 @@ from crazyflie_msgs.msg import ControlStamped
 from crazyflie_utils import Node, TransformError, run
 from crazyflie_utils.main import begin
 from crazyflie_utils.ros1 import patches
+from crazyflie_utils.testing.launching import master
+from crazyflie_utils.testing.programs import running
 
 _COUNT = 5000
 _TOPICS = 100
@@ -34,19 +37,10 @@ _PERIOD = 0.001
 
 def main() -> None:
     """Measure and print."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    os.environ.update(ROS_MASTER_URI=f"http://127.0.0.1:{port}", ROS_IP="127.0.0.1")
     os.environ.pop("ROS_HOSTNAME", None)
-    master = subprocess.Popen(["rosmaster", "--core", "-p", str(port)], stdout=subprocess.DEVNULL)
-    echo = subprocess.Popen([sys.executable, __file__, "echo"])
-    try:
-        _measure()
-    finally:
-        for process in (echo, master):
-            process.terminate()
-            process.wait(_LIMIT)
+    with tempfile.TemporaryDirectory() as folder, master(Path(folder) / "master.log"):
+        with running(sys.executable, __file__, "echo"):
+            _measure()
 
 
 def _measure():

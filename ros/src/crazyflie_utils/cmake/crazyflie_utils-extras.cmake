@@ -1,6 +1,5 @@
 # Run the unit tests (test_*.py) of a folder or a file with pytest, as part of
-# run_tests. catkin itself knows nose only. Hypothesis is told not to mind how slow
-# a machine is, and to try the same examples every time.
+# run_tests. catkin itself knows nose only.
 #
 # :param path: folder or file, relative to the package
 # :param APART: files of this folder that are tests of their own, which may run beside it
@@ -31,6 +30,14 @@ endfunction()
 # :param ARGN: what the names of the tests match, regular expressions
 function(crazyflie_lonely_tests)
   _crazyflie_set_tests_properties("${ARGN}" RUN_SERIAL TRUE COST 9000)
+endfunction()
+
+# Say that tests of this package take long: ``./run tests`` leaves them out, ``./run tests --all``
+# and ``catkin_make run_tests`` run them. Single unit tests are marked ``@pytest.mark.long``.
+#
+# :param ARGN: what the names of the tests match, regular expressions
+function(crazyflie_long_tests)
+  _crazyflie_set_tests_properties("${ARGN}" LABELS long)
 endfunction()
 
 function(_crazyflie_set_tests_properties patterns)

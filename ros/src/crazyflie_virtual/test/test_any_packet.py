@@ -3,7 +3,7 @@
 import math
 import struct
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from virtual_bench import Bench, attitude
 
@@ -33,7 +33,6 @@ def assert_is_somewhere(bench):
     assert not any(map(math.isnan, (*bench.physics.position, *bench.physics.rates)))
 
 
-@settings(max_examples=150, deadline=None)
 @given(st.lists(st.one_of(BYTES, NUMBERS), max_size=12))
 def test_any_packets(datagrams):
     bench = Bench()
@@ -46,7 +45,6 @@ def test_any_packets(datagrams):
     assert_is_somewhere(bench)
 
 
-@settings(max_examples=50, deadline=None)
 @given(st.binary(max_size=60))
 def test_any_datagram(datagram):
     bench = Bench()

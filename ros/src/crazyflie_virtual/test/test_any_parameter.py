@@ -110,7 +110,7 @@ def play(bench, actions):
             bench.run(0.01)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(suppress_health_check=list(HealthCheck))
 @given(ACTIONS)
 def test_any_actions(actions):
     bench = Bench()

@@ -40,6 +40,9 @@ class Expected(NamedTuple):
     end: tuple[float, float] | None = None
 
 
+# What they call of cflib is called in test_cflib.py.
+pytestmark = pytest.mark.long
+
 RUNNING = {
     "autonomy/autonomous_sequence.py": Expected(
         (r"take off at 0\.4", r"Setting position \(0\.0, 0\.0, 0\.0, 0\)"), (1.15, 1.4), (0.0, 0.0)

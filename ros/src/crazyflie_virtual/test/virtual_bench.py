@@ -92,3 +92,14 @@ def cflib_client(protocol=12):
     )
     client.platform._protocolVersion = protocol
     return client, sent
+
+
+def command(bench, method, *arguments, protocol=12, **keywords):
+    """Send what cflib's high-level commander sends; return the error number."""
+    client, sent = cflib_client(protocol)
+    getattr(client.high_level_commander, method)(*arguments, **keywords)
+    (packet,) = sent
+    answer = bench.ask_one(packet.port, packet.channel, packet.data)
+    assert len(answer) == 4
+    assert answer[:2] == packet.data[:2]
+    return answer[3]

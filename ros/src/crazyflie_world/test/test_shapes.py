@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_world.paths import Circle, Waypoints
@@ -55,7 +55,6 @@ def test_distances(shape, origin, direction, expected):
     assert distance(shape, origin, direction) == pytest.approx(expected)
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.tuples(UNIT, UNIT, UNIT), st.tuples(UNIT, UNIT, UNIT))
 def test_where_a_ray_enters_is_the_surface(offset, origin):
     """Aimed at a point within, seen from outside: the entrance is on the surface."""

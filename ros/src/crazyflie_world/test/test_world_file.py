@@ -133,9 +133,7 @@ def test_a_missing_file():
         world_file.load("/nowhere/room.yaml")
 
 
-@settings(
-    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=with_an_odd_word(GOOD))
 def test_any_value_anywhere_is_taken_or_refused(write, text):
     assert_taken_or_refused(world_file.load, write(text))

@@ -176,3 +176,19 @@ def test_what_an_earlier_connection_saw_does_not_count(health):
     _, one, seven = health.report(3.0)
     assert one.message.startswith("not in the stream so far")
     assert seven.level == OK
+
+
+def test_a_rate_outside_its_limits():
+    health = Health(BODIES, 0.2, 0.0, rate_limits=(80.0, 120.0))
+    health.connected("a server")
+    stream(health, 0.5, 1.0, ONE, SEVEN)
+    # Of the first period only a part was streamed.
+    assert health.report(1.0)[0].level == OK
+    stream(health, 1.0, 2.0, ONE, SEVEN)
+    assert health.report(2.0)[0].level == OK
+    limited = Health(BODIES, 0.2, 0.0, rate_limits=(120.0, 200.0))
+    limited.connected("a server")
+    for begin in (0.0, 1.0):
+        stream(limited, begin, begin + 1.0, ONE, SEVEN)
+        status = limited.report(begin + 1.0)[0]
+    assert status[:3] == ("stream", WARN, "100.0 frames per second; expected 120 to 200")

@@ -5,6 +5,7 @@ import socket
 import struct
 import threading
 import time
+from collections import Counter
 
 import pytest
 from natnet_connection import GROUP, LIMIT, connection, is_named, see, server, wait_for_frame
@@ -225,3 +226,20 @@ def test_datagrams_that_mean_nothing_are_told_and_dropped():
         wait_for_frame(source)
     assert [text.split(": ")[0] for text in warnings] == ["ignoring a datagram from 127.0.0.1"] * 2
     assert "cannot decode a DataFrame of NatNet 3.1" in warnings[1]
+
+
+def test_a_server_that_is_silent_is_asked_again_and_again(monkeypatch):
+    with server() as running, connection(running.address[1]) as (source, _):
+        sent, now = [], [time.monotonic()]
+        monkeypatch.setattr(source, "_send", lambda number, text="": sent.append(number))
+        monkeypatch.setattr(module.time, "monotonic", lambda: now[0])
+        source._wants_names = True
+        for _ in range(80):
+            now[0] += 0.05
+            source._send_requests()
+        monkeypatch.undo()
+    count = Counter(sent)
+    # In 4 s.
+    assert 7 <= count[natnet.CONNECT] <= 8
+    assert 3 <= count[natnet.KEEP_ALIVE] <= 4
+    assert count[natnet.REQUEST_MODEL] == 2

@@ -15,24 +15,16 @@ from crazyflie_batch.program import program
 
 @dataclass(frozen=True)
 class Batch:
-    """Flights of n vehicles before they are flown.
-
-    Attributes
-    ----------
-    parameters : mapping
-        By the names of `Plan.parameter_dims`, arrays of shape (dim, n).
-    x : ndarray, shape (x_dim, n)
-        States of the model at the beginning.
-    first : int
-        Number of the first vehicle.
-    """
+    """Flights of n vehicles before they are flown."""
 
     plan: Plan
+    #: By the names of `Plan.parameter_dims`, arrays of shape (dim, n).
     parameters: Mapping[str, NDArray[np.float64]] = field(repr=False)
+    #: Shape (x_dim, n). States of the model at the beginning.
     x: NDArray[np.float64] = field(repr=False)
     ticks: int
     seed: int
-    first: int
+    first: int  #: Number of the first vehicle.
 
     @property
     def n(self) -> int:
@@ -48,33 +40,21 @@ class Batch:
 
 @dataclass(frozen=True)
 class Flights:
-    """Outcomes of n flights.
+    """Outcomes of n flights."""
 
-    Attributes
-    ----------
-    x : ndarray, shape (n, x_dim)
-        States of the model at the end.
-    has_crashed : ndarray of bool, shape (n,)
-        Or its state has overflowed.
-    largest_error, rms_error : ndarray, shape (n,)
-        Distance from the goal after they had time to settle, at the ticks, m.
-    largest_tilt : ndarray, shape (n,)
-        From upright, rad, of the whole flight, at the ticks.
-    largest_speed : ndarray, shape (n,)
-        m/s, of the whole flight, at the ticks.
-    states : ndarray, shape (ticks, n, x_dim)
-        States of the model at every tick; of no tick, if they were not to be recorded.
-    controls : ndarray, shape (ticks, n, 4)
-        The control that was in force from every tick on.
-    """
-
-    x: NDArray[np.float64]
-    has_crashed: NDArray[np.bool_]
+    x: NDArray[np.float64]  #: Shape (n, x_dim). States of the model at the end.
+    has_crashed: NDArray[np.bool_]  #: Shape (n,). Or its state has overflowed.
+    #: largest_error, rms_error: Shape (n,). Distance from the goal after they had time to settle,
+    #: at the ticks, m.
     largest_error: NDArray[np.float64]
     rms_error: NDArray[np.float64]
+    #: Shape (n,). From upright, rad, of the whole flight, at the ticks.
     largest_tilt: NDArray[np.float64]
-    largest_speed: NDArray[np.float64]
+    largest_speed: NDArray[np.float64]  #: Shape (n,); m/s, of the whole flight, at the ticks.
+    #: Shape (ticks, n, x_dim). States of the model at every tick; of no tick, if they were not to
+    #: be recorded.
     states: NDArray[np.float64]
+    #: Shape (ticks, n, 4). The control that was in force from every tick on.
     controls: NDArray[np.float64]
 
 

@@ -14,11 +14,8 @@ from crazyflie_batch import Controller, Measurement, quadrotor, simulate
 from crazyflie_lqr.gain_file import load_matrix
 from crazyflie_model.dynamics import STEP
 
-ONE, MANY = 1, 10_000
-"""Numbers of vehicles that have a goal."""
-
-DURATIONS = {ONE: 60.0, 100: 20.0, MANY: 2.0}
-"""Of the flights, s, by number of vehicles."""
+ONE, MANY = 1, 10_000  #: Numbers of vehicles that have a goal.
+DURATIONS = {ONE: 60.0, 100: 20.0, MANY: 2.0}  #: Of the flights, s, by number of vehicles.
 
 REPEATS = 5
 
@@ -26,14 +23,8 @@ REPEATS = 5
 def steps_per_second(n: int, measurement: Measurement | None = None) -> tuple[float, float]:
     """Return the best of some repeats: by the clock, and by one processor's time.
 
-    Without the time to compile. On a busy machine only the latter is meaningful.
-
-    Parameters
-    ----------
-    n : int
-        Of `DURATIONS`.
-    measurement : Measurement, optional
-        By default without errors.
+    Without the time to compile. On a busy machine only the latter is meaningful. ``n`` is one of
+    `DURATIONS`; without a ``measurement`` there are no errors.
     """
     controller = Controller(_gains(), integrator_k=(-0.05, 0.05, -0.5), integrator_limit=(1, 1, 6))
     model = quadrotor(mass_error=np.linspace(-0.1, 0.1, n))

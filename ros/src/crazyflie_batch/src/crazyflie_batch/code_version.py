@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+#: Their modules decide about a flight; the others only read settings.
 FLOWN_PACKAGES = (
     "crazyflie_batch",
     "crazyflie_lqr",
     "crazyflie_model",
     "crazyflie_state_estimator",
 )
-"""Their modules decide about a flight; the others only read settings."""
 
 
 class OtherFlightsError(Exception):

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 from crazyflie_model.elementwise import Number, Vector, functions, where
 
-_SMALLEST_COSINE = 1e-6
-"""Of a pitch at which roll and yaw are distinct."""
+_SMALLEST_COSINE = 1e-6  #: Of a pitch at which roll and yaw are distinct.
 
 
 def yaw_from_quaternion(quaternion: Sequence[Number]) -> Number:

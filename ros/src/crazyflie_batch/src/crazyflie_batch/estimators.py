@@ -25,8 +25,7 @@ class Estimator(ABC):
     of shape (n,). The class calculates.
     """
 
-    memory_dim: ClassVar[int]
-    """Number of components of the memory."""
+    memory_dim: ClassVar[int]  #: Number of components of the memory.
 
     @classmethod
     @abstractmethod
@@ -38,16 +37,9 @@ class Estimator(ABC):
     def update(
         cls, memory: Vector[Any], dt: Any, position: Vector[Any], parameters: Sequence[Any]
     ) -> tuple[Vector[Any], Vector[Any], Vector[Any]]:
-        """Return memory, position (m) and velocity (m/s) after the next position.
+        """Return memory, position (m) and velocity (m/s) after the next position (3 components, m).
 
-        Parameters
-        ----------
-        memory : list
-        dt : float or ndarray
-            Since the last position, s, positive.
-        position : list, 3 components
-            m.
-        parameters : sequence
+        ``dt`` is the time since the last one, s, positive.
         """
 
 
@@ -75,22 +67,12 @@ class Kalman(Estimator):
     """See `crazyflie_state_estimator.kalman.ConstantAccelerationFilter`; without the control.
 
     Memory: position (3), velocity (3), acceleration (3), and the covariance that the axes share,
-    upper half by rows (6).
-
-    Attributes
-    ----------
-    noise : float or ndarray, shape (n,)
-        Standard deviation of the poses' coordinates, m.
-    acceleration_walk : float or ndarray, shape (n,)
-        m/s^2/sqrt(s).
-
-    Raises
-    ------
-    ValueError
-        One of them is not positive.
+    upper half by rows (6). ValueError: one of the deviations is not positive.
     """
 
+    #: Float or ndarray, shape (n,). Standard deviation of the poses' coordinates, m.
     noise: ArrayLike = kalman.POSITION_NOISE
+    #: Float or ndarray, shape (n,); m/s^2/sqrt(s).
     acceleration_walk: ArrayLike = kalman.ACCELERATION_WALK
     memory_dim = 15
 

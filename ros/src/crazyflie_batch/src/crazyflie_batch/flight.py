@@ -22,20 +22,18 @@ from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Vector, functions, where
 from crazyflie_model.watchdog import watchdog_control
 
+#: Random numbers of a tick: noise of position (3) and attitude (3), of standard deviation 1; and
+#: one in [0, 1), by which a pose is lost.
 NOISE_DIM = 7
-"""Random numbers of a tick: noise of position (3) and attitude (3), of standard deviation 1; and
-one in [0, 1), by which a pose is lost."""
 
+#: Steps of the model from one sample of the inner loops to the next.
 SAMPLE_STEPS = round(inner_loops.PERIOD / STEP)
-"""Steps of the model from one sample of the inner loops to the next."""
+POSE_DIM = 5  #: Of a pose on its way: position (3), yaw, and 1 for one that is not lost.
 
-POSE_DIM = 5
-"""Of a pose on its way: position (3), yaw, and 1 for one that is not lost."""
-
+#: What is remembered of a flight: largest distance from the goal, m, and sum of the squared
+#: distances at the ticks after it has settled; of all ticks, the least cosine of the tilt and the
+#: largest speed, m/s.
 METRICS = ("largest_error", "squared_errors", "least_upright", "largest_speed")
-"""What is remembered of a flight: largest distance from the goal, m, and sum of the squared
-distances at the ticks after it has settled; of all ticks, the least cosine of the tilt and the
-largest speed, m/s."""
 
 
 Components = dict[str, Vector[Any]]
@@ -49,24 +47,16 @@ def components(rows: Iterable[Any], dims: Mapping[str, int]) -> Components:
 
 @dataclass(frozen=True)
 class Plan:
-    """What all flights of a batch have in common.
+    """What all flights of a batch have in common."""
 
-    Attributes
-    ----------
-    make_model : callable
-        ``make_model(**parameters)`` returns the `Dynamics` of one vehicle, by the names in
-        ``model_parameters``.
-    max_tilt : float
-        A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
-    steps : int
-        Of the model in a tick, a multiple of `SAMPLE_STEPS`.
-    """
-
+    #: ``make_model(**parameters)`` returns the `Dynamics` of one vehicle, by the names in
+    #: ``model_parameters``.
     make_model: Callable[..., Dynamics]
     model_parameters: tuple[str, ...]
+    #: A vehicle that is tilted more than this, rad, has crashed, and its motors stop.
     max_tilt: float
     estimator: type[Estimator]
-    steps: int
+    steps: int  #: Of the model in a tick, a multiple of `SAMPLE_STEPS`.
 
     @property
     def period(self) -> float:
@@ -145,11 +135,7 @@ def run_controller(
 ) -> Components:
     """Return the memory after estimator and controller have processed a pose, if one has arrived.
 
-    Parameters
-    ----------
-    pose : list, `POSE_DIM` components
-    tick : float or ndarray
-        At which it was measured.
+    The pose has `POSE_DIM` components and was measured at ``tick``.
     """
     *position, yaw, has_arrived = pose
     (stamp,), (control_stamp,) = memory["stamp"], memory["control_stamp"]

@@ -4,18 +4,13 @@ import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+#: Modules in which a formula ends that does what it must not.
 _CALCULATES = ("crazyflie_batch.symbols", "crazyflie_model.elementwise", "numpy")
-"""Modules in which a formula ends that does what it must not."""
 
 
 @contextmanager
 def naming_the_formula() -> Iterator[None]:
-    """Put the name, file and line of the formula before what is wrong with it.
-
-    Raises
-    ------
-    TypeError
-    """
+    """Put the name, file and line of the formula before what is wrong with it: a TypeError."""
     try:
         yield
     except (AttributeError, TypeError, ValueError) as error:

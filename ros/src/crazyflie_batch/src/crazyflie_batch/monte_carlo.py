@@ -17,28 +17,18 @@ from crazyflie_batch.code_version import OtherFlightsError, code_version
 from crazyflie_batch.estimators import FiniteDifferences, Kalman
 from crazyflie_batch.settings import Settings
 
-CHUNK_SIZE = 256
-"""Flights in a chunk: some tenths of a second on one processor."""
-
+CHUNK_SIZE = 256  #: Flights in a chunk: some tenths of a second on one processor.
+#: Longest time without a finished chunk, s: workers of a cluster may be slow, or gone.
 CHUNK_TIMEOUT = 600.0
-"""Longest time without a finished chunk, s: workers of a cluster may be slow, or gone."""
-
+#: Columns of results; see `crazyflie_batch.Flights`.
 OUTCOMES = ("largest_error", "rms_error", "largest_tilt", "largest_speed", "has_crashed")
-"""Columns of results; see `crazyflie_batch.Flights`."""
 
 
 class Results:
     """A folder with the outcomes of flights, from which an interrupted run continues.
 
-    It also has the settings and the `code_version` of the flights.
-
-    The folder is created if missing.
-
-    Raises
-    ------
-    OtherFlightsError
-        They are of other settings, or of another version of the code.
-    OSError
+    It also has the settings and the `code_version` of the flights, and is created if missing.
+    `OtherFlightsError`: they are of other settings, or of another version of the code.
     """
 
     def __init__(self, folder: Path, settings: Settings):
@@ -108,10 +98,7 @@ def run(
 ) -> None:
     """Simulate the missing chunks; call ``report(count)`` with the flights of each when it ends.
 
-    Raises
-    ------
-    TimeoutError
-        No chunk was finished for `CHUNK_TIMEOUT`.
+    TimeoutError: no chunk was finished for `CHUNK_TIMEOUT`.
     """
     values = settings.values()
     futures: dict[Any, int] = {}
@@ -140,12 +127,8 @@ def fly_chunk(
     """Return the outcomes of a chunk, shape (flights, len(OUTCOMES)).
 
     ``values`` are the swept parameters of the flights from number ``first`` on, see
-    `Settings.values`; ``code`` is the `code_version` of the other flights.
-
-    Raises
-    ------
-    OtherFlightsError
-        This process has another `code_version`.
+    `Settings.values`; ``code`` is the `code_version` of the other flights, or else
+    `OtherFlightsError`.
     """
     if code != code_version():
         raise OtherFlightsError("a worker has another version of the code")

@@ -17,8 +17,7 @@ from crazyflie_batch.report import findings, table, write_csv
 from crazyflie_batch.settings import read_settings
 from crazyflie_utils import ParameterError
 
-SCHEDULER_LIMIT = 10.0
-"""Longest time to connect to a scheduler, and to its workers, s."""
+SCHEDULER_LIMIT = 10.0  #: Longest time to connect to a scheduler, and to its workers, s.
 
 _DESCRIPTION = """
 Fly a vehicle many times with parameters drawn at random. Report how many flights stay within

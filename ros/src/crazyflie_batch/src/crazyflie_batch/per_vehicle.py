@@ -27,13 +27,7 @@ def _refuse(name, wrong, expected):
 
 
 def stacked_columns(values: Mapping[str, ArrayLike], n: int) -> NDArray[np.float64]:
-    """Return numbers or arrays of shape (n,), by name, as one of shape (len(values), n).
-
-    Raises
-    ------
-    ValueError
-        See `columns`.
-    """
+    """Return numbers or arrays (n,), by name, as one array (len(values), n); see `columns`."""
     parts = [columns(name, value, (), n) for name, value in values.items()]
     return np.concatenate([np.empty((0, n)), *parts])
 
@@ -41,10 +35,7 @@ def stacked_columns(values: Mapping[str, ArrayLike], n: int) -> NDArray[np.float
 def columns(name: str, values: Any, shape: tuple[int, ...], n: int) -> NDArray[np.float64]:
     """Return an array of shape ``shape`` or (n, *shape) as one of shape (size, n).
 
-    Raises
-    ------
-    ValueError
-        It has another shape, or is not finite.
+    ValueError: it has another shape, or is not finite.
     """
     array = np.asarray(values, dtype=float)
     if array.shape not in (shape, (n, *shape)):

@@ -27,8 +27,7 @@ _log = logging.getLogger(__name__)
 class ArrayProgram:
     """Flies groups of vehicles that have a plan in common by numpy's arrays; thread-safe."""
 
-    lanes = 256
-    """Vehicles in a group, the last axis of all arrays."""
+    lanes = 256  #: Vehicles in a group, the last axis of all arrays.
 
     def __init__(self, plan: Plan):
         self._plan = plan
@@ -80,10 +79,7 @@ _compiling = threading.Lock()
 def program(plan: Plan) -> "ArrayProgram | MachineCode":
     """Return the program of a plan, made once in a process for all threads.
 
-    Raises
-    ------
-    TypeError
-        A formula cannot be traced; the text names it.
+    TypeError: a formula cannot be traced; the text names it.
     """
     with _compiling:
         return _program(plan)

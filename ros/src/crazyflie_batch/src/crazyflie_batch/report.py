@@ -7,36 +7,23 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
+from scipy.stats import binomtest, rankdata
 
 from crazyflie_batch.monte_carlo import OUTCOMES
 from crazyflie_batch.settings import Settings
 
-QUINTILES = 5
-"""Groups of equal size into which flights are divided by a parameter."""
-
-_CONFIDENCE = 1.96
-"""95 %, in standard deviations."""
+QUINTILES = 5  #: Groups of equal size into which flights are divided by a parameter.
 
 
 @dataclass(frozen=True)
 class Findings:
-    """Parameters and outcomes of all flights.
-
-    Attributes
-    ----------
-    values : dict
-        Swept parameters; see `Settings.values`.
-    outcomes : dict
-        By the names of `crazyflie_batch.Flights`, arrays of all flights.
-    is_within : ndarray of bool, shape (flights,)
-        Whether they stayed within limits.
-    """
+    """Parameters and outcomes of all flights."""
 
     settings: Settings
-    values: dict[str, NDArray[np.float64]]
+    values: dict[str, NDArray[np.float64]]  #: Swept parameters; see `Settings.values`.
+    #: By the names of `crazyflie_batch.Flights`, arrays of all flights.
     outcomes: dict[str, NDArray[np.float64]]
-    is_within: NDArray[np.bool_]
+    is_within: NDArray[np.bool_]  #: Shape (flights,). Whether they stayed within limits.
 
     @property
     def worst(self) -> int:
@@ -77,7 +64,7 @@ def findings(settings: Settings, outcomes: NDArray[np.float64]) -> Findings:
 def table(found: Findings) -> str:
     """Return the findings as text."""
     run, flights = found.settings.run, len(found.is_within)
-    low, high = wilson_interval(int(found.is_within.sum()), flights)
+    low, high = binomtest(int(found.is_within.sum()), flights).proportion_ci(method="wilson")
     confidence = f"{low:.1%} to {high:.1%} with 95 % confidence"
     limits = f"error at most {run.largest_error:g} m after {run.settle_time:g} s"
     lines = [
@@ -125,15 +112,6 @@ def write_csv(found: Findings, path: Path) -> None:
         writer.writerows(
             [number, *(f"{value:.9g}" for value in row)] for number, row in enumerate(rows)
         )
-
-
-def wilson_interval(count: int, total: int) -> tuple[float, float]:
-    """Return the 95 % confidence interval of a fraction (E. B. Wilson, 1927)."""
-    fraction, z2 = count / total, _CONFIDENCE**2
-    middle = (fraction + z2 / (2 * total)) / (1 + z2 / total)
-    half = _CONFIDENCE * math.sqrt(fraction * (1 - fraction) / total + z2 / (4 * total**2))
-    half /= 1 + z2 / total
-    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def _correlation(a, b):

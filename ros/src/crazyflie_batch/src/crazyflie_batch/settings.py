@@ -126,25 +126,13 @@ _EXPECTED = (
 
 @dataclass(frozen=True)
 class Sweep:
-    """Distribution of a parameter over the flights.
+    """Distribution of a parameter over the flights."""
 
-    Attributes
-    ----------
-    name : str
-        Of a `FlightParameters`.
-    unit : str
-    kind : str
-        `UNIFORM`, `NORMAL` or `VALUES`.
-    numbers : tuple of float
-        Lowest and highest; mean and standard deviation; or the values.
-    low, high : float
-        Range of the parameter, to which a normal distribution is cut off.
-    """
-
-    name: str
+    name: str  #: Of a `FlightParameters`.
     unit: str
-    kind: str
-    numbers: tuple[float, ...]
+    kind: str  #: `UNIFORM`, `NORMAL` or `VALUES`.
+    numbers: tuple[float, ...]  #: Lowest and highest; mean and standard deviation; or the values.
+    #: low, high: Range of the parameter, to which a normal distribution is cut off.
     low: float
     high: float
 
@@ -178,13 +166,7 @@ class Settings:
 
 
 def read_settings(path: str | Path) -> Settings:
-    """Return the settings in a file.
-
-    Raises
-    ------
-    ParameterError
-        Names all errors with file and line.
-    """
+    """Return the settings in a file; `ParameterError` names all errors with file and line."""
     file = load(path)
     run = file.read(RunParameters, besides=("vehicle", "sweep"))
     vehicle = file["vehicle"].read(FlightParameters) if "vehicle" in file else _DEFAULTS

@@ -19,32 +19,21 @@ from crazyflie_model.limits import CRASH_TILT
 from crazyflie_model.stabilized_quadrotor import StabilizedQuadrotor
 from crazyflie_model.units import GRAVITY
 
-HOVER = (0.0, 0.0, 0.0, GRAVITY)
-"""Control at the reference."""
-
-_ROUNDING = 1e-6
-"""Of a whole number of periods, as a fraction of one."""
+HOVER = (0.0, 0.0, 0.0, GRAVITY)  #: Control at the reference.
+_ROUNDING = 1e-6  #: Of a whole number of periods, as a fraction of one.
 
 
 @dataclass(frozen=True)
 class Model:
-    """Vehicles of one model, whose parameters may differ.
+    """Vehicles of one model, whose parameters may differ."""
 
-    Attributes
-    ----------
-    make : callable
-        ``make(**parameters)`` returns the `Dynamics` of one vehicle, computed by
-        `crazyflie_model.elementwise` since it is traced with `symbols`. Compiled once for each
-        function: no lambda.
-    parameters : mapping
-        Each a float, or an array of shape (n,).
-    max_tilt : float
-        See `crazyflie_simulator.vehicle.SimulatedVehicle`.
-    """
-
+    #: ``make(**parameters)`` returns the `Dynamics` of one vehicle, computed by
+    #: `crazyflie_model.elementwise` since it is traced with `symbols`. Compiled once for each
+    #: function: no lambda.
     make: Callable[..., Dynamics]
+    #: Each a float, or an array of shape (n,).
     parameters: Mapping[str, ArrayLike] = field(default_factory=dict)
-    max_tilt: float = math.inf
+    max_tilt: float = math.inf  #: See `crazyflie_simulator.vehicle.SimulatedVehicle`.
 
 
 def near_hover() -> Model:
@@ -62,17 +51,8 @@ def quadrotor(
 ) -> Model:
     """Return `crazyflie_model.stabilized_quadrotor.StabilizedQuadrotor`.
 
-    Parameters
-    ----------
-    mass_error, thrust_error : float or array_like, shape (n,)
-        > -1
-    wind : array_like, shape (3,) or (n, 3)
-        Velocity of the air, m/s, constant.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of its range.
+    The errors are fractions > -1, floats or of shape (n,); the wind is the air's velocity, m/s,
+    constant, of shape (3,) or (n, 3). ValueError: an argument is out of its range.
     """
     check_above("mass_error", mass_error, -1.0)
     check_above("thrust_error", thrust_error, -1.0)
@@ -89,9 +69,7 @@ def quadrotor(
 
 def _make_quadrotor(mass_error, thrust_error, wind_x, wind_y, wind_z):
     return StabilizedQuadrotor(
-        mass_error=mass_error,
-        thrust_error=thrust_error,
-        wind=lambda t: (wind_x, wind_y, wind_z),
+        mass_error=mass_error, thrust_error=thrust_error, wind=lambda t: (wind_x, wind_y, wind_z)
     )
 
 
@@ -99,23 +77,12 @@ def _make_quadrotor(mass_error, thrust_error, wind_x, wind_y, wind_z):
 class Controller:
     """`crazyflie_lqr.linear_feedback.IntegralStateFeedback` for every vehicle, in flight.
 
-    Each array may have one more axis in front, of length n.
-
-    Attributes
-    ----------
-    K : array_like, shape (4, 7)
-    u_ref : array_like, shape (4,)
-    integrator_k, integrator_limit : array_like, shape (3,)
-        The limit is >= 0.
-
-    Raises
-    ------
-    ValueError
-        A limit is negative.
+    Each array may have one more axis in front, of length n. ValueError: a limit is negative.
     """
 
-    K: ArrayLike
-    u_ref: ArrayLike = HOVER
+    K: ArrayLike  #: Shape (4, 7).
+    u_ref: ArrayLike = HOVER  #: Shape (4,).
+    #: integrator_k, integrator_limit: Shape (3,). The limit is >= 0.
     integrator_k: ArrayLike = (0.0, 0.0, 0.0)
     integrator_limit: ArrayLike = (0.0, 0.0, 0.0)
 
@@ -127,17 +94,11 @@ class Controller:
 class Measurement:
     """`crazyflie_simulator.motion_capture.MotionCapture` for every vehicle.
 
-    Attributes
-    ----------
-    position_noise, attitude_noise, latency, dropout : float or array_like, shape (n,)
-        In m, rad, s, all >= 0, and a probability.
-
-    Raises
-    ------
-    ValueError
-        An argument is out of its range.
+    ValueError: an argument is out of its range.
     """
 
+    #: position_noise, attitude_noise, latency, dropout: Float or array_like, shape (n,). In m, rad,
+    #: s, all >= 0, and a probability.
     position_noise: ArrayLike = 0.0
     attitude_noise: ArrayLike = 0.0
     latency: ArrayLike = 0.0

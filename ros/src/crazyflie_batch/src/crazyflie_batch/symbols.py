@@ -17,10 +17,11 @@ from llvmlite import ir
 
 DOUBLE = ir.DoubleType()
 
+#: By the number of lanes: how the C library calls its functions of vectors (x86-64 vector function
+#: ABI), with AVX-512, AVX2 and SSE.
 _VECTOR_LETTERS = {8: "e", 4: "d", 2: "b"}
-"""By the number of lanes: how the C library calls its functions of vectors (x86-64 vector function
-ABI), with AVX-512, AVX2 and SSE."""
 
+#: Of the C library.
 _FUNCTIONS = {
     np.sin: "sin",
     np.cos: "cos",
@@ -29,13 +30,11 @@ _FUNCTIONS = {
     np.arctan2: "atan2",
     np.hypot: "hypot",
 }
-"""Of the C library."""
 
+#: Of LLVM: one instruction of most processors.
 _INTRINSICS = {np.sqrt: "llvm.sqrt", np.floor: "llvm.floor", np.absolute: "llvm.fabs"}
-"""Of LLVM: one instruction of most processors."""
-
+#: Arrive as functions where numpy's own numbers are on the left.
 _OPERATORS = {np.add: "fadd", np.subtract: "fsub", np.multiply: "fmul", np.divide: "fdiv"}
-"""Arrive as functions where numpy's own numbers are on the left."""
 
 
 _MUST_NOT_BRANCH = "a formula of a batch must not branch; it chooses with where() or clip()"

@@ -6,41 +6,90 @@ python3 -m crazyflie_dev.count_results build/test_results
 import argparse
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+#: Class name under which rostest notes that a test node ran. The tests of that node are in a file
+#: of their own, rosunit-NAME.xml, beside rostest's.
 _ROSTEST = "rostest.runner.RosTest"
-"""Class name under which rostest notes that a test node ran. The tests of that node
-are in a file of their own, rosunit-NAME.xml, beside rostest's."""
 
 
-def verdicts(path: Path) -> Iterator[tuple[str, str]]:
-    """Yield "passed", "failed" or "skipped" for each test in a JUnit XML file, and its reason.
+@dataclass(frozen=True)
+class Case:
+    """One test in a file of results.
+
+    Attributes
+    ----------
+    report : Path
+        The file.
+    classname, name : str
+        As they stand there; empty for a file without a test.
+    verdict : str
+        "passed", "failed", "skipped" or "flaky".
+    reason : str
+        The first line of what has failed.
+    """
+
+    report: Path
+    classname: str
+    name: str
+    verdict: str
+    reason: str = ""
+
+    def label(self, folder: Path) -> str:
+        """Return the file of results, relative to a folder, and the name of the test."""
+        names = ".".join(part for part in (self.classname, self.name) if part)
+        return f"{self.report.relative_to(folder)}: {names}".removesuffix(": ")
+
+
+def cases(path: Path) -> Iterator[Case]:
+    """Yield the tests in a JUnit XML file.
 
     A file that cannot be read or has no test in it is a failed test: its program
     has died before it wrote its results.
     """
     try:
-        cases = list(ElementTree.parse(path).getroot().iter("testcase"))
-    except ElementTree.ParseError as error:
-        yield "failed", f"no XML: {error}"
+        elements = list(ElementTree.parse(path).getroot().iter("testcase"))
+    except (ElementTree.ParseError, OSError) as error:
+        yield Case(path, "", "", "failed", f"no XML: {error}")
         return
-    if not cases:
-        yield "failed", "no test ran"
-    for case in cases:
-        classname, name = case.get("classname", ""), case.get("name", "")
-        results = f"rosunit-{name.removeprefix('test')}.xml"
-        complaint = next((e for e in case if e.tag in ("failure", "error")), None)
+    if not elements:
+        yield Case(path, "", "", "failed", "no test ran")
+    for element in elements:
+        case = Case(path, element.get("classname", ""), element.get("name", ""), "passed")
+        complaint = next((e for e in element if e.tag in ("failure", "error")), None)
         if complaint is not None:
             text = complaint.get("message") or complaint.text or ""
-            yield "failed", f"{classname}.{name}: {text.strip().partition(chr(10))[0]}"
-        elif case.find("skipped") is not None:
-            yield "skipped", ""
-        elif classname != _ROSTEST:
-            yield "passed", ""
-        elif not path.with_name(results).exists():
-            yield "failed", f"{classname}.{name}: there is no {results}"
+            yield replace(case, verdict="failed", reason=text.strip().partition("\n")[0])
+        elif element.find("skipped") is not None:
+            yield replace(case, verdict="skipped")
+        elif case.classname != _ROSTEST:
+            yield case
+        elif not (results := results_of_node(case)).exists():
+            yield replace(case, verdict="failed", reason=f"there is no {results.name}")
+
+
+def results_of_node(case: Case) -> Path:
+    """Return the file of results of the test node that a test of rostest stands for."""
+    return case.report.with_name(f"rosunit-{case.name.removeprefix('test')}.xml")
+
+
+def summarize(folder: Path, results: Iterable[Case]) -> bool:
+    """Print failed and flaky tests and the sums; tell whether some ran and all passed."""
+    results = list(results)
+    for case in results:
+        if case.verdict == "failed":
+            label = case.label(folder)
+            print(f"FAILED {label}: {case.reason}")
+    count = Counter(case.verdict for case in results)
+    words = ["passed", "failed", *(word for word in ("flaky", "skipped") if word in count)]
+    print(", ".join(f"{count[word]} {word}" for word in words))
+    for case in results:
+        if case.verdict == "flaky":
+            print(f"FLAKY: {case.label(folder)}")
+    return count["passed"] > 0 and not count["failed"] and not count["flaky"]
 
 
 def main() -> int:
@@ -48,15 +97,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Count the tests below a folder of results.")
     parser.add_argument("folder", type=Path)
     folder = parser.parse_args().folder
-    count: Counter[str] = Counter()
-    for path in sorted(folder.rglob("*.xml")):
-        for verdict, reason in verdicts(path):
-            count[verdict] += 1
-            if verdict == "failed":
-                print(f"FAILED {path.relative_to(folder)}: {reason}")
-    words = ["passed", "failed"] + ["skipped"] * ("skipped" in count)
-    print(", ".join(f"{count[word]} {word}" for word in words))
-    return 0 if count["passed"] and not count["failed"] else 1
+    reports = sorted(folder.rglob("*.xml"))
+    return 0 if summarize(folder, [case for path in reports for case in cases(path)]) else 1
 
 
 if __name__ == "__main__":

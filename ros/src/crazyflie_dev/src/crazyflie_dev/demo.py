@@ -19,22 +19,19 @@ from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
 
 HOVER = (0.0, 0.0, 1.0)
 HOVER_DURATION = 2.2
-HOVER_WINDOW = 2.0
-"""Until the figure eight begins; the hover error is taken from it, s."""
+HOVER_WINDOW = 2.0  #: Until the figure eight begins; the hover error is taken from it, s.
 
 EIGHT_DURATION = 6.0
 
-SETTLING = 0.5
-"""From the end of the figure eight to the landing, s."""
+SETTLING = 0.5  #: From the end of the figure eight to the landing, s.
 
 LAUNCH_FILE = ("crazyflie_examples", "sw_controller.launch")
+#: The controller of the examples that follows a yaw, and the model in which it matters.
 ARGUMENTS = ("controller:=position_velocity_yaw", "dynamics:=coupled_7d", "record:=true")
-"""The controller of the examples that follows a yaw, and the model in which it matters."""
 
 REFERENCE, STATUS = "/ref/position_velocity_yaw", "/in_flight_flight_status"
 
-LIMIT = 30.0
-"""The longest that a part of the flight may take, s; a takeoff takes six."""
+LIMIT = 30.0  #: The longest that a part of the flight may take, s; a takeoff takes six.
 
 
 def eight(moment: float) -> PositionVelocityYawState:

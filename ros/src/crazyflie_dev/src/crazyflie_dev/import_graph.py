@@ -19,8 +19,7 @@ from pathlib import Path
 import rospkg
 from catkin_pkg.packages import find_packages
 
-Graph = Mapping[str, set[str]]
-"""Name -> names that it needs."""
+Graph = Mapping[str, set[str]]  #: Name -> names that it needs.
 
 PAGE = "docs/architecture.md"
 PICTURE = "docs/images/packages.svg"
@@ -83,13 +82,7 @@ def circles(graph: Graph) -> list[list[str]]:
 
 
 def floors(graph: Graph) -> list[list[str]]:
-    """Return the names by floor, the lowest first.
-
-    Raises
-    ------
-    graphlib.CycleError
-        The graph has a circle.
-    """
+    """Return the names by floor, the lowest first; graphlib.CycleError for a circle."""
     height: dict[str, int] = {}
     for name in graphlib.TopologicalSorter(graph).static_order():
         height[name] = max((height[each] + 1 for each in graph[name]), default=0)
@@ -119,10 +112,14 @@ def text_of(levels: list[list[str]]) -> str:
 
 
 def dot_of(graph: Graph) -> str:
-    """Return the picture in the language of graphviz; arrows lead to what is needed."""
+    """Return the picture in the language of graphviz; arrows lead to what is needed.
+
+    Names are without "crazyflie_", with which a page would be too narrow to read them.
+    """
     lines = ["digraph {", '  node [shape=box, fontname="Helvetica", fontsize=11];']
     for names in floors(graph):
-        lines.append("  { rank=same; " + " ".join(f'"{name}";' for name in names) + " }")
+        boxes = (f'"{name}" [label="{name.removeprefix("crazyflie_")}"];' for name in names)
+        lines.append("  { rank=same; " + " ".join(boxes) + " }")
     lines += [f'  "{name}" -> "{needed}";' for name, needed in edges(direct(graph))]
     return "\n".join([*lines, "}"]) + "\n"
 

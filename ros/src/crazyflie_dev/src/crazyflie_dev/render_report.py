@@ -11,8 +11,7 @@ PICTURE = Path(__file__).resolve().parents[5] / "docs" / "images" / "flight_repo
 
 WIDTH, HEIGHT = 1200, 872
 
-_LIMIT = 60.0
-"""The longest that Chromium may take, s."""
+_LIMIT = 60.0  #: The longest that Chromium may take, s.
 
 
 def render(page: Path, output: Path, moment: float) -> None:

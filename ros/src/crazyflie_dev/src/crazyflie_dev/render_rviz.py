@@ -23,11 +23,10 @@ from crazyflie_reports.flight_report import HOVER_TOLERANCE
 from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import roslaunch
 
+#: Width and height in pixels of the screen, and of RViz's window in its configuration.
 SCREEN = (1400, 900)
-"""Width and height in pixels of the screen, and of RViz's window in its configuration."""
-
+#: Where the README expects the picture.
 PICTURE = Path(__file__).resolve().parents[5] / "docs" / "images" / "sw_hover.png"
-"""Where the README expects the picture."""
 
 _DRAW_LIMIT = 90.0
 _FEWEST_PIXELS = 60
@@ -116,12 +115,7 @@ class Scene:
 def render(output: Path, log: Path, launch_arguments: list[str]) -> None:
     """Fly to the hover; write what RViz shows into a PNG file, the output of roslaunch into a log.
 
-    Raises
-    ------
-    DisplayError
-        RViz has not drawn what it should.
-    FlightError
-        The vehicle does not hover.
+    `DisplayError`: RViz has not drawn what it should; `FlightError`: the vehicle does not hover.
     """
     description = Path(rospkg.RosPack().get_path("crazyflie_description"))
     with virtual_display(*SCREEN) as display:

@@ -29,41 +29,24 @@ from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeGraph
 from crazyflie_utils.testing.launch_files import composed_nodes, expand
 
-HOVER_HEIGHT = 1.0
-"""Of the launch file, m."""
-
-_STEP = 0.05
-"""Between two looks of the operator at the flight, s."""
-
-_TIMEOUT = 30.0
-"""Longest wait for the reply to a call, or for the vehicle to come to rest, s."""
+HOVER_HEIGHT = 1.0  #: Of the launch file, m.
+_STEP = 0.05  #: Between two looks of the operator at the flight, s.
+_TIMEOUT = 30.0  #: Longest wait for the reply to a call, or for the vehicle to come to rest, s.
 
 
 FAULTS = (*soak_faults.FAULTS, *soak_operator.FAULTS, *soak_intruders.FAULTS)
 
 _SIMULATOR = "/simulator"
 
+#: A vehicle that comes to rest further away than this is carried back to the middle, m.
 _STRAY = 1.5
-"""A vehicle that comes to rest further away than this is carried back to the middle, m."""
 
 
 class Soak:
     """Flights one after the other, with a fault in each.
 
-    Parameters
-    ----------
-    seed : int
-        Of the faults, and of everything else that is random.
-    **arguments
-        Of sw_hover.launch.
-
-    Attributes
-    ----------
-    watch : Watch
-    faults : collections.Counter
-        Fault -> how often.
-    refused, answered : int
-        Number of takeoffs that were refused, and of those that were not.
+    ``seed`` decides the faults and everything else that is random; the other arguments are those of
+    sw_hover.launch.
     """
 
     def __init__(self, seed: int, **arguments: object):
@@ -79,7 +62,8 @@ class Soak:
         )
         self.random = Random(seed)
         self.watch = Watch(self.graph)
-        self.faults: Counter[str] = Counter()
+        self.faults: Counter[str] = Counter()  #: Fault -> how often.
+        #: Number of takeoffs that were refused, and of those that were not.
         self.refused = self.answered = 0
         self._flight = Flight(self.graph, self.random, self.start)
         self.watch.begin()
@@ -201,14 +185,7 @@ class _Fault:
 def soak(duration: float, seed: int, progress: bool = False, **arguments: object) -> dict[str, Any]:
     """Fly for ``duration`` (s, simulated) and return what was seen, as JSON knows it.
 
-    Parameters
-    ----------
-    duration : float
-    seed : int
-    progress : bool
-        Whether to show a bar on the terminal.
-    **arguments
-        Of sw_hover.launch.
+    ``progress`` shows a bar on the terminal; see `Soak` for the other arguments.
     """
     began = time.monotonic()
     run = Soak(seed, **arguments)

@@ -29,59 +29,36 @@ NODES = (CONTROLLER, ESTIMATOR, SERVER, FILTER)
 EMERGENCY = "emergency"
 STARVATION = "this computer is too busy"
 
-_RESPAWN = 1.0
-"""From the end of a node until roslaunch has started it anew, s."""
+_RESPAWN = 1.0  #: From the end of a node until roslaunch has started it anew, s.
 
 Undo = Callable[[], None]
 
 
 @dataclass
 class Flight:
-    """What faults act on.
-
-    Attributes
-    ----------
-    graph : FakeGraph
-    random : Random
-    respawn : callable
-        ``respawn(name)`` starts a node's process anew.
-    """
+    """What faults act on."""
 
     graph: FakeGraph
     random: Random
-    respawn: Callable[[str], None]
+    respawn: Callable[[str], None]  #: ``respawn(name)`` starts a node's process anew.
 
 
 @dataclass
 class Fault:
-    """A fault: how it begins, how long it lasts.
-
-    Attributes
-    ----------
-    name : str
-    begin : callable
-        ``begin(flight)`` returns what ends it.
-    shortest, longest : float
-        s.
-    blinds : bool
-        Whether there is no good pose while it lasts.
-    drops : bool
-        Whether the vehicle may fall: nothing passes the last node before it, or its motors
-        are to stand still.
-    again : callable, optional
-        ``again(flight)`` is called twenty times a second while it lasts.
-    height : float, optional
-        Highest reference that it may lead to, m.
-    """
+    """A fault: how it begins, how long it lasts."""
 
     name: str
-    begin: Callable[[Flight], Undo]
+    begin: Callable[[Flight], Undo]  #: ``begin(flight)`` returns what ends it.
+    #: shortest, longest: s.
     shortest: float
     longest: float
-    blinds: bool = False
+    blinds: bool = False  #: Whether there is no good pose while it lasts.
+    #: Whether the vehicle may fall: nothing passes the last node before it, or its motors are to
+    #: stand still.
     drops: bool = False
+    #: ``again(flight)`` is called twenty times a second while it lasts.
     again: Callable[[Flight], None] = lambda _: None
-    height: float = 0.0
+    height: float = 0.0  #: Highest reference that it may lead to, m.
 
 
 def on_tf(change: Callable[[Any, Flight], list[Any]]) -> Callable[[Flight], Undo]:

@@ -8,14 +8,11 @@ from typing import Any
 from crazyflie_dev.soak_faults import Fault, Flight, Undo, nothing, with_each
 from crazyflie_msgs.msg import Control, ControlStamped, PositionVelocityStateStamped
 
-_HEIGHT = 1.0
-"""Of the references, m."""
-
+_HEIGHT = 1.0  #: Of the references, m.
+#: Where a reference at `_HEIGHT` gets that climbs: at 2 m/s, the most that counts, for 0.5 s, m.
 _MOVED = _HEIGHT + 1.0
-"""Where a reference at `_HEIGHT` gets that climbs: at 2 m/s, the most that counts, for 0.5 s, m."""
-
+#: A camera freezes when the vehicle is above this, m: on the ground poses that repeat are true.
 _FROZEN_ABOVE = 0.1
-"""A camera freezes when the vehicle is above this, m: on the ground poses that repeat are true."""
 
 
 def _refer(x_dot: float, y_dot: float, z_dot: float) -> Callable[[Flight], None]:

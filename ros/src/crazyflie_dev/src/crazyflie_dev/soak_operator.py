@@ -16,11 +16,9 @@ from dynamic_reconfigure.srv import ReconfigureRequest
 from crazyflie_dev.soak_faults import Fault, Flight, Undo, nothing
 from crazyflie_utils.testing import FakeGraph
 
-MISSION = "/mission"
-"""The node that makes references of a mission's commands."""
-
+MISSION = "/mission"  #: The node that makes references of a mission's commands.
+#: It, as a launch file names nodes of a process.
 MISSION_NODE = {MISSION.strip("/"): "crazyflie_fleet.high_level_node:HighLevelNode"}
-"""It, as a launch file names nodes of a process."""
 
 MISSION_PARAMETERS = {
     f"{MISSION}/topics/ref": "/ref",
@@ -31,18 +29,13 @@ MISSION_PARAMETERS = {
     f"{MISSION}/srv/emergency": "/emergency",
 }
 
-HIGHEST = 1.4
-"""Highest place that people ask for, m."""
+HIGHEST = 1.4  #: Highest place that people ask for, m.
+SUM_HEIGHT = 5.0  #: Highest place to which random services lead, m: relative goals add up.
+_STREAM_RADIUS, _STREAM_SPEED = 0.5, 0.6  #: Of the circle that a mission streams, m and m/s.
 
-SUM_HEIGHT = 5.0
-"""Highest place to which random services lead, m: relative goals add up."""
-
-_STREAM_RADIUS, _STREAM_SPEED = 0.5, 0.6
-"""Of the circle that a mission streams, m and m/s."""
-
+#: Services that drop a vehicle, or release the motors of one that was dropped; they have a fault of
+#: their own.
 _MOTORS_OFF = ("/emergency", "/emergency_reset")
-"""Services that drop a vehicle, or release the motors of one that was dropped; they have a fault of
-their own."""
 
 _SET = "/set_parameters"
 
@@ -51,6 +44,10 @@ _full_state = roslib.message.get_message_class("crazyflie_driver/FullState")
 
 _CONFIGS = f"{rospkg.RosPack().get_path('crazyflie_lqr')}/config"
 
+#: Full name of each live parameter of the example -> lowest and highest value with which the
+#: vehicle can fly, or the only one; nothing where the present one stays. Gains of the other sign,
+#: and noise of metres, are legal, too; no controller flies with them. A descent speed of 0 is a
+#: landing by the bare ramp, as documented: from 1 m the vehicle meets the ground at 3 m/s.
 LIVE_VALUES: dict[str, tuple[Any, ...]] = {
     "/takeoff_server/hover/x": (-1.0, 1.0),
     "/takeoff_server/hover/y": (-1.0, 1.0),
@@ -78,10 +75,6 @@ LIVE_VALUES: dict[str, tuple[Any, ...]] = {
     "/simulator/wind/gust": (0.0, 0.3),
     "/simulator/wind/gust_time": (0.2, 2.0),
 }
-"""Full name of each live parameter of the example -> lowest and highest value with which the
-vehicle can fly, or the only one; nothing where the present one stays. Gains of the other sign, and
-noise of metres, are legal, too; no controller flies with them. A descent speed of 0 is a landing by
-the bare ramp, as documented: from 1 m the vehicle meets the ground at 3 m/s."""
 
 
 # Parameters.

@@ -10,40 +10,33 @@ from crazyflie_msgs.msg import FlightStatus
 from crazyflie_takeoff.safe_control import SINK_SPEED
 from crazyflie_utils.testing import FakeGraph
 
-MOST_THRUST = 16.0
-"""Of a final control, m/s^2: the controller's limit."""
+MOST_THRUST = 16.0  #: Of a final control, m/s^2: the controller's limit.
+MOST_TILT = math.radians(15.1)  #: Of a final control, rad: the controller's limit.
+OVERSHOOT = 0.2  #: How far above its highest reference a vehicle may be, m.
 
-MOST_TILT = math.radians(15.1)
-"""Of a final control, rad: the controller's limit."""
-
-OVERSHOOT = 0.2
-"""How far above its highest reference a vehicle may be, m."""
-
+#: The same while nothing passes the last node before the vehicle, which then keeps for 0.5 s what
+#: it was told last, m.
 DEAF_OVERSHOOT = 0.5
-"""The same while nothing passes the last node before the vehicle, which then keeps for 0.5 s
-what it was told last, m."""
 
+#: The same while all nodes stop for up to 0.6 s: a first stop in a climb at full thrust, of 6.2
+#: m/s^2, comes without warning and makes 1.1 m, and ending that climb with 4 m/s^2 1.7 m, less what
+#: was still to be climbed.
 STARVED_OVERSHOOT = 2.5
-"""The same while all nodes stop for up to 0.6 s: a first stop in a climb at full thrust, of
-6.2 m/s^2, comes without warning and makes 1.1 m, and ending that climb with 4 m/s^2 1.7 m,
-less what was still to be climbed."""
 
+#: How long a vehicle may be in the air without a good pose, s: 1.6 s in which the pose may come
+#: back, 5 s of descent, and what it falls then; and the way down at `SINK_SPEED` beside.
 BLIND_LIMIT = 8.0
-"""How long a vehicle may be in the air without a good pose, s: 1.6 s in which the pose may come
-back, 5 s of descent, and what it falls then; and the way down at `SINK_SPEED` beside."""
 
+#: Of a vehicle, m/s: references are 1.4 m away at most, and approached at less than half of it.
 MOST_SPEED = 3.0
-"""Of a vehicle, m/s: references are 1.4 m away at most, and approached at less than half of it."""
 
+#: How far from the middle a vehicle may come in a flight that begins there, m: the models of 7
+#: states have no drag, and glide on while they sink blindly.
 FLY_AWAY = 8.0
-"""How far from the middle a vehicle may come in a flight that begins there, m: the models of 7
-states have no drag, and glide on while they sink blindly."""
 
+#: Most speed at which it may meet the ground unless its motors were switched off, m/s.
 HARD_LANDING = 2.0
-"""Most speed at which it may meet the ground unless its motors were switched off, m/s."""
-
-_AIRBORNE = 0.05
-"""Height from which on a vehicle is in the air, m."""
+_AIRBORNE = 0.05  #: Height from which on a vehicle is in the air, m.
 
 _STATES = {
     FlightStatus.UNKNOWN: "",
@@ -66,45 +59,25 @@ _LEGAL = {
 
 @dataclass
 class Watch:
-    """Compares everything that happens with what has to hold.
-
-    Attributes
-    ----------
-    graph : FakeGraph
-    violations : list of str
-        With the time of each.
-    highest, hardest, farthest : float
-        Largest height above the highest reference, m; speed at which the ground was met
-        with motors on, m/s; distance from the start, m.
-    is_blind : bool
-        Whether a fault keeps good poses away.
-    may_fly : bool
-        Whether a takeoff has been asked for since the vehicle was last on the ground.
-    may_fall : bool
-        Whether the vehicle may meet the ground at any speed.
-    is_emergency : bool
-        Whether motors have to stand still.
-    is_starved : bool
-        Whether all nodes have stopped again and again in this flight.
-    height, distance : float
-        Of the vehicle now from the ground and from the middle, m.
-    state : str
-        Of the flight, as the server tells it.
-    """
+    """Compares everything that happens with what has to hold."""
 
     graph: FakeGraph
-    violations: list[str] = field(default_factory=list)
+    violations: list[str] = field(default_factory=list)  #: With the time of each.
+    #: highest, hardest, farthest: Largest height above the highest reference, m; speed at which the
+    #: ground was met with motors on, m/s; distance from the start, m.
     highest: float = -math.inf
     hardest: float = 0.0
     farthest: float = 0.0
-    is_blind: bool = False
+    is_blind: bool = False  #: Whether a fault keeps good poses away.
+    #: Whether a takeoff has been asked for since the vehicle was last on the ground.
     may_fly: bool = False
-    may_fall: bool = False
-    is_emergency: bool = False
-    is_starved: bool = False
+    may_fall: bool = False  #: Whether the vehicle may meet the ground at any speed.
+    is_emergency: bool = False  #: Whether motors have to stand still.
+    is_starved: bool = False  #: Whether all nodes have stopped again and again in this flight.
+    #: height, distance: Of the vehicle now from the ground and from the middle, m.
     height: float = 0.0
     distance: float = 0.0
-    state: str = ""
+    state: str = ""  #: Of the flight, as the server tells it.
     _reference: float = 0.0
     _blind_since: float = math.inf
     _last: tuple[float, tuple[float, ...]] | None = None

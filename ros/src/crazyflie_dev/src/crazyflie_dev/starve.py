@@ -26,14 +26,9 @@ from crazyflie_reports.flight_operator import FlightError, FlightOperator
 from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import roslaunch
 
-HOVER_HEIGHT = 1.0
-"""Of the launch file, m."""
-
-OVERSHOOT = 0.5
-"""How far above it the vehicle may come, m."""
-
-_RUN = 0.035
-"""How long a node runs on average before it is stopped, s."""
+HOVER_HEIGHT = 1.0  #: Of the launch file, m.
+OVERSHOOT = 0.5  #: How far above it the vehicle may come, m.
+_RUN = 0.035  #: How long a node runs on average before it is stopped, s.
 
 
 def process_ids(names: tuple[str, ...]) -> list[int]:
@@ -70,18 +65,15 @@ def starve(pids: list[int], share: float, duration: float, seed: int) -> None:
 
 
 _GROUPS = Path("/sys/fs/cgroup")
+#: In which a quota counts, microseconds: what Linux and container engines take by default.
 _PERIOD = 100_000
-"""In which a quota counts, microseconds: what Linux and container engines take by default."""
 
 
 @contextmanager
 def limited(pids: list[int], quota: float) -> Iterator[None]:
     """Give processes together a quota of a core, by control groups of version 1 or 2.
 
-    Raises
-    ------
-    OSError
-        The system does not allow it, by permission or since there is no controller of the CPU.
+    OSError: the system does not allow it, by permission or without a controller of the CPU.
     """
     has_version_1 = (_GROUPS / "cpu").is_dir()
     parent = _GROUPS / "cpu" if has_version_1 else _GROUPS

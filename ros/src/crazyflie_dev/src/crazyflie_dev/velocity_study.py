@@ -29,11 +29,8 @@ from crazyflie_state_estimator.kalman import (
 from crazyflie_state_estimator.motion import MotionEstimator
 from crazyflie_state_estimator.rate_filter import FiniteDifference, RateFilter
 
-PERIOD = 0.01
-"""Time between two poses, s."""
-
-NOISE = 0.001
-"""Standard deviation of the poses' coordinates, m."""
+PERIOD = 0.01  #: Time between two poses, s.
+NOISE = 0.001  #: Standard deviation of the poses' coordinates, m.
 
 _SETTLED = slice(round(1.0 / PERIOD), None)
 _STEP = 0.001
@@ -44,24 +41,12 @@ _WAYPOINTS = np.array([(0, 0, 1), (0, 0, 1), (1, 0, 1), (1, 1, 1.5), (-1, 0.5, 0
 
 @dataclass(frozen=True)
 class ModelError:
-    """How a vehicle differs from the model that follows its controls at once.
+    """How a vehicle differs from the model that follows its controls at once."""
 
-    Attributes
-    ----------
-    response_time : float
-        Time constant of attitude and thrust, s.
-    thrust_factor : float
-        Thrust per commanded thrust.
-    drag : float
-        Deceleration per speed, 1/s.
-    gusts : float
-        Standard deviation of the wind's acceleration, m/s^2, which is correlated
-        over 1 s.
-    """
-
-    response_time: float = 0.0
-    thrust_factor: float = 1.0
-    drag: float = 0.0
+    response_time: float = 0.0  #: Time constant of attitude and thrust, s.
+    thrust_factor: float = 1.0  #: Thrust per commanded thrust.
+    drag: float = 0.0  #: Deceleration per speed, 1/s.
+    #: Standard deviation of the wind's acceleration, m/s^2, which is correlated over 1 s.
     gusts: float = 0.0
 
 
@@ -71,25 +56,14 @@ REAL = ModelError(response_time=0.05, thrust_factor=0.9, drag=0.2, gusts=0.3)
 
 @dataclass(frozen=True)
 class SampledFlight:
-    """A flight, sampled every `PERIOD`; n samples.
+    """A flight, sampled every `PERIOD`; n samples."""
 
-    Attributes
-    ----------
-    position, velocity : ndarray, shape (n, 3)
-        The truth, m and m/s.
-    yaw : ndarray, shape (n,)
-        rad.
-    control : ndarray, shape (n, 4)
-        Given at each sample and held until the next.
-    measured : ndarray, shape (n, 3)
-        Position with noise, m.
-    """
-
+    #: position, velocity: Shape (n, 3). The truth, m and m/s.
     position: NDArray[np.float64]
     velocity: NDArray[np.float64]
-    yaw: NDArray[np.float64]
-    control: NDArray[np.float64]
-    measured: NDArray[np.float64]
+    yaw: NDArray[np.float64]  #: Shape (n,); rad.
+    control: NDArray[np.float64]  #: Shape (n, 4). Given at each sample and held until the next.
+    measured: NDArray[np.float64]  #: Shape (n, 3). Position with noise, m.
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -143,6 +117,7 @@ def _correlated_noise(rng, steps, deviation):
     return np.vstack([np.zeros(3), lfilter([1.0], [1.0, _STEP - 1.0], drive, axis=0)])
 
 
+#: Name -> filter with the nodes' defaults, and whether it is given the control.
 FILTERS: dict[str, tuple[Callable[[], RateFilter], bool]] = {
     "finite difference": (FiniteDifference, False),
     "Kalman": (partial(ConstantAccelerationFilter, POSITION_NOISE, ACCELERATION_WALK), False),
@@ -151,7 +126,6 @@ FILTERS: dict[str, tuple[Callable[[], RateFilter], bool]] = {
         True,
     ),
 }
-"""Name -> filter with the nodes' defaults, and whether it is given the control."""
 
 
 def estimate(

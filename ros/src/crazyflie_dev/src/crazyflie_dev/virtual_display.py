@@ -22,10 +22,7 @@ class DisplayError(Exception):
 def screenshot(display: str) -> NDArray[np.uint8]:
     """Return what is on a display, such as ":7", now: shape (height, width, 3), uint8.
 
-    Raises
-    ------
-    DisplayError
-        The display cannot be reached.
+    `DisplayError`: the display cannot be reached.
     """
     try:
         return np.asarray(ImageGrab.grab(xdisplay=display).convert("RGB"))
@@ -37,10 +34,7 @@ def screenshot(display: str) -> NDArray[np.uint8]:
 def virtual_display(width: int, height: int) -> Iterator[str]:
     """Run Xvfb with a size in pixels on a display that is free; yield the display's name.
 
-    Raises
-    ------
-    DisplayError
-        Xvfb is not installed or does not start.
+    `DisplayError`: Xvfb is not installed or does not start.
     """
     number, writable = os.pipe()
     command = ["Xvfb", "-displayfd", str(writable), "-screen", "0", f"{width}x{height}x24"]

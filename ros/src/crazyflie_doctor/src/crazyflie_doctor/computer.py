@@ -17,11 +17,8 @@ from packaging.requirements import Requirement
 
 from crazyflie_doctor.installation import Network, Python, Radio
 
-_RESOLVER_LIMIT = 2.0
-"""Of the wait for the address of a host, s."""
-
-_PROGRAM_LIMIT = 20.0
-"""How long another program may take, s."""
+_RESOLVER_LIMIT = 2.0  #: Of the wait for the address of a host, s.
+_PROGRAM_LIMIT = 20.0  #: How long another program may take, s.
 
 _MODULES = ("rospy", "tf2_ros", "numpy", "scipy", "cflib", "control", "natnet")
 

@@ -8,37 +8,20 @@ OK, WARN, ERROR = "ok", "warn", "error"
 
 @dataclass(frozen=True)
 class Finding:
-    """What is wrong, and what to do.
+    """What is wrong, and what to do."""
 
-    Attributes
-    ----------
-    level : str
-        `WARN`, or `ERROR` for what keeps a vehicle from flying as it should.
-    text : str
-    remedy : str
-    """
-
-    level: str
+    level: str  #: `WARN`, or `ERROR` for what keeps a vehicle from flying as it should.
     text: str
     remedy: str
 
 
 @dataclass(frozen=True)
 class Check:
-    """A check of one thing.
-
-    Attributes
-    ----------
-    name : str
-    fine : str
-        What is so when nothing is found.
-    findings : iterable of Finding
-        Of a generator, which makes the check when it is iterated.
-    """
+    """A check of one thing."""
 
     name: str
-    fine: str
-    findings: Iterable[Finding]
+    fine: str  #: What is so when nothing is found.
+    findings: Iterable[Finding]  #: Of a generator, which makes the check when it is iterated.
 
 
 def warn(text: str, remedy: str) -> Finding:

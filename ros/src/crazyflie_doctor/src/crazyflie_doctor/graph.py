@@ -7,8 +7,7 @@ from typing import Any
 
 from crazyflie_doctor.finding import Finding, error, listed, warn
 
-Type = tuple[str, str]
-"""Name and MD5 sum of a message or service type."""
+Type = tuple[str, str]  #: Name and MD5 sum of a message or service type.
 
 CONTROLS = {
     "crazyflie_msgs/ControlStamped",
@@ -22,41 +21,27 @@ STATES_AND_REFERENCES = {
     "crazyflie_msgs/PositionVelocityYawStateStamped",
 }
 
+#: Inputs, by the ends of their parameters' names, without which a node does its work.
 _OPTIONAL = {"prioritized_control"}
-"""Inputs, by the ends of their parameters' names, without which a node does its work."""
 
 _BUILD = "build the workspace anew (./run build), source it in every shell, and restart the nodes"
 
 
 @dataclass(frozen=True)
 class Graph:
-    """What master and nodes say.
+    """What master and nodes say."""
 
-    Attributes
-    ----------
-    publishers, subscribers : dict
-        Topic -> names of nodes.
-    services : dict
-        Service -> name of its node.
-    parameters : dict
-        Full name -> value; no dictionaries.
-    silent : dict
-        Node that does not answer -> why.
-    topic_types : dict
-        (node, topic) -> the `Type` that this publisher offers.
-    service_types : dict
-        Service -> `Type`.
-    connections : set
-        (publisher, topic, subscriber) that are connected.
-    """
-
+    #: publishers, subscribers: Topic -> names of nodes.
     publishers: Mapping[str, set[str]] = field(default_factory=dict)
     subscribers: Mapping[str, set[str]] = field(default_factory=dict)
-    services: Mapping[str, str] = field(default_factory=dict)
+    services: Mapping[str, str] = field(default_factory=dict)  #: Service -> name of its node.
+    #: Full name -> value; no dictionaries.
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    silent: Mapping[str, str] = field(default_factory=dict)
+    silent: Mapping[str, str] = field(default_factory=dict)  #: Node that does not answer -> why.
+    #: (node, topic) -> the `Type` that this publisher offers.
     topic_types: Mapping[tuple[str, str], Type] = field(default_factory=dict)
-    service_types: Mapping[str, Type] = field(default_factory=dict)
+    service_types: Mapping[str, Type] = field(default_factory=dict)  #: Service -> `Type`.
+    #: (publisher, topic, subscriber) that are connected.
     connections: set[tuple[str, str, str]] = field(default_factory=set)
 
     @property

@@ -6,13 +6,11 @@ from urllib.parse import urlsplit
 
 from crazyflie_doctor.finding import Finding, error, listed, warn
 
-LEAST_FREE = 100e6
-"""Below this much space the logs of a flight may not fit, bytes."""
+LEAST_FREE = 100e6  #: Below this much space the logs of a flight may not fit, bytes.
 
 FEW_FREE = 1e9
 
-_LOOPBACK = "127."
-"""Begin of addresses that no other computer can reach."""
+_LOOPBACK = "127."  #: Begin of addresses that no other computer can reach.
 
 _RULES = "sudo cp $(rospack find crazyflie_link)/udev/99-crazyflie.rules /etc/udev/rules.d/"
 _SOURCE = "source devel/setup.bash (or install/setup.bash) of the workspace in this shell"
@@ -20,20 +18,11 @@ _SOURCE = "source devel/setup.bash (or install/setup.bash) of the workspace in t
 
 @dataclass(frozen=True)
 class Python:
-    """An interpreter.
-
-    Attributes
-    ----------
-    path : str
-    version : str
-        Such as 3.11; empty if it cannot be run.
-    broken : dict
-        Module that cannot be imported -> why.
-    """
+    """An interpreter."""
 
     path: str
-    version: str
-    broken: Mapping[str, str]
+    version: str  #: Such as 3.11; empty if it cannot be run.
+    broken: Mapping[str, str]  #: Module that cannot be imported -> why.
 
 
 def check_python(first: Python, of_ros: str) -> Iterator[Finding]:
@@ -63,23 +52,13 @@ def check_packages(
 
 @dataclass(frozen=True)
 class Network:
-    """How nodes of this shell find each other.
+    """How nodes of this shell find each other."""
 
-    Attributes
-    ----------
-    variables : dict
-        Environment.
-    hostname : str
-        Of this computer.
-    resolve : callable
-        ``resolve(name)`` returns the IPv4 address of a host, empty if unknown.
-    is_own : callable
-        ``is_own(address)`` tells whether this computer has the address.
-    """
-
-    variables: Mapping[str, str]
-    hostname: str
+    variables: Mapping[str, str]  #: Environment.
+    hostname: str  #: Of this computer.
+    #: ``resolve(name)`` returns the IPv4 address of a host, empty if unknown.
     resolve: Callable[[str], str]
+    #: ``is_own(address)`` tells whether this computer has the address.
     is_own: Callable[[str], bool]
 
 
@@ -148,21 +127,12 @@ def check_log_directory(path: str, is_writable: bool, free: float) -> Iterator[F
 
 @dataclass(frozen=True)
 class Radio:
-    """What is known about Crazyradios.
+    """What is known about Crazyradios."""
 
-    Attributes
-    ----------
-    dongles : dict
-        Device file of each that is plugged in -> whether this user may use it.
-    has_rules : bool
-        There is a udev rule for them.
-    groups : tuple of str
-        This user's.
-    """
-
+    #: Device file of each that is plugged in -> whether this user may use it.
     dongles: Mapping[str, bool]
-    has_rules: bool
-    groups: Sequence[str]
+    has_rules: bool  #: There is a udev rule for them.
+    groups: Sequence[str]  #: This user's.
 
 
 def check_radio(radio: Radio, uris: Sequence[str]) -> Iterator[Finding]:

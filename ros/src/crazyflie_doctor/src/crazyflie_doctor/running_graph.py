@@ -15,8 +15,7 @@ from rosgraph.network import read_ros_handshake_header, write_ros_handshake_head
 
 from crazyflie_doctor.graph import Graph, Type
 
-LIMIT = 2.0
-"""Of the wait for one answer, s."""
+LIMIT = 2.0  #: Of the wait for one answer, s.
 
 _AT_A_TIME = 16
 
@@ -58,10 +57,7 @@ def _limited():
 def graph() -> Graph:
     """Ask the master and all nodes, many at a time.
 
-    Raises
-    ------
-    OSError, rosgraph.MasterException
-        The master does not answer.
+    OSError or rosgraph.MasterException: the master does not answer.
     """
     with _limited():
         return _graph(rosgraph.Master(_NAME))

@@ -14,70 +14,45 @@ from crazyflie_lqr.gain_file import GainFileError, load_matrix
 from crazyflie_lqr.margins import loop_margins
 from crazyflie_lqr.models import CONTROLS, LinearModel, full_state, near_hover
 
-LEAST_RATE = 50.0
-"""Below this rate of poses, Hz, velocities are poor."""
-
+LEAST_RATE = 50.0  #: Below this rate of poses, Hz, velocities are poor.
+#: Without a new pose for longer than this the vehicle is no longer controlled, s.
 LONGEST_PAUSE = 0.1
-"""Without a new pose for longer than this the vehicle is no longer controlled, s."""
+LONGEST_AGE = 0.1  #: Older poses, s, are too late for a controller.
 
-LONGEST_AGE = 0.1
-"""Older poses, s, are too late for a controller."""
-
+#: Stamps further ahead of the clock than this, s, are wrong: tf's own static_transform_publisher is
+#: ahead by its period.
 FUTURE = 0.5
-"""Stamps further ahead of the clock than this, s, are wrong: tf's own
-static_transform_publisher is ahead by its period."""
 
+#: Clocks that differ by more than this, s, are different clocks: simulated and real time.
 OTHER_CLOCK = 1e6
-"""Clocks that differ by more than this, s, are different clocks: simulated and real time."""
-
-USED_MARGIN = 2.0 / 3.0
-"""Of the delay margin; what is left is for the vehicle and for jitter."""
+USED_MARGIN = 2.0 / 3.0  #: Of the delay margin; what is left is for the vehicle and for jitter.
 
 
 @dataclass(frozen=True)
 class Transform:
-    """A transform that was received.
+    """A transform that was received."""
 
-    Attributes
-    ----------
-    parent, child, node : str
-        Frames, and the publishing node.
-    stamp, arrival : float
-        ROS time, s.
-    is_static : bool
-        It came on /tf_static.
-    """
-
+    #: parent, child, node: Frames, and the publishing node.
     parent: str
     child: str
     node: str
+    #: stamp, arrival: ROS time, s.
     stamp: float
     arrival: float
-    is_static: bool = False
+    is_static: bool = False  #: It came on /tf_static.
 
 
 @dataclass
 class Recording:
-    """What was published for some seconds.
+    """What was published for some seconds."""
 
-    Attributes
-    ----------
-    transforms : list of Transform
-        In the order in which they came.
-    clocks : list of float
-        Of /clock, s.
-    delays : dict
-        Topic of controls -> times from stamp to arrival, s.
-    control_stamps : dict
-        Topic of controls -> stamps, s.
-    reported : dict
-        Address of a vehicle -> nodes whose diagnostics speak of it.
-    """
-
-    transforms: list[Transform] = field(default_factory=list)
-    clocks: list[float] = field(default_factory=list)
+    transforms: list[Transform] = field(default_factory=list)  #: In the order in which they came.
+    clocks: list[float] = field(default_factory=list)  #: Of /clock, s.
+    #: Topic of controls -> times from stamp to arrival, s.
     delays: dict[str, list[float]] = field(default_factory=dict)
+    #: Topic of controls -> stamps, s.
     control_stamps: dict[str, list[float]] = field(default_factory=dict)
+    #: Address of a vehicle -> nodes whose diagnostics speak of it.
     reported: dict[str, set[str]] = field(default_factory=dict)
 
 

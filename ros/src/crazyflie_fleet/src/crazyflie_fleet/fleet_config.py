@@ -72,6 +72,8 @@ class FleetConfig:
     disabled: tuple[str, ...] = ()  # Names of the others.
     machines: Mapping[str, MachineSettings] = dataclasses.field(default_factory=dict)
     warnings: tuple[str, ...] = ()  # Remarks on the file: line and reason.
+    # Parameters of the driver that say how it broadcasts.
+    broadcasts: Mapping[str, float] = dataclasses.field(default_factory=dict)
     # Names of two whose start points are closer than their buffers.
     unplaced: tuple[tuple[str, str], ...] = ()
 

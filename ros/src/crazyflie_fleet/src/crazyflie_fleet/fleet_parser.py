@@ -14,6 +14,7 @@ from crazyflie_fleet.settings import (
     LOCAL,
     VEHICLE_NAME,
     WITHOUT_EFFECT,
+    BroadcastSettings,
     DefaultTopicSettings,
     FirmwareNumber,
     LogTopicSettings,
@@ -67,8 +68,7 @@ class FleetParser:
             self._check(entry)
         if common is not None:
             self._check(common, "broadcasts")
-            if "broadcasts" in common:
-                self.remarks.idle(common["broadcasts"], "broadcasts")
+        broadcasts = self._broadcasts(common)
         for name, entry in robots.items():
             self._check_type(VEHICLE_NAME, name, entry)
             self._check(entry)
@@ -89,7 +89,7 @@ class FleetParser:
             )
         unplaced = self._unplaced(enabled)
         return FleetConfig(
-            tuple(enabled), tuple(disabled), machines, self.remarks.texts(), unplaced
+            tuple(enabled), tuple(disabled), machines, self.remarks.texts(), broadcasts, unplaced
         )
 
     # What is wrong.
@@ -124,6 +124,17 @@ class FleetParser:
                 self.remarks.idle(idle, key)
         with self._collecting():
             self._firmware(entry)
+
+    def _broadcasts(self, common):
+        if common is None or "broadcasts" not in common:
+            return {}
+        given = self._read(common["broadcasts"], BroadcastSettings)
+        if given is None:
+            return {}
+        return {
+            "broadcast/repeats": given.repeats,
+            "broadcast/repeat_period": given.period_ms / 1000.0,
+        }
 
     def _check_keys(self, entries, known):
         for key, entry in entries.items():

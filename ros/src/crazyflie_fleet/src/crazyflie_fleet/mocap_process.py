@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from crazyflie_fleet import motion_capture_file
+from crazyflie_fleet import motion_capture_file, server_file
 from crazyflie_fleet.fleet_config import FleetConfig
 from crazyflie_fleet.fleet_parameters import FleetParameters, NodeParameters
 from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
@@ -24,6 +24,12 @@ class MocapFleetParameters(FleetParameters):
         "dynamics replace those of mocap_node",
         "",
         "fleet/motion_capture",
+    )
+    server: str = parameter(
+        Text(may_be_empty=True),
+        "crazyswarm2's server.yaml; its limits of the rate replace mocap_node's `rate_limits`",
+        "",
+        "fleet/server",
     )
 
 
@@ -100,9 +106,11 @@ def make_nodes(handle: NodeHandle) -> dict[str, Node]:
         A parameter, or the fleet file, is wrong.
     """
     config = handle.load(MocapFleetParameters)
-    if config.motion_capture:
-        for key, value in motion_capture_file.load(config.motion_capture).items():
-            handle.set_param(f"{handle.name}/{key}", value)
+    given = motion_capture_file.load(config.motion_capture) if config.motion_capture else {}
+    if config.server:
+        given |= server_file.load(config.server).motion_capture
+    for key, value in given.items():
+        handle.set_param(f"{handle.name}/{key}", value)
     fleet, kind = config.fleet(), NodeParameters()
     dynamics = handle.get_param("~dynamics_configurations", kind, {})
     markers = handle.get_param("~marker_configurations", kind, {})

@@ -26,6 +26,15 @@ class MotionCaptureSettings(Parameters):
     hostname: str = parameter(TEXT, "of the computer that runs it")
 
 
+def node_parameters(path: str | Path) -> yaml_file.Entry:
+    """Return the parameters of the first node in a file of ROS 2; raises `ParameterError`."""
+    top = yaml_file.load(path)
+    for node in top.entries().values():
+        if "ros__parameters" in node:
+            return node["ros__parameters"]
+    raise top.error("has no ros__parameters of a node; expected crazyswarm2's layout")
+
+
 def load(path: str | Path) -> dict[str, Any]:
     """Return backend, address, and configurations of markers and dynamics, as mocap_node has them.
 
@@ -34,15 +43,11 @@ def load(path: str | Path) -> dict[str, Any]:
     ParameterError
         About everything that is wrong: file, line, and what was expected.
     """
-    top = yaml_file.load(path)
-    inner = (node.entries().get("ros__parameters") for node in top.entries().values())
-    nodes = [node for node in inner if node is not None]
-    if not nodes:
-        raise top.error("has no ros__parameters of a node; expected crazyswarm2's layout")
+    node = node_parameters(path)
     # Topics and rigid bodies of theirs follow from the fleet file here.
-    settings = nodes[0].read(MotionCaptureSettings, _CONFIGURATIONS, lambda entry, known: None)
+    settings = node.read(MotionCaptureSettings, _CONFIGURATIONS, lambda entry, known: None)
     backend = _BACKENDS[settings.type]
     is_natnet = backend == "natnet"
     address = "optitrack_config/server_address" if is_natnet else "motioncapture_config/hostname"
-    given = {key: nodes[0][key].value for key in _CONFIGURATIONS if key in nodes[0]}
+    given = {key: node[key].value for key in _CONFIGURATIONS if key in node}
     return {"backend": backend, address: settings.hostname, **given}

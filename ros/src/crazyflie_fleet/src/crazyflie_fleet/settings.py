@@ -12,6 +12,7 @@ from crazyflie_utils.parameters.types import (
     FRAME,
     POSITION,
     TEXT,
+    Integer,
     ListOf,
     Number,
     ParameterType,
@@ -224,6 +225,18 @@ class RobotSettings(PartialSettings):
 
     position: tuple[float, float, float] = parameter(
         StartPosition(), "its position before takeoff", name="initial_position"
+    )
+
+
+class BroadcastSettings(Parameters):
+    """How commands to all vehicles of a radio are sent."""
+
+    repeats: int = parameter(Integer(1, 100), "of each command", 5, "num_repeats")
+    period_ms: float = parameter(
+        Number("ms", minimum=0.0, maximum=100.0),
+        "from one to the next",
+        1.0,
+        "delay_between_repeats_ms",
     )
 
 

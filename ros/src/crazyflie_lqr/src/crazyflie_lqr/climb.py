@@ -13,47 +13,24 @@ integrator continues with the thrust that was found.
 
 import math
 
-SPEED = 0.4
-"""Of the reference, m/s."""
-
-ACCELERATION = 0.5
-"""Of the reference, m/s^2."""
-
+SPEED = 0.4  #: Of the reference, m/s.
+ACCELERATION = 0.5  #: Of the reference, m/s^2.
+#: How far the reference may be above the vehicle, m: it waits for one that has not lifted off.
 LEAD = 0.15
-"""How far the reference may be above the vehicle, m: it waits for one that has not lifted off."""
-
-RATE = 3.0
-"""Bandwidth of the observer, 1/s."""
-
-LEARNING_TIME = 3.0 / RATE
-"""The shortest that a climb lasts, s, also where there is no way to go."""
-
+RATE = 3.0  #: Bandwidth of the observer, 1/s.
+LEARNING_TIME = 3.0 / RATE  #: The shortest that a climb lasts, s, also where there is no way to go.
+#: So near to its goal, m, and so slow, m/s, a vehicle has arrived.
 ARRIVAL_DISTANCE, ARRIVAL_SPEED = 0.05, 0.1
-"""So near to its goal, m, and so slow, m/s, a vehicle has arrived."""
 
 
 class Climb:
-    """The way up of one takeoff.
-
-    Attributes
-    ----------
-    disturbance : float
-        What accelerates the vehicle beside thrust and nominal weight, m/s^2, upwards.
-    z, z_dot, z_ddot : float
-        Reference, m, m/s and m/s^2.
-    has_arrived : bool
-        The vehicle is at its goal and the reference, too.
-
-    Parameters
-    ----------
-    limit : float
-        Largest disturbance that is believed in, m/s^2.
-    """
+    """The way up of one takeoff; ``limit`` is the largest disturbance believed in, m/s^2."""
 
     def __init__(self, limit: float):
+        #: What accelerates the vehicle beside thrust and nominal weight, m/s^2, upwards.
         self.disturbance = 0.0
-        self.z = self.z_dot = self.z_ddot = 0.0
-        self.has_arrived = False
+        self.z = self.z_dot = self.z_ddot = 0.0  #: Reference, m, m/s and m/s^2.
+        self.has_arrived = False  #: The vehicle is at its goal and the reference, too.
         self._limit = limit
         self._last_z_dot: float | None = None
         self._elapsed = 0.0
@@ -66,16 +43,9 @@ class Climb:
     def advance(self, dt: float, z: float, z_dot: float, goal: float, excess: float) -> None:
         """Advance to the next state.
 
-        Parameters
-        ----------
-        dt : float
-            Since the last state, s; not used with the first one.
-        z, z_dot : float
-            Height and speed of the vehicle, m and m/s.
-        goal : float
-            Height to climb to, m.
-        excess : float
-            Thrust since the last state, less that of the reference control, m/s^2.
+        It comes ``dt`` s after the last one (not used with the first), at height ``z`` (m) and
+        speed ``z_dot`` (m/s); ``goal`` is the height to climb to (m), ``excess`` the thrust since
+        the last state, less that of the reference control (m/s^2).
         """
         if self._last_z_dot is None:
             self.z, self.z_dot = z, z_dot

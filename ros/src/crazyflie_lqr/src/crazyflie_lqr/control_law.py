@@ -15,25 +15,19 @@ from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 
 ROLL, PITCH, YAW_DOT, THRUST = range(4)
 
-YAW = 6
-"""Index of the yaw in states with position, velocity and yaw."""
+YAW = 6  #: Index of the yaw in states with position, velocity and yaw.
+X_DIM, U_DIM = 7, 4  #: Of these states, and of controls.
 
-X_DIM, U_DIM = 7, 4
-"""Of these states, and of controls."""
-
+#: Least and most of each control.
 LIMITS = (
     (-MAX_TILT, MAX_TILT),
     (-MAX_TILT, MAX_TILT),
     (-math.inf, math.inf),
     (MIN_THRUST, MAX_THRUST),
 )
-"""Least and most of each control."""
 
-INTEGRATED = (PITCH, ROLL, THRUST)
-"""The controls that the integrals of x, y and z act on."""
-
-MAX_GAP = 0.5
-"""Longest time between two states over which the position error is integrated, s."""
+INTEGRATED = (PITCH, ROLL, THRUST)  #: The controls that the integrals of x, y and z act on.
+MAX_GAP = 0.5  #: Longest time between two states over which the position error is integrated, s.
 
 
 def heading_error(
@@ -69,25 +63,12 @@ def integrate(
     k: Number,
     limit: Number,
 ) -> Number:
-    """Return the integral of the position error along an axis after ``dt``, m s.
+    """Return the integral of the position error along an axis after ``dt`` (s), m s.
 
     Does not grow while it drives the control further into its limit (conditional integration:
-    Astrom and Hagglund, Advanced PID Control, 2006, 3.5).
-
-    Parameters
-    ----------
-    axis : int
-        0, 1 or 2: x, y or z in the heading frame.
-    integral : float or ndarray
-        Before, m s.
-    error : float or ndarray
-        m.
-    dt : float or ndarray
-        Since the last state, s.
-    linear : sequence, 4 components
-        Of `linear_control`.
-    k, limit : float or ndarray
-        Gain and largest absolute value of this integral; see `linear_feedback`.
+    Astrom and Hagglund, Advanced PID Control, 2006, 3.5). The axis is 0, 1 or 2: x, y or z in the
+    heading frame; ``error`` is in m, ``linear`` the control of `linear_control`; ``k`` and
+    ``limit`` are gain and largest absolute value of this integral, see `linear_feedback`.
     """
     grown = clip(integral + error * dt, -limit, limit)
     low, high = LIMITS[INTEGRATED[axis]]

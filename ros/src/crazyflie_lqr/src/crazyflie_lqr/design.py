@@ -14,11 +14,8 @@ from scipy.linalg import expm
 
 from crazyflie_lqr.models import LinearModel
 
-_ROUNDOFF = 1e-9
-"""What is this much smaller than its surroundings counts as zero."""
-
-_MAX_DELAY_STEPS = 50
-"""Longest delay, in sample times; each adds u_dim states."""
+_ROUNDOFF = 1e-9  #: What is this much smaller than its surroundings counts as zero.
+_MAX_DELAY_STEPS = 50  #: Longest delay, in sample times; each adds u_dim states.
 
 
 class DesignError(ValueError):
@@ -27,20 +24,11 @@ class DesignError(ValueError):
 
 @dataclass(frozen=True)
 class Weights:
-    """What deviations and control cost.
+    """What deviations and control cost."""
 
-    Attributes
-    ----------
-    Q : ndarray, shape (x_dim, x_dim)
-        Of the state: symmetric, positive semidefinite.
-    R : ndarray, shape (u_dim, u_dim)
-        Of the control: symmetric, positive definite.
-    N : ndarray, shape (x_dim, u_dim)
-        Of their products: ``[[Q, N], [N^T, R]]`` is positive semidefinite.
-    """
-
-    Q: NDArray[np.float64]
-    R: NDArray[np.float64]
+    Q: NDArray[np.float64]  #: Shape (x_dim, x_dim). Of the state: symmetric, positive semidefinite.
+    R: NDArray[np.float64]  #: Shape (u_dim, u_dim). Of the control: symmetric, positive definite.
+    #: Shape (x_dim, u_dim). Of their products: ``[[Q, N], [N^T, R]]`` is positive semidefinite.
     N: NDArray[np.float64]
 
     def check(self) -> None:
@@ -78,25 +66,14 @@ class Weights:
 
 @dataclass(frozen=True)
 class Design:
-    """Gains and the plant they were designed for.
+    """Gains and the plant they were designed for."""
 
-    Attributes
-    ----------
-    K : ndarray, shape (u_dim, x_dim)
-        Gains, u = u_ref + K (x - x_ref).
-    A : ndarray, shape (n, n)
-        Dynamics of the plant: the model's; of a sampled design, one step of the
-        model and, behind the x_dim states of the model, the controls that are
-        still on their way.
-    B : ndarray, shape (n, u_dim)
-    sample_time : float
-        s; 0 is continuous.
-    """
-
-    K: NDArray[np.float64]
+    K: NDArray[np.float64]  #: Shape (u_dim, x_dim). Gains, u = u_ref + K (x - x_ref).
+    #: Shape (n, n). Dynamics of the plant: the model's; of a sampled design, one step of the model
+    #: and, behind the x_dim states of the model, the controls that are still on their way.
     A: NDArray[np.float64]
-    B: NDArray[np.float64]
-    sample_time: float
+    B: NDArray[np.float64]  #: Shape (n, u_dim).
+    sample_time: float  #: s; 0 is continuous.
 
     @property
     def feedback(self) -> NDArray[np.float64]:

@@ -11,14 +11,13 @@ from crazyflie_lqr.design import Design
 from crazyflie_lqr.margins import loop_response
 from crazyflie_lqr.models import CONTROLS, LinearModel
 
+#: What a reference may step in, and the control that answers.
 _OUTPUTS = {"x": "pitch", "y": "roll", "z": "thrust", "yaw": "yaw_dot"}
-"""What a reference may step in, and the control that answers."""
 
 _UNITS = {"roll": "rad", "pitch": "rad", "yaw_dot": "rad/s", "thrust": "m/s²"}
 
 
-Responses = dict[str, NDArray[np.float64]]
-"""By name of an output, shape (n,)."""
+Responses = dict[str, NDArray[np.float64]]  #: By name of an output, shape (n,).
 
 
 def step_responses(
@@ -26,12 +25,7 @@ def step_responses(
 ) -> tuple[NDArray[np.float64], Responses, Responses]:
     """Return what follows a unit step of the reference in x, y, z and yaw, each alone.
 
-    Returns
-    -------
-    time : ndarray, shape (n,)
-        s.
-    states, controls : dict
-        How each output moves, in m or rad; and the control that moves it.
+    That is: the times (s), how each output moves (m or rad), and the control that moves it.
     """
     slowest = -design.poles.real.max()
     duration = min(8.0 / slowest, 60.0)

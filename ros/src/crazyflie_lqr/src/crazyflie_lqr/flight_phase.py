@@ -2,11 +2,8 @@
 
 import math
 
-LIFTED = 0.05
-"""A vehicle so far above the lowest height it has been at flies, m."""
-
-LIFTOFF_TIMEOUT = 3.0
-"""Longest time from a change of the reference's height to the liftoff, s."""
+LIFTED = 0.05  #: A vehicle so far above the lowest height it has been at flies, m.
+LIFTOFF_TIMEOUT = 3.0  #: Longest time from a change of the reference's height to the liftoff, s.
 
 
 class GroundGuess:

@@ -41,11 +41,9 @@ __all__ = [
     "heading_error",
 ]
 
-_LEAST_DAMPING = 0.7
-"""A height loop with this damping ratio overshoots a step by 5 %."""
-
+_LEAST_DAMPING = 0.7  #: A height loop with this damping ratio overshoots a step by 5 %.
+#: A state or a control; of so few numbers, plain floats are several times quicker than arrays.
 Components = Sequence[float]
-"""A state or a control; of so few numbers, plain floats are several times quicker than arrays."""
 
 
 def at_rest(x: Components, yaw_index: int) -> list[float]:
@@ -59,16 +57,9 @@ class LinearFeedback:
     """The control law u = u_ref + K e, with e of `heading_error`.
 
     A subclass overrides `control`; or `law`, which is the same in plain floats and what `control`
-    calls. A process that uses `law` only does without numpy.
-
-    Parameters
-    ----------
-    K : array_like, shape (u_dim, x_dim)
-        Gains, with the sign that belongs to the plus.
-    u_ref : array_like, shape (u_dim,)
-        Control at the reference: hover.
-    yaw_index : int
-        Where the yaw is in the state.
+    calls. A process that uses `law` only does without numpy. K has the shape (u_dim, x_dim), with
+    the sign that belongs to the plus; u_ref is the control at the reference, hover; ``yaw_index``
+    is where the yaw is in the state.
     """
 
     def __init__(self, K: Iterable[Iterable[float]], u_ref: Iterable[float], yaw_index: int):
@@ -97,14 +88,9 @@ class LinearFeedback:
     def control(
         self, x: "NDArray[np.float64]", x_ref: "NDArray[np.float64]", time: float
     ) -> "NDArray[np.float64]":
-        """Return the control, shape (u_dim,), for a state.
+        """Return the control, shape (u_dim,), for a state and a reference, both of shape (x_dim,).
 
-        Parameters
-        ----------
-        x, x_ref : ndarray, shape (x_dim,)
-            State and reference.
-        time : float
-            The state's stamp, s.
+        ``time`` is the state's stamp, s.
         """
         return _array(self.law(_floats(x), _floats(x_ref), time))
 

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-MAX_GAIN = 1e6
-"""Largest number of a gain file: larger ones make controls that are not finite."""
+MAX_GAIN = 1e6  #: Largest number of a gain file: larger ones make controls that are not finite.
 
 
 class LinearFeedbackParameters(Parameters):
@@ -96,26 +95,17 @@ class LinearFeedbackNode(Node):
 
     A subclass describes its state in class attributes, and may override `complete_reference` and
     `make_controller`. Unless it does, or the controller overrides `control`, no arrays are made.
-
-    Attributes
-    ----------
-    state_type, reference_type : type
-        Stamped messages with a field ``state``, all float64.
-    parameters_type : type
-        `LinearFeedbackParameters` or a subclass.
-    yaw_index : int
-        Where the yaw is in the state, which begins with position and velocity.
-    reference_tail : tuple of float
-        What the state has behind the fields of a reference.
     """
 
     needed_in_flight = True
 
+    #: state_type, reference_type: Stamped messages with a field ``state``, all float64.
     state_type: type
     reference_type: type
+    #: `LinearFeedbackParameters` or a subclass.
     parameters_type: type[LinearFeedbackParameters] = LinearFeedbackParameters
-    yaw_index: int
-    reference_tail: tuple[float, ...] = ()
+    yaw_index: int  #: Where the yaw is in the state, which begins with position and velocity.
+    reference_tail: tuple[float, ...] = ()  #: What the state has behind the fields of a reference.
 
     def __init__(self) -> None:
         self._reference = GuardedReference(self.yaw_index, report=self._warn_of_reference)

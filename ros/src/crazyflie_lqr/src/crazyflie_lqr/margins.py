@@ -19,38 +19,22 @@ _FREQUENCIES = 500
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of one loop.
+    """Margins of one loop."""
 
-    Attributes
-    ----------
-    gain_up, gain_down : float
-        Factors by which the loop gain may grow and shrink; infinity and 0 if
-        they may without limit.
-    phase : float
-        Phase it may lose, rad; infinity if its gain is never 1.
-    crossover : float
-        Where the phase margin is, rad/s; NaN without one.
-    delay : float
-        Time by which the control may be late in addition, s.
-    """
-
+    #: gain_up, gain_down: Factors by which the loop gain may grow and shrink; infinity and 0 if
+    #: they may without limit.
     gain_up: float
     gain_down: float
-    phase: float
-    crossover: float
-    delay: float
+    phase: float  #: Phase it may lose, rad; infinity if its gain is never 1.
+    crossover: float  #: Where the phase margin is, rad/s; NaN without one.
+    delay: float  #: Time by which the control may be late in addition, s.
 
 
 def loop_response(design: Design, loop: int) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
     """Return the frequency response of one loop (of a control) broken at the plant's input.
 
-    Returns
-    -------
-    frequency : ndarray, shape (n,)
-        rad/s; for a sampled design up to half its sample rate.
-    response : ndarray of complex, shape (n,)
-        Loop transfer function L of the negative feedback: unstable where L
-        turns about -1.
+    That is: frequencies (rad/s; for a sampled design up to half its sample rate), and at each the
+    loop transfer function L of the negative feedback: unstable where L turns about -1.
     """
     system = _broken_loop(design, loop)
     speed = np.abs(design.poles)

@@ -14,14 +14,13 @@ from crazyflie_model.units import GRAVITY
 
 CONTROLS = ("roll", "pitch", "yaw_dot", "thrust")
 
+#: How roll and pitch of the vehicle follow their commands in `full_state`, s: the firmware's
+#: attitude loop turns an error into a rate, and its rate loop is much faster.
 ATTITUDE_TIME_CONSTANT = 1.0 / inner_loops.TILT.kp
-"""How roll and pitch of the vehicle follow their commands in `full_state`, s: the
-firmware's attitude loop turns an error into a rate, and its rate loop is much
-faster."""
 
+#: Lag of the measured angular rates in `full_state`, s: they are differences of attitudes 10 ms
+#: apart.
 RATE_TIME_CONSTANT = 0.01
-"""Lag of the measured angular rates in `full_state`, s: they are differences of
-attitudes 10 ms apart."""
 
 
 @dataclass(frozen=True)
@@ -95,5 +94,5 @@ def full_state() -> LinearModel:
     return _model("full_state", rates)
 
 
+#: Name -> function that returns the model.
 MODELS = {"near_hover": near_hover, "full_state": full_state}
-"""Name -> function that returns the model."""

@@ -7,31 +7,20 @@ from crazyflie_lqr.linear_feedback import Components, at_rest
 from crazyflie_lqr.reference_velocity import VELOCITY_LIMIT, VelocityCheck, limited
 from crazyflie_utils.last_valid import LastValid
 
-DESCENT_LIMIT = 0.3
-"""How long the reference of a descent counts, and it alone, s."""
+DESCENT_LIMIT = 0.3  #: How long the reference of a descent counts, and it alone, s.
 
 
 class GuardedReference:
     """The last valid reference; or, some time after invalid ones came, a hold point.
 
     `crazyflie_utils.last_valid.HOLD_LIMIT` after the first invalid reference the vehicle stops
-    where it is, until a valid one comes. A reference that is older than the present one is
-    ignored; one that is far away is moved nearer. One with a velocity becomes a position at rest
-    when no other has followed for `VELOCITY_LIMIT`, and at once when the positions of the
-    references do not move with their velocities (see `VelocityCheck`).
-
-    Parameters
-    ----------
-    yaw_index : int
-        Where the yaw is in the state.
-    max_jump : float, optional
-        How far from the vehicle a new reference may be, m. One that is further away becomes a
-        place to rest at so far from the vehicle, in the same direction, and is this as long as
-        references come from about there.
-    max_speed : float, optional
-        A larger velocity of a reference is made as large as this, m/s.
-    report : callable, optional
-        ``report(text)`` is told of that.
+    where it is, until a valid one comes. A reference that is older than the present one is ignored;
+    one that is further from the vehicle than ``max_jump`` (m) becomes a place to rest at so far
+    from the vehicle, in the same direction, and is this as long as references come from about
+    there; a velocity larger than ``max_speed`` (m/s) is made as large as this; ``report(text)`` is
+    told of both. One with a velocity becomes a position at rest when no other has followed for
+    `VELOCITY_LIMIT`, and at once when the positions of the references do not move with their
+    velocities (see `VelocityCheck`). ``yaw_index`` is where the yaw is in the state.
     """
 
     def __init__(
@@ -63,15 +52,8 @@ class GuardedReference:
     ) -> bool:
         """Take a valid reference; return False if it is older than the present one, and ignored.
 
-        Parameters
-        ----------
-        x_ref : sequence, x_dim components
-        stamp : float
-            When it was made, s; 0 if that is not known.
-        now : float
-            By the same clock. A later stamp counts as this.
-        time : float
-            Now, s, by the clock of `value`.
+        It was made at ``stamp`` (s; 0 if that is not known); ``now`` is by the same clock, and a
+        later stamp counts as this; ``time`` is now, s, by the clock of `value`.
         """
         # After a reset of the clock nothing can be told from the stamps of before.
         if self._stamp > now:

@@ -3,25 +3,17 @@
 import math
 from collections.abc import Sequence
 
+#: How long the velocity of a reference counts that is not followed by another, s.
 VELOCITY_LIMIT = 0.5
-"""How long the velocity of a reference counts that is not followed by another, s."""
-
-MAX_LEAD = 0.5
-"""By how much velocities may have led further than the points have moved, m."""
-
-_MEMORY = 2.0
-"""Time constant at which such a lead is forgotten, s."""
-
+MAX_LEAD = 0.5  #: By how much velocities may have led further than the points have moved, m.
+_MEMORY = 2.0  #: Time constant at which such a lead is forgotten, s.
+#: A point that is further than this, m, from where its velocity led to did not move there.
 _JUMP = 0.1
-"""A point that is further than this, m, from where its velocity led to did not move there."""
-
-_FASTEST = 100.0
-"""Larger velocities are taken as of this size, m/s, in order not to overflow."""
+_FASTEST = 100.0  #: Larger velocities are taken as of this size, m/s, in order not to overflow.
 
 _HERE = (0.0, 0.0, 0.0)
 
-Vector = Sequence[float]
-"""Three components, fixed frame."""
+Vector = Sequence[float]  #: Three components, fixed frame.
 
 
 class VelocityCheck:

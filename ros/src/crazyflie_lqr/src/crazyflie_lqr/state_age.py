@@ -1,11 +1,10 @@
 """The age of states, by their stamps."""
 
+#: Clocks that differ by more than this, s, are not meant to agree: one of them is simulated, or is
+#: that of a bag.
 SAME_CLOCK = 60.0
-"""Clocks that differ by more than this, s, are not meant to agree: one of them is simulated, or
-is that of a bag."""
 
-_DRIFT = 1e-3
-"""By how much clocks that are not meant to agree may run apart, s/s."""
+_DRIFT = 1e-3  #: By how much clocks that are not meant to agree may run apart, s/s.
 
 
 class StateAge:

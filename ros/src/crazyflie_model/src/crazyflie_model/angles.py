@@ -16,8 +16,7 @@ from crazyflie_model.elementwise import Many, Number, clip, functions
 Triple = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
-_SMALLEST_COSINE = 1e-6
-"""Of a pitch at which roll and yaw are distinct."""
+_SMALLEST_COSINE = 1e-6  #: Of a pitch at which roll and yaw are distinct.
 
 
 @overload

@@ -14,40 +14,25 @@ from crazyflie_model.angles import Triple
 
 Array = NDArray[np.float64]
 
+#: How far within its cell a vehicle stays, m, so that two that touch do not overlap by rounding.
 _CLEARANCE = 1e-6
-"""How far within its cell a vehicle stays, m, so that two that touch do not overlap by rounding."""
 
 
 @dataclass(frozen=True)
 class AvoidanceSettings:
-    """Settings; names of the firmware's parameter group colAv in brackets.
+    """Settings; names of the firmware's parameter group colAv in brackets."""
 
-    Attributes
-    ----------
-    radii : tuple, 3 components
-        Of the ellipsoid that others stay out of, m (ellipsoidX, Y, Z).
-    box_min, box_max : tuple, 3 components
-        Corners of the box that the vehicle stays in, m (bboxMinX, ... bboxMaxZ).
-    horizon : float
-        How far ahead motion is limited, s (horizon).
-    max_speed : float
-        Of each axis, m/s (maxSpeed).
-    sidestep_threshold : float
-        Distance from a wall of the cell at which a sidestep to the right begins, m (sidestepThrsh).
-    tolerance : float
-        How far outside of its cell a point counts as inside, in tenths of m (vorTol).
-    max_iterations : int
-        Of the projection into the cell (vorIters).
-    """
-
-    radii: Triple
+    radii: Triple  #: Of the ellipsoid that others stay out of, m (ellipsoidX, Y, Z).
+    #: box_min, box_max: Corners of the box that the vehicle stays in, m (bboxMinX, ... bboxMaxZ).
     box_min: Triple = (-math.inf,) * 3
     box_max: Triple = (math.inf,) * 3
-    horizon: float = 1.0
-    max_speed: float = 0.5
+    horizon: float = 1.0  #: How far ahead motion is limited, s (horizon).
+    max_speed: float = 0.5  #: Of each axis, m/s (maxSpeed).
+    #: Distance from a wall of the cell at which a sidestep to the right begins, m (sidestepThrsh).
     sidestep_threshold: float = 0.25
+    #: How far outside of its cell a point counts as inside, in tenths of m (vorTol).
     tolerance: float = 1e-5
-    max_iterations: int = 100
+    max_iterations: int = 100  #: Of the projection into the cell (vorIters).
 
 
 class CollisionAvoidance:
@@ -62,14 +47,8 @@ class CollisionAvoidance:
     ) -> tuple[Array, Array]:
         """Return the position (m) and velocity (m/s) to track instead of a goal and its velocity.
 
-        Parameters
-        ----------
-        position : (3,) array
-            Of the vehicle, m.
-        others : (n, 3) array
-            Positions of other vehicles, m.
-        goal, velocity : (3,) array
-            m, m/s. A velocity of 0 means a goal to stop at.
+        A velocity of 0 means a goal to stop at. ``others`` are the positions of n other vehicles,
+        shape (n, 3), m.
         """
         cell = _Cell(self.settings, position, others)
         wanted = goal - position

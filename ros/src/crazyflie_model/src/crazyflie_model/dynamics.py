@@ -20,12 +20,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-STEP = 0.001
-"""Integration step of every model, s."""
+STEP = 0.001  #: Integration step of every model, s.
 
+#: Friction coefficient of a 7-dimensional vehicle on the ground: dry plastic on a hard floor, for
+#: which tables have 0.3 to 0.6.
 GROUND_FRICTION = 0.5
-"""Friction coefficient of a 7-dimensional vehicle on the ground: dry plastic on a hard floor, for
-which tables have 0.3 to 0.6."""
 
 
 class Dynamics(ABC):
@@ -64,10 +63,7 @@ class Dynamics(ABC):
     def derivative(self, t: float, x: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
         """Return the time derivative, shape as x, ``t`` s after the start.
 
-        Parameters
-        ----------
-        x : array_like, shape (x_dim,) or (..., x_dim)
-        u : array_like, shape (u_dim,) or (..., u_dim)
+        x has the shape (x_dim,) or (..., x_dim), u (u_dim,) or (..., u_dim).
         """
         return join(self.rates(t, split(x), split(u)))
 
@@ -168,17 +164,9 @@ class Coupled7D(SevenDimensional):
 def coupled_acceleration(u: Sequence[Number], yaw: Number) -> Vector[Number]:
     """Return the acceleration, m/s^2, fixed frame, of a vehicle that follows a control at once.
 
-    The thrust T, tilted by roll and pitch about the heading, and gravity:
-    x_ddot = T (sin(pitch) cos(yaw) + sin(roll) sin(yaw)),
-    y_ddot = T (-sin(roll) cos(yaw) + sin(pitch) sin(yaw)),
-    z_ddot = T cos(roll) cos(pitch) - g.
-
-    Parameters
-    ----------
-    u : sequence, 4 components
-        Control; the yaw rate is of no consequence.
-    yaw : float or ndarray
-        rad.
+    The thrust T, tilted by roll and pitch about the heading (``yaw``, rad), and gravity: x_ddot = T
+    (sin(pitch) cos(yaw) + sin(roll) sin(yaw)), y_ddot = T (-sin(roll) cos(yaw) + sin(pitch)
+    sin(yaw)), z_ddot = T cos(roll) cos(pitch) - g. The yaw rate is of no consequence.
     """
     roll, pitch, _, thrust = u
     trigonometry = functions(roll)

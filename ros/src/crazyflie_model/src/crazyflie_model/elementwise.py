@@ -21,14 +21,12 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
+#: A component of many vehicles: an array, or a float that holds for all of them.
 Many: TypeAlias = "float | NDArray[np.float64]"
-"""A component of many vehicles: an array, or a float that holds for all of them."""
-
+#: A component of one vehicle or of many: what is made of floats only is a float.
 Number = TypeVar("Number", float, "Many")
-"""A component of one vehicle or of many: what is made of floats only is a float."""
-
+#: The components of a state, a control or a vector: ``Vector[float]`` is one vehicle's.
 Vector = list[Number]
-"""The components of a state, a control or a vector: ``Vector[float]`` is one vehicle's."""
 
 
 def split(vectors: ArrayLike) -> Vector[Many]:

@@ -18,27 +18,16 @@ from crazyflie_model.mixer import limit, mix
 from crazyflie_model.pid import Gains, terms
 from crazyflie_model.units import pwm_from_thrust
 
-PERIOD = 0.002
-"""Time between two samples, s."""
+PERIOD = 0.002  #: Time between two samples, s.
+OUTPUT_LIMIT = 32767.0  #: Largest output of a rate controller, PWM: 16 bits in the firmware.
+TILT = Gains(6.0, 3.0, 0.0, 20.0)  #: Roll and pitch, deg, to body rates, deg/s.
+HEADING = Gains(6.0, 1.0, 0.35, 360.0)  #: Yaw, deg, to body rate, deg/s.
+TILT_RATE = Gains(250.0, 500.0, 2.5, 33.3)  #: Rates about forward and left, deg/s, to PWM.
+HEADING_RATE = Gains(120.0, 16.7, 0.0, 166.7)  #: Rate about up, deg/s, to PWM.
 
-OUTPUT_LIMIT = 32767.0
-"""Largest output of a rate controller, PWM: 16 bits in the firmware."""
-
-TILT = Gains(6.0, 3.0, 0.0, 20.0)
-"""Roll and pitch, deg, to body rates, deg/s."""
-
-HEADING = Gains(6.0, 1.0, 0.35, 360.0)
-"""Yaw, deg, to body rate, deg/s."""
-
-TILT_RATE = Gains(250.0, 500.0, 2.5, 33.3)
-"""Rates about forward and left, deg/s, to PWM."""
-
-HEADING_RATE = Gains(120.0, 16.7, 0.0, 166.7)
-"""Rate about up, deg/s, to PWM."""
-
+#: What the loops remember: integrals of the attitude errors (3), of the rate errors (3), last body
+#: rates about forward and left (2), heading that is held.
 MEMORY_DIM = 9
-"""What the loops remember: integrals of the attitude errors (3), of the rate
-errors (3), last body rates about forward and left (2), heading that is held."""
 
 _DEGREE = math.pi / 180.0
 
@@ -67,25 +56,12 @@ def update(
     attitude: tuple[Number, Number, Number],
     rates: Vector[Number],
 ) -> tuple[Vector[Number], Vector[Number]]:
-    """Return memory and motor commands after one sample.
+    """Return memory and motor commands (PWM, of motors 1 to 4) after one sample.
 
-    Without thrust the motors are off and the loops begin anew.
-
-    Parameters
-    ----------
-    memory : list, 9 components
-        What was returned `PERIOD` ago.
-    setpoint : list, 4 components
-        Roll, pitch in rad, yaw rate in rad/s, thrust in m/s^2.
-    attitude : tuple, 3 components
-        Roll, pitch, yaw of `angles.zyx_from_quaternion`, rad.
-    rates : list, 3 components
-        Body rates, rad/s.
-
-    Returns
-    -------
-    tuple of Vector
-        Memory, 9 components, and the commands of motors 1 to 4, PWM.
+    Without thrust the motors are off and the loops begin anew. ``memory`` is what was returned
+    `PERIOD` ago; ``setpoint`` is roll and pitch in rad, yaw rate in rad/s, thrust in m/s^2;
+    ``attitude`` is roll, pitch and yaw of `angles.zyx_from_quaternion`, rad; ``rates`` are the
+    body's, rad/s.
     """
     roll_i, pitch_i, yaw_i, p_i, q_i, r_i, p_before, q_before, heading = memory
     roll_set, pitch_set, yaw_dot_set, thrust = setpoint

@@ -1,29 +1,26 @@
 """What a Crazyflie can do, what its firmware lets it do, and what it is asked for at most."""
 
-FULL_PWM = 65535.0
-"""Largest command of a motor and of the radio link, 16 bits."""
+FULL_PWM = 65535.0  #: Largest command of a motor and of the radio link, 16 bits.
 
+#: Most thrust of an attitude setpoint, PWM: firmware and driver lower what is above it, and leave
+#: the rest to the attitude loops (MAX_THRUST of crtp_commander_rpyt.c).
 MAX_SETPOINT_PWM = 60000.0
-"""Most thrust of an attitude setpoint, PWM: firmware and driver lower what is above it, and
-leave the rest to the attitude loops (MAX_THRUST of crtp_commander_rpyt.c)."""
 
-MAX_TILT = 0.2618
-"""Largest roll and pitch that controllers ask for, rad (15 degrees)."""
+MAX_TILT = 0.2618  #: Largest roll and pitch that controllers ask for, rad (15 degrees).
 
+#: Most yaw rate of a control, rad/s (200 degrees/s), as of crazyflie_controller and of
+#: teleoperation.
 MAX_YAW_RATE = 3.4907
-"""Most yaw rate of a control, rad/s (200 degrees/s), as of crazyflie_controller and of
-teleoperation."""
 
+#: A vehicle that is tilted more than this, rad (60 degrees), has crashed or is about to.
 CRASH_TILT = 1.0472
-"""A vehicle that is tilted more than this, rad (60 degrees), has crashed or is about to."""
 
+#: Range of the thrust that controllers ask for in flight, m/s^2: with less a vehicle stands on the
+#: ground or has its motors off, more than that it cannot do.
 MIN_THRUST, MAX_THRUST = 4.0, 16.0
-"""Range of the thrust that controllers ask for in flight, m/s^2: with less a vehicle stands on
-the ground or has its motors off, more than that it cannot do."""
 
-MAX_SPEED = 5.0
-"""The fastest that a vehicle is believed to fly, m/s."""
+MAX_SPEED = 5.0  #: The fastest that a vehicle is believed to fly, m/s.
 
+#: Age of the last setpoint from which the firmware levels a flying vehicle out, and from which it
+#: stops its motors, s (COMMANDER_WDT_TIMEOUT_STABILIZE and _SHUTDOWN of commander.h).
 LEVEL_AGE, OFF_AGE = 0.5, 2.0
-"""Age of the last setpoint from which the firmware levels a flying vehicle out, and from which it
-stops its motors, s (COMMANDER_WDT_TIMEOUT_STABILIZE and _SHUTDOWN of commander.h)."""

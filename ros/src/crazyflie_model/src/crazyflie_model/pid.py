@@ -7,19 +7,14 @@ from crazyflie_model.elementwise import Number, clip
 
 @dataclass(frozen=True)
 class Gains:
-    """Gains of a PID controller whose derivative is that of the measurement.
+    """Gains of a PID controller whose derivative is that of the measurement."""
 
-    Attributes
-    ----------
-    kp, ki, kd : float
-        Output per error, per integral of the error, per rate of change of the measurement.
-    limit : float
-        Of the integral's magnitude, unit of the error times s. The default is the firmware's.
-    """
-
+    #: kp, ki, kd: Output per error, per integral of the error, per rate of change of the
+    #: measurement.
     kp: float
     ki: float
     kd: float
+    #: Of the integral's magnitude, unit of the error times s. The default is the firmware's.
     limit: float = 5000.0
 
 
@@ -28,18 +23,9 @@ def terms(
 ) -> tuple[Number, Number, Number, Number]:
     """Return the proportional, integral and derivative part of the output, and the integral.
 
-    Parameters
-    ----------
-    gains : Gains
-        Or any object with its attributes.
-    error : float or ndarray
-        Desired minus measured value.
-    integral : float or ndarray
-        Of the error, as returned by the last update.
-    slope : float or ndarray
-        Rate of change of the measurement.
-    dt : float
-        Time between two updates, s.
+    ``error`` is the desired minus the measured value, ``integral`` the error's, as returned by the
+    last update ``dt`` s ago, ``slope`` the rate of change of the measurement. Any object with the
+    attributes of `Gains` does.
     """
     integral = clip(integral + error * dt, -gains.limit, gains.limit)
     return gains.kp * error, gains.ki * integral, -gains.kd * slope, integral

@@ -11,18 +11,9 @@ def smooth_piece(
 ) -> PolynomialPiece:
     """Return the piece from a goal to rest at a position (m) and heading (rad).
 
-    Each axis is the polynomial of the 7th degree that meets position, velocity,
-    acceleration and jerk (zero) at both ends, heading without acceleration. From
-    rest to rest this is 35 s^4 - 84 s^5 + 70 s^6 - 20 s^7 of the way.
-
-    Parameters
-    ----------
-    start : Goal
-    position : tuple, 3 components
-    yaw : float
-        The turn is the shorter one.
-    duration : float
-        s, > 0.
+    Each axis is the polynomial of the 7th degree that meets position, velocity, acceleration and
+    jerk (zero) at both ends, heading without acceleration. From rest to rest this is 35 s^4 - 84
+    s^5 + 70 s^6 - 20 s^7 of the way. The turn is the shorter one; ``duration`` is in s, > 0.
     """
     turn = math.remainder(yaw - start.yaw, 2.0 * math.pi)
     axes = [

@@ -17,11 +17,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-COEFFICIENTS = 8
-"""Most coefficients of a polynomial, the constant first."""
-
+COEFFICIENTS = 8  #: Most coefficients of a polynomial, the constant first.
+#: Bytes of a piece in the vehicle's memory: 4 times 8 coefficients and the duration, float32.
 PIECE_SIZE = 132
-"""Bytes of a piece in the vehicle's memory: 4 times 8 coefficients and the duration, float32."""
 
 _PIECE = struct.Struct("<33f")
 
@@ -44,13 +42,8 @@ def evaluate(
 def hermite(start: ArrayLike, end: ArrayLike, duration: float) -> tuple[float, ...]:
     """Return the coefficients, the constant first, of the polynomial between two ends.
 
-    Parameters
-    ----------
-    start, end : array_like, shape (n,)
-        Value and derivatives by time; four at both ends make a polynomial of the
-        7th degree.
-    duration : float
-        Time between them, s, > 0.
+    An end is value and derivatives by time; four at both make a polynomial of the 7th degree.
+    ``duration`` is the time between them, s, > 0.
     """
     from scipy.interpolate import BPoly
 
@@ -74,19 +67,13 @@ def _power_basis(bernstein):
 
 
 class Goal(NamedTuple, Generic[Number]):
-    """Where a trajectory is at one time, or at many.
+    """Where a trajectory is at one time, or at many."""
 
-    Attributes
-    ----------
-    position, velocity, acceleration : tuple, 3 components
-        m, m/s, m/s^2.
-    yaw, yaw_rate : float or ndarray
-        rad, rad/s.
-    """
-
+    #: position, velocity, acceleration: m, m/s, m/s^2.
     position: tuple[Number, Number, Number]
     velocity: tuple[Number, Number, Number]
     acceleration: tuple[Number, Number, Number]
+    #: yaw, yaw_rate: rad, rad/s.
     yaw: Number
     yaw_rate: Number
 
@@ -99,17 +86,10 @@ def at_rest(position: Sequence[float], yaw: float = 0.0) -> Goal[float]:
 
 @dataclass(frozen=True)
 class PolynomialPiece:
-    """One piece of a trajectory: four polynomials of the time since it began.
+    """One piece of a trajectory: four polynomials of the time since it began."""
 
-    Attributes
-    ----------
-    duration : float
-        s.
-    x, y, z, yaw : sequence of float
-        Up to `COEFFICIENTS`, the constant first: m and rad, in powers of s.
-    """
-
-    duration: float
+    duration: float  #: s.
+    #: x, y, z, yaw: Up to `COEFFICIENTS`, the constant first: m and rad, in powers of s.
     x: Sequence[float]
     y: Sequence[float]
     z: Sequence[float]

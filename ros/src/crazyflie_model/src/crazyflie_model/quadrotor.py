@@ -20,11 +20,8 @@ from crazyflie_model.integrators import rk4_step
 from crazyflie_model.limits import FULL_PWM
 from crazyflie_model.units import GRAVITY, HOVER_PWM
 
-BODY_DIM = 17
-"""Components of the airframe's state."""
-
-STILL_AIR = (0.0, 0.0, 0.0)
-"""No wind, m/s."""
+BODY_DIM = 17  #: Components of the airframe's state.
+STILL_AIR = (0.0, 0.0, 0.0)  #: No wind, m/s.
 
 
 @dataclass(frozen=True)
@@ -39,39 +36,25 @@ class QuadrotorParameters:
     quadrocopter, bachelor thesis, ETH Zurich, 2015.
     [B] Bitcraze, Crazyflie 2.1 data sheet, and the firmware's constants, which
     agree with [F] in the torque of a rotor. [L] has four times as much.
-
-    Attributes
-    ----------
-    mass : float
-        kg, with battery [B, L].
-    inertia_x, inertia_y, inertia_z : float
-        Principal moments about forward, left and up, kg m^2 [L].
-    arm : float
-        From the centre to a rotor's axis, m: half of motor to motor [B].
-    thrust_constant : float
-        Thrust of a rotor over its speed squared, N s^2 [L].
-    torque_per_thrust : float
-        Torque of a rotor over its thrust, m [F].
-    drag_horizontal, drag_vertical : float
-        Drag over airspeed over the sum of the rotor speeds, across and along
-        the rotors' axes, kg [F].
-    motor_time_constant : float
-        Of the first-order lag between commanded and true speed, s [F: discrete
-        pole at 0.9695404 with 500 Hz].
-    max_rotor_speed : float
-        rad/s [L, at full PWM].
     """
 
-    mass: float = 0.027
+    mass: float = 0.027  #: kg, with battery [B, L].
+    #: inertia_x, inertia_y, inertia_z: Principal moments about forward, left and up, kg m^2 [L].
     inertia_x: float = 1.395e-5
     inertia_y: float = 1.436e-5
     inertia_z: float = 2.173e-5
-    arm: float = 0.046
+    arm: float = 0.046  #: From the centre to a rotor's axis, m: half of motor to motor [B].
+    #: Thrust of a rotor over its speed squared, N s^2 [L].
     thrust_constant: float = 3.1582e-10 * (30.0 / math.pi) ** 2
-    torque_per_thrust: float = 0.005964552
+    torque_per_thrust: float = 0.005964552  #: Torque of a rotor over its thrust, m [F].
+    #: drag_horizontal, drag_vertical: Drag over airspeed over the sum of the rotor speeds, across
+    #: and along the rotors' axes, kg [F].
     drag_horizontal: float = 9.1785e-7
     drag_vertical: float = 10.311e-7
+    #: Of the first-order lag between commanded and true speed, s [F: discrete pole at 0.9695404
+    #: with 500 Hz].
     motor_time_constant: float = -0.002 / math.log(0.9695404)
+    #: rad/s [L, at full PWM].
     max_rotor_speed: float = (0.2685 * FULL_PWM + 4070.3) * math.pi / 30.0
 
     @cached_property
@@ -101,8 +84,7 @@ class QuadrotorParameters:
         )
 
 
-CRAZYFLIE = QuadrotorParameters()
-"""The Crazyflie 2.1."""
+CRAZYFLIE = QuadrotorParameters()  #: The Crazyflie 2.1.
 
 
 class Airframe:
@@ -183,19 +165,11 @@ class Airframe:
     def step(
         self, t: float, x: Vector[Number], rotor_speeds: Vector[Number], wind: Triple, dt: float
     ) -> Vector[Number]:
-        """Return the state one step later, with the quaternion of norm 1, on or above ground.
+        """Return the state (17 components) ``dt`` s later, with the quaternion of norm 1.
 
-        Parameters
-        ----------
-        t : float
-            Time at the beginning of the step, s.
-        x : list, 17 components
-        rotor_speeds : list, 4 components
-            Commanded, rad/s; limited to what the motors can do.
-        wind : tuple, 3 components
-            Velocity of the air in the fixed frame, m/s.
-        dt : float
-            Step, s.
+        The vehicle stays on or above the ground. ``t`` is the time at the beginning, s;
+        ``rotor_speeds`` are commanded, rad/s, and limited to what the motors can do; ``wind`` is
+        the velocity of the air in the fixed frame, m/s.
         """
         top = self.parameters.max_rotor_speed
         commands: Vector[Number] = [clip(speed, 0.0, top) for speed in rotor_speeds]

@@ -8,13 +8,7 @@ from crazyflie_model import inner_loops
 from crazyflie_model.angles import Quaternion, Triple, zyx_from_quaternion
 from crazyflie_model.dynamics import STEP, Dynamics
 from crazyflie_model.elementwise import Number, Vector, where
-from crazyflie_model.quadrotor import (
-    BODY_DIM,
-    CRAZYFLIE,
-    STILL_AIR,
-    Airframe,
-    QuadrotorParameters,
-)
+from crazyflie_model.quadrotor import BODY_DIM, CRAZYFLIE, STILL_AIR, Airframe, QuadrotorParameters
 
 _STEPS_PER_SAMPLE = round(inner_loops.PERIOD / STEP)
 

@@ -38,9 +38,9 @@ class SupervisorState(enum.IntFlag):
         return bool(self & reported)
 
     @property
-    def is_unable_to_fly(self) -> bool:
-        """Whether the vehicle cannot take off before it is put upright or restarted."""
-        return bool(self & (self.TUMBLED | self.LOCKED | self.CRASHED))
+    def faults(self) -> "SupervisorState":
+        """Flags with which the vehicle cannot take off before it is put upright or restarted."""
+        return self & (self.TUMBLED | self.LOCKED | self.CRASHED)
 
     def words(self) -> str:
         """Return the state in words, such as "armed, flying"."""

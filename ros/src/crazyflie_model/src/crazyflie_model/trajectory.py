@@ -8,8 +8,8 @@ from crazyflie_model.angles import Triple
 from crazyflie_model.elementwise import Number, clip, where
 from crazyflie_model.polynomials import Goal, PolynomialPiece
 
+#: Flown one after the other: as in the CSV files of crazyflie_demo and in a vehicle's memory.
 Pieces = Sequence[PolynomialPiece]
-"""Flown one after the other: as in the CSV files of crazyflie_demo and in a vehicle's memory."""
 
 
 def minimum_jerk(s: Number) -> tuple[Number, Number]:
@@ -71,21 +71,11 @@ def turned(pieces: Pieces, pivot: Triple, angle: float) -> list[PolynomialPiece]
 
 @dataclass(frozen=True)
 class Trajectory:
-    """Pieces flown one after the other, then rest at the last position.
+    """Pieces flown one after the other, then rest at the last position."""
 
-    Attributes
-    ----------
-    pieces : sequence of PolynomialPiece
-        At least one.
-    time_scale : float
-        > 0; 2 is half as fast.
-    backwards : bool
-        From the end to the beginning.
-    """
-
-    pieces: Pieces
-    time_scale: float = 1.0
-    backwards: bool = False
+    pieces: Pieces  #: At least one.
+    time_scale: float = 1.0  #: > 0; 2 is half as fast.
+    backwards: bool = False  #: From the end to the beginning.
 
     @property
     def duration(self) -> float:

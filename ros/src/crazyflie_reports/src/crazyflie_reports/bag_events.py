@@ -12,11 +12,8 @@ from typing import Any
 
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
 
-MERGE_TIME = 1.0
-"""The same event within this time of the last counts as one, s."""
-
-MAX_EVENTS = 20_000
-"""Of a bag; more are only counted."""
+MERGE_TIME = 1.0  #: The same event within this time of the last counts as one, s.
+MAX_EVENTS = 20_000  #: Of a bag; more are only counted.
 
 _WARN, _ERROR = 4, 8  # Levels of rosgraph_msgs/Log.
 
@@ -37,46 +34,25 @@ class Kind(Enum):
 
 @dataclass
 class Event:
-    """Something that happened.
+    """Something that happened."""
 
-    Attributes
-    ----------
-    time : float
-        s, when it was recorded.
-    namespace : str
-        Of the node or topic that it comes from.
-    kind : Kind
-    text : str
-    count : int
-        How many times in succession.
-    """
-
-    time: float
-    namespace: str
+    time: float  #: s, when it was recorded.
+    namespace: str  #: Of the node or topic that it comes from.
     kind: Kind
     text: str
-    count: int = 1
+    count: int = 1  #: How many times in succession.
 
 
 class EventLog:
-    """Events, collected from messages in the order of their times.
-
-    Attributes
-    ----------
-    events : list of Event
-    dropped : int
-        Those beyond `MAX_EVENTS`.
-    flight_states : dict
-        By namespace, times (s) and states of the flight (constants of FlightStatus).
-    links : dict
-        By namespace, one after the other: time (s), share of answered pings, and setpoints that
-        were not sent so far.
-    """
+    """Events, collected from messages in the order of their times."""
 
     def __init__(self) -> None:
         self.events: list[Event] = []
-        self.dropped = 0
+        self.dropped = 0  #: Those beyond `MAX_EVENTS`.
+        #: By namespace, times (s) and states of the flight (constants of FlightStatus).
         self.flight_states: dict[str, list[tuple[float, int]]] = defaultdict(list)
+        #: By namespace, one after the other: time (s), share of answered pings, and setpoints that
+        #: were not sent so far.
         self.links: dict[str, array[float]] = defaultdict(lambda: array("d"))
         self._last: dict[Any, Any] = {}
         self._latest: dict[tuple[str, Kind, str], tuple[float, Event]] = {}
@@ -193,16 +169,7 @@ class EventLog:
 
 
 def concerning(events: list[Event], name: str, others: set[str]) -> Iterator[Event]:
-    """Yield the events of a vehicle, and those that are no other vehicle's.
-
-    Parameters
-    ----------
-    events : list of Event
-    name : str
-        The vehicle's namespace.
-    others : set of str
-        The namespaces of all other vehicles.
-    """
+    """Yield the events of a vehicle, and those that are no other vehicle's, by namespaces."""
     for event in events:
         words = {
             word.split("/")[0] for word in re.findall(r"[\w/]+", event.text.replace(" /", " "))

@@ -19,8 +19,7 @@ MAGIC = b"#ROSBAG V2.0\n"
 
 _MESSAGE, _BAG_HEADER, _CHUNK, _CONNECTION = b"\x02", b"\x03", b"\x05", b"\x07"
 
-_LARGEST_HEADER = 1 << 20
-"""Longer headers of records, bytes, are no headers: the file is damaged."""
+_LARGEST_HEADER = 1 << 20  #: Longer headers of records, bytes, are no headers: the file is damaged.
 
 _UINT32 = struct.Struct("<I")
 _UINT64 = struct.Struct("<Q")
@@ -37,14 +36,10 @@ class _BrokenOffError(Exception):
 
 @dataclass(frozen=True)
 class Connection:
-    """A topic of one publisher.
+    """A topic of one publisher."""
 
-    Attributes
-    ----------
-    topic, datatype, md5sum, definition : str
-        As the publisher named them; the definition is the text of the message file.
-    """
-
+    #: topic, datatype, md5sum, definition: As the publisher named them; the definition is the text
+    #: of the message file.
     topic: str
     datatype: str
     md5sum: str
@@ -54,27 +49,13 @@ class Connection:
 class BagFile:
     """A bag file that is read once, from its beginning.
 
-    Parameters
-    ----------
-    path : Path
-
-    Attributes
-    ----------
-    connections : list of Connection
-        Those that have been met so far.
-    interruption : str
-        Why reading has ended early; empty if it has not.
-
-    Raises
-    ------
-    BagError
-        There is no such file, or it is not a bag of format 2.0.
+    `BagError`: there is no such file, or it is not a bag of format 2.0.
     """
 
     def __init__(self, path: Path):
         self._path = path
-        self.connections: list[Connection] = []
-        self.interruption = ""
+        self.connections: list[Connection] = []  #: Those that have been met so far.
+        self.interruption = ""  #: Why reading has ended early; empty if it has not.
         self._by_id: dict[bytes, Connection] = {}
         try:
             with path.open("rb") as file:

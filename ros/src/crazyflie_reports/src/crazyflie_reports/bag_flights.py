@@ -10,14 +10,9 @@ from crazyflie_reports.bag_events import Event
 from crazyflie_reports.bag_vehicles import Rows, Vehicle
 from crazyflie_reports.flight_record import CONTROL_FIELDS, STATE_FIELDS, FlightRecord, Series
 
-PAUSE = 1.0
-"""Without thrust for longer than this, s, a flight is over."""
-
-LIFT = 0.1
-"""A vehicle of which only poses are known flies this high above the lowest, m."""
-
-MARGIN = 1.0
-"""What is shown of the time before and after a flight, s."""
+PAUSE = 1.0  #: Without thrust for longer than this, s, a flight is over.
+LIFT = 0.1  #: A vehicle of which only poses are known flies this high above the lowest, m.
+MARGIN = 1.0  #: What is shown of the time before and after a flight, s.
 
 PHASES = {
     FlightStatus.UNKNOWN: "unknown",
@@ -39,36 +34,19 @@ class Phase:
 
 @dataclass
 class Flight:
-    """A flight of a vehicle.
+    """A flight of a vehicle."""
 
-    Attributes
-    ----------
-    vehicle : str
-        Its name.
-    number : int
-        Of the vehicle's flights in the recording, from 1.
-    phases : list of Phase
-    record : FlightRecord
-        With `MARGIN` before and after.
-    attitude, battery, link, delays : ndarray
-        As in `Vehicle`.
-    lost : int or None
-        As in `Vehicle`.
-    is_driven : bool
-        As in `Vehicle`.
-    events : list of Event
-    """
-
-    vehicle: str
-    number: int
+    vehicle: str  #: Its name.
+    number: int  #: Of the vehicle's flights in the recording, from 1.
     phases: list[Phase]
-    record: FlightRecord
+    record: FlightRecord  #: With `MARGIN` before and after.
+    #: attitude, battery, link, delays: As in `Vehicle`.
     attitude: Rows
     battery: Rows
     link: Rows
     delays: Rows
-    lost: int | None
-    is_driven: bool
+    lost: int | None  #: As in `Vehicle`.
+    is_driven: bool  #: As in `Vehicle`.
     events: list[Event]
 
     @property
@@ -83,23 +61,13 @@ class Flight:
 
 
 def flights(
-    vehicle: Vehicle,
-    states: list[tuple[float, int]],
-    events: list[Event],
-    end: float,
+    vehicle: Vehicle, states: list[tuple[float, int]], events: list[Event], end: float
 ) -> Iterator[Flight]:
-    """Yield the flights of a vehicle.
+    """Yield the flights of a vehicle, from the events that concern it.
 
-    Parameters
-    ----------
-    vehicle : Vehicle
-    states : list
-        Times (s) and states of its flight, as the takeoff server has published them; where there
-        are none, the phases follow from in_flight, thrust and height.
-    events : list of Event
-        That concern the vehicle.
-    end : float
-        Of the recording, s.
+    ``states`` are times (s) and states of its flight, as the takeoff server has published them;
+    where there are none, the phases follow from in_flight, thrust and height. ``end`` is that of
+    the recording, s.
     """
     known = _phases(sorted(states), end) if states else _guessed(vehicle)
     lasting = (phases for phases in known if phases[-1].end > phases[0].start)

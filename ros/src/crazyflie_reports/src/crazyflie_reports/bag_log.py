@@ -21,36 +21,22 @@ from crazyflie_reports.bag_topics import (
     transform_row,
 )
 
-POSE_PERIOD = 0.009
-"""Of transforms, which may come at 1 kHz, one in this time is kept, s."""
+POSE_PERIOD = 0.009  #: Of transforms, which may come at 1 kHz, one in this time is kept, s.
 
 _BUFFER = 8192  # Numbers.
 
 
 class Spool:
-    """Rows of numbers, of which only the newest are in memory.
+    """Rows of numbers, of which only the newest are in memory, and the others in a file.
 
     Each begins with the time of recording (s), the stamp (s; 0 without one) and the number in
-    sequence.
-
-    Parameters
-    ----------
-    path : Path
-        Of a file that is made when it is needed.
-    fields : tuple of str
-        What a row has behind these three.
-
-    Attributes
-    ----------
-    fields : tuple of str
-    count : int
-        Of rows.
+    sequence; then it has ``fields``. The file is made when it is needed.
     """
 
     def __init__(self, path: Path, fields: tuple[str, ...]):
         self._path, self.fields = path, fields
         self._buffer = array("d")
-        self.count = 0
+        self.count = 0  #: Of rows.
         self.last_time = float("-inf")
 
     def append(self, time: float, stamp: float, number: int, row: Sequence[float]) -> None:
@@ -75,14 +61,7 @@ class Spool:
 
 @dataclass
 class Source:
-    """The series of a topic.
-
-    Attributes
-    ----------
-    topic, namespace : str
-    role : Role
-    spool : Spool
-    """
+    """The series of a topic."""
 
     topic: str
     namespace: str
@@ -92,39 +71,22 @@ class Source:
 
 @dataclass
 class BagLog:
-    """What a recording has for a report.
+    """What a recording has for a report."""
 
-    Attributes
-    ----------
-    name : str
-        Of the recording.
-    sources : dict of str to Source
-        By topic.
-    frames : dict of str to Spool
-        `POSE_FIELDS` by child frame of /tf.
-    events : EventLog
-    start, end : float
-        Times of the first and the last message that was read, s.
-    remarks : list of str
-        What is missing, or could not be read.
-    """
-
-    name: str
-    sources: dict[str, Source] = field(default_factory=dict)
-    frames: dict[str, Spool] = field(default_factory=dict)
+    name: str  #: Of the recording.
+    sources: dict[str, Source] = field(default_factory=dict)  #: By topic.
+    frames: dict[str, Spool] = field(default_factory=dict)  #: `POSE_FIELDS` by child frame of /tf.
     events: EventLog = field(default_factory=EventLog)
+    #: start, end: Times of the first and the last message that was read, s.
     start: float = float("inf")
     end: float = float("-inf")
-    remarks: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)  #: What is missing, or could not be read.
 
 
 def files_of(path: Path) -> list[Path]:
     """Return the files of a recording: those of a folder in their order, or the file itself.
 
-    Raises
-    ------
-    BagError
-        There is no such file or folder, or no bag in the folder.
+    `BagError`: there is no such file or folder, or no bag in the folder.
     """
     if path.is_file():
         return [path]
@@ -148,23 +110,11 @@ def read(
     names: dict[str, str] | None = None,
     progress: Callable[[int], Any] = lambda size: None,
 ) -> BagLog:
-    """Read a recording.
+    """Read a recording: a bag, or a folder of bags that follow each other.
 
-    Parameters
-    ----------
-    path : Path
-        Of a bag, or of a folder of bags that follow each other.
-    folder : Path
-        Where series that are too long for memory are kept as long as the log is used.
-    names : dict, optional
-        By role, a regular expression of topics in place of the documented ones.
-    progress : callable, optional
-        Called with numbers of bytes.
-
-    Raises
-    ------
-    BagError
-        It cannot be read, or has none of the topics.
+    Series that are too long for memory are kept in ``folder`` as long as the log is used. ``names``
+    has, by role, regular expressions of topics in place of the documented ones; ``progress`` is
+    called with numbers of bytes. `BagError`: it cannot be read, or has none of the topics.
     """
     log = BagLog(path.name)
     reader = _Reader(log, folder, names or {})

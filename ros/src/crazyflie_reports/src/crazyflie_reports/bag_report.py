@@ -40,16 +40,10 @@ def flights_of(log: bag_log.BagLog) -> Iterator[Flight]:
 
 
 class Report:
-    """A report on recordings, which grows with each that is added.
-
-    Attributes
-    ----------
-    recordings : list of dict
-        As `report_page.page` takes them.
-    """
+    """A report on recordings, which grows with each that is added."""
 
     def __init__(self) -> None:
-        self.recordings: list[dict[str, Any]] = []
+        self.recordings: list[dict[str, Any]] = []  #: As `report_page.page` takes them.
         self._flights: list[tuple[dict[str, Any], list[Figure]]] = []
 
     def add(self, log: bag_log.BagLog) -> None:
@@ -127,19 +121,8 @@ class Report:
 def make(paths: list[Path], folder: Path, names: dict[str, str] | None = None) -> list[str]:
     """Write a report on recordings; return what went wrong with any of them.
 
-    Parameters
-    ----------
-    paths : list of Path
-        Bags, or folders of bags that follow each other.
-    folder : Path
-        Of the report.
-    names : dict, optional
-        As in `bag_log.read`.
-
-    Raises
-    ------
-    ReportError
-        None of the recordings can be read, or the folder cannot be written.
+    A path is a bag, or a folder of bags that follow each other; for ``names`` see `bag_log.read`.
+    `ReportError`: none of the recordings can be read, or the folder cannot be written.
     """
     report, problems = Report(), []
     try:

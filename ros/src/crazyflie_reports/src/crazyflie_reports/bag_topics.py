@@ -25,23 +25,12 @@ Row = Sequence[float]
 
 @dataclass(frozen=True)
 class Role:
-    """A series of numbers that topics of some names and types are for a vehicle.
-
-    Attributes
-    ----------
-    name : str
-    topics : str
-        Regular expression of the name below the vehicle's namespace.
-    fields : tuple of str
-        Of a row.
-    rows : dict
-        By type, what makes a row of a message.
-    """
+    """A series of numbers that topics of some names and types are for a vehicle."""
 
     name: str
-    topics: str
-    fields: tuple[str, ...]
-    rows: dict[str, Callable[[Any], Row]]
+    topics: str  #: Regular expression of the name below the vehicle's namespace.
+    fields: tuple[str, ...]  #: Of a row.
+    rows: dict[str, Callable[[Any], Row]]  #: By type, what makes a row of a message.
 
 
 def _of_pose(pose):
@@ -114,6 +103,7 @@ ROLES = (
     Role("toggle", "in_flight", (), {"std_msgs/Empty": lambda message: ()}),
 )
 
+#: Types that are not series, with the names of their topics below a namespace.
 EVENT_TYPES = {
     "crazyflie_msgs/FlightStatus": r".*flight_status",
     "crazyflie_msgs/FilterStatus": r".*filter_status",
@@ -124,36 +114,26 @@ EVENT_TYPES = {
     "tf2_msgs/TFMessage": r"tf",
     "tf/tfMessage": r"tf",
 }
-"""Types that are not series, with the names of their topics below a namespace."""
 
+#: Numbers behind the header: these frequent messages are decoded without an object.
 FLOATS = {
     "crazyflie_msgs/ControlStamped": 4,
     "crazyflie_msgs/PositionVelocityStateStamped": 6,
     "crazyflie_msgs/PositionVelocityYawStateStamped": 7,
     "crazyflie_msgs/FullStateStamped": 12,
 }
-"""Numbers behind the header: these frequent messages are decoded without an object."""
 
 _HEADER = struct.Struct("<III")
 
 
 @dataclass(frozen=True)
 class Topic:
-    """How messages of a connection are read.
+    """How messages of a connection are read."""
 
-    Attributes
-    ----------
-    namespace : str
-        Of the vehicle, without slashes at its ends.
-    role : Role or None
-        None for messages that are events.
-    decode : callable
-        ``decode(data)`` returns stamp (s, 0 without one), number in sequence, and a row or,
-        without a role, the message.
-    """
-
-    namespace: str
-    role: Role | None
+    namespace: str  #: Of the vehicle, without slashes at its ends.
+    role: Role | None  #: None for messages that are events.
+    #: ``decode(data)`` returns stamp (s, 0 without one), number in sequence, and a row or, without
+    #: a role, the message.
     decode: Callable[[bytes], tuple[float, int, Any]]
 
 
@@ -164,16 +144,7 @@ class TopicError(Exception):
 def topic_of(connection: Connection, names: dict[str, str]) -> Topic | None:
     """Return how a connection is read; None if a report does not need it.
 
-    Parameters
-    ----------
-    connection : Connection
-    names : dict
-        By role, a regular expression of names in place of the documented ones.
-
-    Raises
-    ------
-    TopicError
-        Its type has another definition here.
+    For ``names`` see `bag_log.read`. `TopicError`: its type has another definition here.
     """
     for role in ROLES:
         namespace = _namespace(connection.topic, names.get(role.name, role.topics))

@@ -14,8 +14,7 @@ Rows = NDArray[np.float64]
 
 _TIME, _STAMP, _NUMBER, _FIRST = 0, 1, 2, 3  # Columns of a spool.
 
-OTHER_CLOCK = 10.0
-"""Stamps that are further from the time of recording, s, are another clock's."""
+OTHER_CLOCK = 10.0  #: Stamps that are further from the time of recording, s, are another clock's.
 
 
 @dataclass
@@ -24,43 +23,21 @@ class Vehicle:
 
     Each array has a time of recording (s) in its first column and the fields that are named here
     in the others; there may be no rows.
-
-    Attributes
-    ----------
-    name : str
-        Its namespace, or, where it has none, the frame of /tf.
-    namespace : str
-    is_driven : bool
-        A driver has sent its controls: it is no simulated one.
-    state, reference : ndarray
-        STATE_FIELDS; velocities and yaw may be NaN.
-    control : ndarray
-        CONTROL_FIELDS.
-    attitude : ndarray
-        POSE_FIELDS.
-    battery : ndarray
-        V.
-    link : ndarray
-        Share of answered pings, and setpoints that were not sent so far.
-    toggles : ndarray
-        Without fields.
-    delays : ndarray
-        From the stamp of the newest pose to each control, s.
-    lost : int or None
-        States that were published and not recorded; None without numbers in sequence.
     """
 
-    name: str
+    name: str  #: Its namespace, or, where it has none, the frame of /tf.
     namespace: str
-    is_driven: bool
+    is_driven: bool  #: A driver has sent its controls: it is no simulated one.
+    #: state, reference: STATE_FIELDS; velocities and yaw may be NaN.
     state: Rows
     reference: Rows
-    control: Rows
-    attitude: Rows
-    battery: Rows
-    link: Rows
-    toggles: Rows
-    delays: Rows
+    control: Rows  #: CONTROL_FIELDS.
+    attitude: Rows  #: POSE_FIELDS.
+    battery: Rows  #: V.
+    link: Rows  #: Share of answered pings, and setpoints that were not sent so far.
+    toggles: Rows  #: Without fields.
+    delays: Rows  #: From the stamp of the newest pose to each control, s.
+    #: States that were published and not recorded; None without numbers in sequence.
     lost: int | None
 
 

@@ -18,45 +18,26 @@ from crazyflie_reports.flight_report import (
     TOUCHDOWN_LIMIT,
 )
 
+#: Largest distance of a real or virtual vehicle from its hover point, m: motion capture, trim and
+#: propellers are not ideal.
 HARDWARE_TOLERANCE = 0.05
-"""Largest distance of a real or virtual vehicle from its hover point, m: motion capture, trim and
-propellers are not ideal."""
 
-HOVER_TIME_LIMIT = 8.0
-"""The takeoff server's 1 s of open loop and 5 s of hover, and 2 s more, s."""
-
-TRACKING_LIMIT = 0.2
-"""Largest distance from a moving reference, m."""
-
-DELAY_LIMIT = 0.02
-"""95 % of the controls follow the pose within this time, s."""
-
-LEAST_RATE = 50.0
-"""Of states and controls, Hz; at lower ones velocities are poor."""
-
-GAP_LIMIT = 0.1
-"""Without a new state for longer than this the vehicle is not controlled, s."""
-
-LEAST_VOLTAGE = 3.2
-"""Of one lithium polymer cell under load, V."""
+HOVER_TIME_LIMIT = 8.0  #: The takeoff server's 1 s of open loop and 5 s of hover, and 2 s more, s.
+TRACKING_LIMIT = 0.2  #: Largest distance from a moving reference, m.
+DELAY_LIMIT = 0.02  #: 95 % of the controls follow the pose within this time, s.
+LEAST_RATE = 50.0  #: Of states and controls, Hz; at lower ones velocities are poor.
+GAP_LIMIT = 0.1  #: Without a new state for longer than this the vehicle is not controlled, s.
+LEAST_VOLTAGE = 3.2  #: Of one lithium polymer cell under load, V.
 
 
 @dataclass(frozen=True)
 class Figure:
-    """A number that describes a flight.
-
-    Attributes
-    ----------
-    name, unit : str
-    value : float
-        NaN if it is not known.
-    minimum, maximum : float
-        What is normal, if that is limited.
-    """
+    """A number that describes a flight."""
 
     name: str
     unit: str
-    value: float
+    value: float  #: NaN if it is not known.
+    #: minimum, maximum: What is normal, if that is limited.
     minimum: float = -math.inf
     maximum: float = math.inf
 

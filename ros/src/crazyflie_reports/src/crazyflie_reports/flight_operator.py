@@ -23,16 +23,9 @@ class FlightError(Exception):
 class FlightOperator:
     """Takes off, hovers and lands through a vehicle's services, and records the flight.
 
-    Parameters
-    ----------
-    process : Process
-        Not started yet.
-    namespace : str
-        Of the vehicle's topics and services: of takeoff, land, state and so on.
-    limit : float
-        The longest that anything may take, s of the machine's clock.
-    start : bool
-        Start the process; where several operators share it, the last one does.
+    The process is not started yet; where several operators share it, the last one does (``start``).
+    ``namespace`` is that of the vehicle's topics and services; nothing may take longer than
+    ``limit``, s of the machine's clock.
     """
 
     def __init__(

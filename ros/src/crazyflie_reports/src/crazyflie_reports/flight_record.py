@@ -10,11 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 STATE_FIELDS = ("x", "y", "z", "x_dot", "y_dot", "z_dot", "yaw")
 CONTROL_FIELDS = ("roll", "pitch", "yaw_dot", "thrust")
 
-GROUND_TOLERANCE = 0.01
-"""A vehicle below this height stands on the ground, m."""
-
-AT_POINT = 0.001
-"""References closer to a point than this lead to it, m."""
+GROUND_TOLERANCE = 0.01  #: A vehicle below this height stands on the ground, m.
+AT_POINT = 0.001  #: References closer to a point than this lead to it, m.
 
 
 class Series:
@@ -76,24 +73,15 @@ class Series:
 
 @dataclass
 class FlightRecord:
-    """Messages and events of one flight; times in s of ROS time.
+    """Messages and events of one flight; times in s of ROS time."""
 
-    Attributes
-    ----------
-    state, final_control, takeoff_control, reference : Series
-        What was published on these topics.
-    toggles : list of float
-        When in_flight was toggled.
-    events : dict
-        When something was done: "takeoff" and "land" (called), "flying" and
-        "landed" (answered).
-    """
-
+    #: state, final_control, takeoff_control, reference: What was published on these topics.
     state: Series = field(default_factory=lambda: Series(STATE_FIELDS))
     final_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     takeoff_control: Series = field(default_factory=lambda: Series(CONTROL_FIELDS))
     reference: Series = field(default_factory=lambda: Series(STATE_FIELDS[:6]))
-    toggles: list[float] = field(default_factory=list)
+    toggles: list[float] = field(default_factory=list)  #: When in_flight was toggled.
+    #: When something was done: "takeoff" and "land" (called), "flying" and "landed" (answered).
     events: dict[str, float] = field(default_factory=dict)
 
     def position_error(self, point: ArrayLike) -> NDArray[np.float64]:
@@ -144,10 +132,7 @@ class FlightRecord:
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
         """Return mean and maximum distance (m) from a point for ``duration`` s until `hover_end`.
 
-        Raises
-        ------
-        ValueError
-            No state was recorded in that time.
+        ValueError: no state was recorded in that time.
         """
         times, errors = self._hover(point)
         errors = errors[times >= self.hover_end(point) - duration]
@@ -158,12 +143,8 @@ class FlightRecord:
     def touchdown_speed(self) -> float:
         """Return the downward speed at which the vehicle met the ground (m/s).
 
-        The fastest of the last tenth of a second above `GROUND_TOLERANCE`.
-
-        Raises
-        ------
-        ValueError
-            It did not come down.
+        The fastest of the last tenth of a second above `GROUND_TOLERANCE`. ValueError: it did not
+        come down.
         """
         times, heights = self.state.times, self.state.column("z")
         descending = np.flatnonzero((times >= self.events["land"]) & (heights > GROUND_TOLERANCE))

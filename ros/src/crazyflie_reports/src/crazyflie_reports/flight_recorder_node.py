@@ -34,19 +34,11 @@ class FlightRecorderParameters(Parameters):
 
 
 class FlightRecorderNode(Node):
-    """Record the topics of a flight; by default those of the examples in its namespace.
-
-    Attributes
-    ----------
-    record : FlightRecord
-        What has been received so far.
-    received : threading.Condition
-        Notified after every message.
-    """
+    """Record the topics of a flight; by default those of the examples in its namespace."""
 
     def __init__(self) -> None:
-        self.record = FlightRecord()
-        self.received = threading.Condition()
+        self.record = FlightRecord()  #: What has been received so far.
+        self.received = threading.Condition()  #: Notified after every message.
         self._stopped = False
 
     @override

@@ -5,46 +5,24 @@ from dataclasses import dataclass
 
 from crazyflie_reports.flight_record import GROUND_TOLERANCE, FlightRecord
 
-HOVER_TOLERANCE = 0.01
-"""Largest distance from the hover point of a good flight, m."""
-
-HOVER_WINDOW = 5.0
-"""Time before the end of the hover from which its error is taken, s."""
-
-OVERSHOOT_LIMIT = 0.1
-"""How far a good flight may rise above the hover point, m."""
-
-TOUCHDOWN_LIMIT = 0.5
-"""Fastest touchdown of a good flight, m/s."""
+HOVER_TOLERANCE = 0.01  #: Largest distance from the hover point of a good flight, m.
+HOVER_WINDOW = 5.0  #: Time before the end of the hover from which its error is taken, s.
+OVERSHOOT_LIMIT = 0.1  #: How far a good flight may rise above the hover point, m.
+TOUCHDOWN_LIMIT = 0.5  #: Fastest touchdown of a good flight, m/s.
 
 
 @dataclass(frozen=True)
 class FlightReport:
-    """Figures of one flight from /takeoff to /land.
+    """Figures of one flight from /takeoff to /land."""
 
-    Attributes
-    ----------
-    time_to_hover : float
-        From the call of /takeoff until it stayed within `HOVER_TOLERANCE`, s.
-    overshoot : float
-        Above the hover height, m.
-    hover_error_mean, hover_error_max : float
-        Distance from the hover point at the end of the hover, m.
-    touchdown_speed : float
-        m/s.
-    final_height : float
-        m.
-    final_thrust : float
-        m/s^2.
-    """
-
-    time_to_hover: float
-    overshoot: float
+    time_to_hover: float  #: From the call of /takeoff until it stayed within `HOVER_TOLERANCE`, s.
+    overshoot: float  #: Above the hover height, m.
+    #: hover_error_mean, hover_error_max: Distance from the hover point at the end of the hover, m.
     hover_error_mean: float
     hover_error_max: float
-    touchdown_speed: float
-    final_height: float
-    final_thrust: float
+    touchdown_speed: float  #: m/s.
+    final_height: float  #: m.
+    final_thrust: float  #: m/s^2.
 
     @classmethod
     def of(

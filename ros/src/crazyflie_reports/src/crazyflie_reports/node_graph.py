@@ -15,11 +15,12 @@ import rosgraph
 
 from crazyflie_utils.testing.launching import roslaunch
 
+#: Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them.
 Registrations = list[tuple[str, list[str]]]
-"""Topics, each with its nodes, as `rosgraph.Master.getSystemState` gives them."""
 
 HIDDEN_TOPICS = ("/rosout", "/rosout_agg", "/clock", "/tf_static")
 HIDDEN_NODES = {"/rosout"}
+#: Nodes of the software example.
 EXAMPLE = {
     "/simulator",
     "/state_estimator",
@@ -28,13 +29,12 @@ EXAMPLE = {
     "/takeoff_control_filter",
     "/robot_base_link_publisher",
 }
-"""Nodes of the software example."""
 
 _LIMIT = 60.0
 
+#: A graph that has not changed for this long, in s, is complete: nodes register their topics one by
+#: one.
 _QUIET = 2.0
-"""A graph that has not changed for this long, in s, is complete: nodes register their
-topics one by one."""
 
 
 def dot(published: Registrations, subscribed: Registrations) -> str:
@@ -43,10 +43,7 @@ def dot(published: Registrations, subscribed: Registrations) -> str:
         {topic: set(nodes) - HIDDEN_NODES for topic, nodes in part if topic not in HIDDEN_TOPICS}
         for part in (published, subscribed)
     )
-    lines = [
-        "digraph {",
-        '  rankdir=LR; bgcolor=white; node [fontname="Helvetica", fontsize=11];',
-    ]
+    lines = ["digraph {", '  rankdir=LR; bgcolor=white; node [fontname="Helvetica", fontsize=11];']
     nodes: set[str] = set()
     edges = []
     for topic in sorted(sources.keys() & sinks.keys()):
@@ -61,10 +58,7 @@ def dot(published: Registrations, subscribed: Registrations) -> str:
 def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
     """Return publications and subscriptions once all ``expected`` nodes have registered theirs.
 
-    Raises
-    ------
-    TimeoutError
-        They are not, after some time.
+    TimeoutError: they are not, after some time.
     """
     master = rosgraph.Master("/node_graph")
     deadline = time.monotonic() + _LIMIT
@@ -85,10 +79,7 @@ def running_graph(expected: set[str]) -> tuple[Registrations, Registrations]:
 def example_graph() -> tuple[Registrations, Registrations]:
     """Launch the software example, and return its publications and subscriptions.
 
-    Raises
-    ------
-    TimeoutError
-        Not all nodes are there after some time.
+    TimeoutError: not all nodes are there after some time.
     """
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "sw_hover.log"

@@ -17,16 +17,15 @@ import roslib.packages
 import rosparam
 import rospkg
 
+#: Regular expression of what is recorded: what examples and drivers document, without images.
 TOPICS = (
     r"/tf(_static)?|/diagnostics|/rosout|/flights|(/.*)?/("
     r"(full_)?state|state/full_state|ref(/.*)?|ref_descent|control/(lqr|takeoff|merged|final)|in_flight(_.*)?"
     r"|pose|goal|cmd_[a-z_]+|external_(pose|position)|battery|rssi|imu|connected|status|vehicle_status"
     r"|parameter_updates)"
 )
-"""Regular expression of what is recorded: what examples and drivers document, without images."""
 
-MAX_SIZE = 1024
-"""Of a bag, MB; then the next one begins."""
+MAX_SIZE = 1024  #: Of a bag, MB; then the next one begins.
 
 PARAMETERS = "parameters.yaml"
 
@@ -34,14 +33,8 @@ PARAMETERS = "parameters.yaml"
 def record(folder: Path, topics: str, ros_arguments: list[str]) -> int:
     """Record until the process is told to stop; say what there is then; return the exit status.
 
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    topics : str
-        Regular expression.
-    ros_arguments : list of str
-        For the recording node: its name, remappings.
+    The folder is made if it is not there; ``topics`` is a regular expression; the arguments for the
+    recording node are its name and remappings.
     """
     folder.mkdir(parents=True, exist_ok=True)
     rosparam.dump_params(str(folder / PARAMETERS), "/")

@@ -14,14 +14,10 @@ from crazyflie_reports.figures import Figure
 
 Array = NDArray[np.float64]
 
+#: Of a curve at most, at least, and about what all flights share.
 MOST_POINTS, LEAST_POINTS, ALL_POINTS = 1000, 100, 40_000
-"""Of a curve at most, at least, and about what all flights share."""
-
-FRAME_PERIOD = 0.04
-"""From one pose of the replay to the next, where points are enough, s."""
-
-MAX_EVENTS = 300
-"""That a flight's list shows."""
+FRAME_PERIOD = 0.04  #: From one pose of the replay to the next, where points are enough, s.
+MAX_EVENTS = 300  #: That a flight's list shows.
 
 
 def points_of(vehicles: int) -> int:
@@ -72,12 +68,8 @@ def flight_data(flight: Flight, found: list[Figure], points: int) -> dict[str, A
 def page(recordings: list[dict[str, Any]], figure_names: list[list[str]]) -> str:
     """Return the HTML of a report.
 
-    Parameters
-    ----------
-    recordings : list of dict
-        Each with name, start, duration, remarks, and flights as `flight_data` returns them.
-    figure_names : list of list
-        Name and unit of each figure.
+    A recording has name, start, duration, remarks, and flights as `flight_data` returns them; a
+    figure has a name and a unit.
     """
     folder = Path(rospkg.RosPack().get_path("crazyflie_reports")) / "page"
     data = json.dumps({"recordings": recordings, "figures": figure_names}, allow_nan=False)

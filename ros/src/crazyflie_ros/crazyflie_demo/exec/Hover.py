@@ -14,11 +14,8 @@ from std_msgs.msg import Empty
 
 from crazyflie_driver.msg import Hover
 
-SPEED = 0.2
-"""Of all ways, m/s."""
-
-RATE = 20.0
-"""Setpoints a second; the firmware gives up after 0.5 s without one."""
+SPEED = 0.2  #: Of all ways, m/s.
+RATE = 20.0  #: Setpoints a second; the firmware gives up after 0.5 s without one.
 
 
 class Crazyflie:

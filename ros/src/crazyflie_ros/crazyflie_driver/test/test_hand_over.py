@@ -123,7 +123,6 @@ ILLEGAL = st.one_of(
 
 @settings(
     deadline=None,
-    max_examples=60,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(call=ILLEGAL)

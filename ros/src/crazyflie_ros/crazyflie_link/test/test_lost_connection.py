@@ -91,7 +91,7 @@ def test_a_restart_takes_the_trajectories_along(vehicle, link):
         link.high_level.start_trajectory(3)
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(suppress_health_check=list(HealthCheck))
 @given(packets=st.lists(st.binary(max_size=31), min_size=1, max_size=10))
 def test_no_packet_ends_the_thread_that_receives(shared, packets):
     vehicle, link, _ = shared
@@ -102,7 +102,7 @@ def test_no_packet_ends_the_thread_that_receives(shared, packets):
     assert link.parameters.read("ring.effect") == 6
 
 
-@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(suppress_health_check=list(HealthCheck))
 @given(
     packets=st.lists(
         st.tuples(st.sampled_from([2, 4, 5, 13]), st.integers(0, 3), st.binary(max_size=30)),

@@ -14,30 +14,15 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+#: Time of a measurement (s), position (m), quaternion (x, y, z, w).
 Pose = tuple[float, Triple, Quaternion]
-"""Time of a measurement (s), position (m), quaternion (x, y, z, w)."""
 
 
 class MotionCapture:
     """Poses as they are measured: with noise, some of them late, some never.
 
-    All attributes may be changed at any time.
-
-    Attributes
-    ----------
-    position_noise : float
-        Standard deviation along each axis, m.
-    attitude_noise : float
-        Standard deviation of the rotation about each axis of the body, rad.
-    latency : float
-        Time from a measurement to its arrival, s.
-    dropout : float
-        Probability in [0, 1] that a pose is lost.
-
-    Parameters
-    ----------
-    seed : int or sequence of int
-        The same seed gives the same errors to the same poses.
+    All attributes may be changed at any time. The same ``seed`` gives the same errors to the same
+    poses.
     """
 
     def __init__(
@@ -48,10 +33,11 @@ class MotionCapture:
         dropout: float = 0.0,
         seed: int | Sequence[int] = 0,
     ):
-        self.position_noise = position_noise
+        self.position_noise = position_noise  #: Standard deviation along each axis, m.
+        #: Standard deviation of the rotation about each axis of the body, rad.
         self.attitude_noise = attitude_noise
-        self.latency = latency
-        self.dropout = dropout
+        self.latency = latency  #: Time from a measurement to its arrival, s.
+        self.dropout = dropout  #: Probability in [0, 1] that a pose is lost.
         self._seed = seed
         self._in_transit: deque[Pose] = deque()
 

@@ -24,14 +24,11 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.vectors import to_tuple
 
+#: Longest time that is integrated at once, s; more, after a jump of the clock, is skipped.
 MAX_CATCH_UP = 1.0
-"""Longest time that is integrated at once, s; more, after a jump of the clock, is skipped."""
-
+#: Poses of the last so many seconds are broadcast late when the machine was busy.
 MAX_LATENESS = 0.1
-"""Poses of the last so many seconds are broadcast late when the machine was busy."""
-
-IDLE_PERIOD = 0.1
-"""Period at which a simulator without pose consumers checks for them, s."""
+IDLE_PERIOD = 0.1  #: Period at which a simulator without pose consumers checks for them, s.
 
 
 class MotionCaptureParameters(Parameters):
@@ -53,10 +50,7 @@ class MotionCaptureParameters(Parameters):
         live=True,
     )
     dropout: float = parameter(
-        Number(minimum=0.0, maximum=1.0),
-        "probability that a pose is not broadcast",
-        0.0,
-        live=True,
+        Number(minimum=0.0, maximum=1.0), "probability that a pose is not broadcast", 0.0, live=True
     )
 
 
@@ -94,19 +88,13 @@ class SimulatorNode(Node):
     """Fly a vehicle on the controls of a topic and broadcast its pose to tf.
 
     A subclass defines the vehicle's model in `make_dynamics`.
-
-    Attributes
-    ----------
-    parameters_type : type
-        A subclass of `SimulatorParameters`, where a model has parameters of its own.
-    max_tilt : float
-        See `SimulatedVehicle`; for models that can turn over.
     """
 
     needed_in_flight = True
 
+    #: A subclass of `SimulatorParameters`, where a model has parameters of its own.
     parameters_type: type[SimulatorParameters] = SimulatorParameters
-    max_tilt = math.inf
+    max_tilt = math.inf  #: See `SimulatedVehicle`; for models that can turn over.
 
     def __init__(self) -> None:
         self._ticks = 0

@@ -21,26 +21,12 @@ _OFF: Vector[float] = [0.0, 0.0, 0.0, 0.0]
 class SimulatedVehicle:
     """One simulated vehicle, with the firmware's watchdog.
 
-    It stays put until the first control. When controls stop coming it does what
-    the firmware does; see `watchdog_control`.
+    It stays put at ``position`` (m, fixed frame), from ``time`` (s) on, until the first control.
+    When controls stop coming it does what the firmware does; see `watchdog_control`. A vehicle that
+    is tilted more than ``max_tilt`` (rad) has crashed: its motors stay off until `recover`.
 
-    Two vehicles that are given the same controls at the same times fly the
-    same, to the last bit, however often `advance_to` is called.
-
-    Parameters
-    ----------
-    dynamics : Dynamics
-    position : sequence, 3 components
-        Where it stands at the beginning, m, fixed frame.
-    time : float
-        Its time at the beginning, s.
-    max_tilt : float, optional
-        A vehicle that is tilted more than this, rad, has crashed: its motors stay off until
-        `recover`. By default none does.
-
-    Attributes
-    ----------
-    has_crashed : bool
+    Two vehicles that are given the same controls at the same times fly the same, to the last bit,
+    however often `advance_to` is called.
     """
 
     def __init__(

@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike
 
 from crazyflie_model.angles import Triple
 
-_WAVES = 64
-"""Waves that a gust is made of, along each axis."""
+_WAVES = 64  #: Waves that a gust is made of, along each axis.
 
 
 class Wind:

@@ -25,46 +25,38 @@ from typing import NamedTuple
 
 from crazyflie_state_estimator.kalman import ConstantAccelerationFilter
 
+#: Poses and controls are averaged over at least this time, s, and so many poses.
 BLOCK, BLOCK_POSES = 0.05, 4
-"""Poses and controls are averaged over at least this time, s, and so many poses."""
+MAX_GAP = 0.25  #: After a longer pause between two poses, s, the estimate starts anew.
+DISTURBANCE_WALK = 0.25  #: Random walk of the disturbance, m/s^2/sqrt(s).
 
-MAX_GAP = 0.25
-"""After a longer pause between two poses, s, the estimate starts anew."""
-
-DISTURBANCE_WALK = 0.25
-"""Random walk of the disturbance, m/s^2/sqrt(s)."""
-
+#: Standard deviations of the velocity, m/s, and of the disturbance, m/s^2, after lifting off: mass
+#: and thrust of a vehicle may be wrong by 15 %.
 FIRST_SPEED, FIRST_DISTURBANCE = 1.0, 1.5
-"""Standard deviations of the velocity, m/s, and of the disturbance, m/s^2, after lifting off: mass
-and thrust of a vehicle may be wrong by 15 %."""
 
+#: By how much the disturbance of a vehicle that stays at one place changes, m/s^2.
 DISTURBANCE_CHANGE = 0.05
-"""By how much the disturbance of a vehicle that stays at one place changes, m/s^2."""
 
+#: Time constant of the vehicle's response (motors, attitude, latency of the poses) and its standard
+#: deviation, s.
 LAG, LAG_ERROR = 0.1, 0.04
-"""Time constant of the vehicle's response (motors, attitude, latency of the poses) and its
-standard deviation, s."""
 
+#: Least time T of a prediction, s, and the threshold for its distance, standard deviations. Of 570
+#: healthy flights, with gusts of up to 1 m/s and noise of up to 3 mm, the worst reached 0.8 of a
+#: threshold.
 THRESHOLDS = ((0.8, 3.6), (0.35, 5.5))
-"""Least time T of a prediction, s, and the threshold for its distance, standard deviations. Of
-570 healthy flights, with gusts of up to 1 m/s and noise of up to 3 mm, the worst reached 0.8 of
-a threshold."""
 
+#: Estimates from the first part of a stay, s, still contain the end of the motion before it.
 SETTLING = 0.5
-"""Estimates from the first part of a stay, s, still contain the end of the motion before it."""
+WINDOW, ESTIMATE_PERIOD = 3.0, 0.25  #: Estimates are kept for this time, one every period, s.
 
-WINDOW, ESTIMATE_PERIOD = 3.0, 0.25
-"""Estimates are kept for this time, one every period, s."""
-
+#: Poses stay at a place when the mean of a block differs from that of the stay by less than the
+#: former, m, and so many standard deviations of the difference.
 TOLERANCE, TOLERANCE_FACTOR = 0.0003, 4.0
-"""Poses stay at a place when the mean of a block differs from that of the stay by less than the
-former, m, and so many standard deviations of the difference."""
 
+#: Least noise of a pose, and error of the prediction at T = 0, m.
 MIN_NOISE, PLACE_ERROR = 1e-4, 0.003
-"""Least noise of a pose, and error of the prediction at T = 0, m."""
-
-NOISE_AVERAGING = 40.0
-"""The variance of the noise is averaged over so many blocks."""
+NOISE_AVERAGING = 40.0  #: The variance of the noise is averaged over so many blocks.
 
 Vector = Sequence[float]
 

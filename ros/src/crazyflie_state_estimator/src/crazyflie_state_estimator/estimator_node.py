@@ -28,27 +28,17 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.vectors import from_vector, stamped, to_tuple
 
-REPORT_PERIOD = 1.0
-"""Of the diagnostics, s; REP 107 wants one report a second."""
-
-SILENCE_PERIOD = 0.1
-"""Period at which an estimator that acts on arrival checks for silence, s."""
+REPORT_PERIOD = 1.0  #: Of the diagnostics, s; REP 107 wants one report a second.
+SILENCE_PERIOD = 0.1  #: Period at which an estimator that acts on arrival checks for silence, s.
 
 
 class StateEstimatorNode(Node):
-    """Publish the state of the vehicle that tf knows.
-
-    Attributes
-    ----------
-    state_type : type
-        Stamped message to publish, with a field ``state``, all float64.
-    parameters_type : type
-        `StateEstimatorParameters` or a subclass.
-    """
+    """Publish the state of the vehicle that tf knows."""
 
     needed_in_flight = True
 
-    state_type: type
+    state_type: type  #: Stamped message to publish, with a field ``state``, all float64.
+    #: `StateEstimatorParameters` or a subclass.
     parameters_type: type[StateEstimatorParameters] = StateEstimatorParameters
 
     def __init__(self) -> None:

@@ -9,40 +9,25 @@ import math
 
 from crazyflie_state_estimator.control_response import Departure, ResponseMonitor, Vector
 
+#: So far above that place a pose that repeats is none on the ground, m: that repeats, too.
 CLEAR = 0.01
-"""So far above that place a pose that repeats is none on the ground, m: that repeats, too."""
 
+#: On the ground a vehicle may need so much acceleration upwards more than nominal, m/s^2; what is
+#: commanded beyond that lifts any, when it has made so much speed, m/s.
 HEAVY, LIFTING = 3.0, 0.3
-"""On the ground a vehicle may need so much acceleration upwards more than nominal, m/s^2; what is
-commanded beyond that lifts any, when it has made so much speed, m/s."""
 
+#: A vehicle whose last motion was smaller than this, m, has come to rest gradually.
 _ROUNDING = 1e-6
-"""A vehicle whose last motion was smaller than this, m, has come to rest gradually."""
-
-LIFTED = 0.04
-"""So far above the place where its motors were off last, a vehicle flies, m."""
-
-_LEFT = 0.03
-"""A camera that has gone on shows the vehicle further away than this, m, ..."""
-
-_CONFIRMATION = 3
-"""... in so many poses in a row."""
+LIFTED = 0.04  #: So far above the place where its motors were off last, a vehicle flies, m.
+_LEFT = 0.03  #: A camera that has gone on shows the vehicle further away than this, m, ...
+_CONFIRMATION = 3  #: ... in so many poses in a row.
 
 
 class FrozenPoseMonitor:
     """Detects poses that have stopped being those of the vehicle.
 
-    Parameters
-    ----------
-    knows_control : bool
-        Whether the acceleration that the control commands is known. If it is not, only poses
-        that repeat to the last bit are detected, above the lowest one that was seen.
-
-    Attributes
-    ----------
-    departure : Departure or None
-        Where the vehicle is instead of the last pose, if that is the first one that does not
-        respond to the control.
+    Where the acceleration that the control commands is not known, only poses that repeat to the
+    last bit are detected, above the lowest one that was seen.
     """
 
     def __init__(self, knows_control: bool):
@@ -65,6 +50,8 @@ class FrozenPoseMonitor:
         self._time = 0.0
         self._place: Vector | None = None
         self._outside = 0
+        #: Where the vehicle is instead of the last pose, if that is the first one that does not
+        #: respond to the control.
         self.departure: Departure | None = None
         self._response.reset()
 
@@ -73,14 +60,9 @@ class FrozenPoseMonitor:
     ) -> bool:
         """Take a pose; return whether it is not the vehicle's.
 
-        Parameters
-        ----------
-        time : float
-            Its stamp, s, later than the one before.
-        position, rotation : sequence, 3 and 4 components
-            m, fixed frame, and quaternion.
-        acceleration : sequence, 3 components, or None
-            Of the control, m/s^2, fixed frame; None while it is unknown or not that of flight.
+        Its stamp ``time`` (s) is later than the one before; position (m, fixed frame) and rotation
+        (quaternion). ``acceleration`` is the control's, m/s^2, fixed frame; None while it is
+        unknown or not that of flight.
         """
         self.departure = None
         if self._ground is None or (self._knows_control and acceleration is None):

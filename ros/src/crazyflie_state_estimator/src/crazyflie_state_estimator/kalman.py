@@ -4,26 +4,26 @@ from typing_extensions import override
 
 from crazyflie_state_estimator.rate_filter import Components, RateFilter
 
+#: Default noise of poses, m and rad: a motion capture system that is not at its best.
 POSITION_NOISE, ANGLE_NOISE = 0.001, 0.005
-"""Default noise of poses, m and rad: a motion capture system that is not at its best."""
 
+#: Default for a vehicle whose control is not known, m/s^2/sqrt(s). Its tilt is limited to 15
+#: degrees, or 2.6 m/s^2, and may go from side to side in a second.
 ACCELERATION_WALK = 3.0
-"""Default for a vehicle whose control is not known, m/s^2/sqrt(s). Its tilt is limited to
-15 degrees, or 2.6 m/s^2, and may go from side to side in a second."""
 
+#: Default where the control is known: wind, and how the vehicle differs from its model.
 ACCELERATION_WALK_WITH_CONTROL = 1.0
-"""Default where the control is known: wind, and how the vehicle differs from its model."""
 
+#: Default for roll, pitch and yaw, rad/s^2/sqrt(s): with `ANGLE_NOISE` at 100 Hz their rates are
+#: followed up to about 40 rad/s.
 ANGULAR_ACCELERATION_WALK = 30.0
-"""Default for roll, pitch and yaw, rad/s^2/sqrt(s): with `ANGLE_NOISE` at 100 Hz their
-rates are followed up to about 40 rad/s."""
 
+#: After a longer pause between two samples, in s, the filter starts afresh: the acceleration known
+#: by then is out of date.
 MEMORY = 1.0
-"""After a longer pause between two samples, in s, the filter starts afresh: the
-acceleration known by then is out of date."""
 
+#: Standard deviations at the first sample, per s and s^2: next to nothing is assumed.
 UNKNOWN_RATE, UNKNOWN_ACCELERATION = 10.0, 10.0
-"""Standard deviations at the first sample, per s and s^2: next to nothing is assumed."""
 
 
 class ConstantAccelerationFilter(RateFilter):

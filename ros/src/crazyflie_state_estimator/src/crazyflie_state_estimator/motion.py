@@ -8,40 +8,24 @@ from crazyflie_state_estimator.rate_filter import Components, RateFilter
 
 
 class Motion(NamedTuple):
-    """Where a vehicle is and how it moves, in the fixed frame.
+    """Where a vehicle is and how it moves, in the fixed frame."""
 
-    Attributes
-    ----------
-    position : sequence, 3 components
-        x, y, z in m.
-    velocity : sequence, 3 components
-        m/s.
-    attitude : sequence, 3 components
-        Roll, pitch, yaw in rad, in [-pi, pi]; see `crazyflie_model.angles`.
-    attitude_rate : sequence, 3 components
-        Time derivatives of roll, pitch, yaw in rad/s (not the body's angular
-        velocity).
-    """
-
-    position: Components
-    velocity: Components
-    attitude: Components
+    position: Components  #: x, y, z in m.
+    velocity: Components  #: m/s.
+    attitude: Components  #: Roll, pitch, yaw in rad, in [-pi, pi]; see `crazyflie_model.angles`.
+    #: Time derivatives of roll, pitch, yaw in rad/s (not the body's angular velocity).
     attitude_rate: Components
 
 
 class MotionEstimator:
     """Motion from a sequence of poses, by the poses' own stamps.
 
-    A pose whose stamp repeats is ignored, and so is one that is not finite. One
-    whose stamp goes back is the first of a new sequence: tf hands out the latest
-    pose, so its stamp goes back only when time does.
+    A pose whose stamp repeats is ignored, and so is one that is not finite. One whose stamp goes
+    back is the first of a new sequence: tf hands out the latest pose, so its stamp goes back only
+    when time does.
 
-    Parameters
-    ----------
-    position_filter : RateFilter
-    angle_filter : RateFilter
-        Of unwrapped roll, pitch and yaw, for their rates. The angles are passed on as they are:
-        smoothing would cost the yaw loop its phase.
+    The angle filter is given unwrapped roll, pitch and yaw, for their rates. The angles are passed
+    on as they are: smoothing would cost the yaw loop its phase.
     """
 
     def __init__(self, position_filter: RateFilter, angle_filter: RateFilter):
@@ -63,16 +47,9 @@ class MotionEstimator:
     ) -> Motion | None:
         """Take the next pose and return the motion, or None when it is the first or ignored.
 
-        Parameters
-        ----------
-        stamp : int
-            Time of the pose, ns: floats resolve the time of day to 0.2 us only.
-        position : sequence, 3 components
-            m.
-        attitude : sequence, 3 components
-            Roll, pitch, yaw in rad.
-        acceleration : sequence, 3 components, optional
-            Commanded since the last pose, if it is known, m/s^2.
+        The stamp is in ns, since floats resolve the time of day to 0.2 us only; the position in m;
+        the attitude roll, pitch, yaw in rad; ``acceleration`` was commanded since the last pose, if
+        it is known, m/s^2.
         """
         if not (_is_finite(position) and _is_finite(attitude)):
             return None

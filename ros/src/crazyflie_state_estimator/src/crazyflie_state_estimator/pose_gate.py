@@ -4,26 +4,21 @@ import math
 from collections.abc import Sequence
 from enum import Enum
 
+#: A position that is too far away is accepted after the vehicle has been measured there for this
+#: time, s: it was carried there while it was not measured.
 PERSISTENCE = 0.3
-"""A position that is too far away is accepted after the vehicle has been measured there for this
-time, s: it was carried there while it was not measured."""
 
+#: Longest time for which a vehicle that was not measured is assumed to have flown on, s.
 MAX_COAST_TIME = 0.5
-"""Longest time for which a vehicle that was not measured is assumed to have flown on, s."""
 
+#: Number of poses in a row, without a jump between them, that are accepted after outliers: some
+#: outliers happen to lie where the vehicle might be.
 CONFIRMATION = 3
-"""Number of poses in a row, without a jump between them, that are accepted after outliers: some
-outliers happen to lie where the vehicle might be."""
 
+#: A single pose is accepted within this time after a good one, s: the vehicle cannot be far.
 TRUST_WINDOW = 0.03
-"""A single pose is accepted within this time after a good one, s: the vehicle cannot be far."""
-
-NOISE_MARGIN = 0.02
-"""Largest displacement of a pose by noise, m."""
-
-
-Pose = tuple[float, tuple[float, ...]]
-"""Time, s, and position, m."""
+NOISE_MARGIN = 0.02  #: Largest displacement of a pose by noise, m.
+Pose = tuple[float, tuple[float, ...]]  #: Time, s, and position, m.
 
 
 class Classification(Enum):
@@ -31,8 +26,7 @@ class Classification(Enum):
 
     GOOD = "good"
     BAD = "bad"
-    MOVED = "moved"
-    """Good, but the vehicle did not fly there: filters restart."""
+    MOVED = "moved"  #: Good, but the vehicle did not fly there: filters restart.
 
 
 class PoseGate:

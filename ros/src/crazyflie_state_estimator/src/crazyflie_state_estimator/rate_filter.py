@@ -5,11 +5,10 @@ from collections.abc import Sequence
 
 from typing_extensions import override
 
+#: One number for each axis. Of so few, plain floats are several times quicker than arrays.
 Components = Sequence[float]
-"""One number for each axis. Of so few, plain floats are several times quicker than arrays."""
-
+#: No source of poses is so quick, s: stamps that are nearer to each other are bad ones.
 LEAST_STEP = 0.0005
-"""No source of poses is so quick, s: stamps that are nearer to each other are bad ones."""
 
 
 class RateFilter(ABC):
@@ -23,36 +22,20 @@ class RateFilter(ABC):
     def step(
         self, dt: float, value: Components, acceleration: Components | None = None
     ) -> tuple[Components, Components]:
-        """Take the next sample.
+        """Take the next sample; return the signal at its time, and its rate per second.
 
-        Parameters
-        ----------
-        dt : float
-            Time since the last sample, s, positive.
-        value : sequence, n components
-        acceleration : sequence, n components, optional
-            Commanded since the last sample, if it is known. Not every filter uses it.
-
-        Returns
-        -------
-        value, rate : sequence, n components
-            The signal at the time of the sample and its rate, in units of the
-            signal and units per second.
+        It comes ``dt`` s after the last one (positive) and has n components, as has the
+        acceleration that was commanded since then, if it is known. Not every filter uses it.
         """
 
 
 class FiniteDifference(RateFilter):
     """The signal as it is sampled, and the difference quotient of its last two samples.
 
-    The quotient is exact for linear signals; otherwise it is the rate half a
-    period ago, up to second order. Independent noise of standard deviation s on
-    the samples becomes sqrt(2) s / dt on the rate; so samples that come sooner than
-    ``least_step`` after one another leave the rate as it was, until so much time has passed.
-
-    Parameters
-    ----------
-    least_step : float, optional
-        Shortest time that a change is divided by, s.
+    The quotient is exact for linear signals; otherwise it is the rate half a period ago, up to
+    second order. Independent noise of standard deviation s on the samples becomes sqrt(2) s / dt on
+    the rate; so samples that come sooner than ``least_step`` (s) after one another leave the rate
+    as it was, until so much time has passed.
     """
 
     def __init__(self, least_step: float = LEAST_STEP):

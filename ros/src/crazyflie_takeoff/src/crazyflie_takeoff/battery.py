@@ -13,27 +13,16 @@ class Charge(enum.Enum):
     CRITICAL = enum.auto()
 
 
-MAX_VOLTAGE_AGE = 5.0
-"""A voltage that is older does not count, s; the driver sends one a second."""
-
-_LONGEST_STEP = 1.5
-"""Voltages that are further apart count as this far, s."""
-
-_NOT_LOWER = -math.inf
-"""How long a voltage has been lower that is not, s."""
+MAX_VOLTAGE_AGE = 5.0  #: A voltage that is older does not count, s; the driver sends one a second.
+_LONGEST_STEP = 1.5  #: Voltages that are further apart count as this far, s.
+_NOT_LOWER = -math.inf  #: How long a voltage has been lower that is not, s.
 
 
 class Battery:
-    """The charge of a battery, by how long its voltage has been below two levels.
+    """The charge of a battery, by how long its voltage has been below two levels (V).
 
-    In flight a voltage sags with every burst of thrust; so it has to stay low.
-
-    Parameters
-    ----------
-    low, critical : float
-        V.
-    duration : float
-        How long it has to be lower, s; with 0 a single low voltage is enough.
+    In flight a voltage sags with every burst of thrust; so it has to stay low for ``duration`` (s);
+    with 0 a single low voltage is enough.
     """
 
     def __init__(self, low: float, critical: float, duration: float):

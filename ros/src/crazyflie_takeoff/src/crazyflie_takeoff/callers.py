@@ -3,25 +3,17 @@
 import math
 from collections import deque
 
+#: A node that takes the place of one that sent less than this before, s, overlaps with it.
 OVERLAP = 0.5
-"""A node that takes the place of one that sent less than this before, s, overlaps with it."""
-
-MEMORY = 5.0
-"""An overlap is forgotten after this, s."""
+MEMORY = 5.0  #: An overlap is forgotten after this, s.
 
 
 class Callers:
-    """The nodes that publish on one topic.
+    """The nodes that publish on one topic: ``what``, in plural.
 
     A node that ends and another one that takes its place, or the same that is started again, are no
-    two publishers: only changes count at which the former one has sent a moment before.
-
-    Parameters
-    ----------
-    what : str
-        What they publish, in plural.
-    tolerance : int
-        So many such changes within `MEMORY` are a handover.
+    two publishers: only changes count at which the former one has sent a moment before. So many of
+    them as ``tolerance`` within `MEMORY` are a handover.
     """
 
     def __init__(self, what: str, tolerance: int):
@@ -33,16 +25,9 @@ class Callers:
         self._changes: deque[float] = deque(maxlen=tolerance + 1)
 
     def note(self, time: float, caller: str, overlap: float = OVERLAP) -> None:
-        """Take a message.
+        """Take a message that a node has sent at ``time`` (s); without a name, one of this process.
 
-        Parameters
-        ----------
-        time : float
-            Now, s.
-        caller : str
-            Name of the node; empty for one of this process.
-        overlap : float, optional
-            See `OVERLAP`, s.
+        For ``overlap``, s, see `OVERLAP`.
         """
         self.advance(time)
         if self._last is not None and caller != self._last[0]:

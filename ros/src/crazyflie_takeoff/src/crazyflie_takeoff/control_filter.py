@@ -5,8 +5,8 @@ from typing import Generic, TypeVar
 
 from crazyflie_takeoff.flight_state import FlightState
 
+#: A takeoff control older than this no longer keeps the controller out, s.
 TAKEOFF_CONTROL_LIMIT = 0.5
-"""A takeoff control older than this no longer keeps the controller out, s."""
 
 
 Control = TypeVar("Control")

@@ -8,48 +8,30 @@ from crazyflie_takeoff.limits import Debounce
 from crazyflie_takeoff.motion import Motion
 from crazyflie_takeoff.safe_control import Setpoint, limited
 
-CLIMB_RESPONSE = 0.1
-"""Time constant at which a climb approaches its limit, s."""
-
-CLIMB_BRAKING = 4.0
-"""Deceleration below the highest place, m/s^2."""
-
-RETURN_RATE = 0.5
-"""At which a vehicle above the highest place comes back, 1/s."""
-
-LANDING_CLIMB = 0.5
-"""Climb of a vehicle that is to land, m/s."""
-
-CLIMB_TIMEOUT = 2.0
-"""Controls that ask for too much climb for longer than this end the flight, s."""
-
+CLIMB_RESPONSE = 0.1  #: Time constant at which a climb approaches its limit, s.
+CLIMB_BRAKING = 4.0  #: Deceleration below the highest place, m/s^2.
+RETURN_RATE = 0.5  #: At which a vehicle above the highest place comes back, 1/s.
+LANDING_CLIMB = 0.5  #: Climb of a vehicle that is to land, m/s.
+CLIMB_TIMEOUT = 2.0  #: Controls that ask for too much climb for longer than this end the flight, s.
+#: By which a control may change the speed while the filter does not run, m/s.
 MAX_SPEED_CHANGE = 0.5
-"""By which a control may change the speed while the filter does not run, m/s."""
 
+#: A filter that has not run for longer than this, s, keeps the vehicle's z_dot itself within
+#: `MAX_SPEED_CHANGE`: controls that are made of states from before the gap add up.
 BUSY_GAP = 0.2
-"""A filter that has not run for longer than this, s, keeps the vehicle's z_dot itself within
-`MAX_SPEED_CHANGE`: controls that are made of states from before the gap add up."""
 
+#: A filter that has not run in so much of its time, in gaps longer than `BUSY_GAP`, cannot see a
+#: vehicle fly; averaged over the latter, s.
 STARVED_SHARE, STARVATION_MEMORY = 0.5, 3.0
-"""A filter that has not run in so much of its time, in gaps longer than `BUSY_GAP`, cannot see a
-vehicle fly; averaged over the latter, s."""
 
-LONGEST_GAP = 1.0
-"""Of a filter that runs, s; a clock that steps further was set."""
-
-GAP_MEMORY = 2.0
-"""Time constant with which a gap is forgotten, s."""
+LONGEST_GAP = 1.0  #: Of a filter that runs, s; a clock that steps further was set.
+GAP_MEMORY = 2.0  #: Time constant with which a gap is forgotten, s.
 
 
 def in_range(control: Setpoint, lowest: float) -> Setpoint:
-    """Return a control with roll, pitch, yaw rate and thrust within their ranges.
+    """Return a finite control with roll, pitch, yaw rate and thrust within their ranges.
 
-    Parameters
-    ----------
-    control : Setpoint
-        Finite.
-    lowest : float
-        Least thrust, m/s^2: `MIN_THRUST` in flight.
+    ``lowest`` is the least thrust, m/s^2: `MIN_THRUST` in flight.
     """
     return Setpoint(
         limited(control.roll, MAX_TILT),
@@ -72,25 +54,12 @@ class ClimbLimit:
         self._debounce = Debounce(CLIMB_TIMEOUT)
 
     def apply(
-        self,
-        thrust: float,
-        hover: float,
-        motion: Motion | None,
-        highest: float,
-        is_landing: bool,
+        self, thrust: float, hover: float, motion: Motion | None, highest: float, is_landing: bool
     ) -> float:
         """Return the thrust that is passed on, m/s^2.
 
-        Parameters
-        ----------
-        thrust, hover : float
-            What is asked for, and what carries the weight, m/s^2.
-        motion : Motion or None
-            None when it is not known.
-        highest : float
-            z that is not to be exceeded, m.
-        is_landing : bool
-            Whether the vehicle is to come down.
+        ``thrust`` is asked for, ``hover`` carries the weight, m/s^2; z is not to exceed ``highest``
+        (m); without a known motion nothing is limited.
         """
         self._complaint = ""
         if motion is None:
@@ -154,15 +123,9 @@ class RunGaps:
     ) -> Setpoint:
         """Return what is passed on of a control.
 
-        Parameters
-        ----------
-        control : Setpoint
-        hover : float
-            Thrust of hover, m/s^2.
-        climb : float
-            z_dot, m/s, which may be ended within a gap; 0 if it is not known.
-        is_ramp : bool
-            Whether it may be of a landing's ramp: then only what is above hover is limited.
+        ``hover`` is the thrust that carries the weight, m/s^2; ``climb`` is z_dot, m/s, which may
+        be ended within a gap; 0 if it is not known. Of a control that may be of a landing's ramp
+        (``is_ramp``), only what is above hover is limited.
         """
         if self._longest <= 0.0:
             return control

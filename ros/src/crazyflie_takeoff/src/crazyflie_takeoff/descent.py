@@ -2,29 +2,17 @@
 
 from crazyflie_takeoff.motion import Position
 
-DESCENT_MARGIN = 3.0
-"""How much longer than calculated a descent may take, s."""
+DESCENT_MARGIN = 3.0  #: How much longer than calculated a descent may take, s.
 
+#: How far below the ground a descent's reference goes, m, so that the vehicle meets the ground with
+#: its speed also when it hangs above the reference.
 PRESS_DEPTH = 0.3
-"""How far below the ground a descent's reference goes, m, so that the vehicle
-meets the ground with its speed also when it hangs above the reference."""
 
 
 class Descent:
-    """A reference that sinks at a constant speed.
+    """A reference that sinks at a constant speed (m/s) to the ground (z, m).
 
-    Times are s since the landing began.
-
-    Parameters
-    ----------
-    begin : float
-        When it is at ``position``, s.
-    position : tuple of float
-        m.
-    ground : float
-        z of the ground, m.
-    speed : float
-        m/s.
+    Times are s since the landing began; at ``begin`` it is at ``position`` (m).
     """
 
     def __init__(self, begin: float, position: Position, ground: float, speed: float):

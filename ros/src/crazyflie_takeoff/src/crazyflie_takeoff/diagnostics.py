@@ -6,8 +6,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 from crazyflie_utils import NodeHandle
 
-PERIOD = 1.0
-"""Of the diagnostics, s; REP 107 recommends one report a second."""
+PERIOD = 1.0  #: Of the diagnostics, s; REP 107 recommends one report a second.
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 

@@ -4,8 +4,7 @@ import math
 
 from crazyflie_model.supervisor import SupervisorState
 
-MAX_CONNECTION_AGE = 3.0
-"""An older message does not count, s: the driver sends one every second."""
+MAX_CONNECTION_AGE = 3.0  #: An older message does not count, s: the driver sends one every second.
 
 
 class DriverConnection:
@@ -31,7 +30,7 @@ class DriverConnection:
             return ""
         if self._is_emergency:
             return "the vehicle was stopped by emergency; remove it, restart it and add it again"
-        if self._state.is_unable_to_fly:
+        if self._state.faults:
             return f"the vehicle cannot fly, its state is: {self._state.words()}; restart it"
         return ""
 

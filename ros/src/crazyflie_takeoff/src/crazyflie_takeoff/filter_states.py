@@ -12,14 +12,11 @@ from crazyflie_takeoff.motion import Measurement, Motion
 from crazyflie_takeoff.safe_control import descent_time
 from crazyflie_takeoff.transition_table import Table, Transition, step
 
+#: A control younger than this, s, is never late: three periods of a controller at 100 Hz.
 SHORTEST_HOLD = 0.03
-"""A control younger than this, s, is never late: three periods of a controller at 100 Hz."""
-
-LAST_STATE = 0.7
-"""The oldest state from which the filter reckons how the vehicle moves, s."""
-
+LAST_STATE = 0.7  #: The oldest state from which the filter reckons how the vehicle moves, s.
+#: How long after the motors were stopped they cannot be released, s: the vehicle may still fall.
 RESET_DELAY = 2.0
-"""How long after the motors were stopped they cannot be released, s: the vehicle may still fall."""
 
 
 class FilterState(enum.IntEnum):
@@ -190,6 +187,7 @@ class FilterMachine:
         self.reason = reason
         self._choice.end_flight()
 
+    #: The transitions; in any other case the state stays.
     TABLE: ClassVar[Table[FilterState, "FilterMachine"]] = (
         Transition(_PASSING, Event.FIRST_STATE, _seen_on_ground, _DOWN, _stay_on_ground),
         Transition(_PASSING, Event.TICK, _control_is_lost, _HOLDING, _hold_place),
@@ -212,4 +210,3 @@ class FilterMachine:
         Transition(_DOWN, Event.STOP, None, _EMERGENCY, _stop_at_once),
         Transition(_EMERGENCY, Event.RESET, _may_be_reset, _DOWN, _release),
     )
-    """The transitions; in any other case the state stays."""

@@ -22,15 +22,12 @@ from crazyflie_takeoff.server_table import (
 from crazyflie_takeoff.transition_table import find, step
 from crazyflie_utils.refusal import RefusalError
 
-RAMP_RATE = 5.0
-"""How fast the thrust of a landing goes down from hover, m/s^2 per s."""
-
-ZERO_THRUST_PERIOD = 0.1
-"""Period at which zero thrust is repeated on the ground, s."""
-
+RAMP_RATE = 5.0  #: How fast the thrust of a landing goes down from hover, m/s^2 per s.
+ZERO_THRUST_PERIOD = 0.1  #: Period at which zero thrust is repeated on the ground, s.
+#: A descent that has to end within a time takes at least this, s, however late it is.
 SHORTEST_DESCENT = 1.0
-"""A descent that has to end within a time takes at least this, s, however late it is."""
 
+#: Why a takeoff or a landing is refused.
 REFUSALS = {
     None: "the state of the flight is not known yet",
     FlightState.ON_GROUND: "the vehicle is on the ground",
@@ -39,7 +36,6 @@ REFUSALS = {
     FlightState.DESCENDING: "a landing is under way",
     FlightState.LANDING: "a landing is under way",
 }
-"""Why a takeoff or a landing is refused."""
 
 
 @dataclass(frozen=True)
@@ -95,27 +91,17 @@ class FlightStateMachine:
         self.state = step(TABLE, self.state, event, self._context)
 
     def request(self, event: Event) -> None:
-        """Take the transition of an event.
-
-        Raises
-        ------
-        RefusalError
-            The present state has none.
-        """
+        """Take the transition of an event; `RefusalError` if the present state has none."""
         if not self.accepts(event):
             raise RefusalError(REFUSALS[self.flight_state])
         self.handle(event)
 
     def recover(self, position: Position | None, ground: float) -> None:
-        """Conclude the state of the flight from the filter's report and the position.
+        """Conclude the state of the flight from the filter's report and the measured position (m).
 
-        Parameters
-        ----------
-        position : tuple of float or None
-            Measured x, y, z, m.
-        ground : float
-            Height (z) of the ground that the former server has noted, m. If the filter remembers
-            no flight, it may be of another launch, and the ground is taken to be at z = 0.
+        ``ground`` is the height (z) of the ground that the former server has noted, m. If the
+        filter remembers no flight, it may be of another launch, and the ground is taken to be at z
+        = 0.
         """
         remembered = self.filter.remembered
         self._context.measured = position

@@ -32,11 +32,5 @@ _IN_FLIGHT = (FlightState.FLYING, FlightState.DESCENDING)
 
 
 def flight_state(code: int) -> FlightState | None:
-    """Return the state of a constant of FlightStatus; None for UNKNOWN.
-
-    Raises
-    ------
-    ValueError
-        There is no such constant.
-    """
+    """Return the state of a constant of FlightStatus; None for UNKNOWN, else ValueError."""
     return FlightState(code) if code else None

@@ -7,17 +7,11 @@ from crazyflie_takeoff.control_limits import ClimbLimit, RunGaps
 from crazyflie_takeoff.limits import Debounce, Limits, Walls
 from crazyflie_takeoff.motion import MAX_STATE_AGE, Motion
 
-HANDOVER = 3
-"""So many changes of the controller are a handover from one to the other."""
-
+HANDOVER = 3  #: So many changes of the controller are a handover from one to the other.
+#: How long a limit has to be exceeded, s: a single measurement that is wrong is no crash.
 CRASH_DURATION = 0.1
-"""How long a limit has to be exceeded, s: a single measurement that is wrong is no crash."""
-
-DESCENT_TIMEOUT = 1.5
-"""How long a vehicle that is to land may stay up, s."""
-
-PROGRESS = 0.02
-"""Less than this below where it was highest is no descent, m."""
+DESCENT_TIMEOUT = 1.5  #: How long a vehicle that is to land may stay up, s.
+PROGRESS = 0.02  #: Less than this below where it was highest is no descent, m.
 
 
 class DescentWatch:
@@ -28,14 +22,9 @@ class DescentWatch:
         self._debounce = Debounce(DESCENT_TIMEOUT)
 
     def advance(self, step: float, height: float | None) -> str:
-        """Let time pass; return in words what is wrong, or an empty text.
+        """Let time pass (s); return in words what is wrong, or an empty text.
 
-        Parameters
-        ----------
-        step : float
-            s.
-        height : float or None
-            m; None while the vehicle is not to land, or its height is not known.
+        ``height`` is in m; None while the vehicle is not to land, or its height is not known.
         """
         complaint = ""
         if height is not None and self._highest is not None and height > self._highest - PROGRESS:
@@ -87,19 +76,11 @@ class FlightWatch:
         self._commanded_callers.note(time, caller)
 
     def advance(self, time: float, step: float, height: float | None) -> tuple[str, str]:
-        """Let time pass until ``time``, of which ``step`` counts.
+        """Let time pass until ``time``, of which ``step`` counts, s; return crash and objection.
 
-        Parameters
-        ----------
-        time, step : float
-            s.
-        height : float or None
-            Of a vehicle that its controller is to bring down, m; None of any other.
-
-        Returns
-        -------
-        crash, objection : str
-            Why the motors are stopped in the air, and why the vehicle is landed; or empty.
+        They are in words why the motors are stopped in the air, and why the vehicle is landed; or
+        empty. ``height`` (m) is that of a vehicle that its controller is to bring down; None of any
+        other.
         """
         self.gaps.run(time)
         for callers in (self._takeoff_callers, self._commanded_callers):

@@ -2,14 +2,9 @@
 
 from crazyflie_takeoff.motion import Motion
 
-TOUCHDOWN_HEIGHT = 0.05
-"""A vehicle less than this above the ground counts as down, m."""
-
-ON_GROUND_HEIGHT = 0.1
-"""A vehicle less than this above the ground has not been flown, m."""
-
-TOUCHDOWN_SPEED = 0.1
-"""A vehicle near the ground that sinks slower than this has met it, m/s."""
+TOUCHDOWN_HEIGHT = 0.05  #: A vehicle less than this above the ground counts as down, m.
+ON_GROUND_HEIGHT = 0.1  #: A vehicle less than this above the ground has not been flown, m.
+TOUCHDOWN_SPEED = 0.1  #: A vehicle near the ground that sinks slower than this has met it, m/s.
 
 
 class Ground:

@@ -3,34 +3,19 @@
 import math
 from typing import NamedTuple
 
-MAX_STATE_AGE = 0.2
-"""A state that is older does not count, s."""
-
-MAX_POSITION_AGE = 0.5
-"""A position that is older is not used by the server, s."""
-
-DRIFT = 0.1
-"""How fast the age that is taken for usual may grow, s/s."""
-
-
-Position = tuple[float, float, float]
-"""x, y, z in m, fixed frame, z up."""
+MAX_STATE_AGE = 0.2  #: A state that is older does not count, s.
+MAX_POSITION_AGE = 0.5  #: A position that is older is not used by the server, s.
+DRIFT = 0.1  #: How fast the age that is taken for usual may grow, s/s.
+Position = tuple[float, float, float]  #: x, y, z in m, fixed frame, z up.
 
 
 class Motion(NamedTuple):
-    """A measured state.
+    """A measured state."""
 
-    Attributes
-    ----------
-    position, velocity : tuple of float, length 3
-        m and m/s, fixed frame, z up.
-    yaw : float
-        rad.
-    """
-
+    #: position, velocity: m and m/s, fixed frame, z up.
     position: Position
     velocity: tuple[float, float, float]
-    yaw: float = 0.0
+    yaw: float = 0.0  #: rad.
 
 
 class Measurement:
@@ -117,12 +102,7 @@ class Delay:
     def excess(self, stamp: float, now: float) -> float:
         """Return how much older than usual the data of a message are, s.
 
-        Parameters
-        ----------
-        stamp : float
-            Of the data, s; zero, or the same again, has no age.
-        now : float
-            By the same clock, s.
+        ``stamp`` and ``now`` are by one clock, s; a stamp of zero, or the same again, has no age.
         """
         if stamp == 0.0 or stamp == self._stamp:
             return 0.0

@@ -13,8 +13,7 @@ from crazyflie_takeoff.limits import Limits
 from crazyflie_takeoff.motion import Measurement, Motion
 from crazyflie_takeoff.safe_control import MOTORS_OFF, HoverThrust, Setpoint
 
-LEARNING_STEP = 0.2
-"""Nothing is learned from controls that are further apart, s."""
+LEARNING_STEP = 0.2  #: Nothing is learned from controls that are further apart, s.
 
 
 class Relay(Generic[Control]):

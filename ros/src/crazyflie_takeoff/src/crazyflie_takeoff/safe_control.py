@@ -15,61 +15,42 @@ from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.motion import Motion
 
+#: More time than this never passes between two ticks, s: after a clock was set, or the process was
+#: stopped for a while, no silence is as long as it seems.
 LONGEST_STEP = 0.05
-"""More time than this never passes between two ticks, s: after a clock was set, or the process
-was stopped for a while, no silence is as long as it seems."""
 
-HOVER_RANGE = 0.25
-"""How far the hover thrust may be from g, as a fraction."""
+HOVER_RANGE = 0.25  #: How far the hover thrust may be from g, as a fraction.
+AVERAGING = 2.0  #: Time constant of the mean of the commanded thrust, s.
 
-AVERAGING = 2.0
-"""Time constant of the mean of the commanded thrust, s."""
-
+#: How fast the target speed goes down in a descent, and from the beginning while no state comes,
+#: m/s^2: the thrust is then as much below hover, which may have been learned 2 % too high. From 1 m
+#: a vehicle without a state meets the ground at 0.7 m/s, from 2 m at 1.0 m/s.
 SINK_RATE = 0.3
-"""How fast the target speed goes down in a descent, and from the beginning while no state comes,
-m/s^2: the thrust is then as much below hover, which may have been learned 2 % too high. From 1 m a
-vehicle without a state meets the ground at 0.7 m/s, from 2 m at 1.0 m/s."""
 
-SINK_SPEED = 0.4
-"""The target speed goes down to this while the speed is measured, m/s."""
-
-SETTLING = 0.3
-"""Time constant at which the speed follows its target, s."""
-
-MAX_CORRECTION = 0.2 * GRAVITY
-"""Most that the thrust exceeds hover, m/s^2."""
-
-MAX_BRAKING = 0.4 * GRAVITY
-"""The same below hover, which ends a climb, m/s^2."""
-
+SINK_SPEED = 0.4  #: The target speed goes down to this while the speed is measured, m/s.
+SETTLING = 0.3  #: Time constant at which the speed follows its target, s.
+MAX_CORRECTION = 0.2 * GRAVITY  #: Most that the thrust exceeds hover, m/s^2.
+MAX_BRAKING = 0.4 * GRAVITY  #: The same below hover, which ends a climb, m/s^2.
+#: Of the place, 1/s^2: 0.25 rad/m, as the softer gains (K_manual.txt) have it.
 POSITION_GAIN = 0.25 * GRAVITY
-"""Of the place, 1/s^2: 0.25 rad/m, as the softer gains (K_manual.txt) have it."""
 
+#: Of the velocity, 1/s: 0.3 rad/(m/s), which damps `POSITION_GAIN` critically. The softer gains
+#: have more, which a noisy velocity would turn into tilt.
 VELOCITY_GAIN = 0.3 * GRAVITY
-"""Of the velocity, 1/s: 0.3 rad/(m/s), which damps `POSITION_GAIN` critically. The softer gains
-have more, which a noisy velocity would turn into tilt."""
 
+#: The place is no further away than this for the purpose of the control, m: so the vehicle moves
+#: towards it at 0.4 m/s at most.
 MAX_DISTANCE = 0.5
-"""The place is no further away than this for the purpose of the control, m: so the vehicle moves
-towards it at 0.4 m/s at most."""
 
-MAX_SAFE_TILT = 0.15
-"""Most roll and pitch of the filter's own, rad."""
-
+MAX_SAFE_TILT = 0.15  #: Most roll and pitch of the filter's own, rad.
+#: The place to keep is where a vehicle gets horizontally in this time with its speed, s.
 STOPPING_TIME = 0.5
-"""The place to keep is where a vehicle gets horizontally in this time with its speed, s."""
-
-HEIGHT_GAIN = 1.0
-"""Target speed over height error, 1/s,"""
-
-MAX_HEIGHT_SPEED = 0.3
-"""which is at most this, m/s."""
-
+HEIGHT_GAIN = 1.0  #: Target speed over height error, 1/s,
+MAX_HEIGHT_SPEED = 0.3  #: which is at most this, m/s.
+#: Most thrust that the filter gives by itself, m/s^2.
 MAX_SUBSTITUTE = (1.0 + HOVER_RANGE) * GRAVITY
-"""Most thrust that the filter gives by itself, m/s^2."""
-
+#: How long the change from the filter's control back to the controller's takes, s.
 RETURN_TIME = 0.2
-"""How long the change from the filter's control back to the controller's takes, s."""
 
 
 class Setpoint(NamedTuple):
@@ -107,15 +88,9 @@ class HoverThrust:
         return limited(self._thrust - self._acceleration, HOVER_RANGE * GRAVITY, GRAVITY)
 
     def update(self, step: float, control: Setpoint, speed: float | None) -> None:
-        """Take a control that flies the vehicle.
+        """Take a control that flies the vehicle, ``step`` s after the last one.
 
-        Parameters
-        ----------
-        step : float
-            Since the last one, s.
-        control : Setpoint
-        speed : float or None
-            Measured z_dot, m/s.
+        ``speed`` is the measured z_dot, m/s, or None.
         """
         share = step / (AVERAGING + step)
         vertical = control.thrust * math.cos(control.roll) * math.cos(control.pitch)
@@ -135,11 +110,7 @@ class SafeControl:
     """
 
     def __init__(
-        self,
-        hover: float,
-        motion: Motion | None,
-        age: float = 0.0,
-        control: Setpoint = MOTORS_OFF,
+        self, hover: float, motion: Motion | None, age: float = 0.0, control: Setpoint = MOTORS_OFF
     ):
         self._hover = hover
         self._control = control
@@ -157,16 +128,10 @@ class SafeControl:
         return self._velocity[2]
 
     def advance(self, step: float, measured: Motion | None, sinks: bool) -> Setpoint:
-        """Return the next control.
+        """Return the next control, ``step`` s after the last one.
 
-        Parameters
-        ----------
-        step : float
-            Since the last one, s.
-        measured : Motion or None
-            The latest one; the same object again is one that has been taken already.
-        sinks : bool
-            Whether the vehicle is to come down.
+        ``measured`` is the latest motion; the same object again is one that has been taken already.
+        ``sinks`` is whether the vehicle is to come down.
         """
         self._reckon(step)
         offset = self._offset(measured)

@@ -102,17 +102,9 @@ class SafeFilter(Generic[Control]):
     def takeoff(
         self, time: float, control: Control, setpoint: Setpoint, caller: str = ""
     ) -> Control | Setpoint | None:
-        """Return what to pass on when a takeoff control has come.
+        """Return what to pass on when a takeoff control has come from a node at ``time`` (s).
 
-        Parameters
-        ----------
-        time : float
-            Now, s.
-        control : object
-        setpoint : Setpoint
-            Its numbers.
-        caller : str
-            Name of the node that sent it.
+        ``setpoint`` has the numbers of ``control``.
         """
         self.watch.gaps.run(time)
         self.watch.note_takeoff(time, caller, self.machine.is_on_ground)
@@ -128,12 +120,7 @@ class SafeFilter(Generic[Control]):
         return self.relay.takeoff(time, control, setpoint)
 
     def commanded(
-        self,
-        time: float,
-        control: Control,
-        setpoint: Setpoint,
-        caller: str = "",
-        age: float = 0.0,
+        self, time: float, control: Control, setpoint: Setpoint, caller: str = "", age: float = 0.0
     ) -> Control | Setpoint | None:
         """Return what to pass on when a commanded control has come; see `takeoff`.
 
@@ -238,10 +225,7 @@ class SafeFilter(Generic[Control]):
     def reset(self) -> None:
         """Let the next takeoff have the vehicle again.
 
-        Raises
-        ------
-        RefusalError
-            Nothing has stopped the motors, or the vehicle may not be on the ground yet.
+        `RefusalError`: nothing has stopped the motors, or the vehicle may not be on the ground yet.
         """
         if self.state is not FilterState.EMERGENCY:
             raise RefusalError("there is no emergency")

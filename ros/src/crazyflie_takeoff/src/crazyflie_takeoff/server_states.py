@@ -53,8 +53,8 @@ class Event(enum.Enum):
 
 
 STOPS = (Event.FILTER_EMERGENCY, Event.FILTER_REFUSES)
+#: With these the filter has the vehicle.
 TAKEOVERS = (Event.FILTER_SINKS, Event.FILTER_DOWN, *STOPS)
-"""With these the filter has the vehicle."""
 
 
 class FilterReport(NamedTuple):
@@ -66,5 +66,4 @@ class FilterReport(NamedTuple):
     reason: str = ""  # Why it does not pass controls on, or refuses takeoffs.
 
 
-NO_FILTER = FilterReport()
-"""Before a filter has published anything."""
+NO_FILTER = FilterReport()  #: Before a filter has published anything.

@@ -14,26 +14,14 @@ from crazyflie_takeoff.motion import Position
 from crazyflie_takeoff.server_states import NO_FILTER, STOPS, Event, FilterReport, ServerState
 from crazyflie_takeoff.transition_table import Table, Transition
 
-LIFT_OFF_THRUST = GRAVITY + 0.2
-"""Thrust of the open-loop part of a takeoff, m/s^2."""
-
-LIFT_OFF_TIME = 3.0
-"""A vehicle that a controller has not lifted off in this time, s, cannot fly."""
-
-RAMP_DURATION = 1.0
-"""How long the thrust of a landing goes down, s; zero thrust follows."""
-
-TOUCHDOWN_LIMIT = 2.0
-"""How long after the ramp a vehicle may take to come down, s."""
-
+LIFT_OFF_THRUST = GRAVITY + 0.2  #: Thrust of the open-loop part of a takeoff, m/s^2.
+LIFT_OFF_TIME = 3.0  #: A vehicle that a controller has not lifted off in this time, s, cannot fly.
+RAMP_DURATION = 1.0  #: How long the thrust of a landing goes down, s; zero thrust follows.
+TOUCHDOWN_LIMIT = 2.0  #: How long after the ramp a vehicle may take to come down, s.
+#: A vehicle above this height is in flight if no flight state is remembered, m.
 FLYING_HEIGHT = 0.15
-"""A vehicle above this height is in flight if no flight state is remembered, m."""
-
-FILTER_LIMIT = 60.0
-"""How long the filter may take to bring a vehicle down, or hold it, s."""
-
-ROUNDING = 1e-6
-"""Tolerance of comparisons between times, s."""
+FILTER_LIMIT = 60.0  #: How long the filter may take to bring a vehicle down, or hold it, s.
+ROUNDING = 1e-6  #: Tolerance of comparisons between times, s.
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,7 @@ _EVENTS = {
 def report_of(message: FilterStatus) -> FilterReport:
     """Return what a filter's message means to the server.
 
-    Raises
-    ------
-    KeyError, ValueError
-        The message has a state that does not exist.
+    KeyError or ValueError: the message has a state that does not exist.
     """
     event, reason = _EVENTS[message.state], message.reason
     if message.takeoff_refusal and event in (Event.FILTER_PASSES, Event.FILTER_DOWN):

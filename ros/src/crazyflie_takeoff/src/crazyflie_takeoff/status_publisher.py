@@ -13,6 +13,7 @@ from crazyflie_takeoff.takeoff_server_parameters import TakeoffServerParameters
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.vectors import stamped
 
+#: For an operator both parts of a landing are one.
 _LOG_WORDS = {
     FlightState.ON_GROUND: "on the ground",
     FlightState.TAKING_OFF: "taking off",
@@ -20,7 +21,6 @@ _LOG_WORDS = {
     FlightState.DESCENDING: "landing",
     FlightState.LANDING: "landing",
 }
-"""For an operator both parts of a landing are one."""
 
 
 class StatusPublisher:

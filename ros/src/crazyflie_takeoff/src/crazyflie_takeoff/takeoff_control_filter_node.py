@@ -23,31 +23,19 @@ from crazyflie_utils import Node, NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import stamped
 
-TIME_STEP = 0.01
-"""Period of the controls that the filter makes itself, s."""
+TIME_STEP = 0.01  #: Period of the controls that the filter makes itself, s.
+NOMINAL_TIME_STEP = 0.04  #: The same while nothing is wrong, s.
 
-NOMINAL_TIME_STEP = 0.04
-"""The same while nothing is wrong, s."""
-
+#: How long a filter that has started listens before it passes a controller, s: some periods of the
+#: zero thrust on the ground, and less than a vehicle flies on without controls.
 LISTENING_TIME = 0.4
-"""How long a filter that has started listens before it passes a controller, s: some
-periods of the zero thrust on the ground, and less than a vehicle flies on without
-controls."""
 
-SERVER_LIMIT = 2.0
-"""How long it waits for the flight state of a server that still recovers it, s."""
-
+SERVER_LIMIT = 2.0  #: How long it waits for the flight state of a server that still recovers it, s.
+#: How long after its start a filter does not take commands for a sign of flight, s.
 FRESH_TIME = 5.0
-"""How long after its start a filter does not take commands for a sign of flight, s."""
-
-CONTROLLER_POLL_PERIOD = 0.1
-"""Between two looks for publishers of commanded controls, s."""
-
-BUSY_GAP = 0.1
-"""The computer of a filter that does not run for this long, s, is too busy."""
-
-REPETITION = 10.0
-"""Shortest time between two warnings of the same kind, s."""
+CONTROLLER_POLL_PERIOD = 0.1  #: Between two looks for publishers of commanded controls, s.
+BUSY_GAP = 0.1  #: The computer of a filter that does not run for this long, s, is too busy.
+REPETITION = 10.0  #: Shortest time between two warnings of the same kind, s.
 
 
 class TakeoffControlFilterNode(Node):

@@ -32,25 +32,19 @@ from crazyflie_utils import Node, NodeHandle, ParameterError, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.vectors import from_vector, stamped
 
-TIME_STEP = 0.01
-"""Period of the server, s."""
-
-CRUISE_TIME_STEP = 0.1
-"""The same in flight, when it only watches the battery, s."""
-
-STATUS_PERIOD = 0.1
-"""Period at which the status is compared with the published one, s."""
-
+TIME_STEP = 0.01  #: Period of the server, s.
+CRUISE_TIME_STEP = 0.1  #: The same in flight, when it only watches the battery, s.
+STATUS_PERIOD = 0.1  #: Period at which the status is compared with the published one, s.
+#: How long a server that has started waits for evidence of the state of the flight, s.
 RECOVERY_LIMIT = 1.0
-"""How long a server that has started waits for evidence of the state of the flight, s."""
 
+#: Limit of a descent when the process is to end, s: with the end of the landing it takes less than
+#: the 10 s for which a process with a flight goes on.
 LEAVE_LIMIT = 7.0
-"""Limit of a descent when the process is to end, s: with the end of the landing it takes less than
-the 10 s for which a process with a flight goes on."""
 
+#: How long after the server's start a takeoff waits for the first state and for a controller, s:
+#: nodes that are launched together need a while to find each other.
 START_LIMIT = 5.0
-"""How long after the server's start a takeoff waits for the first state and for a
-controller, s: nodes that are launched together need a while to find each other."""
 
 
 class TakeoffServerNode(Node):

@@ -103,7 +103,6 @@ def test_no_sensors(write, text):
 
 
 @given(st.floats(0.0, math.pi), st.integers(1, 60))
-@settings(max_examples=30, deadline=None)
 def test_a_cone_has_its_width_and_an_axis(spread, count):
     rays = cone(spread, count)
     assert rays.shape == (count, 3)
@@ -174,9 +173,7 @@ def test_noise(write):
     assert np.std(readings) == pytest.approx(0.02, rel=0.15)
 
 
-@settings(
-    max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(text=with_an_odd_word(GOOD))
 def test_any_value_anywhere_is_taken_or_refused(write, text):
     assert_taken_or_refused(range_sensors.load, write(text))

@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from crazyflie_vision.follow import Follower, GainParameters, SpeedParameters
@@ -54,7 +54,6 @@ def test_limits(x, y, radius):
     assert v.y == 0.0
 
 
-@settings(max_examples=30)
 @given(st.floats(0.4, 4.0), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
 def test_it_arrives(depth, bearing, height):
     # A vehicle that has every velocity at once; what it follows rests.

@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
@@ -44,7 +44,6 @@ def project(point, pose):
 ANGLE = st.floats(-0.3, 0.3)
 
 
-@settings(max_examples=25, deadline=None)
 @given(st.floats(0.6, 3.0), st.floats(-0.2, 0.2), st.floats(-0.15, 0.15), ANGLE, ANGLE, ANGLE)
 def test_a_ball_is_where_it_is_projected(ahead, left, up, roll, pitch, yaw):
     # Where the camera looks, whatever its attitude; within the image.
@@ -151,7 +150,6 @@ def test_a_cylinder_has_its_width_and_height():
 PLACE = st.tuples(*3 * [st.floats(-2.5, 2.5)])
 
 
-@settings(max_examples=25, deadline=None)
 @given(PLACE, st.floats(-3.2, 3.2), st.floats(-3.2, 3.2), st.floats(-3.2, 3.2))
 def test_any_pose_gives_an_image(position, roll, pitch, yaw):
     objects = (

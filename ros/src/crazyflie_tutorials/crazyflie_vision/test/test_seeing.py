@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from test_camera import CONFIG
 
@@ -55,7 +55,6 @@ def test_threshold():
     assert not filters.threshold(half, 200).any()
 
 
-@settings(max_examples=30, deadline=None)
 @given(st.integers(30, 290), st.integers(30, 210), st.integers(4, 28))
 def test_a_disc_is_found_in_noise(x, y, radius):
     scene = disc(20, 20, 15, (200, 80, 30))
@@ -115,7 +114,6 @@ def test_a_bad_cascade_is_named(tmp_path, content):
         FaceDetector(str(file))
 
 
-@settings(max_examples=20, deadline=None)
 @given(st.floats(-50, 400), st.floats(-50, 400), st.floats(0.1, 300))
 def test_what_is_drawn_leaves_the_image_alone(x, y, radius):
     scene = image()

@@ -9,15 +9,10 @@ from collections.abc import Callable
 
 import genpy
 
-_QUIET = 100_000
-"""Two readings of clocks that are this close, in ns, were not interrupted."""
-
+_QUIET = 100_000  #: Two readings of clocks that are this close, in ns, were not interrupted.
+#: Wall clock and monotonic clock may drift apart by this, in ns, before stamps follow.
 _OFFSET_TOLERANCE = 1_000_000
-"""Wall clock and monotonic clock may drift apart by this, in ns, before stamps follow."""
-
-
-_SECOND = 1_000_000_000
-"""ns."""
+_SECOND = 1_000_000_000  #: ns.
 
 
 def ros_time(nanoseconds: int) -> genpy.Time:

@@ -19,16 +19,7 @@ from crazyflie_utils.transport import Transport
 class ProcessContext:
     """One executor, one clock, one set of topics, one tf buffer.
 
-    Parameters
-    ----------
-    transport : Transport
-    use_sim_time : bool
-        Use simulated time, which stands still until it is set.
-
-    Attributes
-    ----------
-    exit_status : int or None
-        With which the process is to end; None while it is not.
+    With ``use_sim_time`` the clock is simulated time, which stands still until it is set.
     """
 
     def __init__(self, transport: Transport, use_sim_time: bool):
@@ -51,6 +42,7 @@ class ProcessContext:
         self._simulated = TimerQueue(self.executor, *tf)
         self.clock_source = ClockSource(transport, self.topics, self.clock, self._simulated)
         self._inhibitors: list[ShutdownInhibitor] = []
+        #: With which the process is to end; None while it is not.
         self.exit_status: int | None = None
         if isinstance(self.clock, SimulatedClock):
             self.clock.on_change(self._run_simulated)

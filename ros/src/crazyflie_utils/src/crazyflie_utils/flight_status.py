@@ -9,22 +9,12 @@ from crazyflie_utils.handle import NodeHandle
 
 
 def subscribe(
-    handle: NodeHandle,
-    topic: str,
-    text_topic: str | None,
-    callback: Callable[[FlightStatus], None],
+    handle: NodeHandle, topic: str, text_topic: str | None, callback: Callable[[FlightStatus], None]
 ) -> None:
-    """Have ``callback(status)`` called for each flight status.
+    """Have ``callback(status)`` called for each flight status on a topic.
 
-    Parameters
-    ----------
-    handle : NodeHandle
-    topic : str
-        Of crazyflie_msgs/FlightStatus.
-    text_topic : str or None
-        Of std_msgs/String, for a takeoff server without flight status: names of states in small
-        letters; any other text is `FlightStatus.UNKNOWN`.
-    callback : callable
+    A takeoff server without flight status has a ``text_topic`` of std_msgs/String: names of states
+    in small letters; any other text is `FlightStatus.UNKNOWN`.
     """
     handle.subscribe(topic, FlightStatus, callback)
     if text_topic is not None:

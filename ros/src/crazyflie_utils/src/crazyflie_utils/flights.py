@@ -7,26 +7,17 @@ from std_msgs.msg import String
 
 from crazyflie_utils.topics import Topics
 
-TOPIC = "/flights"
-"""Topic of nodes that start and end flights, latched."""
+TOPIC = "/flights"  #: Topic of nodes that start and end flights, latched.
 
 _IN_FLIGHT, _TO_END, _ON_GROUND = "in flight", "in flight, to end", "on ground"
 
 
 class ShutdownInhibitor:
-    """Publishes the flights that a node starts and ends, which inhibit the end of processes.
-
-    Attributes
-    ----------
-    node : str
-        Its absolute name.
-    in_flight : bool
-        What was published last.
-    """
+    """Publishes the flights that a node starts and ends, which inhibit the end of processes."""
 
     def __init__(self, topics: Topics, node: str):
-        self.node = node
-        self.in_flight = False
+        self.node = node  #: Its absolute name.
+        self.in_flight = False  #: What was published last.
         self._publisher = topics.publisher(TOPIC, String, latch=True)
 
     def publish(self, in_flight: bool) -> None:

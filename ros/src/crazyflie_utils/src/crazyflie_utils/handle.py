@@ -28,51 +28,33 @@ class NodeHandle:
 
     Callbacks run one at a time, also those of several nodes in a process. One that raises is logged
     once with its traceback, `on_fault` has the node made safe, and it will be called again.
-
-    Parameters
-    ----------
-    process : ProcessContext
-    name : str
-        Absolute name of the node, such as /simulator.
-
-    Attributes
-    ----------
-    is_closed : bool
-        Whether `close` was called.
-    info, warn, error : callable
-        See `NodeLog`.
-    time, stamp, nanoseconds : callable
-        Seconds for intervals, ROS time for headers; see `SteadyClock` and `SimulatedClock`.
-    clock_publisher, next_event : callable
-        For the node that publishes /clock; see `ClockSource`.
-    broadcast_transforms, broadcast_static_transforms, listen_to_transforms, listen_to_poses, \
-    has_pose_consumers, rejected_transforms : callable
-        See `Transforms`.
-    service_nodes, report_fault : callable
-        See `Transport.service_nodes`, which waits for the master, and `FaultHandler.report`.
+    ``name`` is the node's absolute name, such as /simulator.
     """
 
     def __init__(self, process: ProcessContext, name: str):
         self.name = name
-        self.is_closed = False
+        self.is_closed = False  #: Whether `close` was called.
         self._process = process
         self._submit = process.executor.submit
         self._undo: list[Callable[[], None]] = []
         self._latest: list[LatestMessage] = []
         log = NodeLog(process.transport, name)
-        self.info, self.warn, self.error = log.info, log.warn, log.error
+        self.info, self.warn, self.error = log.info, log.warn, log.error  #: See `NodeLog`.
         self._faults = FaultHandler(log)
-        self.report_fault = self._faults.report
+        self.report_fault = self._faults.report  #: See `FaultHandler.report`.
         clock = process.clock
+        #: Seconds for intervals, ROS time for headers; see `SteadyClock` and `SimulatedClock`.
         self.time, self.stamp, self.nanoseconds = clock.time, clock.stamp, clock.nanoseconds
         source = process.clock_source
+        #: For the node that publishes /clock; see `ClockSource`.
         self.clock_publisher, self.next_event = source.publisher, source.next_event
         tf = process.transforms
-        self.broadcast_transforms = tf.broadcaster
+        self.broadcast_transforms = tf.broadcaster  #: These six: see `Transforms`.
         self.broadcast_static_transforms = tf.static_broadcaster
         self.listen_to_transforms, self.listen_to_poses = tf.listener, tf.pose_listener
         self.has_pose_consumers = tf.has_pose_consumers
         self.rejected_transforms = tf.rejected_by_reason
+        #: See `Transport.service_nodes`, which waits for the master.
         self.service_nodes = process.transport.service_nodes
 
     def child(self) -> "NodeHandle":
@@ -98,13 +80,8 @@ class NodeHandle:
     def load(self, parameters: type[P], on_change: Callable[[P], None] | None = None) -> P:
         """Return the node's own (private) parameters; `ParameterError` about all that is wrong.
 
-        Parameters
-        ----------
-        parameters : type
-            Subclass of `Parameters`.
-        on_change : callable, optional
-            Offers the live ones to dynamic_reconfigure: ``on_change(parameters)`` is called with
-            all of them, checked, after some were changed. It may raise `ParameterError` to refuse.
+        ``on_change(parameters)`` offers the live ones to dynamic_reconfigure: it is called with all
+        of them, checked, after some were changed. It may raise `ParameterError` to refuse.
         """
         source = PrivateParameters(self._process.transport.get_param, self.name, self.resolve)
         loaded = parameters.read(source.get, source.full_name)
@@ -145,15 +122,10 @@ class NodeHandle:
     ) -> Subscriber:
         """Have ``callback(message)`` called for each message, which is shared: never change it.
 
-        Parameters
-        ----------
-        finite : str, optional
-            A field of the message, such as "control", whose numbers must be finite.
-            Other messages are dropped with a warning, and
-        on_invalid : callable, optional
-            is called instead, without arguments.
-        latest_only : bool, optional
-            Only the latest message is delivered, before the node's next timer or service call.
+        ``finite`` is a field of the message, such as "control", whose numbers must be finite: other
+        messages are dropped with a warning, and ``on_invalid()`` is called instead. With
+        ``latest_only`` only the latest message is delivered, before the node's next timer or
+        service call.
         """
         name = self.resolve(topic)
         if finite:

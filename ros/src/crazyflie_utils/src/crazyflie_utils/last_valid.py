@@ -5,9 +5,9 @@ from typing import Generic, TypeVar
 
 T = TypeVar("T")
 
+#: How long, in s, a valid value may stand in for invalid ones: the firmware, too, gives up on a
+#: setpoint after 500 ms.
 HOLD_LIMIT = 0.5
-"""How long, in s, a valid value may stand in for invalid ones: the firmware,
-too, gives up on a setpoint after 500 ms."""
 
 
 class LastValid(Generic[T]):

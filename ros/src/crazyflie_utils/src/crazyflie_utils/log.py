@@ -58,15 +58,10 @@ class FaultHandler:
     """Logs what the callbacks of a node raise, and has the node made safe.
 
     A fault is logged with its traceback when it is new, and later only counted.
-
-    Attributes
-    ----------
-    enter_safe_state : callable or None
-        Called after each fault.
     """
 
     def __init__(self, log: NodeLog):
-        self.enter_safe_state: Callable[[], None] | None = None
+        self.enter_safe_state: Callable[[], None] | None = None  #: Called after each fault.
         self._log = log
         self._counts: dict[tuple[type, str, int | None], int] = {}
 

@@ -24,24 +24,16 @@ from crazyflie_utils.ros1.master_watch import MasterWatch
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.shutdown import FLUSH_TIME, Shutdown, catch_signals, exit_at_once, fail
 
-_MASTER_LIMIT = 10.0
-"""How long, in s, a node waits for a ROS master."""
-
+_MASTER_LIMIT = 10.0  #: How long, in s, a node waits for a ROS master.
+#: How long, in s, a thread that has something to do waits for another that computes.
 _SWITCH_INTERVAL = 0.0005
-"""How long, in s, a thread that has something to do waits for another that computes."""
 
 
 def run(node_class: type | str, default_name: str) -> None:
     """Run one node in this process until ROS shuts down; does not return.
 
-    Exits with status 1 when the node cannot be initialized.
-
-    Parameters
-    ----------
-    node_class : type or str
-        Subclass of `Node`, or "package.module:Class".
-    default_name : str
-        Unless the launch file gives another.
+    The class is a subclass of `Node`, or "package.module:Class"; the launch file may give another
+    name. Exits with status 1 when the node cannot be initialized.
     """
 
     def make_node(handle):
@@ -69,13 +61,9 @@ def run_composed(default_name: str) -> None:
 def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, Node]]) -> None:
     """Run the nodes that a function makes; does not return.
 
-    Parameters
-    ----------
-    default_name : str
-        Name of the process's own node unless the launch file gives another.
-    make_nodes : callable
-        ``make_nodes(handle)``, with the handle of that node, returns all nodes by absolute name.
-        What it raises ends the process with status 1.
+    ``make_nodes(handle)``, with the handle of the process's own node, returns all nodes by absolute
+    name. What it raises ends the process with status 1. The launch file may give another name than
+    ``default_name`` to the process's own node.
     """
     signals = catch_signals()
     _run(begin(default_name, signals), make_nodes, signals)

@@ -2,11 +2,8 @@
 
 import reprlib
 
-_VALUE_LENGTH = 80
-"""Characters of a value in a message; an expected list of a few numbers fits."""
-
-_NAME_LENGTH = 200
-"""Characters of a name, or of a list of names, in a message."""
+_VALUE_LENGTH = 80  #: Characters of a value in a message; an expected list of a few numbers fits.
+_NAME_LENGTH = 200  #: Characters of a name, or of a list of names, in a message.
 
 
 class _Repr(reprlib.Repr):

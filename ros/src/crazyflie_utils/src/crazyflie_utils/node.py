@@ -17,8 +17,8 @@ class Node:
     needs no locks.
     """
 
+    #: Whether a process with this node lives on after SIGINT until flights have ended.
     needed_in_flight: ClassVar[bool] = False
-    """Whether a process with this node lives on after SIGINT until flights have ended."""
 
     _handle: NodeHandle
 

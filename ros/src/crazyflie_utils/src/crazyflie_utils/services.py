@@ -10,8 +10,8 @@ from typing_extensions import override
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.transport import ServiceError
 
+#: The `NodeHandle` of the node that offers or calls the service; its module imports this one.
 Handle = Any
-"""The `NodeHandle` of the node that offers or calls the service; its module imports this one."""
 
 
 def serve(
@@ -27,9 +27,7 @@ def serve(
         return
     try:
         response = callback(request)
-    except ServiceError as error:
-        answer.set_exception(error)
-    except RefusalError as reason:
+    except (ServiceError, RefusalError) as reason:
         answer.set_exception(ServiceError(str(reason)))
     except Exception as error:
         handle.report_fault(callback, error)
@@ -66,9 +64,7 @@ def forward(done: Future[Any], to: Future[Any], handle: Handle) -> None:
     error = done.exception()
     if error is None:
         to.set_result(done.result())
-    elif isinstance(error, ServiceError):
-        to.set_exception(error)
-    elif isinstance(error, RefusalError):
+    elif isinstance(error, (ServiceError, RefusalError)):
         to.set_exception(ServiceError(str(error)))
     else:
         handle.error(f"a service failed\n{''.join(traceback.format_exception(error))}")

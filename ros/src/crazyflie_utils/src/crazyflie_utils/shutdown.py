@@ -14,20 +14,19 @@ from crazyflie_utils.flights import Flights
 from crazyflie_utils.node import Node
 from crazyflie_utils.process import Process
 
-_SHUTDOWN_LIMIT = 2.0
-"""How long, in s, shutdown waits for a callback that does not return."""
+_SHUTDOWN_LIMIT = 2.0  #: How long, in s, shutdown waits for a callback that does not return.
 
+#: How long, in s, a process goes on for a flight that is to end: less than the 15 s that roslaunch
+#: gives it.
 _FLIGHT_LIMIT = 10.0
-"""How long, in s, a process goes on for a flight that is to end: less than the 15 s
-that roslaunch gives it."""
 
+#: How long, in s, a process waits for another one to publish that its flight is to end, before it
+#: logs by itself that it waits.
 _NOTICE_DELAY = 1.0
-"""How long, in s, a process waits for another one to publish that its flight is to end, before it
-logs by itself that it waits."""
 
+#: How long, in s, the last messages have to be sent by rospy's threads and to be read: a subscriber
+#: hangs up as soon as the master tells it of the publisher's end.
 FLUSH_TIME = 0.2
-"""How long, in s, the last messages have to be sent by rospy's threads and to be
-read: a subscriber hangs up as soon as the master tells it of the publisher's end."""
 
 
 def catch_signals() -> list[int]:
@@ -52,18 +51,12 @@ def catch_signals() -> list[int]:
 
 
 class Shutdown:
-    """What a process with nodes, by absolute name, does before rospy closes its connections.
-
-    Attributes
-    ----------
-    is_stuck : bool
-        Whether a callback has not returned.
-    """
+    """What a process with nodes, by absolute name, does before rospy closes its connections."""
 
     def __init__(self, process: Process, nodes: dict[str, Node]):
         self._process = process
         self._nodes = nodes
-        self.is_stuck = False
+        self.is_stuck = False  #: Whether a callback has not returned.
         needed = [name for name, node in nodes.items() if node.needed_in_flight]
         self._flights = Flights(process.topics, needed) if needed else None
 

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from crazyflie_utils.messages import shown
 
-MAX_SIZE = 10_000_000
-"""Bytes of a file of text; longer ones are something else."""
+MAX_SIZE = 10_000_000  #: Bytes of a file of text; longer ones are something else.
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -22,10 +21,8 @@ class TextFileError(Exception):
 def read_text(path: str | Path, max_size: int = MAX_SIZE) -> str:
     """Return the text of a file in UTF-8, without a byte order mark.
 
-    Raises
-    ------
-    TextFileError
-        It cannot be read, is longer than ``max_size`` bytes, is not in UTF-8, or has a NUL.
+    `TextFileError`: it cannot be read, is longer than ``max_size`` bytes, is not in UTF-8, or has a
+    NUL.
     """
     try:
         with open(path, "rb") as file:

@@ -12,16 +12,16 @@ from operator import attrgetter
 from crazyflie_utils.clock import SteadyClock
 from crazyflie_utils.executor import Executor
 
+#: A timer is due this much early, s: more than the rounding of a float that holds the seconds since
+#: 1970, less than anyone can notice.
 _TOLERANCE = 1e-6
-"""A timer is due this much early, s: more than the rounding of a float that holds
-the seconds since 1970, less than anyone can notice."""
 
+#: Timers of at most this period, s, are due together where they can be: waking up costs more than
+#: most of them do.
 _TOGETHER = 0.1
-"""Timers of at most this period, s, are due together where they can be: waking up costs more than
-most of them do."""
 
+#: Timers that are spread are due so far apart, s: most others are due as often as that.
 _SLOT = 0.01
-"""Timers that are spread are due so far apart, s: most others are due as often as that."""
 
 
 class Timer:

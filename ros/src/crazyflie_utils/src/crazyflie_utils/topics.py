@@ -30,16 +30,10 @@ class Topic:
 
 
 class Publisher:
-    """The right to publish on a topic.
-
-    Attributes
-    ----------
-    latched : genpy.Message or None
-        What late subscribers are sent.
-    """
+    """The right to publish on a topic."""
 
     def __init__(self, topic: Topic, external: ExternalPublisher, latch: bool):
-        self.latched: genpy.Message | None = None
+        self.latched: genpy.Message | None = None  #: What late subscribers are sent.
         self._topic = topic
         self._external = external
         self._latch = latch

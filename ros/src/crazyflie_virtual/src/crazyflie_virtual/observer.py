@@ -16,29 +16,17 @@ _FORM = struct.Struct("<4sH32s14d")
 
 
 class Observation(NamedTuple):
-    """The truth about a vehicle at some moment.
+    """The truth about a vehicle at some moment."""
 
-    Attributes
-    ----------
-    body_id, name : int, str
-        Of the vehicle; the name has at most 31 bytes.
-    time : float
-        Of the machine's monotonic clock, s.
-    position, velocity : tuple, 3 components
-        m and m/s, fixed frame.
-    quaternion : tuple, 4 components
-        (x, y, z, w), body to fixed frame.
-    rates : tuple, 3 components
-        Body rates, rad/s.
-    """
-
+    #: body_id, name: Of the vehicle; the name has at most 31 bytes.
     body_id: int
     name: str
-    time: float
+    time: float  #: Of the machine's monotonic clock, s.
+    #: position, velocity: m and m/s, fixed frame.
     position: Triple
     velocity: Triple
-    quaternion: Quaternion
-    rates: Triple
+    quaternion: Quaternion  #: (x, y, z, w), body to fixed frame.
+    rates: Triple  #: Body rates, rad/s.
 
     def encode(self) -> bytes:
         """Return the observation as a datagram."""

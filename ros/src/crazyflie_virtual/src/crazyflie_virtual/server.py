@@ -7,31 +7,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any
 
-Address = tuple[str, int]
-"""Host and port."""
-
-_BURST = 256
-"""Datagrams taken in at one time, so that a flood does not stop everything else."""
-
-_STOP_LIMIT = 2.0
-"""How long `Server.stop` waits for the thread, s."""
+Address = tuple[str, int]  #: Host and port.
+_BURST = 256  #: Datagrams taken in at one time, so that a flood does not stop everything else.
+_STOP_LIMIT = 2.0  #: How long `Server.stop` waits for the thread, s.
 
 
 class Server(ABC):
-    """A server in real time.
+    """A server in real time; `stop` closes its sockets."""
 
-    Parameters
-    ----------
-    sockets : socket
-        Closed by `stop`.
-
-    Attributes
-    ----------
-    switches : object
-        Its attributes are the live fields of the settings.
-    """
-
-    switches: Any
+    switches: Any  #: Its attributes are the live fields of the settings.
 
     def __init__(self, *sockets: socket.socket):
         self._sockets = sockets
@@ -66,13 +50,7 @@ class Server(ABC):
 
 
 def open_socket(host: str, port: int) -> socket.socket:
-    """Return a non-blocking UDP socket on a port; 0 for a free one.
-
-    Raises
-    ------
-    OSError
-        The text names host and port.
-    """
+    """Return a non-blocking UDP socket on a port, 0 for a free one; OSError names host and port."""
     result = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     try:
         result.bind((host, port))

@@ -9,24 +9,16 @@ from crazyflie_utils.node import Node
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters
 from crazyflie_virtual.server import Server
 
-_POLL_PERIOD = 0.5
-"""How often the switches are read, s."""
+_POLL_PERIOD = 0.5  #: How often the switches are read, s.
 
 
 class ServerNode(Node):
-    """Runs a server; switches are polled, so that ``rosparam set`` works on them, too.
-
-    Attributes
-    ----------
-    settings_type : type
-        Subclass of `Parameters`.
-    server_type : type
-        ``server_type(settings, warn)`` listens, or raises `OSError`; ``warn(text)`` logs.
-    """
+    """Runs a server; switches are polled, so that ``rosparam set`` works on them, too."""
 
     needed_in_flight = True
 
-    settings_type: ClassVar[type[Parameters]]
+    settings_type: ClassVar[type[Parameters]]  #: Subclass of `Parameters`.
+    #: ``server_type(settings, warn)`` listens, or raises `OSError`; ``warn(text)`` logs.
     server_type: ClassVar[type]
 
     @override

@@ -1,20 +1,12 @@
 """The settings of a virtual vehicle: ROS parameters, or a command line."""
 
 from crazyflie_utils.parameters.declaration import Parameters, parameter
-from crazyflie_utils.parameters.types import (
-    BOOLEAN,
-    METRES,
-    TEXT,
-    Integer,
-    Number,
-    Text,
-)
+from crazyflie_utils.parameters.types import BOOLEAN, METRES, TEXT, Integer, Number, Text
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.firmware.localization import DECK, NONE
 from crazyflie_virtual.observer import DEFAULT_PORT
 
-FIRST_PORT = 19850
-"""UDP port of the first vehicle: clients scan from here to 19859."""
+FIRST_PORT = 19850  #: UDP port of the first vehicle: clients scan from here to 19859.
 
 _FRACTION = Number(minimum=-0.5, maximum=1.0)
 _PROBABILITY = Number(minimum=0.0, maximum=1.0)
@@ -88,11 +80,7 @@ class VehicleSettings(Parameters):
         "observer/id",
     )
     loss: float = parameter(
-        _PROBABILITY,
-        "probability that a packet, either way, is lost",
-        0.0,
-        "fault/loss",
-        live=True,
+        _PROBABILITY, "probability that a packet, either way, is lost", 0.0, "fault/loss", live=True
     )
     delay: float = parameter(
         Number("s", minimum=0.0, maximum=10.0),
@@ -116,11 +104,7 @@ class VehicleSettings(Parameters):
         live=True,
     )
     motor_failure: int = parameter(
-        Integer(0, 4),
-        "the failed motor, 1 to 4; 0 for none",
-        0,
-        "fault/motor_failure",
-        live=True,
+        Integer(0, 4), "the failed motor, 1 to 4; 0 for none", 0, "fault/motor_failure", live=True
     )
 
     def switches(self) -> FaultSwitches:

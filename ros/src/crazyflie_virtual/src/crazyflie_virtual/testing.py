@@ -10,13 +10,7 @@ from crazyflie_virtual.settings import VehicleSettings
 
 @contextlib.contextmanager
 def virtual_vehicle(**settings: Any) -> Iterator[tuple[VehicleServer, str]]:
-    """Run a vehicle, on a free port unless given; yield its server and its address.
-
-    Parameters
-    ----------
-    settings
-        Of `crazyflie_virtual.settings.VehicleSettings`.
-    """
+    """Run a vehicle with `VehicleSettings`, by default on a free port; yield server and address."""
     server = VehicleServer(VehicleSettings(**{"port": 0, "observer_port": 0, **settings}))
     server.start()
     try:

@@ -12,17 +12,16 @@ from crazyflie_virtual.link.crtp import Packet, Port
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_world import world_file
 
+#: Of the link port: packets that the radio chip answers itself, also while the microcontroller is
+#: off.
 _RADIO_CHANNEL = 3
-"""Of the link port: packets that the radio chip answers itself, also while the
-microcontroller is off."""
 
 _RADIO_COMMAND = 0xFE
 _ALL_OFF, _OFF, _ON, _RESET = 0x01, 0x02, 0x03, 0xF0
 
 _BATTERY_STEPS = 10
 
-_RESTART_TIME = 1.0
-"""Time of a restart after a failed assertion, s: assumed."""
+_RESTART_TIME = 1.0  #: Time of a restart after a failed assertion, s: assumed.
 
 _LOGGER = logging.getLogger(__name__)
 
@@ -30,24 +29,13 @@ _LOGGER = logging.getLogger(__name__)
 class VirtualVehicle:
     """Body, battery, radio chip and microcontroller.
 
-    Raises
-    ------
-    ParameterError
-        The world file is missing or wrong.
-
-    Attributes
-    ----------
-    physics : Physics
-        The true state.
-    battery : Battery
-    faults : FaultSwitches
-    board : Board or None
-        None while the microcontroller is off.
+    `ParameterError`: the world file is missing or wrong.
     """
 
     def __init__(self, settings: VehicleSettings):
         self._settings = settings
         self.faults = settings.switches()
+        #: The true state.
         self.physics = Physics(
             (settings.init_x, settings.init_y, 0.0),
             settings.init_yaw,
@@ -62,7 +50,7 @@ class VirtualVehicle:
         self._is_dead = False
         self._failure = ""
         self._restart_time = math.inf
-        self.board: Board | None = None
+        self.board: Board | None = None  #: None while the microcontroller is off.
         self._turn_on()
 
     @property
@@ -94,13 +82,7 @@ class VirtualVehicle:
             return []
 
     def advance_to(self, time: float) -> list[bytes]:
-        """Advance to the last whole step before ``time`` (s).
-
-        Returns
-        -------
-        list of bytes
-            Datagrams for the client that answer no request.
-        """
+        """Advance to the last whole step before ``time`` (s); return unasked datagrams."""
         datagrams = []
         for _ in range(math.floor(time / STEP + 1e-6) - self._steps):
             datagrams += self._step()

@@ -10,8 +10,7 @@ from crazyflie_virtual.link.server import VehicleServer
 from crazyflie_virtual.server_node import ServerNode
 from crazyflie_virtual.settings import VehicleSettings
 
-_LOOK_PERIOD = 0.05
-"""Period at which the moving objects of the vehicle's world are looked up, s."""
+_LOOK_PERIOD = 0.05  #: Period at which the moving objects of the vehicle's world are looked up, s.
 
 
 class VirtualCrazyflieNode(ServerNode):

@@ -10,8 +10,7 @@ from crazyflie_world.world import World
 
 _SHAPES = {Box: Marker.CUBE, Cylinder: Marker.CYLINDER, Ball: Marker.SPHERE}
 
-_FLOOR_THICKNESS = 0.001
-"""m; without one, RViz would draw nothing."""
+_FLOOR_THICKNESS = 0.001  #: m; without one, RViz would draw nothing.
 
 
 def markers(world: World) -> MarkerArray:

@@ -10,8 +10,7 @@ from typing_extensions import override
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FINITE, POSITION, TIME_STEP, ListOf, Number
 
-Position = tuple[float, float, float]
-"""x, y, z in m."""
+Position = tuple[float, float, float]  #: x, y, z in m.
 
 
 class Path(Parameters):

@@ -15,40 +15,24 @@ from numpy.typing import ArrayLike, NDArray
 from crazyflie_utils.parameters.types import ListOf, Number
 from crazyflie_world.paths import Path, Position
 
-Colour = tuple[float, float, float]
-"""Red, green, blue, each from 0 to 1."""
-
-COLOUR = ListOf(Number(minimum=0.0, maximum=1.0), 3)
-"""Type of a parameter that is a `Colour`."""
-
-Vectors = NDArray[np.float64]
-"""Shape (..., 3)."""
-
+Colour = tuple[float, float, float]  #: Red, green, blue, each from 0 to 1.
+COLOUR = ListOf(Number(minimum=0.0, maximum=1.0), 3)  #: Type of a parameter that is a `Colour`.
+Vectors = NDArray[np.float64]  #: Shape (..., 3).
+#: Distances at which rays enter and leave, shape (...,); the first is larger where they miss.
 Interval = tuple[NDArray[np.float64], NDArray[np.float64]]
-"""Distances at which rays enter and leave, shape (...,); the first is larger where they miss."""
 
 WALL_COLOUR = (0.85, 0.85, 0.8)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """What all solid shapes have.
+    """What all solid shapes have."""
 
-    Attributes
-    ----------
-    name : str
-        No two objects of a world have the same; for those that move it is that of their tf frame.
-    centre : tuple of float
-        x, y, z in the world's frame, m.
-    colour : tuple of float
-    path : Path or None
-        Where the centre moves, if it does.
-    """
-
+    #: No two objects of a world have the same; for those that move it is that of their tf frame.
     name: str
-    centre: Position
+    centre: Position  #: x, y, z in the world's frame, m.
     colour: Colour = (0.5, 0.5, 0.5)
-    path: Path | None = None
+    path: Path | None = None  #: Where the centre moves, if it does.
 
     @property
     def size(self) -> Position:
@@ -56,19 +40,10 @@ class Shape:
         raise NotImplementedError
 
     def interval(self, origins: Vectors, directions: Vectors) -> Interval:
-        """Return how far along rays the shape begins and ends.
+        """Return how far along rays the shape begins and ends, in lengths of the directions.
 
-        Parameters
-        ----------
-        origins : ndarray, shape (..., 3)
-            In the world's frame, m.
-        directions : ndarray, shape (..., 3)
-            None of them 0.
-
-        Returns
-        -------
-        tuple of ndarray, shape (...,)
-            In lengths of the directions; both are negative for what is behind the origin.
+        Origins (m) and directions, of shape (..., 3), are in the world's frame; no direction is 0.
+        Both distances are negative for what is behind the origin.
         """
         raise NotImplementedError
 
@@ -83,21 +58,12 @@ class Shape:
 
 @dataclass(frozen=True, kw_only=True)
 class Box(Shape):
-    """A box that stands upright.
+    """A box that stands upright."""
 
-    Attributes
-    ----------
-    extent : tuple of float
-        Along its own x, y and z, m.
-    yaw : float
-        How far it is turned about the vertical, rad.
-    picture : str
-        File of what is to be seen on its front, the side that looks along its own x; empty for
-        nothing.
-    """
-
-    extent: Position
-    yaw: float = 0.0
+    extent: Position  #: Along its own x, y and z, m.
+    yaw: float = 0.0  #: How far it is turned about the vertical, rad.
+    #: File of what is to be seen on its front, the side that looks along its own x; empty for
+    #: nothing.
     picture: str = ""
 
     @property
@@ -173,21 +139,11 @@ def wall(
 def cast(
     shapes: tuple[Shape, ...], origins: ArrayLike, directions: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.intp]]:
-    """Return what rays meet first, and how far away it is.
+    """Return how far away what rays meet first is, m, and its index; infinite and -1 for nothing.
 
-    Parameters
-    ----------
-    shapes : tuple of Shape
-    origins, directions : array_like, shape (..., 3)
-        Of the rays, in the world's frame; one origin may serve all. Directions have the
-        length 1, or else distances are in their lengths.
-
-    Returns
-    -------
-    distances : ndarray, shape (...,)
-        m; infinite where nothing is met, 0 within a shape.
-    indices : ndarray of int, shape (...,)
-        Into ``shapes``; -1 where nothing is met.
+    Origins and directions, of shape (..., 3), are in the world's frame; one origin may serve all.
+    Directions have the length 1, or else distances are in their lengths. Within a shape the
+    distance is 0.
     """
     origins, directions = np.broadcast_arrays(
         np.asarray(origins, dtype=float), np.asarray(directions, dtype=float)

@@ -12,12 +12,8 @@ from crazyflie_utils.parameters.types import ListOf, Number, Text
 from crazyflie_world.paths import Position
 from crazyflie_world.shapes import COLOUR, Box, Colour, Shape, cast
 
-FLOOR = "floor"
-"""Name of the floor among the solids."""
-
-
-TEXTURES = ("plain", "checkers", "speckles")
-"""Of floors."""
+FLOOR = "floor"  #: Name of the floor among the solids.
+TEXTURES = ("plain", "checkers", "speckles")  #: Of floors.
 
 
 class Floor(Parameters):
@@ -34,20 +30,11 @@ class Floor(Parameters):
 
 @dataclass(frozen=True)
 class World:
-    """A floor and objects, at one moment.
+    """A floor and objects, at one moment."""
 
-    Attributes
-    ----------
-    frame : str
-        The tf frame of all positions.
-    floor : Floor
-    objects : tuple of Shape
-        Walls are boxes.
-    """
-
-    frame: str
+    frame: str  #: The tf frame of all positions.
     floor: Floor
-    objects: tuple[Shape, ...] = ()
+    objects: tuple[Shape, ...] = ()  #: Walls are boxes.
 
     @property
     def solids(self) -> tuple[Shape, ...]:

@@ -18,6 +18,7 @@ from crazyflie_utils.parameters.types import (
     METRES,
     POSITION,
     TEXT,
+    File,
     ListOf,
     Number,
     ParameterType,
@@ -126,42 +127,22 @@ class WorldParameters(Parameters):
     floor: Floor = group(Floor, "floor")
 
 
+#: Objects that may move, by their type.
 OBJECTS: dict[str, type[_ObjectParameters]] = {
     "box": BoxParameters,
     "cylinder": CylinderParameters,
     "ball": BallParameters,
 }
-"""Objects that may move, by their type."""
 
 WALL = "wall"
 
-PATHS: dict[str, type[Path]] = {"circle": Circle, "waypoints": Waypoints}
-"""Paths, by their type."""
-
-
-class WorldFile(ParameterType):
-    """The path of a world file; as a value, the `World` in it."""
-
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> World:
-        if not isinstance(value, str) or not value:
-            raise ValueError
-        return load(value)
-
-    @override
-    def __str__(self) -> str:
-        return "the path of a world file"
+PATHS: dict[str, type[Path]] = {"circle": Circle, "waypoints": Waypoints}  #: Paths, by their type.
 
 
 def load(path: str | FilePath) -> World:
     """Return the world in a file.
 
-    Raises
-    ------
-    ParameterError
-        About everything that is wrong in it: file, line and what was expected.
+    `ParameterError` is about everything that is wrong in it: file, line and what was expected.
     """
     file = yaml_file.load(path)
     settings = file.read(WorldParameters, besides=("objects",))
@@ -182,6 +163,9 @@ def load(path: str | FilePath) -> World:
     if complaints:
         raise ParameterError(*complaints)
     return World(settings.frame, settings.floor, tuple(objects))
+
+
+WORLD_FILE = File(load, "a world file")
 
 
 def _object(entry: Entry) -> Shape:

@@ -10,13 +10,13 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TIME_STEP, TOPIC
 from crazyflie_world.markers import markers, pose
 from crazyflie_world.world import World
-from crazyflie_world.world_file import WorldFile
+from crazyflie_world.world_file import WORLD_FILE
 
 
 class WorldNodeParameters(Parameters):
     """Parameters of `WorldNode`."""
 
-    world: World = parameter(WorldFile(), "the world, a YAML file")
+    world: World = parameter(WORLD_FILE, "the world, a YAML file")
     markers_topic: str = parameter(
         TOPIC, "for RViz, latched", "world/markers", name="topics/markers"
     )

@@ -3,14 +3,9 @@
 from collections import deque
 from statistics import median
 
-_INTERVALS = 50
-"""Intervals whose median is the period of the stream."""
-
-_LEARNING = 10
-"""Intervals that must be known before they decide anything."""
-
-_STALL = 5.0
-"""Periods without a frame, after which the next one may have been waiting."""
+_INTERVALS = 50  #: Intervals whose median is the period of the stream.
+_LEARNING = 10  #: Intervals that must be known before they decide anything.
+_STALL = 5.0  #: Periods without a frame, after which the next one may have been waiting.
 
 
 class ArrivalTimes:

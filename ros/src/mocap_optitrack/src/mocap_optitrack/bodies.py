@@ -46,18 +46,10 @@ class RigidBodyParameters(OutputParameters):
 
 @dataclass(frozen=True)
 class Body:
-    """A body that is to be published.
+    """A body that is to be published."""
 
-    Attributes
-    ----------
-    key : str
-        Its entry in the dictionary.
-    parameters : OutputParameters
-        Its topics and frames.
-    """
-
-    key: str
-    parameters: OutputParameters
+    key: str  #: Its entry in the dictionary.
+    parameters: OutputParameters  #: Its topics and frames.
 
     @property
     def name(self) -> str | None:
@@ -91,18 +83,10 @@ class RigidBody(Body):
 
 @dataclass(frozen=True)
 class Bodies:
-    """The bodies of one dictionary that are to be published.
+    """The bodies of one dictionary that are to be published."""
 
-    Attributes
-    ----------
-    bodies : list of Body
-        At least one.
-    unknown : list of str
-        Entries that have no meaning, such as "rigid_bodies/1/odom".
-    """
-
-    bodies: list[Body]
-    unknown: list[str]
+    bodies: list[Body]  #: At least one.
+    unknown: list[str]  #: Entries that have no meaning, such as "rigid_bodies/1/odom".
 
 
 class SingleMarkerParameters(OutputParameters):
@@ -159,22 +143,14 @@ class SingleMarker(Body):
 
 
 class RigidBodyDictionary(ParameterType):
-    """The dictionary ``rigid_bodies``; a refusal names all that is wrong with it.
-
-    Attributes
-    ----------
-    key : str
-        The dictionary's name.
-    entry_type, body_type : type
-        Of an entry's parameters, and of what it becomes.
-    outputs : tuple of str
-        An entry has one of these parameters at least.
-    """
+    """The dictionary ``rigid_bodies``; a refusal names all that is wrong with it."""
 
     label = "dictionary"
-    key = "rigid_bodies"
+    key = "rigid_bodies"  #: The dictionary's name.
+    #: entry_type, body_type: Of an entry's parameters, and of what it becomes.
     entry_type: type[OutputParameters] = RigidBodyParameters
     body_type: type[Body] = RigidBody
+    #: An entry has one of these parameters at least.
     outputs: tuple[str, ...] = ("pose", "pose2d", "child_frame_id")
 
     @override
@@ -207,7 +183,6 @@ class RigidBodyDictionary(ParameterType):
         return Bodies(bodies, unknown)
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return (
             "a dictionary of number or name of a body: {pose, pose2d, child_frame_id, "
             "parent_frame_id}"

@@ -3,43 +3,38 @@
 from collections import deque
 from enum import Enum
 
-_BUCKET = 0.25
-"""s of local time whose shortest delay is kept as one figure."""
+_BUCKET = 0.25  #: s of local time whose shortest delay is kept as one figure.
 
+#: Buckets that make up the window: 5 s, in which clocks that differ by 50 ppm, a lot for quartz,
+#: drift apart by 0.25 ms.
 _BUCKETS = 20
-"""Buckets that make up the window: 5 s, in which clocks that differ by 50 ppm, a lot
-for quartz, drift apart by 0.25 ms."""
 
+#: A new stream is only listened to until the shortest delays of two buckets in a row differ by less
+#: than this, s; or, on a bad network, until the window is full.
 _AGREEMENT = 2e-3
-"""A new stream is only listened to until the shortest delays of two buckets in a row
-differ by less than this, s; or, on a bad network, until the window is full."""
 
+#: How fast the offset follows, s/s. A velocity from stamps is wrong by this fraction at most, and
+#: stamps never run backwards; no quartz drifts as fast.
 _SLEW = 1e-3
-"""How fast the offset follows, s/s. A velocity from stamps is wrong by this fraction at
-most, and stamps never run backwards; no quartz drifts as fast."""
 
-_JUMP = 0.1
-"""A difference that no drift explains, s."""
+_JUMP = 0.1  #: A difference that no drift explains, s.
 
+#: A message that was sent this long before the newest one, s, has not been overtaken: networks do
+#: not hold messages back for so long.
 _RESTART = 1.0
-"""A message that was sent this long before the newest one, s, has not been overtaken:
-networks do not hold messages back for so long."""
 
+#: Messages in a row that contradict what is known, until the clock is taken to be set.
 _CONTRADICTION_LIMIT = 10
-"""Messages in a row that contradict what is known, until the clock is taken to be set."""
 
 
 class FrameOrder(Enum):
     """Order of a message among those before it, by its times."""
 
-    NEW = "new"
-    """Sent after all others."""
-    OLD = "old"
-    """Sent with or before one that has come already: doubled, or overtaken on its way."""
-    FOREIGN = "foreign"
-    """By another clock: too far back, or not even sent when it arrived."""
+    NEW = "new"  #: Sent after all others.
+    OLD = "old"  #: Sent with or before one that has come already: doubled, or overtaken on its way.
+    FOREIGN = "foreign"  #: By another clock: too far back, or not even sent when it arrived.
+    #: One of the clocks was set; everything is learned anew, beginning with this message.
     RESTART = "restart"
-    """One of the clocks was set; everything is learned anew, beginning with this message."""
 
 
 class ClockOffset:
@@ -72,12 +67,8 @@ class ClockOffset:
     def update(self, sent: float, arrival: float) -> FrameOrder:
         """Process a message and return what it is.
 
-        Parameters
-        ----------
-        sent : float
-            s of the server's clock.
-        arrival : float
-            s of the local clock; never before that of the last message.
+        It was sent at a time of the server's clock, s, and arrived at one of the local clock, never
+        before the last message.
         """
         difference = arrival - sent
         order = self._classify(sent, difference)
@@ -106,10 +97,7 @@ class ClockOffset:
     def to_local(self, moment: float) -> float:
         """Return a moment of the server's clock (s) by the local clock (s).
 
-        Raises
-        ------
-        ValueError
-            Not enough messages have come; see `is_settled`.
+        ValueError: not enough messages have come; see `is_settled`.
         """
         if self._offset is None:
             raise ValueError("the offset of the server's clock has not settled yet")

@@ -9,15 +9,14 @@ from typing import NamedTuple
 from mocap_optitrack.bodies import Body as ConfiguredBody
 from mocap_optitrack.frames import Body
 
-OK, WARN, ERROR = range(3)
-"""Levels, as in diagnostic_msgs/DiagnosticStatus."""
+OK, WARN, ERROR = range(3)  #: Levels, as in diagnostic_msgs/DiagnosticStatus.
 
+#: How long a body may be missing before that is a fault: nothing is seen in the first moments of a
+#: stream, s.
 _GRACE = 2.0
-"""How long a body may be missing before that is a fault: nothing is seen in the
-first moments of a stream, s."""
 
+#: Bodies that are not configured and are remembered, so that a message can name them.
 _MOST_OTHERS = 10
-"""Bodies that are not configured and are remembered, so that a message can name them."""
 
 _TWO_SERVERS = "the server's clock keeps jumping: do two servers send to the same address?"
 
@@ -33,49 +32,33 @@ class Event(Enum):
 
 
 class Status(NamedTuple):
-    """The state of the stream or of a body.
+    """The state of the stream or of a body."""
 
-    Attributes
-    ----------
-    component : str
-        What it is about.
-    level : int
-        `OK`, `WARN` or `ERROR`.
-    message : str
-        For an operator.
-    values : dict of str to str
-        Figures, with their units in the keys.
-    """
-
-    component: str
-    level: int
-    message: str
-    values: dict[str, str]
+    component: str  #: What it is about.
+    level: int  #: `OK`, `WARN` or `ERROR`.
+    message: str  #: For an operator.
+    values: dict[str, str]  #: Figures, with their units in the keys.
 
 
 class Health:
-    """Counts what happens between two reports.
+    """Counts what happens between two reports; ``now`` is the time at the beginning, s.
 
-    Parameters
-    ----------
-    bodies : sequence of bodies.Body
-    stale_after : float
-        Gaps longer than this are a fault, s.
-    now : float
-        s.
-
-    Attributes
-    ----------
-    stale_after : float
-        For the reports to come.
+    Fewer frames a second than the first of ``rate_limits``, or more than the second, are a fault.
     """
 
     _longest_gap: float
 
-    def __init__(self, bodies: Sequence[ConfiguredBody], stale_after: float, now: float):
+    def __init__(
+        self,
+        bodies: Sequence[ConfiguredBody],
+        stale_after: float,
+        now: float,
+        rate_limits: tuple[float, float] | None = None,
+    ):
+        self._rate_limits = rate_limits or (0.0, math.inf)
         self._bodies = {body.key: _BodyCount() for body in bodies}
         self._labels = {body.key: body.component for body in bodies}
-        self.stale_after = stale_after
+        self.stale_after = stale_after  #: For the reports to come.
         self._server: str | None = None
         self._failure = "not connected so far"
         self._silence = "no frames"
@@ -167,10 +150,10 @@ class Health:
             mean = math.fsum(self._latencies) / frames
             values["latency, mean (ms)"] = _milliseconds(mean)
             values["latency, maximum (ms)"] = _milliseconds(max(self._latencies))
-        level, message = self._stream_assessment(values, gap)
+        level, message = self._stream_assessment(values, gap, rate)
         return Status("stream", level, message, values)
 
-    def _stream_assessment(self, values, gap):
+    def _stream_assessment(self, values, gap, rate):
         if self._server is None:
             return ERROR, self._failure
         foreign = self._events[Event.FOREIGN]
@@ -186,6 +169,10 @@ class Health:
             return WARN, _TWO_SERVERS
         if gap > self.stale_after:
             return WARN, f"gaps of up to {values['longest gap (ms)']} ms"
+        low, high = self._rate_limits
+        is_whole = self._stream_begin <= self._begin
+        if is_whole and not low <= rate <= high:
+            return WARN, f"{rate:.1f} frames per second; expected {low:g} to {high:g}"
         return OK, (
             f"{values['rate (Hz)']} frames per second, {values['latency, mean (ms)']} ms old"
         )

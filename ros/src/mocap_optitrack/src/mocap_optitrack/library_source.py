@@ -17,35 +17,24 @@ from mocap_optitrack.arrival_times import ArrivalTimes
 from mocap_optitrack.frames import Body, Frame
 from mocap_optitrack.source import Source, SourceError
 
-SYSTEMS = ("vicon", "qualisys", "vrpn")
-"""What the package can do beside NatNet."""
-
-_MARGIN = 2.0
-"""Added to the worker's own limit of connecting, s."""
+SYSTEMS = ("vicon", "qualisys", "vrpn")  #: What the package can do beside NatNet.
+_MARGIN = 2.0  #: Added to the worker's own limit of connecting, s.
 
 _CHUNK = 65536
 
 
 class LibrarySource(Source):
-    """A system that the motioncapture package knows.
+    """A system that the motioncapture package knows, one of `SYSTEMS`.
 
-    The package says neither when a frame was taken nor which bodies are tracked.
-    So frames have the time of their arrival at the package, which `ArrivalTimes` estimates
-    for those that have waited there, and a body counts as tracked when its
-    pose is not, to the last bit, the one it had in the frame before: measurements of
-    a body at rest differ by their noise, and a system that has lost a body, or its
-    cameras, repeats itself.
+    The package says neither when a frame was taken nor which bodies are tracked. So frames have the
+    time of their arrival at the package, which `ArrivalTimes` estimates for those that have waited
+    there, and a body counts as tracked when its pose is not, to the last bit, the one it had in the
+    frame before: measurements of a body at rest differ by their noise, and a system that has lost a
+    body, or its cameras, repeats itself.
 
-    Parameters
-    ----------
-    system : str
-        One of `SYSTEMS`.
-    host : str
-        Name or address of the server; for VRPN also with a port, ``vicon:3884``.
-    clock : callable
-        Returns the local time, s.
-    needs_points : bool
-        Whether a package that tells no unlabelled markers is of no use.
+    ``host`` is name or address of the server; for VRPN also with a port, ``vicon:3884``.
+    ``clock()`` returns the local time, s. A package that tells no unlabelled markers is of no use
+    if ``needs_points``.
     """
 
     def __init__(

@@ -7,9 +7,9 @@ from scipy.optimize import linear_sum_assignment
 
 from mocap_optitrack.marker_motion import UNSEEN_COST, MarkerMotion, Point
 
+#: By how much the second-best assignment has to cost more: it is less likely by exp(-3), which is 1
+#: in 20.
 _AMBIGUITY = 6.0
-"""By how much the second-best assignment has to cost more: it is less likely by exp(-3), which
-is 1 in 20."""
 
 _IMPOSSIBLE = 1e6
 
@@ -20,17 +20,9 @@ def assign(
     """Return index of marker -> index of point, and the markers that may be another point, too.
 
     The assignment is the most likely one: it has the least sum of `MarkerMotion.costs`, and of
-    `UNSEEN_COST` for each marker that is not seen. A pair is ambiguous when the marker has
-    another point within its gate, or the point another marker, and the best assignment without
-    the pair costs little more.
-
-    Parameters
-    ----------
-    motions : sequence of MarkerMotion
-    time : float
-        Of the frame, s.
-    points : (n, 3) array
-        m.
+    `UNSEEN_COST` for each marker that is not seen. A pair is ambiguous when the marker has another
+    point within its gate, or the point another marker, and the best assignment without the pair
+    costs little more. ``time`` is the frame's, s; ``points`` are of shape (n, 3), m.
     """
     m, n = len(motions), len(points)
     costs = np.full((m, n + m), _IMPOSSIBLE)

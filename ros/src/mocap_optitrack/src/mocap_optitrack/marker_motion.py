@@ -8,74 +8,43 @@ import numpy.typing as npt
 
 from mocap_optitrack.frames import Vector3
 
-Point = npt.NDArray[np.float64]
-"""x, y, z in m, z up."""
+Point = npt.NDArray[np.float64]  #: x, y, z in m, z up.
+GATE = 4.0  #: Standard deviations: of three normal variables together, 1 in 1000 is farther away.
 
-GATE = 4.0
-"""Standard deviations: of three normal variables together, 1 in 1000 is farther away."""
-
+#: Of a marker along each axis, m^2. OptiTrack tells less than 0.3 mm; a marker that is seen in part
+#: by some cameras is off by more.
 _MEASUREMENT_VARIANCE = 0.002**2
-"""Of a marker along each axis, m^2. OptiTrack tells less than 0.3 mm; a marker that is seen in
-part by some cameras is off by more."""
 
+#: Of `MarkerMotion.costs`: -2 log(0.1 * 0.1 / m^3 * (2 pi _MEASUREMENT_VARIANCE)^1.5), for a marker
+#: that is missing in one frame of ten, and one reflection in 10 m^3.
 UNSEEN_COST = 40.0
-"""Of `MarkerMotion.costs`: -2 log(0.1 * 0.1 / m^3 * (2 pi _MEASUREMENT_VARIANCE)^1.5), for a marker
-that is missing in one frame of ten, and one reflection in 10 m^3."""
 
-_FIRST_SPEED_VARIANCE = 1.0
-"""Of a marker that has been seen once, m^2/s^2."""
-
-_BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5
-"""Noise of two measurements, m."""
+_FIRST_SPEED_VARIANCE = 1.0  #: Of a marker that has been seen once, m^2/s^2.
+_BOX_MARGIN = GATE * (2.0 * _MEASUREMENT_VARIANCE) ** 0.5  #: Noise of two measurements, m.
 
 
 class MotionLimits(NamedTuple):
-    """Limits of a vehicle's motion.
+    """Limits of a vehicle's motion."""
 
-    Attributes
-    ----------
-    max_velocity : Vector3
-        Along each axis, m/s; those of crazyswarm2's dynamics configurations.
-    max_acceleration : float
-        m/s^2; three standard deviations of the filter's acceleration.
-    """
-
+    #: Along each axis, m/s; those of crazyswarm2's dynamics configurations.
     max_velocity: Vector3 = (2.0, 2.0, 3.0)
-    max_acceleration: float = 8.0
+    max_acceleration: float = 8.0  #: m/s^2; three standard deviations of the filter's acceleration.
 
 
 class MarkerMotion:
     """Constant-velocity Kalman filter of a marker; its three axes have one covariance.
 
-    The acceleration is constant from one measurement to the next, and independent of that
-    before (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
-    Navigation, 2001, section 6.3.2, discrete white noise acceleration).
-
-    Parameters
-    ----------
-    time : float
-        Of the first measurement, s.
-    position : (3,) array
-        m.
-    limits : MotionLimits
-
-    Attributes
-    ----------
-    time : float
-        Of the last measurement, s.
-    position, velocity : (3,) array
-        Estimates at that time, m and m/s.
-    measured : (3,) array
-        The last measurement, m.
-    limits : MotionLimits
-        From the next prediction on.
+    The acceleration is constant from one measurement to the next, and independent of that before
+    (Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
+    section 6.3.2, discrete white noise acceleration). The first measurement was made at ``time``
+    (s), of a ``position`` (3,) in m.
     """
 
     def __init__(self, time: float, position: Point, limits: MotionLimits):
-        self.time = time
-        self.position = self.measured = position
-        self.velocity = np.zeros(3)
-        self.limits = limits
+        self.time = time  #: Of the last measurement, s.
+        self.measured = position  #: The last measurement, m.
+        self.position, self.velocity = position, np.zeros(3)  #: Estimates at that time, m and m/s.
+        self.limits = limits  #: From the next prediction on.
         self._covariance = (_MEASUREMENT_VARIANCE, 0.0, _FIRST_SPEED_VARIANCE)
 
     def variance(self, time: float) -> float:

@@ -21,18 +21,11 @@ from mocap_optitrack.marker_vehicle import (
 class MarkerTracker:
     """Assigns the unlabelled markers of frames to vehicles.
 
-    All markers have a track, those of no vehicle too: a reflection that was there before a
-    vehicle was lost is not taken for the vehicle. If vehicles keep their maximum velocities
-    and accelerations and their markers are `SEPARATION` apart, no vehicle gets the marker of
-    another: when two are possible, none is taken.
-
-    Parameters
-    ----------
-    vehicles : sequence of MarkerVehicle
-    hold_time : float
-        How long a vehicle may be unseen in flight, s.
-    log : callable
-        Called with a text about each vehicle that is lost, and that is found again.
+    All markers have a track, those of no vehicle too: a reflection that was there before a vehicle
+    was lost is not taken for the vehicle. If vehicles keep their maximum velocities and
+    accelerations and their markers are `SEPARATION` apart, no vehicle gets the marker of another:
+    when two are possible, none is taken. A vehicle may be unseen in flight for ``hold_time`` (s);
+    ``log(text)`` is called about each that is lost, and that is found again.
     """
 
     def __init__(
@@ -57,12 +50,8 @@ class MarkerTracker:
     def update(self, time: float, points: Sequence[Vector3]) -> dict[str, Vector3]:
         """Return the measured positions (m) of the vehicles whose markers are in a frame.
 
-        Parameters
-        ----------
-        time : float
-            Of the frame, s; the vehicles are `UNSEEN` again when it is before the last one's.
-        points : sequence of Vector3
-            Unlabelled markers, m, z up. Points that are not finite are left out.
+        The vehicles are `UNSEEN` again when its time (s) is before the last one's. ``points`` are
+        its unlabelled markers, m, z up; those that are not finite are left out.
         """
         if time <= self._time:
             self._strangers = []

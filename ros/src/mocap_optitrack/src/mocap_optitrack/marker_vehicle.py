@@ -10,44 +10,33 @@ import numpy.typing as npt
 from mocap_optitrack.frames import Vector3
 from mocap_optitrack.marker_motion import MarkerMotion, MotionLimits, Point
 
+#: The markers of two vehicles are at least this far apart, m: a Crazyflie has 92 mm from motor to
+#: motor. So a gate of half of it has the marker of one vehicle at most.
 SEPARATION = 0.1
-"""The markers of two vehicles are at least this far apart, m: a Crazyflie has 92 mm from motor to
-motor. So a gate of half of it has the marker of one vehicle at most."""
 
+#: How far a marker may be from its vehicle's start point, m, if no other start point is nearer than
+#: three times as much.
 START_RADIUS = 0.25
-"""How far a marker may be from its vehicle's start point, m, if no other start point is nearer
-than three times as much."""
 
+#: A marker that has been within so many m for so many s rests.
 _REST_TIME, _REST_RADIUS = 0.5, 0.02
-"""A marker that has been within so many m for so many s rests."""
+_GROUND = 0.1  #: How much higher than at its first place a vehicle on the ground may be, m.
 
-_GROUND = 0.1
-"""How much higher than at its first place a vehicle on the ground may be, m."""
-
+#: A vehicle without poses has stopped after so many s, and is on the ground after so many s:
+#: crazyflie_takeoff's filter ends its motion and lets it sink.
 _STOP_TIME, _FALL_TIME = 1.0, 5.0
-"""A vehicle without poses has stopped after so many s, and is on the ground after so many s:
-crazyflie_takeoff's filter ends its motion and lets it sink."""
 
+#: Frames in which a marker has been seen that is taken for a vehicle's: reflections flash.
 _LEAST_SIGHTINGS = 3
-"""Frames in which a marker has been seen that is taken for a vehicle's: reflections flash."""
-
+#: How long a marker of no vehicle may be unseen, s; one that `flashes` in no frame.
 FORGET_TIME = 0.1
-"""How long a marker of no vehicle may be unseen, s; one that `flashes` in no frame."""
 
 
 class MarkerVehicle(NamedTuple):
-    """A vehicle with one marker.
-
-    Attributes
-    ----------
-    name : str
-    start : Vector3
-        Of its marker, before the first flight, m, z up.
-    limits : MotionLimits
-    """
+    """A vehicle with one marker."""
 
     name: str
-    start: Vector3
+    start: Vector3  #: Of its marker, before the first flight, m, z up.
     limits: MotionLimits = MotionLimits()
 
 

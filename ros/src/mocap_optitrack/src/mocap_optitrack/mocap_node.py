@@ -30,15 +30,12 @@ from mocap_optitrack.parameters import NATNET, MocapParameters
 from mocap_optitrack.source import Receiver
 from mocap_optitrack.tracker import Tracker
 
-_REPORT_PERIOD = 1.0
-"""Of the diagnostics, s; REP 107 wants one report a second."""
+_REPORT_PERIOD = 1.0  #: Of the diagnostics, s; REP 107 wants one report a second.
+_REPEAT = 5.0  #: The same warning comes at most this often, s.
 
-_REPEAT = 5.0
-"""The same warning comes at most this often, s."""
-
+#: How long a heading counts, s: a gyroscope drifts by some degrees a minute, and the driver's come
+#: every 0.1 s.
 MAX_HEADING_AGE = 2.0
-"""How long a heading counts, s: a gyroscope drifts by some degrees a minute, and the driver's
-come every 0.1 s."""
 
 
 class MocapNode(Node):
@@ -58,31 +55,14 @@ class MocapNode(Node):
         bodies, stale_after = parameters.bodies, parameters.stale_after
         self._server = ""
         self._stamp = genpy.Time()
-        self._health = Health(bodies, stale_after, handle.time())
+        self._health = Health(bodies, stale_after, handle.time(), parameters.rate_limits)
         self._tracker = Tracker(
-            bodies,
-            parameters.up_axis,
-            stale_after,
-            self._health,
-            parameters.hold_time,
-            handle.warn,
+            bodies, parameters.up_axis, stale_after, self._health, parameters.hold_time, handle.warn
         )
-        self._poses = {
-            body.key: handle.publisher(_private(body.parameters.pose), PoseStamped)
-            for body in bodies
-            if body.parameters.pose is not None
-        }
-        self._poses2d = {
-            body.key: handle.publisher(_private(body.parameters.pose2d), Pose2D)
-            for body in bodies
-            if body.parameters.pose2d is not None
-        }
         markers = parameters.markers
-        self._positions = {
-            marker.key: handle.publisher(_private(marker.parameters.position), PointStamped)
-            for marker in markers
-            if marker.parameters.position is not None
-        }
+        self._poses = _publishers(handle, bodies, "pose", PoseStamped)
+        self._poses2d = _publishers(handle, bodies, "pose2d", Pose2D)
+        self._positions = _publishers(handle, markers, "position", PointStamped)
         self._headings: dict[str, tuple[float, float]] = {}
         for marker in markers:
             if marker.parameters.heading is not None:
@@ -227,6 +207,16 @@ class MocapNode(Node):
             if status.level == ERROR and stream.level < ERROR:
                 text = f"{status.component}: {status.message}"
                 self._handle.warn(text, throttle=_REPEAT, key=status.component)
+
+
+def _publishers(handle, bodies, output, message_type):
+    """Return body's key -> publisher of an output, for the bodies that have it."""
+    topics = {body.key: getattr(body.parameters, output) for body in bodies}
+    return {
+        key: handle.publisher(_private(topic), message_type)
+        for key, topic in topics.items()
+        if topic is not None
+    }
 
 
 def _private(topic):

@@ -25,12 +25,11 @@ KEEP_ALIVE = NatNetClient.NAT_KEEPALIVE
 
 _HEADER = struct.Struct("<HH")
 
-_INFO_SIZE = 264
-"""Bytes of a server's name and versions, which natnet decodes."""
+_INFO_SIZE = 264  #: Bytes of a server's name and versions, which natnet decodes.
 
+#: What servers from 3.0 on add: ticks per second of their clock, data port, whether they send to a
+#: group, and the group.
 _CONNECTION = struct.Struct("<QHB4B")
-"""What servers from 3.0 on add: ticks per second of their clock, data port, whether
-they send to a group, and the group."""
 
 
 class DecodeError(Exception):
@@ -38,24 +37,14 @@ class DecodeError(Exception):
 
 
 class ServerInfo(NamedTuple):
-    """A server's answer to `CONNECT`.
+    """A server's answer to `CONNECT`."""
 
-    Attributes
-    ----------
-    name, version : str
-        Of the application, such as "Motive"; of the stream, such as "3.1".
-    clock_frequency : int or None
-        Ticks of its clock per second.
-    is_multicast : bool or None
-        Whether it sends to a group and not to each client.
-    multicast_address, data_port : str or None, int or None
-        The group.
-    """
-
+    #: name, version: Of the application, such as "Motive"; of the stream, such as "3.1".
     name: str
     version: str
-    clock_frequency: int | None = None
-    is_multicast: bool | None = None
+    clock_frequency: int | None = None  #: Ticks of its clock per second.
+    is_multicast: bool | None = None  #: Whether it sends to a group and not to each client.
+    #: multicast_address, data_port: The group.
     multicast_address: str | None = None
     data_port: int | None = None
 
@@ -67,12 +56,7 @@ def request(number: int, text: str = "") -> bytes:
 
 
 def split(datagram: bytes) -> tuple[int, bytes]:
-    """Return number and payload of a message.
-
-    Raises
-    ------
-    DecodeError
-    """
+    """Return number and payload of a message, or raise `DecodeError`."""
     if len(datagram) < _HEADER.size:
         raise DecodeError(f"a datagram of {len(datagram)} bytes is no NatNet message")
     number, length = _HEADER.unpack_from(datagram)
@@ -83,12 +67,7 @@ def split(datagram: bytes) -> tuple[int, bytes]:
 
 
 def read_server_info(payload: bytes) -> ServerInfo:
-    """Return the content of a `SERVER_INFO` message.
-
-    Raises
-    ------
-    DecodeError
-    """
+    """Return the content of a `SERVER_INFO` message, or raise `DecodeError`."""
     info = _decode(_Info, payload, None)
     version = str(info.nat_net_protocol_version.truncate(2))
     if len(payload) < _INFO_SIZE + _CONNECTION.size:
@@ -101,12 +80,7 @@ def read_server_info(payload: bytes) -> ServerInfo:
 
 
 def read_names(payload: bytes, version: str) -> dict[int, str]:
-    """Return the content of a `MODEL` message: number to name of all rigid bodies.
-
-    Raises
-    ------
-    DecodeError
-    """
+    """Return number to name of all rigid bodies in a `MODEL` message, or raise `DecodeError`."""
     model = _decode(DataDescriptions, payload, version)
     return {body.id_num: body.name for body in model.rigid_bodies}
 
@@ -114,24 +88,11 @@ def read_names(payload: bytes, version: str) -> dict[int, str]:
 def read_frame(
     payload: bytes, version: str, clock_frequency: int | None, names: dict[int, str], arrival: float
 ) -> Frame:
-    """Return the content of a `FRAME` message.
+    """Return the content of a `FRAME` message of a stream's version, or raise `DecodeError`.
 
-    Parameters
-    ----------
-    payload : bytes
-    version : str
-        Of the stream.
-    clock_frequency : int or None
-        Ticks of the server's clock per second; without it, or before version 3.0, the
-        frame's one software time stamp stands for exposure and sending.
-    names : dict
-        Number to name of rigid bodies.
-    arrival : float
-        s of the local clock.
-
-    Raises
-    ------
-    DecodeError
+    ``clock_frequency`` is in ticks of the server's clock per second; without it, or before version
+    3.0, the frame's one software time stamp stands for exposure and sending. ``names`` are those of
+    rigid bodies by number; ``arrival`` is s of the local clock.
     """
     frame = _decode(DataFrame, payload, version)
     stamps = frame.suffix

@@ -17,15 +17,7 @@ def any_address_may_answer(address: str) -> bool:
 def interface_towards(address: str) -> str | None:
     """Return the address of this machine's interface that leads to another address.
 
-    Returns
-    -------
-    str or None
-        None for a broadcast address.
-
-    Raises
-    ------
-    OSError
-        No route leads there.
+    None for a broadcast address; OSError if no route leads there.
     """
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
@@ -39,10 +31,7 @@ def interface_towards(address: str) -> str | None:
 def join_group(receiver: socket.socket, address: str, port: int, interface: str) -> None:
     """Let a UDP socket receive the datagrams to a group at a port, from one interface.
 
-    Raises
-    ------
-    OSError
-        The port is taken, or this machine has no such interface.
+    OSError: the port is taken, or this machine has no such interface.
     """
     # Other programs on this machine may listen to the same group.
     receiver.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

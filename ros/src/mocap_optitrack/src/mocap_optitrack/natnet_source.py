@@ -15,23 +15,14 @@ from mocap_optitrack.natnet_network import any_address_may_answer, interface_tow
 from mocap_optitrack.parameters import NatNetParameters
 from mocap_optitrack.source import Source, SourceError
 
-_ANSWER_LIMIT = 2.0
-"""How long a server may take to answer, s."""
-
-_ASK_AGAIN = 0.5
-"""Datagrams get lost: from one request for an answer to the next, s."""
-
-_NAMES_AGAIN = 2.0
-"""From one request for the names of bodies to the next, s."""
-
+_ANSWER_LIMIT = 2.0  #: How long a server may take to answer, s.
+_ASK_AGAIN = 0.5  #: Datagrams get lost: from one request for an answer to the next, s.
+_NAMES_AGAIN = 2.0  #: From one request for the names of bodies to the next, s.
+#: Without a frame for this long the server is asked again, s: after a restart it has no clients.
 _SILENCE = 0.5
-"""Without a frame for this long the server is asked again, s: after a restart it has no clients."""
-
-_KEEP_ALIVE = 1.0
-"""From one keep-alive to the next, without which a server stops sending, s."""
-
+_KEEP_ALIVE = 1.0  #: From one keep-alive to the next, without which a server stops sending, s.
+#: From one warning about datagrams of other senders than the server to the next, s.
 _FOREIGN_AGAIN = 5.0
-"""From one warning about datagrams of other senders than the server to the next, s."""
 
 _LARGEST = 65536
 _THIS_MACHINE = "127.0.0.1"
@@ -41,17 +32,10 @@ _ALL_INTERFACES = "0.0.0.0"
 class NatNetSource(Source):
     """A NatNet server, unicast or multicast as the server has it.
 
-    UDP is not authenticated, and every machine in the network can send to the ports. Only
-    datagrams from the server's address count: the configured one, else that of the first
-    server that answers, else that of the first frame of the group.
-
-    Parameters
-    ----------
-    parameters : NatNetParameters
-    clock : callable
-        Returns the local time, s.
-    warn : callable
-        Called with a text about every datagram that is dropped.
+    UDP is not authenticated, and every machine in the network can send to the ports. Only datagrams
+    from the server's address count: the configured one, else that of the first server that answers,
+    else that of the first frame of the group. ``clock()`` returns the local time, s; ``warn(text)``
+    is called about every datagram that is dropped.
     """
 
     def __init__(

@@ -12,6 +12,8 @@ from crazyflie_utils.parameters.types import (
     TEXT,
     TIME_STEP,
     Integer,
+    ListOf,
+    Number,
     ParameterType,
     Text,
 )
@@ -26,8 +28,7 @@ from mocap_optitrack.bodies import (
 )
 from mocap_optitrack.library_source import SYSTEMS
 
-NATNET = "natnet"
-"""Backend of OptiTrack; the others are `library_source.SYSTEMS`."""
+NATNET = "natnet"  #: Backend of OptiTrack; the others are `library_source.SYSTEMS`.
 
 _PORT = Integer(1, 65535)
 
@@ -54,7 +55,6 @@ class Address(ParameterType):
         return value
 
     def __str__(self) -> str:
-        """Return what is expected."""
         if self.multicast:
             return f"a multicast address, {self.range}"
         return "an IP address such as 192.168.1.20"
@@ -77,7 +77,6 @@ class StreamVersion(ParameterType):
         return f"{major}.{minor}"
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return "a NatNet version from 2.0 on, such as 3.1 or [3, 1, 0, 0]"
 
 
@@ -152,6 +151,11 @@ class MocapParameters(Parameters):
         "poses that are older on arrival are dropped, longer gaps are reported",
         0.2,
         live=True,
+    )
+    rate_limits: tuple[float, float] | None = parameter(
+        ListOf(Number("Hz", minimum=0.0), 2),
+        "with fewer frames a second than the first, or more than the second, the diagnostics warn",
+        None,
     )
     natnet: NatNetParameters = group(NatNetParameters, "optitrack_config")
     library: LibraryParameters = group(LibraryParameters, "motioncapture_config")

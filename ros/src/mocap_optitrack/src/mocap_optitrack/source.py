@@ -8,21 +8,15 @@ from collections.abc import Callable
 
 from mocap_optitrack.frames import Frame
 
-_SILENCE = 1.0
-"""A connection without a frame for this long is reported, s."""
+_SILENCE = 1.0  #: A connection without a frame for this long is reported, s.
 
+#: A connection without a frame for this long is made anew, s: the server may have moved, or a
+#: network interface may have forgotten its multicast groups.
 _RECONNECT_AFTER = 10.0
-"""A connection without a frame for this long is made anew, s: the server may have moved,
-or a network interface may have forgotten its multicast groups."""
 
-_RETRY = 1.0
-"""From a failure to the next attempt, s."""
-
-_POLL = 0.1
-"""How long a source may wait for a frame before `Receiver.stop` is looked for, s."""
-
-_STOP_LIMIT = 0.5
-"""How long `Receiver.stop` waits for the thread, s."""
+_RETRY = 1.0  #: From a failure to the next attempt, s.
+_POLL = 0.1  #: How long a source may wait for a frame before `Receiver.stop` is looked for, s.
+_STOP_LIMIT = 0.5  #: How long `Receiver.stop` waits for the thread, s.
 
 
 class SourceError(Exception):
@@ -34,21 +28,13 @@ class Source(ABC):
 
     @abstractmethod
     def open(self) -> str:
-        """Connect, within a few seconds, and return to what.
-
-        Raises
-        ------
-        SourceError
-        """
+        """Connect, within a few seconds, and return to what; or raise `SourceError`."""
 
     @abstractmethod
     def read(self, limit: float) -> Frame | None:
         """Return the next frame; None if there is none within ``limit`` seconds or so.
 
-        Raises
-        ------
-        SourceError
-            The connection has ended.
+        `SourceError`: the connection has ended.
         """
 
     @property

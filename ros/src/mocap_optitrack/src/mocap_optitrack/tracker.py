@@ -11,9 +11,9 @@ from mocap_optitrack.frames import Frame, Quaternion, Vector3
 from mocap_optitrack.health import Event, Health
 from mocap_optitrack.marker_tracker import MarkerTracker
 
+#: By how much a stamp may be ahead of its arrival, s: the offset of the server's clock is known to
+#: a millisecond or two.
 _LEAD = 0.005
-"""By how much a stamp may be ahead of its arrival, s: the offset of the server's clock is
-known to a millisecond or two."""
 
 _EVENTS = {
     FrameOrder.OLD: Event.REPEATED,
@@ -23,56 +23,26 @@ _EVENTS = {
 
 _UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 
-_RESET = 1.0
-"""By how much local time steps back when a simulation is reset, at least, s."""
+_RESET = 1.0  #: By how much local time steps back when a simulation is reset, at least, s.
 
 
 class BodyPose(NamedTuple):
-    """A body where the cameras saw it.
-
-    Attributes
-    ----------
-    body : Body
-    time : float
-        When, s of the local clock.
-    position : Vector3
-        m, z up.
-    quaternion : Quaternion or None
-        Of norm 1; None for a single marker.
-    """
+    """A body where the cameras saw it."""
 
     body: Body
-    time: float
-    position: Vector3
-    quaternion: Quaternion | None
+    time: float  #: When, s of the local clock.
+    position: Vector3  #: m, z up.
+    quaternion: Quaternion | None  #: Of norm 1; None for a single marker.
 
 
 class Tracker:
     """Finds the configured bodies in frames and drops what is invalid or stale.
 
-    A frame counts once: one that is not newer than the last one is dropped. So is one
-    that is older than ``stale_after`` on arrival, or from the future, or from another
-    server's clock. Of a frame, bodies are dropped that were not tracked or whose pose
-    is none.
-
-    Parameters
-    ----------
-    bodies : sequence of Body
-    up_axis : str
-        Of the stream; see `axes.UP_AXES`.
-    stale_after : float
-        s.
-    health : Health
-        Counts what happens.
-    hold_time : float
-        Of a `MarkerTracker` of single markers, s.
-    log : callable
-        Likewise.
-
-    Attributes
-    ----------
-    stale_after : float
-        For the frames to come.
+    A frame counts once: one that is not newer than the last one is dropped. So is one that is older
+    than ``stale_after`` (s) on arrival, or from the future, or from another server's clock. Of a
+    frame, bodies are dropped that were not tracked or whose pose is none. ``up_axis`` is the
+    stream's, see `axes.UP_AXES`; ``health`` counts what happens; ``hold_time`` (s) and ``log`` are
+    those of a `MarkerTracker`.
     """
 
     def __init__(
@@ -91,7 +61,7 @@ class Tracker:
         self._by_number = {str(int(body.key)): body for body in bodies if body.name is None}
         self._by_name = {body.name: body for body in bodies if body.name is not None}
         self._up_axis = up_axis
-        self.stale_after = stale_after
+        self.stale_after = stale_after  #: For the frames to come.
         self._health = health
         self._newest = self._arrival = -math.inf
         self._clock = ClockOffset()

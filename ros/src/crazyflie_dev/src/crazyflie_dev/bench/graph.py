@@ -14,15 +14,13 @@ import rosgraph
 
 from crazyflie_dev.bench.row import NotMeasuredError
 
-_LIMIT = 60.0
-"""How long, in s, anything may take until it is there."""
+_LIMIT = 60.0  #: How long, in s, anything may take until it is there.
 
 _TICK = 1.0 / os.sysconf("SC_CLK_TCK")
 
 _CALLER = "/bench"
 
-Arrivals = list[tuple[str, int, int]]
-"""Topic, arrival and stamp, in ns of the machine's clock."""
+Arrivals = list[tuple[str, int, int]]  #: Topic, arrival and stamp, in ns of the machine's clock.
 
 
 def wait_for_service(name: str, limit: float = _LIMIT) -> None:

@@ -12,11 +12,8 @@ from crazyflie_dev.bench import graph
 from crazyflie_dev.bench.row import NotMeasuredError, Row
 from crazyflie_utils.testing.launching import roslaunch
 
-DURATION = 20.0
-"""For how long a figure is measured, s."""
-
-_BEGINNING = 500_000_000
-"""So long, ns, rates are not counted."""
+DURATION = 20.0  #: For how long a figure is measured, s.
+_BEGINNING = 500_000_000  #: So long, ns, rates are not counted.
 
 _NODES = (
     "/simulator",

@@ -24,11 +24,9 @@ from rosgraph.network import read_ros_handshake_header, write_ros_handshake_head
 _LENGTH = struct.Struct("<I")
 _TIME = struct.Struct("<2I")
 
+#: Where a stamp is in a serialized message; behind a sequence number if nothing else is said.
 _STAMP_AT = {"tf2_msgs/TFMessage": 8, "rosgraph_msgs/Clock": 0}
-"""Where a stamp is in a serialized message; behind a sequence number if nothing else is said."""
-
-_LIMIT = 10.0
-"""How long, in s, a publisher may take to answer."""
+_LIMIT = 10.0  #: How long, in s, a publisher may take to answer.
 
 
 class Connection:

@@ -6,11 +6,8 @@ import numpy as np
 
 from crazyflie_dev.bench.row import Row
 
-PERIOD = 0.01
-"""Of the loop, s: that of the controls."""
-
-COUNT = 500
-"""How many periods are measured."""
+PERIOD = 0.01  #: Of the loop, s: that of the controls.
+COUNT = 500  #: How many periods are measured.
 
 
 def _longest_periods():
@@ -23,6 +20,4 @@ def _longest_periods():
     return float(np.percentile(np.diff(moments), 99)) * 1e3
 
 
-ROWS = [
-    Row("machine", "an empty loop of 10 ms, p99 of the period", "ms", _longest_periods),
-]
+ROWS = [Row("machine", "an empty loop of 10 ms, p99 of the period", "ms", _longest_periods)]

@@ -11,25 +11,13 @@ class NotMeasuredError(Exception):
 
 @dataclass(frozen=True)
 class Row:
-    """A figure.
+    """A figure."""
 
-    Attributes
-    ----------
-    name : str
-        A word for the command line.
-    text : str
-        What it is.
-    unit : str
-    measure : callable
-        Returns the figure, a float. Raises `NotMeasuredError`.
-    least, most : float
-        The goal: where the figure is to be.
-    """
-
-    name: str
-    text: str
+    name: str  #: A word for the command line.
+    text: str  #: What it is.
     unit: str
-    measure: Callable[[], float]
+    measure: Callable[[], float]  #: Returns the figure, a float. Raises `NotMeasuredError`.
+    #: least, most: The goal: where the figure is to be.
     least: float = -math.inf
     most: float = math.inf
 

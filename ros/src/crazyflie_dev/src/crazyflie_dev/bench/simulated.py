@@ -15,8 +15,7 @@ from crazyflie_utils.testing.launch_files import expand
 from crazyflie_utils.testing.launching import master
 from crazyflie_utils.testing.programs import running
 
-DURATION = 10.0
-"""For how long it is measured, s of the machine's clock."""
+DURATION = 10.0  #: For how long it is measured, s of the machine's clock.
 
 _CLOCK = ("/composed", "/clock", "rosgraph_msgs/Clock")
 

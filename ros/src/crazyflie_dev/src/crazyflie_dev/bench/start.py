@@ -25,6 +25,4 @@ def _start_time():
     return statistics.median(times[1:])
 
 
-ROWS = [
-    Row("start", "from roslaunch to /takeoff, one process", "s", _start_time, most=1.5),
-]
+ROWS = [Row("start", "from roslaunch to /takeoff, one process", "s", _start_time, most=1.5)]

@@ -15,48 +15,31 @@ from crazyflie_dev.bench import graph
 from crazyflie_dev.bench.row import NotMeasuredError, Row
 from crazyflie_utils.testing.launching import roslaunch
 
-DURATION = 20.0
-"""For how long it is measured, s."""
-
+DURATION = 20.0  #: For how long it is measured, s.
+#: The 99th percentile of the periods of a control that is to come every 10 ms, ms.
 LONGEST_PERIOD = 12.0
-"""The 99th percentile of the periods of a control that is to come every 10 ms, ms."""
 
 _NUMBERS = range(10, 200, 10)
 
 _START_LIMIT = 180.0
 
-_POSITION_TIME = 3.0
-"""From the service of takeoff to its call, s: vehicles first need a position."""
-
-_SETTLING = 2.0
-"""From the end of the takeoff on, s."""
+_POSITION_TIME = 3.0  #: From the service of takeoff to its call, s: vehicles first need a position.
+_SETTLING = 2.0  #: From the end of the takeoff on, s.
 
 
 @dataclass(frozen=True)
 class SwarmFigures:
-    """What a flight of some vehicles costs.
+    """What a flight of some vehicles costs."""
 
-    Attributes
-    ----------
-    n : int
-        Number of vehicles.
-    start : float
-        From roslaunch to the service that has them all take off, s.
-    cpu : float
-        Processor time of their process, % of the time of the flight, which may be simulated.
-    p50, p99, longest : float
-        Periods of the final control of three of them, as they arrive outside, ms.
-    memory : float
-        MiB.
-    """
-
-    n: int
-    start: float
+    n: int  #: Number of vehicles.
+    start: float  #: From roslaunch to the service that has them all take off, s.
+    #: Processor time of their process, % of the time of the flight, which may be simulated.
     cpu: float
+    #: p50, p99, longest: Periods of the final control of three of them, as they arrive outside, ms.
     p50: float
     p99: float
     longest: float
-    memory: float
+    memory: float  #: MiB.
 
 
 def measure(n: int, arguments: Sequence[str] = (), core: int = 0) -> SwarmFigures:

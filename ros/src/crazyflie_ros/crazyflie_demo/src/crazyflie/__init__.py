@@ -23,18 +23,14 @@ from crazyflie_driver import srv
 from crazyflie_driver.msg import FullState, Position, TrajectoryPolynomialPiece, VelocityWorld
 from crazyflie_model.angles import quaternion_from_rpy
 
-_WORLD = "world"
-"""The fixed frame, unless the script's parameter ~frames/fixed says otherwise."""
-
-_TF_LIMIT = 10.0
-"""Longest time until a position, or a voltage, is received, s."""
-
+_WORLD = "world"  #: The fixed frame, unless the script's parameter ~frames/fixed says otherwise.
+_TF_LIMIT = 10.0  #: Longest time until a position, or a voltage, is received, s.
+#: Of a position, s: tf keeps the last one of a vehicle that is not tracked any more.
 _MAX_POSITION_AGE = 0.5
-"""Of a position, s: tf keeps the last one of a vehicle that is not tracked any more."""
 
+#: Namespace, below a vehicle's name, of crazyflie_mission_api's high_level_node, which offers the
+#: driver's services for a vehicle that a controller of this workspace flies.
 _COMMANDER = "high_level"
-"""Namespace, below a vehicle's name, of crazyflie_mission_api's high_level_node, which offers the
-driver's services for a vehicle that a controller of this workspace flies."""
 
 _SETPOINTS = {
     "cmd_full_state": FullState,
@@ -61,15 +57,9 @@ class Crazyflie:
     """A vehicle of the driver, or a simulated one; the constructor blocks until it is there.
 
     A command returns when the vehicle has received it, not when it has been carried out. Every
-    method raises `rospy.ServiceException` when the driver refuses.
-
-    Parameters
-    ----------
-    prefix : str
-        The vehicle's namespace, its tf_prefix.
-    tf : str or tf.TransformListener or tf2_ros.Buffer
-        For `position` only: the vehicle's tf frame; or a listener or buffer, which is asked for
-        the frame ``prefix``.
+    method raises `rospy.ServiceException` when the driver refuses. ``prefix`` is the vehicle's
+    namespace, its tf_prefix; ``tf`` is for `position` only: the vehicle's tf frame, or a
+    tf.TransformListener or tf2_ros.Buffer, which is asked for the frame ``prefix``.
     """
 
     # The names of arguments, here and below, are those of scripts that exist.

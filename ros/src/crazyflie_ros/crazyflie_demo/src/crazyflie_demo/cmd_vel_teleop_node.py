@@ -12,8 +12,8 @@ from crazyflie_model.limits import FULL_PWM, MAX_SETPOINT_PWM
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import Number
 
+#: Four joystick axes, numbered from 0, and what they are multiplied by.
 Sticks = tuple[tuple[int, float], ...]
-"""Four joystick axes, numbered from 0, and what they are multiplied by."""
 
 _TILT = Number("deg", above=0.0, maximum=60.0)
 

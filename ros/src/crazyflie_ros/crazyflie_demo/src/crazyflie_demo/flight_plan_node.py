@@ -20,17 +20,16 @@ from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.parameters.writer import ParameterWriter
 
+#: Longest time of a service call, of the driver's connection before the first one, and of the
+#: master's answer, s.
 _LIMIT = 15.0
-"""Longest time of a service call, of the driver's connection before the first one, and of the
-master's answer, s."""
 
-_PAUSE = 0.5
-"""Between the end of one manoeuvre and the next, s."""
+_PAUSE = 0.5  #: Between the end of one manoeuvre and the next, s.
 
+#: Duration of a landing over that of a takeoff. At its end the firmware stops the motors, and the
+#: vehicle, which lags behind the setpoint, is still in the air: from 0.5 m, the virtual one falls
+#: the last 6 cm of a landing of 2 s and touches down with 0.8 m/s; in one of 3 s, with 0.1 m/s.
 _LANDING = 1.5
-"""Duration of a landing over that of a takeoff. At its end the firmware stops the motors, and the
-vehicle, which lags behind the setpoint, is still in the air: from 0.5 m, the virtual one falls the
-last 6 cm of a landing of 2 s and touches down with 0.8 m/s; in one of 3 s, with 0.1 m/s."""
 
 _HIGH_LEVEL = "commander/enHighLevel"
 

@@ -6,8 +6,7 @@ from sensor_msgs.msg import Joy
 
 from crazyflie_utils import NodeHandle
 
-JOY_LIMIT = 0.5
-"""Age, s, at which the last message of a joystick that repeats itself expires."""
+JOY_LIMIT = 0.5  #: Age, s, at which the last message of a joystick that repeats itself expires.
 
 REPEATED = "repeated"
 """frame_id, which has no other use, of a Joy whose publisher sends the next one within `JOY_LIMIT`.

@@ -11,14 +11,9 @@ from crazyflie_demo.joystick import EVENT, Joystick, JoystickState
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TEXT, Number
 
-_POLL_PERIOD = 0.01
-"""Time between two reads of the device, s."""
-
-_OPEN_PERIOD = 1.0
-"""Time between two tries to open it, s."""
-
-_EVENTS = 512
-"""Events that are read at most at one time."""
+_POLL_PERIOD = 0.01  #: Time between two reads of the device, s.
+_OPEN_PERIOD = 1.0  #: Time between two tries to open it, s.
+_EVENTS = 512  #: Events that are read at most at one time.
 
 _HINTS = {
     errno.ENOENT: "is it plugged in, and does the parameter dev name it?",

@@ -2,21 +2,12 @@
 
 import struct
 
+#: struct js_event: time in ms, value, type, number of the axis or button.
 EVENT = struct.Struct("=IhBB")
-"""struct js_event: time in ms, value, type, number of the axis or button."""
-
-BUTTON, AXIS = 0x01, 0x02
-"""Types of events."""
-
-INITIAL = 0x80
-"""Added to the type of events that report the state at the opening of the device."""
-
-_FULL = 32767
-"""Value of an axis at its end."""
-
-
-JoystickState = tuple[list[float], list[int]]
-"""Axes and buttons."""
+BUTTON, AXIS = 0x01, 0x02  #: Types of events.
+INITIAL = 0x80  #: Added to the type of events that report the state at the opening of the device.
+_FULL = 32767  #: Value of an axis at its end.
+JoystickState = tuple[list[float], list[int]]  #: Axes and buttons.
 
 
 class Joystick:

@@ -13,8 +13,7 @@ from crazyflie_utils.parameters.writer import ParameterWriter
 
 _HEADLIGHT_PARAMETER = "ring/headlightEnable"
 
-_LIMIT = 5.0
-"""How long a service may take, s."""
+_LIMIT = 5.0  #: How long a service may take, s.
 
 
 class JoystickControllerParameters(JoyParameters):

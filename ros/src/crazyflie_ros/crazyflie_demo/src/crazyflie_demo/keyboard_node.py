@@ -17,8 +17,7 @@ from crazyflie_demo.keyboard import HELP, Keyboard
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import Number
 
-_PERIOD = 0.05
-"""Time between two messages, s."""
+_PERIOD = 0.05  #: Time between two messages, s.
 
 
 class KeyboardParameters(Parameters):

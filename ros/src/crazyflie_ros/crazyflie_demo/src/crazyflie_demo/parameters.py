@@ -4,11 +4,8 @@ from crazyflie_controller.pose_source import WorldFrameParameters
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Integer, Number
 
-AXIS = Integer(0, 255)
-"""Number of a joystick's axis."""
-
-RATE = Number("Hz", above=0.0, maximum=500.0)
-"""How often something is published."""
+AXIS = Integer(0, 255)  #: Number of a joystick's axis.
+RATE = Number("Hz", above=0.0, maximum=500.0)  #: How often something is published.
 
 
 class JoyParameters(Parameters):

@@ -12,21 +12,14 @@ from crazyflie_driver.setpoint_gate import OVERLAP
 from crazyflie_driver.srv import Land, LandRequest
 from crazyflie_utils import Node, NodeHandle
 
-_LANDING = 2.0
-"""Duration of the landing after an interrupted flight, s."""
+_LANDING = 2.0  #: Duration of the landing after an interrupted flight, s.
+_LIMIT = 15.0  #: Longest time of a service call, s.
+_FINISH_LIMIT = 10.0  #: Longest time in which a failed landing is requested again, s.
+_RETRY_PERIOD = 1.0  #: Between two requests, s.
 
-_LIMIT = 15.0
-"""Longest time of a service call, s."""
-
-_FINISH_LIMIT = 10.0
-"""Longest time in which a failed landing is requested again, s."""
-
-_RETRY_PERIOD = 1.0
-"""Between two requests, s."""
-
+#: Longest time of a landing's service call, s. `OVERLAP` after the landing the driver passes
+#: setpoints on again, which override it: one that is accepted later is requested again.
 _MAX_ANSWER_TIME = OVERLAP / 2.0
-"""Longest time of a landing's service call, s. `OVERLAP` after the landing the driver passes
-setpoints on again, which override it: one that is accepted later is requested again."""
 
 
 class StreamNode(Node):

@@ -11,32 +11,15 @@ import numpy as np
 from crazyflie_model.elementwise import join
 from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
 from crazyflie_utils.messages import shortened, shown
-from crazyflie_utils.parameters.types import TEXT, ParameterType
 from crazyflie_utils.text_input import TextFileError, number_from_text, read_text
 
+#: Of a line in a file: duration, then the coefficients of x, y, z and yaw.
 COLUMNS = 1 + 4 * COEFFICIENTS
-"""Of a line in a file: duration, then the coefficients of x, y, z and yaw."""
-
-_GAP = 0.01
-"""How far apart two pieces may be where they meet, m or rad."""
+_GAP = 0.01  #: How far apart two pieces may be where they meet, m or rad.
 
 
 class TrajectoryError(ValueError):
     """A file holds no trajectory that can be flown; the text says where and why."""
-
-
-class TrajectoryFile(ParameterType):
-    """The name of a CSV file, which is loaded."""
-
-    label = "string"
-
-    def __call__(self, value: object) -> list[PolynomialPiece]:
-        """Return the pieces in the file."""
-        return load(TEXT(value))
-
-    def __str__(self) -> str:
-        """Return what is expected."""
-        return "the name of a CSV file with a trajectory"
 
 
 def load(path: str | Path) -> list[PolynomialPiece]:

@@ -3,7 +3,7 @@
 from typing_extensions import override
 
 from crazyflie_demo.flight_plan_node import FlightPlanNode, FlightPlanParameters, Step, seconds
-from crazyflie_demo.trajectory_file import TrajectoryFile, summary
+from crazyflie_demo.trajectory_file import load, summary
 from crazyflie_driver.msg import TrajectoryPolynomialPiece
 from crazyflie_driver.srv import (
     StartTrajectory,
@@ -13,14 +13,14 @@ from crazyflie_driver.srv import (
 )
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_utils import NodeHandle, parameter
-from crazyflie_utils.parameters.types import BOOLEAN, Number
+from crazyflie_utils.parameters.types import BOOLEAN, File, Number
 
 
 class TrajectoryFlightParameters(FlightPlanParameters):
     """Parameters of `TrajectoryFlightNode`."""
 
     pieces: list[PolynomialPiece] = parameter(
-        TrajectoryFile(), "CSV file of the trajectory", name="file"
+        File(load, "a CSV file with a trajectory"), "CSV file of the trajectory", name="file"
     )
     timescale: float = parameter(
         Number(above=0.0, maximum=100.0), "2 takes twice as long as the file says", 1.0

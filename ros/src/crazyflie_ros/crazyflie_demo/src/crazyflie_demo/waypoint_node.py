@@ -36,6 +36,7 @@ class WaypointParameters(GoalParameters, PoseParameters):
 class DemoNode(Node):
     """Publish waypoints as goals, one after the other; these are a square."""
 
+    #: Where to go unless the parameter ``waypoints`` says otherwise.
     waypoints: tuple[Waypoint, ...] = (
         Waypoint(0.0, 0.0, 0.5, 0.0, 2.0),
         Waypoint(0.5, 0.5, 0.5, 0.0, 1.0),
@@ -44,7 +45,6 @@ class DemoNode(Node):
         Waypoint(-0.5, 0.5, 0.5, 0.0, 1.0),
         Waypoint(0.0, 0.0, 0.5, 0.0, 0.0),
     )
-    """Where to go unless the parameter ``waypoints`` says otherwise."""
 
     def __init__(self) -> None:
         self._stamp: float | None = None

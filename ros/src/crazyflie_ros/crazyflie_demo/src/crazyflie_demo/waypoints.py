@@ -3,6 +3,8 @@
 import math
 from typing import NamedTuple
 
+from typing_extensions import override
+
 from crazyflie_model.angles import wrap_to_pi
 from crazyflie_utils.messages import shown
 from crazyflie_utils.parameters.types import DURATION, FINITE, ParameterType
@@ -25,14 +27,13 @@ class WaypointList(ParameterType):
     unit = "m, rad, s"
     range = "finite, seconds >= 0"
 
+    @override
     def __call__(self, value: object) -> list[Waypoint]:
-        """Return the waypoints."""
         if not isinstance(value, list) or not value:
             raise ValueError
         return [self._waypoint(number, entry) for number, entry in enumerate(value)]
 
     def __str__(self) -> str:
-        """Return what is expected."""
         return f"a {self.label} in {self.unit}, {self.range}"
 
     @staticmethod

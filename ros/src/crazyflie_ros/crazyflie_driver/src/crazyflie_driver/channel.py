@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from crazyflie_driver.flight_commands import Need
+from crazyflie_driver.server_parameters import BroadcastParameters
 from crazyflie_driver.vehicle import DriverVehicle
 from crazyflie_link.address import Address
 from crazyflie_link.broadcast import Broadcaster, SharedCommand
@@ -16,14 +17,16 @@ from crazyflie_link.packed_poses import PackedPoses
 class Channel:
     """Broadcasts to vehicles on one channel; the address is that of any of them.
 
-    From ``least_poses`` vehicles on (0 for never), external poses of those on a radio are packed.
+    External poses of vehicles on a radio are packed, if they are as many as the parameters say.
     """
 
-    def __init__(self, address: Address, least_poses: int):
+    def __init__(self, address: Address, parameters: BroadcastParameters):
         self.vehicles: list[DriverVehicle] = []
-        self.broadcaster = Broadcaster(address, self._links)
+        self.broadcaster = Broadcaster(
+            address, self._links, parameters.repeats, parameters.repeat_period
+        )
         self._poses = PackedPoses(self.broadcaster)
-        self._least_poses = least_poses
+        self._least_poses = parameters.poses
 
     def add(self, vehicle: DriverVehicle) -> None:
         """Take a vehicle in."""

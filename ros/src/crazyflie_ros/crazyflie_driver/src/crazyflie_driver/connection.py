@@ -66,6 +66,11 @@ class Connection:
     def __post_init__(self) -> None:
         self.text = f"connecting to {self._crazyflie.address.uri}"
 
+    @property
+    def is_connected(self) -> bool:
+        """Whether there is a link now."""
+        return self._crazyflie.state is LinkState.CONNECTED
+
     def connect(
         self, limit: float, prepare: Callable[[], None], announce: Callable[[], None]
     ) -> None:

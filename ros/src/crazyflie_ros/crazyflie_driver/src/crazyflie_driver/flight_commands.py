@@ -10,7 +10,7 @@ from typing import TypeVar
 from crazyflie_driver.battery import Battery, Charge
 from crazyflie_driver.command import LAND, STOP, TAKEOFF, Command
 from crazyflie_driver.emergency import Emergency
-from crazyflie_driver.flight_state import NOT_FLYABLE, FlightState
+from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Job, Jobs
 from crazyflie_driver.server_parameters import SafetyParameters
 from crazyflie_driver.setpoint_gate import Event
@@ -194,7 +194,7 @@ class FlightCommands:
         state = self._flight.supervisor
         if state is None or not self._setpoints.runs_motors:
             return
-        if state & NOT_FLYABLE or SupervisorState.CAN_FLY not in state:
+        if state.faults or SupervisorState.CAN_FLY not in state:
             raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
 
     def _check_and_arm(self, job: Job) -> None:
@@ -207,7 +207,7 @@ class FlightCommands:
         state = self._state_once_armed(supervisor, job)
         if state is None:
             return
-        if state & NOT_FLYABLE:
+        if state.faults:
             raise ServiceError(f"the vehicle cannot fly, its state is: {state.words()}")
         if state.reports_planner and self._flight.is_high_level(state):
             raise ServiceError(
@@ -224,7 +224,7 @@ class FlightCommands:
             if state is None or time.monotonic() > end:
                 return state
             rearms = SupervisorState.AUTO_ARMED in state
-            if not rearms or state & (SupervisorState.CAN_FLY | NOT_FLYABLE):
+            if not rearms or state.faults or SupervisorState.CAN_FLY in state:
                 return state
             time.sleep(_REARMING / 10)
 

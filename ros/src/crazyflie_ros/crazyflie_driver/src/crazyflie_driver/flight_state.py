@@ -10,9 +10,6 @@ from crazyflie_link.errors import LinkLostError, NoReplyError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle
 
-NOT_FLYABLE = SupervisorState.TUMBLED | SupervisorState.LOCKED | SupervisorState.CRASHED
-"""States in which a vehicle cannot take off."""
-
 _ESTIMATOR, _KALMAN = "stabilizer.estimator", 2
 """Parameter of the firmware, and its value for the extended Kalman filter."""
 

@@ -104,8 +104,7 @@ class CrazyflieServerNode(Node):
         self._vehicles[requested.uri] = vehicle
         address = vehicle.crazyflie.address
         if address.channel not in self._channels:
-            least = self._parameters.broadcast_poses
-            self._channels[address.channel] = Channel(address, least)
+            self._channels[address.channel] = Channel(address, self._parameters.broadcast)
         self._channels[address.channel].add(vehicle)
         self._handle.info(f"{requested.name}: connecting to {requested.uri}")
         return self._when_done(vehicle.connect(), self._finish_adding, vehicle)
@@ -180,6 +179,7 @@ class CrazyflieServerNode(Node):
                         vehicle.status.status(),
                         f"{component}: {vehicle.parameters.name}",
                         vehicle.parameters.uri,
+                        self._parameters.link,
                     )
                     for vehicle in self._vehicles.values()
                 ],

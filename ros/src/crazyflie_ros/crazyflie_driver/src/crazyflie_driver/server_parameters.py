@@ -1,10 +1,13 @@
 """Parameters of the driver."""
 
+from crazyflie_link.broadcast import REPEAT_PERIOD, REPEATS
 from crazyflie_utils import Parameters, parameter
+from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC, Integer, Number
 
 _VOLTS = Number("V", minimum=0.0)
 _SECONDS = Number("s", minimum=0.0)
+_SHARE = Number("", minimum=0.0, maximum=1.0)
 
 
 class SafetyParameters(Parameters):
@@ -37,6 +40,36 @@ class SafetyParameters(Parameters):
     )
 
 
+class LinkLimits(Parameters):
+    """With what the diagnostics warn of a link."""
+
+    min_quality: float = parameter(_SHARE, "with less of the pings answered they warn", 0.8)
+    max_latency: float | None = parameter(
+        Number("s", above=0.0), "with more they warn; without it they do not", None
+    )
+    min_unicast_rate: float = parameter(
+        _SHARE,
+        "with less of the packets of a second received by the vehicle, as its log says, they warn",
+        0.0,
+    )
+    min_broadcast_rate: float = parameter(_SHARE, "the same of broadcast packets", 0.0)
+
+
+class BroadcastParameters(Parameters):
+    """How broadcasts are sent."""
+
+    repeats: int = parameter(Integer(1, 100), "how often a command is broadcast", REPEATS)
+    repeat_period: float = parameter(
+        Number("s", minimum=0.0, maximum=0.1), "from one time to the next", REPEAT_PERIOD
+    )
+    poses: int = parameter(
+        Integer(0, 255),
+        "from so many vehicles on one radio channel on, their external positions and poses are "
+        "packed (to 1 mm and about 0.2 degrees) and broadcast; 0 for never",
+        5,
+    )
+
+
 class CrazyflieServerParameters(SafetyParameters):
     """Parameters of `CrazyflieServerNode`."""
 
@@ -56,10 +89,5 @@ class CrazyflieServerParameters(SafetyParameters):
         "/all/emergency",
         "topics/emergency",
     )
-    broadcast_poses: int = parameter(
-        Integer(0, 255),
-        "from so many vehicles on one radio channel on, their external positions and poses are "
-        "packed (to 1 mm and about 0.2 degrees) and broadcast; 0 for never",
-        5,
-        "broadcast/poses",
-    )
+    link: LinkLimits = group(LinkLimits, "link")
+    broadcast: BroadcastParameters = group(BroadcastParameters, "broadcast")

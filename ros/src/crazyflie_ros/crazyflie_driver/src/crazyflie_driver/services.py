@@ -34,7 +34,7 @@ class VehicleServices:
 
     _handle: NodeHandle
     _name: str
-    _names: ServiceNames
+    _prefix: str
     _crazyflie: Crazyflie
     _jobs: Jobs
     _gate: SetpointGate
@@ -42,7 +42,13 @@ class VehicleServices:
     _commands: FlightCommands
     _emergency: Emergency
     _mirror: ParameterMirror
-    _setup: SetupServices
+
+    def __post_init__(self) -> None:
+        self._names = ServiceNames(self._handle, self._prefix)
+
+    def wait_for_names(self, is_over: Callable[[], bool]) -> None:
+        """Wait for controllers whose services have these names; see `ServiceNames`."""
+        self._names.wait_for_controllers(is_over)
 
     def advertise(self) -> None:
         """Offer all services that the vehicle has."""
@@ -59,7 +65,10 @@ class VehicleServices:
             "notify_setpoints_stop": (srv.NotifySetpointsStop, self._on_notify_setpoints_stop),
             "send_packet": (srv.sendPacket, self._on_send_packet),
         }
-        offered.update(self._setup.services())
+        setup = SetupServices(
+            self._crazyflie, self._jobs, self._flight, self._emergency, self._mirror
+        )
+        offered.update(setup.services())
         for name, service_type in SERVICE_TYPES.items():
             offered[name] = service_type, partial(self._on_command, name, service_type)
         if self._crazyflie.address.is_radio:

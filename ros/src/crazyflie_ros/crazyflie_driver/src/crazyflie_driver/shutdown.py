@@ -2,7 +2,6 @@
 
 import contextlib
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from crazyflie_driver.emergency import Emergency
@@ -11,6 +10,7 @@ from crazyflie_driver.setpoint_topics import SetpointTopics
 from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_link.errors import AlreadyLandingError, CrazyflieError
 from crazyflie_model.supervisor import SupervisorState
+from crazyflie_utils import NodeHandle
 
 _EMERGENCY_LIMIT = 1.0
 """Time limit of the vehicle's confirmation of an emergency stop, s."""
@@ -28,12 +28,13 @@ class Shutdown:
     to a vehicle of which neither supervisor nor log report whether it flies.
     """
 
+    _handle: NodeHandle
+    _name: str
     _crazyflie: Crazyflie
     _emergency: Emergency
     _flight: FlightState
     _setpoints: SetpointTopics
     _duration: float
-    _warn: Callable[[str], None]
 
     def land_or_stop(self, limit: float) -> str:
         """Return what could not be done within a limit (s), empty if nothing; blocks.
@@ -60,6 +61,9 @@ class Shutdown:
         if problem:
             self._warn(problem)
         return problem
+
+    def _warn(self, text):
+        self._handle.warn(f"{self._name}: {text}")
 
     def _land_or_stop(self, state, limit):
         setpoints = self._setpoints

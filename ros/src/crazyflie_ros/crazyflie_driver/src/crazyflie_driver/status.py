@@ -5,12 +5,14 @@ import math
 from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 
 from crazyflie_driver import battery
-from crazyflie_driver.flight_state import NOT_FLYABLE
+from crazyflie_driver.server_parameters import LinkLimits
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import VehicleStatus
 
-LOW_QUALITY = 0.8
-"""Share of answered pings below which the link is poor."""
+_FEW_PACKETS = 10
+"""Of so few packets in a second the share that is received means nothing."""
+
+_DEFAULTS = LinkLimits.from_mapping({})
 
 LINK_NAMES = {
     VehicleStatus.DISCONNECTED: "disconnected",
@@ -23,7 +25,7 @@ _EMERGENCY = "emergency stop: remove, restart and add the vehicle"
 _BLOCKED = "setpoints are ignored since the link was lost: pause them, or call a service"
 
 
-def findings(status: VehicleStatus) -> list[tuple[int, str]]:
+def findings(status: VehicleStatus, limits: LinkLimits = _DEFAULTS) -> list[tuple[int, str]]:
     """Return (level, text) of everything that is not as it should be, worst first."""
     found = []
     error, warn = DiagnosticStatus.ERROR, DiagnosticStatus.WARN
@@ -32,7 +34,7 @@ def findings(status: VehicleStatus) -> list[tuple[int, str]]:
     if status.link != VehicleStatus.CONNECTED:
         level = warn if status.link == VehicleStatus.CONNECTING else error
         found.append((level, status.link_text))
-    faults = SupervisorState(status.supervisor) & NOT_FLYABLE
+    faults = SupervisorState(status.supervisor).faults
     if faults:
         found.append((error, f"cannot fly: {faults.words()}"))
     if status.battery >= VehicleStatus.BATTERY_LOW:
@@ -41,10 +43,27 @@ def findings(status: VehicleStatus) -> list[tuple[int, str]]:
         found.append((level, battery.words(charge, status.battery_voltage)))
     if status.link == VehicleStatus.CONNECTED and status.are_setpoints_blocked:
         found.append((warn, _BLOCKED))
-    if status.is_link_poor or status.link_quality < LOW_QUALITY:
-        answered = 0.0 if math.isnan(status.link_quality) else 100.0 * status.link_quality
-        found.append((warn, f"poor link: {answered:.0f} % of pings answered"))
+    found += [(warn, f"poor link: {text}") for text in _link_faults(status, limits)]
     return sorted(found, key=lambda finding: -finding[0])
+
+
+def _link_faults(status, limits):
+    if status.is_link_poor or status.link_quality < limits.min_quality:
+        answered = 0.0 if math.isnan(status.link_quality) else 100.0 * status.link_quality
+        yield f"{answered:.0f} % of pings answered"
+    if limits.max_latency is not None and status.latency > limits.max_latency:
+        yield (
+            f"latency {1000.0 * status.latency:.1f} ms, expected at most "
+            f"{1000.0 * limits.max_latency:g} ms"
+        )
+    counts = {
+        "unicast": (status.num_rx_unicast, status.num_tx_unicast, limits.min_unicast_rate),
+        "broadcast": (status.num_rx_broadcast, status.num_tx_broadcast, limits.min_broadcast_rate),
+    }
+    for kind, (received, sent, limit) in counts.items():
+        # None received: it is not logged.
+        if sent >= _FEW_PACKETS and 0 < received < limit * sent:
+            yield f"{received} of {sent} {kind} packets received, expected {100.0 * limit:g} %"
 
 
 def words(status: VehicleStatus) -> str:
@@ -54,8 +73,8 @@ def words(status: VehicleStatus) -> str:
         return _EMERGENCY
     if status.link != VehicleStatus.CONNECTED:
         return f"{LINK_NAMES[status.link]}: {status.link_text}"
-    if state & NOT_FLYABLE:
-        text = f"cannot fly: {(state & NOT_FLYABLE).words()}; restart the vehicle"
+    if state.faults:
+        text = f"cannot fly: {state.faults.words()}; restart the vehicle"
     elif SupervisorState.FLYING in state:
         text = "flying: on " + ("setpoints" if status.is_streamed else "high-level commands")
     elif not status.has_supervisor:
@@ -74,9 +93,11 @@ def words(status: VehicleStatus) -> str:
     return "; ".join(reasons)
 
 
-def diagnostics(status: VehicleStatus, name: str, hardware_id: str) -> DiagnosticStatus:
+def diagnostics(
+    status: VehicleStatus, name: str, hardware_id: str, limits: LinkLimits = _DEFAULTS
+) -> DiagnosticStatus:
     """Return a status as diagnostic_msgs/DiagnosticStatus."""
-    found = findings(status)
+    found = findings(status, limits)
     level, text = found[0] if found else (DiagnosticStatus.OK, "connected")
     state = SupervisorState(status.supervisor).words() if status.has_supervisor else "unknown"
     rows = [

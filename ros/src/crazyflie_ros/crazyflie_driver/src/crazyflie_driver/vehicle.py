@@ -9,18 +9,17 @@ from crazyflie_driver.emergency import Emergency
 from crazyflie_driver.flight_commands import FlightCommands
 from crazyflie_driver.flight_state import FlightState
 from crazyflie_driver.jobs import Jobs
+from crazyflie_driver.lifecycle import Lifecycle
 from crazyflie_driver.log_topics import LogTopics
 from crazyflie_driver.parameter_mirror import ParameterMirror
 from crazyflie_driver.server_parameters import CrazyflieServerParameters
-from crazyflie_driver.service_names import ServiceNames
 from crazyflie_driver.services import VehicleServices
-from crazyflie_driver.setpoint_gate import Event, SetpointGate
+from crazyflie_driver.setpoint_gate import SetpointGate
 from crazyflie_driver.setpoint_topics import SetpointTopics
-from crazyflie_driver.setup_services import SetupServices
 from crazyflie_driver.shutdown import Shutdown
 from crazyflie_driver.status_publisher import StatusPublisher
 from crazyflie_driver.vehicle_parameters import VehicleParameters
-from crazyflie_link.crazyflie import Crazyflie, LinkState
+from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_utils import NodeHandle
 
 
@@ -39,15 +38,14 @@ class DriverVehicle:
     ):
         name, prefix = parameters.name, parameters.prefix
         self.parameters = parameters
-        self._handle = handle
-        self._server = server
+        self._limit = server.connect_limit
         own = handle.child()
         self.crazyflie = crazyflie = Crazyflie(
             parameters.uri,
             reconnect=True,
-            on_state=self._on_link_state,
+            on_state=lambda state, text: self._lifecycle.on_link_state(state, text),
             on_console=lambda line: own.info(f"{name}: {line}"),
-            on_packet=self._on_packet,
+            on_packet=lambda *packet: self._lifecycle.on_packet(*packet),
         )
         gate = SetpointGate()
         self.jobs = jobs = Jobs(name, lambda text: handle.error(f"{name}: {text}"))
@@ -58,34 +56,39 @@ class DriverVehicle:
         self._connection = connection = Connection(
             handle, own, name, crazyflie, gate, jobs, delivery, lambda: self.status.publish()
         )
+        frame = server.fixed_frame
         self._log = log = LogTopics(
-            own, parameters, crazyflie, delivery, server.fixed_frame, self._on_log_status
+            own, parameters, crazyflie, delivery, frame, lambda: self._lifecycle.on_log()
         )
         self.setpoints = setpoints = SetpointTopics(own, parameters, crazyflie, log, gate)
         self.flight = flight = FlightState(own, crazyflie, log, setpoints)
-        self.status = StatusPublisher(own, prefix, crazyflie, log, setpoints, battery, connection)
-        self.emergency = emergency = Emergency(crazyflie, gate, jobs, self.status.publish)
-        self.commands = FlightCommands(
+        self.status = status = StatusPublisher(
+            own, prefix, crazyflie, log, setpoints, battery, connection
+        )
+        self.emergency = emergency = Emergency(crazyflie, gate, jobs, status.publish)
+        self.commands = commands = FlightCommands(
             own, name, crazyflie, setpoints, flight, battery, emergency, jobs, server
         )
-        self._mirror = mirror = ParameterMirror(own, prefix, crazyflie)
-        self._names = names = ServiceNames(own, prefix)
-        self._services = VehicleServices(
+        mirror = ParameterMirror(own, prefix, crazyflie)
+        services = VehicleServices(
+            own, name, prefix, crazyflie, jobs, gate, flight, commands, emergency, mirror
+        )
+        self._lifecycle = Lifecycle(
             own,
-            name,
-            names,
-            crazyflie,
-            jobs,
-            gate,
+            parameters,
+            connection,
+            log,
+            setpoints,
             flight,
-            self.commands,
-            emergency,
+            battery,
+            commands,
             mirror,
-            SetupServices(crazyflie, jobs, flight, emergency, mirror),
+            services,
+            status,
         )
         duration = server.landing_duration
-        self._shutdown = Shutdown(crazyflie, emergency, flight, setpoints, duration, self._warn)
-        self.status.publish()
+        self._shutdown = Shutdown(own, name, crazyflie, emergency, flight, setpoints, duration)
+        status.publish()
 
     @property
     def is_closing(self) -> bool:
@@ -103,12 +106,7 @@ class DriverVehicle:
         The future fails with `ServiceError` when that is not possible; then nothing
         remains of the vehicle.
         """
-        return self.jobs.submit(
-            "connecting",
-            lambda _: self._connection.connect(
-                self._server.connect_limit, self._wait_for_controllers, self._announce
-            ),
-        )
+        return self.jobs.submit("connecting", lambda _: self._lifecycle.connect(self._limit))
 
     def remove(self, limit: float) -> Future[str]:
         """Land, stop the motors, end the link, take topics and services down.
@@ -120,49 +118,3 @@ class DriverVehicle:
         self._connection.is_closing = True
         self.status.publish_connected(False)
         return self._connection.close(lambda: self._shutdown.land_or_stop(limit))
-
-    def _wait_for_controllers(self):
-        self._names.wait_for_controllers(lambda: self.is_closing)
-
-    def _announce(self):
-        self._log.start()
-        if self.parameters.enable_parameters:
-            self._mirror.publish()
-        if not self.emergency.is_latched:
-            self.setpoints.open_thrust_lock(self.flight.read())
-        self._services.advertise()
-        self.setpoints.subscribe()
-        self.commands.start()
-
-    def _resume(self):
-        for problem in self._mirror.reapply_parameters():
-            self._warn(f"not written again: {problem}")
-        if self.parameters.enable_parameters:
-            self._mirror.publish()
-        self.setpoints.open_thrust_lock(self.flight.read())
-
-    def _warn(self, text):
-        self._handle.warn(f"{self.parameters.name}: {text}")
-
-    # What comes from the vehicle.
-
-    def _on_log_status(self):
-        voltage = self._log.voltage
-        if voltage is not None:
-            self.battery.update(voltage, self._handle.time())
-            self.commands.check_battery()
-        if self.flight.is_flying and self.crazyflie.state is LinkState.CONNECTED:
-            self.setpoints.gate.handle(Event.FLIGHT_REPORTED)
-        self.setpoints.check_lift()
-        self.status.publish()
-
-    def _on_link_state(self, state, text):
-        if state is LinkState.LOST:
-            # The state before the loss is not that of now.
-            self._log.supervisor = None
-            self._log.variances.clear()
-        self._connection.on_state(state, text, self._resume)
-
-    def _on_packet(self, port, channel, data):
-        if not self.is_closing:
-            self._log.publish_packet(port, channel, data)

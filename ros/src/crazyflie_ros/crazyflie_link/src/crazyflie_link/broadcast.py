@@ -37,7 +37,7 @@ class Broadcaster:
     """Sends to all vehicles of a radio's channel; over UDP, a copy to each of the links.
 
     The address is that of any vehicle of the channel; ``links()`` returns those of the vehicles
-    that are connected.
+    that are connected. Commands are sent ``repeats`` times, ``period`` (s) after each other.
 
     Attributes
     ----------
@@ -45,14 +45,21 @@ class Broadcaster:
         Packets that were broadcast.
     """
 
-    def __init__(self, address: Address, links: Callable[[], Iterable[Link]]):
+    def __init__(
+        self,
+        address: Address,
+        links: Callable[[], Iterable[Link]],
+        repeats: int = REPEATS,
+        period: float = REPEAT_PERIOD,
+    ):
         self._links = links
+        self._repeats, self._period = repeats, period
         self._radio = RadioBroadcast(address.uri) if address.is_radio else None
         self._queue = TransmitQueue()
         self.sent = 0
 
     def send(self, packets: Sequence[CRTPPacket], urgent: bool = False) -> None:
-        """Have packets sent `REPEATS` times; does not block.
+        """Have packets sent again and again; does not block.
 
         Urgent ones go before all others. What cannot be sent is logged: every vehicle has to be
         looked at afterwards in any case.
@@ -70,9 +77,9 @@ class Broadcaster:
             self._radio.close()
 
     def _repeat(self, packets):
-        for number in range(REPEATS):
+        for number in range(self._repeats):
             if number:
-                time.sleep(REPEAT_PERIOD)
+                time.sleep(self._period)
             self._transmit(packets)
 
     def _transmit(self, packets):

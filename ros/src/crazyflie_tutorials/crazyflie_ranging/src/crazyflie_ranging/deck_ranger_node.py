@@ -7,7 +7,7 @@ from typing_extensions import override
 
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_ranging.range_publisher import RangePublisher
-from crazyflie_ranging.range_sensors import RangeSensor, SensorFile
+from crazyflie_ranging.range_sensors import SENSOR_FILE, RangeSensor
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import FRAME, TEXT, TOPIC, ListOf
 
@@ -17,7 +17,7 @@ _MILLIMETRE = 0.001
 class DeckRangerParameters(Parameters):
     """Parameters of `DeckRangerNode`."""
 
-    sensors: tuple[RangeSensor, ...] = parameter(SensorFile(), "the sensors, a YAML file")
+    sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
     variables: tuple[str, ...] = parameter(
         ListOf(TEXT),
         "of the log block in their order, as in the driver's parameter",

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from typing_extensions import override
 
@@ -15,9 +14,9 @@ from crazyflie_utils.parameters.types import (
     FRAME,
     POSITION,
     TOPIC,
+    File,
     Integer,
     Number,
-    ParameterType,
     Text,
 )
 
@@ -82,22 +81,6 @@ class RangeSensor(Parameters):
         return distance if distance >= self.min_range else -math.inf
 
 
-class SensorFile(ParameterType):
-    """The path of a sensor file; as a value, the sensors in it."""
-
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> tuple[RangeSensor, ...]:
-        if not isinstance(value, str) or not value:
-            raise ValueError
-        return load(value)
-
-    @override
-    def __str__(self) -> str:
-        return "the path of a sensor file"
-
-
 def load(path: str | Path) -> tuple[RangeSensor, ...]:
     """Return the sensors in a file, which has a list ``sensors``.
 
@@ -129,3 +112,6 @@ def load(path: str | Path) -> tuple[RangeSensor, ...]:
     if complaints:
         raise ParameterError(*complaints)
     return tuple(sensors)
+
+
+SENSOR_FILE = File(load, "a sensor file")

@@ -9,19 +9,19 @@ from geometry_msgs.msg import TransformStamped
 from typing_extensions import override
 
 from crazyflie_ranging.range_publisher import RangePublisher
-from crazyflie_ranging.range_sensors import RangeSensor, SensorFile
+from crazyflie_ranging.range_sensors import SENSOR_FILE, RangeSensor
 from crazyflie_ranging.ranger import Ranger
 from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, TOPIC, Integer
 from crazyflie_world.world import World
-from crazyflie_world.world_file import WorldFile
+from crazyflie_world.world_file import WORLD_FILE
 
 
 class SimulatedRangerParameters(Parameters):
     """Parameters of `SimulatedRangerNode`."""
 
-    world: World = parameter(WorldFile(), "what the sensors see, a YAML file")
-    sensors: tuple[RangeSensor, ...] = parameter(SensorFile(), "the sensors, a YAML file")
+    world: World = parameter(WORLD_FILE, "what the sensors see, a YAML file")
+    sensors: tuple[RangeSensor, ...] = parameter(SENSOR_FILE, "the sensors, a YAML file")
     ranges_topic: str = parameter(
         TOPIC, "below it, each sensor has its topic", "range", name="topics/ranges"
     )

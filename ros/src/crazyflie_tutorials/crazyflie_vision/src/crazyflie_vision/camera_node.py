@@ -2,7 +2,6 @@
 
 from collections import deque
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
@@ -19,40 +18,26 @@ from crazyflie_utils import (
     TransformError,
     parameter,
 )
-from crazyflie_utils.parameters.types import FRAME, TOPIC, ParameterType
+from crazyflie_utils.parameters.types import FRAME, TOPIC, File
 from crazyflie_vision.camera import CameraParameters, Pinhole, Pose, load, optical_pose
 from crazyflie_vision.images import camera_info, to_message
 from crazyflie_vision.noise import PixelNoise
 from crazyflie_vision.renderer import Renderer
 from crazyflie_world.shapes import Shape
 from crazyflie_world.world import World
-from crazyflie_world.world_file import WorldFile
+from crazyflie_world.world_file import WORLD_FILE
 
 _EARLY = 1e-6
 """By which a message may be, s: less than anyone can notice, more than the rounding of times."""
 
 
-class CameraFile(ParameterType):
-    """The path of a camera's file; as a value, the `CameraParameters` in it."""
-
-    label = "string"
-
-    @override
-    def __call__(self, value: Any) -> CameraParameters:
-        if not isinstance(value, str) or not value:
-            raise ValueError
-        return load(value)
-
-    @override
-    def __str__(self) -> str:
-        return "the path of a camera's YAML file"
-
-
 class CameraNodeParameters(Parameters):
     """Parameters of `CameraNode`."""
 
-    world: World = parameter(WorldFile(), "what there is to be seen, a YAML file")
-    camera: CameraParameters = parameter(CameraFile(), "the camera, a YAML file")
+    world: World = parameter(WORLD_FILE, "what there is to be seen, a YAML file")
+    camera: CameraParameters = parameter(
+        File(load, "a camera's YAML file"), "the camera, a YAML file"
+    )
     vehicle_frame: str = parameter(
         FRAME, "what the camera is mounted on", "crazyflie", name="frames/vehicle"
     )

@@ -15,8 +15,7 @@ from typing import Any, Self, dataclass_transform
 from crazyflie_utils.messages import shown
 from crazyflie_utils.parameters.types import ParameterType
 
-REQUIRED = dataclasses.MISSING
-"""Default of a parameter that has none."""
+REQUIRED = dataclasses.MISSING  #: Default of a parameter that has none.
 
 _KEY = "declaration"
 
@@ -31,27 +30,15 @@ class ParameterError(Exception):
 
 @dataclasses.dataclass(frozen=True)
 class Declaration:
-    """What is known about a parameter.
+    """What is known about a parameter."""
 
-    Attributes
-    ----------
-    name : str
-        Below the node's name, such as "topics/state"; a name that begins with a
-        slash is not the node's own.
-    type : ParameterType
-    help : str
-        What it is; without its type, unit, range and default.
-    default : object
-        Taken as it is when the parameter is not set; `REQUIRED` for none.
-    live : bool
-        Whether it may be changed while the node runs.
-    """
-
+    #: Below the node's name, such as "topics/state"; a name that begins with a slash is not the
+    #: node's own.
     name: str
     type: ParameterType
-    help: str
-    default: Any
-    live: bool
+    help: str  #: What it is; without its type, unit, range and default.
+    default: Any  #: Taken as it is when the parameter is not set; `REQUIRED` for none.
+    live: bool  #: Whether it may be changed while the node runs.
 
 
 @dataclasses.dataclass(frozen=True)
@@ -105,17 +92,9 @@ class Parameters:
     def read(cls, get: Callable[[str], Any], full_name: Callable[[str], str] = str) -> Self:
         """Return the parameters that a source holds, all of them checked.
 
-        Parameters
-        ----------
-        get : callable
-            ``get(name)`` returns the raw value of a parameter, or raises KeyError.
-        full_name : callable
-            ``full_name(name)`` is how messages call it.
-
-        Raises
-        ------
-        ParameterError
-            About everything that is missing or not what is expected.
+        ``get(name)`` returns the raw value of a parameter, or raises KeyError; ``full_name(name)``
+        is how messages call it. `ParameterError` is about everything that is missing or not what is
+        expected.
         """
         values: dict[str, Any] = {}
         complaints: list[str] = []

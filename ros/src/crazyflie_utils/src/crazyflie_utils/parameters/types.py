@@ -1,6 +1,7 @@
 """Types of parameters: what a value may be, and in words (``str(type)``) what is expected."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,21 +11,11 @@ from crazyflie_utils.text_input import number_from_text
 
 
 class ParameterType:
-    """Base class of parameter types.
+    """Base class of parameter types."""
 
-    Attributes
-    ----------
-    label : str
-        For tables and command lines, such as "float".
-    unit : str
-        Of a number; empty for none.
-    range : str
-        For tables, such as "> 0"; empty for none.
-    """
-
-    label: str
-    unit: str = ""
-    range: str = ""
+    label: str  #: For tables and command lines, such as "float".
+    unit: str = ""  #: Of a number; empty for none.
+    range: str = ""  #: For tables, such as "> 0"; empty for none.
 
     def __call__(self, value: Any) -> Any:
         """Return the value that a raw one, of the parameter server or a command line, means.
@@ -233,11 +224,27 @@ class ListOf(ParameterType):
         return f"{count}, each entry {self.entry}"
 
 
+@dataclass(frozen=True)
+class File(ParameterType):
+    """The path of a file; its value is what ``load(path)`` returns, which raises what is wrong."""
+
+    load: Callable[[str], Any]
+    content: str  #: For messages, such as "a world file".
+    label = "string"
+
+    @override
+    def __call__(self, value: Any) -> Any:
+        return self.load(TEXT(value))
+
+    def __str__(self) -> str:
+        return f"the path of {self.content}"
+
+
 FINITE = Number()
 POSITIVE = Number(above=0.0)
 DURATION = Number(unit="s", minimum=0.0)
+#: A period of a node: with shorter ones it would do nothing else than to be late.
 TIME_STEP = Number(unit="s", minimum=1e-4)
-"""A period of a node: with shorter ones it would do nothing else than to be late."""
 METRES = Number(unit="m")
 BOOLEAN = Boolean()
 TEXT = Text()

@@ -25,11 +25,8 @@ P = TypeVar("P", bound=Parameters)
 def load(path: str | Path) -> "Entry":
     """Return the content of a file, which is a mapping.
 
-    Raises
-    ------
-    ParameterError
-        It cannot be read, is no YAML, no mapping, has a key twice, or is larger than a file of
-        settings can be: see `yaml_loader`.
+    `ParameterError`: it cannot be read, is no YAML, no mapping, has a key twice, or is larger than
+    a file of settings can be, see `yaml_loader`.
     """
     try:
         text = read_text(path, MAX_SIZE)
@@ -58,18 +55,10 @@ def _refusal(name, error):
 
 @dataclass(frozen=True)
 class Entry:
-    """A value in a file, and its place. What it is not, raises `ParameterError` with the place.
+    """A value in a file, and its place. What it is not, raises `ParameterError` with the place."""
 
-    Attributes
-    ----------
-    name : str
-        Its keys from the top of the file, such as "boxes/table"; empty for the whole.
-    node : yaml.Node
-        What the parser made of it.
-    """
-
-    name: str
-    node: yaml.Node
+    name: str  #: Its keys from the top of the file, such as "boxes/table"; empty for the whole.
+    node: yaml.Node  #: What the parser made of it.
 
     @property
     def file(self) -> Path:

@@ -12,14 +12,9 @@ from typing_extensions import override
 from crazyflie_utils.messages import shortened
 from crazyflie_utils.text_input import TextFileError
 
-MAX_SIZE = 1_000_000
-"""Bytes of a file: a fleet of a thousand vehicles has a third of it."""
-
-MAX_DEPTH = 50
-"""Lists and mappings inside each other."""
-
-MAX_NODES = 50_000
-"""Values and keys; an alias counts as what it stands for."""
+MAX_SIZE = 1_000_000  #: Bytes of a file: a fleet of a thousand vehicles has a third of it.
+MAX_DEPTH = 50  #: Lists and mappings inside each other.
+MAX_NODES = 50_000  #: Values and keys; an alias counts as what it stands for.
 
 
 def compose(text: str, name: str) -> yaml.Node | None:

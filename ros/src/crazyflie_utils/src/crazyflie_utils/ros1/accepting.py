@@ -13,11 +13,8 @@ from rosgraph.network import (
 
 from crazyflie_utils.ros1.receiving import Report
 
-_HEADER_LIMIT = 5.0
-"""How long, in s, a peer may take to send its header."""
-
-MAX_PENDING = 32
-"""Connections whose header has not come yet."""
+_HEADER_LIMIT = 5.0  #: How long, in s, a peer may take to send its header.
+MAX_PENDING = 32  #: Connections whose header has not come yet.
 
 
 class Acceptor:

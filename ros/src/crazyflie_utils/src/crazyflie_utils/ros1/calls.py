@@ -12,14 +12,14 @@ import rospy
 
 from crazyflie_utils.transport import ServiceError
 
+#: How long, in s of the machine's clock, the caller of a service waits while simulated time stands
+#: still.
 _STALL_LIMIT = 5.0
-"""How long, in s of the machine's clock, the caller of a service waits while simulated time
-stands still."""
 
 
+#: Calls of one service that may be without an answer. rospy waits for one without a limit, in a
+#: thread that nothing can end.
 _MAX_CALLS = 8
-"""Calls of one service that may be without an answer. rospy waits for one without a limit, in
-a thread that nothing can end."""
 
 
 class ServiceCaller:

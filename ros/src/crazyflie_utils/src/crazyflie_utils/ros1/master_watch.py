@@ -8,8 +8,7 @@ import rospy
 
 from crazyflie_utils.ros1 import registering
 
-_PERIOD = 2.0
-"""How often the master is asked whether it knows this process, s."""
+_PERIOD = 2.0  #: How often the master is asked whether it knows this process, s.
 
 
 class MasterWatch:

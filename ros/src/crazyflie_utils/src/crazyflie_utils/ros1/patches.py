@@ -39,30 +39,15 @@ _TCP = "rospy.impl.tcpros_base:"
 
 @dataclass(frozen=True)
 class Patch:
-    """A change of rospy.
+    """A change of rospy."""
 
-    Attributes
-    ----------
-    replaces : str
-        What rospy does.
-    reason : str
-        What is done in its place, and why.
-    gain : str
-        Measured without -> with it, on a machine that did other things, too.
-    without : str
-        What is slower or missing without it, for the log.
-    targets : dict of str to str
-        "module:Class.function" to its parameters and, behind a colon, names that its code uses.
-    versions : str
-        Of rospy, in which it was seen to work.
-    """
-
-    replaces: str
-    reason: str
-    gain: str
-    without: str
+    replaces: str  #: What rospy does.
+    reason: str  #: What is done in its place, and why.
+    gain: str  #: Measured without -> with it, on a machine that did other things, too.
+    without: str  #: What is slower or missing without it, for the log.
+    #: "module:Class.function" to its parameters and, behind a colon, names that its code uses.
     targets: dict[str, str]
-    versions: str = "1.15.15"
+    versions: str = "1.15.15"  #: Of rospy, in which it was seen to work.
 
 
 PATCHES = {
@@ -87,7 +72,7 @@ PATCHES = {
     "harden_subscribers": Patch(
         "all that comes is decoded; if a message cannot be, rospy connects again, for ever",
         "it is dropped and named once; a flood is decoded in part, so that control goes on",
-        "no figure: it guards flights (docs/safety.md, Peers)",
+        "no figure: it guards flights (docs/faults.md, Peers)",
         "publishers that send nonsense, or floods, delay the nodes of this process",
         {
             f"{_TCP}TCPROSTransport.receive_once": "self: read_buff protocol is_latched latch",
@@ -110,7 +95,7 @@ PATCHES = {
     "harden_tcp_server": Patch(
         "headers of connections are read one after the other, without a limit of time",
         "each in a thread, within 5 s: a peer that connects and is silent keeps /emergency waiting",
-        "no figure: it guards flights (docs/safety.md, Peers)",
+        "no figure: it guards flights (docs/faults.md, Peers)",
         "a peer that connects and says nothing blocks all others",
         {
             f"{_TCP}TCPROSServer._tcp_server_callback": "self sock client_addr: "

@@ -16,25 +16,17 @@ import genpy
 import rospy
 from rospy.exceptions import TransportException, TransportInitError, TransportTerminated
 
+#: ``report(text, key)`` takes note of what a peer did wrong; the key is that of the kind.
 Report = Callable[[str, Hashable], None]
-"""``report(text, key)`` takes note of what a peer did wrong; the key is that of the kind."""
 
 _LENGTH = struct.Struct("<I")
 
+#: The longest message that is taken, bytes: an uncompressed image of 20 megapixels.
 MAX_MESSAGE_SIZE = 64_000_000
-"""The longest message that is taken, bytes: an uncompressed image of 20 megapixels."""
-
-MAX_RATE = 2000.0
-"""Messages per second on one connection; more of them are a flood,"""
-
-_BURST = 200.0
-"""when there are so many more than that."""
-
-_FLOOD_PERIOD = 0.005
-"""In a flood, one message is taken in such a period, s."""
-
-_MAX_READS = 16
-"""Reads of a socket in one period: a flood never ends, but part of it is enough."""
+MAX_RATE = 2000.0  #: Messages per second on one connection; more of them are a flood,
+_BURST = 200.0  #: when there are so many more than that.
+_FLOOD_PERIOD = 0.005  #: In a flood, one message is taken in such a period, s.
+_MAX_READS = 16  #: Reads of a socket in one period: a flood never ends, but part of it is enough.
 
 
 class RateLimiter:
@@ -154,13 +146,8 @@ class Inbox:
 def harden(connection: Any, report: Report, limits_rate: bool) -> None:
     """Have one connection to a publisher, which is not connected yet, receive by an `Inbox`.
 
-    Parameters
-    ----------
-    connection : rospy.impl.tcpros_base.TCPROSTransport
-    report : callable
-    limits_rate : bool
-        Decode only the last message of every 5 ms in a flood of more than `MAX_RATE`; all of them,
-        every 5 ms, of a message type with the attribute ``lossless``.
+    With ``limits_rate`` only the last message of every 5 ms is decoded in a flood of more than
+    `MAX_RATE`; all of them, every 5 ms, of a message type with the attribute ``lossless``.
     """
     inbox: list[Inbox] = []
 

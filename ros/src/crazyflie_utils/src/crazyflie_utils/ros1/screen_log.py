@@ -2,8 +2,7 @@
 
 import logging
 
-ROSOUT = "rosout"
-"""The logger behind rospy.loginfo and its like."""
+ROSOUT = "rosout"  #: The logger behind rospy.loginfo and its like.
 
 
 class Shielded(logging.Handler):

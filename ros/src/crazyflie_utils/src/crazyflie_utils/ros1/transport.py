@@ -20,16 +20,11 @@ from crazyflie_utils.ros1 import patches
 from crazyflie_utils.ros1.calls import ServiceCaller, wait_for_answer
 from crazyflie_utils.ros1.own_topics import OwnCallback, publish
 from crazyflie_utils.ros1.screen_log import shield_screen_log
-from crazyflie_utils.transport import (
-    ExternalPublisher,
-    ExternalSubscriber,
-    ServiceError,
-    Transport,
-)
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
 
+#: Messages kept for a listener that does not keep up: a simulation that runs as fast as it can
+#: fills a short queue faster than the listener gets its turn.
 _QUEUE_SIZE = 100
-"""Messages kept for a listener that does not keep up: a simulation that runs as fast as it
-can fills a short queue faster than the listener gets its turn."""
 
 
 class _RosPublisher(ExternalPublisher):

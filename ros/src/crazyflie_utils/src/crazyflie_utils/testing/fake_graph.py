@@ -11,43 +11,27 @@ import genpy
 
 from crazyflie_utils.node import Node
 from crazyflie_utils.testing.fake_process import FakeProcess, FakeSubscriber, FakeTransport
-from crazyflie_utils.transport import (
-    ExternalPublisher,
-    ExternalSubscriber,
-    ServiceError,
-)
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError
 
 Deliver = Callable[[Any], None]
 
+#: Messages that wait for a frozen process on one connection; of later ones the last counts.
 _MAX_WAITING = 100
-"""Messages that wait for a frozen process on one connection; of later ones the last counts."""
 
 
 class FakeGraph:
     """Processes with a node each, and the connections between them.
 
-    Parameters
-    ----------
-    parameters : dict
-        Full name to raw value, for all processes.
-    start : float
-        Time at the beginning, s.
-
-    Attributes
-    ----------
-    time : float
-        Now, s.
-    faults : dict of str to callable
-        What a fault makes of the messages on a topic: ``fault(message)`` returns those
-        that arrive in its place.
-    log : list of (str, str)
-        Level and text of what nodes have logged.
+    ``parameters`` are those of all processes, full name to raw value; ``start`` is the time at the
+    beginning, s.
     """
 
     def __init__(self, parameters: dict[str, object], start: float = 100.0):
-        self.time = start
+        self.time = start  #: Now, s.
+        #: What a fault makes of the messages on a topic: ``fault(message)`` returns those that
+        #: arrive in its place.
         self.faults: dict[str, Callable[[Any], list[Any]]] = {}
-        self.log: list[tuple[str, str]] = []
+        self.log: list[tuple[str, str]] = []  #: Level and text of what nodes have logged.
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
         self._listeners: dict[str, list[Deliver]] = {}
@@ -56,13 +40,7 @@ class FakeGraph:
     # The processes.
 
     def start(self, name: str, node: Node) -> None:
-        """Start a process with one node.
-
-        Raises
-        ------
-        RuntimeError
-            The node could not be initialized.
-        """
+        """Start a process with one node; RuntimeError if the node could not be initialized."""
         process = self._processes[name] = _GraphProcess(name, self, self._parameters)
         if not process.launch(node, name):
             raise RuntimeError(f"{name} was not initialized: {self.log[-1:]}")

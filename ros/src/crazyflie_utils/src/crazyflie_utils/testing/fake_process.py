@@ -15,12 +15,7 @@ from crazyflie_utils.clock import SimulatedClock
 from crazyflie_utils.node import Node
 from crazyflie_utils.process import Process
 from crazyflie_utils.timers import Timer
-from crazyflie_utils.transport import (
-    ExternalPublisher,
-    ExternalSubscriber,
-    ServiceError,
-    Transport,
-)
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
 
 
 class _Record(ExternalPublisher):
@@ -153,14 +148,9 @@ class FakeTransport(Transport):
 class FakeProcess(Process):
     """A process for tests: the real node handle, executor, timers and tf buffer.
 
-    Parameters
-    ----------
-    parameters : dict
-        Full name to raw value, such as {"/simulator/time_step": 0.01}.
-    start : float
-        Simulated time at the beginning, s.
-    transport : FakeTransport, optional
-        In the place of one with ``parameters``.
+    The parameters are full name to raw value, such as {"/simulator/time_step": 0.01}; a
+    ``transport`` takes the place of one with them. ``start`` is the simulated time at the
+    beginning, s.
     """
 
     transport: FakeTransport

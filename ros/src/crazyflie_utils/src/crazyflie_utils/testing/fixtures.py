@@ -5,8 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-_LIMIT = 120.0
-"""The longest that a test may take, s."""
+_LIMIT = 120.0  #: The longest that a test may take, s.
 
 
 @pytest.fixture(autouse=True)

@@ -42,11 +42,7 @@ class HostilePublisher:
     """
 
     def __init__(
-        self,
-        topic: str,
-        message_type: type[genpy.Message],
-        md5sum: str = "",
-        is_ready: bool = True,
+        self, topic: str, message_type: type[genpy.Message], md5sum: str = "", is_ready: bool = True
     ):
         self.is_ready = is_ready
         self._topic = topic
@@ -60,10 +56,8 @@ class HostilePublisher:
             "latching": "0",
         }
         self._sockets: list[socket.socket] = []
-        self.accepted = 0
-        """How many connections have been made so far,"""
-        self.refused = 0
-        """and how many of them came too early."""
+        self.accepted = 0  #: How many connections have been made so far,
+        self.refused = 0  #: and how many of them came too early.
         self._server = socket.create_server((_ADDRESS, 0))
         self._slave = SimpleXMLRPCServer((_ADDRESS, 0), logRequests=False)
         port = self._server.getsockname()[1]

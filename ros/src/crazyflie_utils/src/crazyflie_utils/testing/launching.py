@@ -14,8 +14,7 @@ import rosgraph
 
 from crazyflie_utils.testing.programs import free_port, running
 
-_START_LIMIT = 60.0
-"""How long roslaunch may take until its master answers, s."""
+_START_LIMIT = 60.0  #: How long roslaunch may take until its master answers, s.
 
 _COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _COMPLAINT = re.compile(r"\[(ERROR|FATAL)\]|RLException|process has died")

@@ -47,10 +47,10 @@ def listening(topic: str, message_type: type[genpy.Message]) -> Iterator[Receive
         subscriber.unregister()
 
 
+#: By topic, one for the life of the process. A rospy subscriber that is told of a new publisher of
+#: a process before it has noticed that the one before it hung up takes it for that one, and never
+#: connects.
 _publishers: dict[str, rospy.Publisher] = {}
-"""By topic, one for the life of the process. A rospy subscriber that is told of a new publisher of
-a process before it has noticed that the one before it hung up takes it for that one, and never
-connects."""
 
 
 def exchange(

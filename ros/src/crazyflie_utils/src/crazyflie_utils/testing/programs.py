@@ -8,8 +8,8 @@ import subprocess
 from collections.abc import Iterator
 from typing import Any
 
+#: How long a program may take to end after each signal, s; roslaunch gives its nodes 15.
 _END_LIMIT = 60.0
-"""How long a program may take to end after each signal, s; roslaunch gives its nodes 15."""
 
 
 def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:

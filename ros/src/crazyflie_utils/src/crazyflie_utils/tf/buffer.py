@@ -17,11 +17,9 @@ connected), ExtrapolationException (not at that time).
 
 _LATEST = genpy.Time()
 
-_CACHE = genpy.Duration(10.0)
-"""What tf2 keeps, by its own default."""
-
+_CACHE = genpy.Duration(10.0)  #: What tf2 keeps, by its own default.
+#: Stamps that are remembered for tf2: the last ten seconds of a vehicle at 1 kHz.
 _MAX_STAMPS = 10_000
-"""Stamps that are remembered for tf2: the last ten seconds of a vehicle at 1 kHz."""
 
 
 class Buffer:

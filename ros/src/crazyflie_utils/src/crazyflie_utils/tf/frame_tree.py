@@ -17,27 +17,17 @@ import tf2_py
 from crazyflie_utils.tf.buffer import Buffer
 from crazyflie_utils.tf.poses import PoseCodec, StampedPose, entries
 
-_HISTORY = 100
-"""Poses of a frame that are kept for the moment when tf2 is begun."""
+_HISTORY = 100  #: Poses of a frame that are kept for the moment when tf2 is begun.
+_NORM_TOLERANCE = 0.01  #: How far tf2 lets the squared norm of a quaternion be from 1.
 
-_NORM_TOLERANCE = 0.01
-"""How far tf2 lets the squared norm of a quaternion be from 1."""
-
+#: A stamp that is older than the last one of its frame by less than this, ns, came by a slower way;
+#: the present pose is still the younger one.
 _STEP_BACK = 100_000_000
-"""A stamp that is older than the last one of its frame by less than this, ns, came by a slower
-way; the present pose is still the younger one."""
 
-_STEPS_BACK = 3
-"""So many of them in a row, and the source's clock has been set back."""
-
-_MAX_FRAMES = 1000
-"""Names of frames that are known, and frames that are kept for later."""
-
-_MAX_BYTES = 1024
-"""Of a transform that is kept for later."""
-
-_ONE = b"\x01\0\0\0"
-"""The length of a message with one transform."""
+_STEPS_BACK = 3  #: So many of them in a row, and the source's clock has been set back.
+_MAX_FRAMES = 1000  #: Names of frames that are known, and frames that are kept for later.
+_MAX_BYTES = 1024  #: Of a transform that is kept for later.
+_ONE = b"\x01\0\0\0"  #: The length of a message with one transform.
 
 
 class _Frame:
@@ -54,23 +44,9 @@ class _Frame:
 class FrameTree:
     """Frames, their poses and parents. Not for several threads at once.
 
-    Parameters
-    ----------
-    codec : PoseCodec
-    warn : callable
-        ``warn(text, key)`` is called about every transform that is dropped; with the same key
-        it is for the same reason.
-    ahead : float
-        How far the stamp of a transform may be ahead of now, s.
-    on_new : callable
-        ``on_new(pose)`` is called with every pose that is the latest of its frame.
-
-    Attributes
-    ----------
-    rejected : collections.Counter
-        How many transforms were dropped, by reason.
-    followed : set of str
-        Frames that are decoded.
+    ``warn(text, key)`` is called about every transform that is dropped; with the same key it is for
+    the same reason. ``ahead`` is how far the stamp of a transform may be ahead of now, s.
+    ``on_new(pose)`` is called with every pose that is the latest of its frame.
     """
 
     def __init__(
@@ -80,8 +56,8 @@ class FrameTree:
         ahead: float,
         on_new: Callable[[StampedPose], None],
     ):
-        self.rejected: Counter[str] = Counter()
-        self.followed: set[str] = set()
+        self.rejected: Counter[str] = Counter()  #: How many transforms were dropped, by reason.
+        self.followed: set[str] = set()  #: Frames that are decoded.
         self._codec = codec
         self._warn = warn
         self._ahead = round(ahead * 1e9)
@@ -111,10 +87,7 @@ class FrameTree:
     def lookup(self, target: str, source: str, stamp: int = 0) -> StampedPose:
         """Return the pose of frame ``source`` in ``target`` at a ROS time (ns), or the latest.
 
-        Raises
-        ------
-        TransformError
-            A frame is unknown, the two are not connected, or not at that time.
+        `TransformError`: a frame is unknown, the two are not connected, or not at that time.
         """
         # tf2 need not begin as long as it would know no answer.
         for name in (target, source):

@@ -20,29 +20,19 @@ _HEADER = struct.Struct("<4I")  # Sequence number, s, ns, length of the parent's
 _POSE = struct.Struct("<7d")
 _STAMP = struct.Struct("<3I")
 
+#: Pairs of frames whose names are kept as they are on the wire, and the other way round.
 _MAX_NAMES = 1000
-"""Pairs of frames whose names are kept as they are on the wire, and the other way round."""
 
 
 class StampedPose(NamedTuple):
-    """Where a frame is at a time.
+    """Where a frame is at a time."""
 
-    Attributes
-    ----------
-    parent, child : str
-        The frame that the pose is in, and the one whose pose it is.
-    stamp : int
-        ROS time, ns.
-    position : tuple of float
-        x, y, z in m.
-    rotation : tuple of float
-        Quaternion (x, y, z, w), from child to parent coordinates.
-    """
-
+    #: parent, child: The frame that the pose is in, and the one whose pose it is.
     parent: str
     child: str
-    stamp: int
-    position: tuple[float, float, float]
+    stamp: int  #: ROS time, ns.
+    position: tuple[float, float, float]  #: x, y, z in m.
+    #: Quaternion (x, y, z, w), from child to parent coordinates.
     rotation: tuple[float, float, float, float]
 
     @staticmethod
@@ -73,19 +63,13 @@ class StampedPose(NamedTuple):
 
 
 class RawTransforms(TFMessage):
-    """A tf2_msgs/TFMessage as it is on the wire, decoded when it is asked for its transforms.
-
-    Attributes
-    ----------
-    raw : bytes
-        The serialized message.
-    """
+    """A tf2_msgs/TFMessage as it is on the wire, decoded when it is asked for its transforms."""
 
     __slots__ = ("raw",)
     lossless = True
 
     def __init__(self) -> None:
-        self.raw = _LENGTH.pack(0)
+        self.raw = _LENGTH.pack(0)  #: The serialized message.
 
     def deserialize(self, data: bytes) -> "RawTransforms":
         """Keep the serialized message."""
@@ -112,10 +96,7 @@ class PoseCodec:
     def decode(self, raw: bytes, start: int, end: int) -> StampedPose:
         """Return what is between two places of a serialized message, as `entries` names them.
 
-        Raises
-        ------
-        UnicodeDecodeError
-            A name is no text.
+        UnicodeDecodeError: a name is no text.
         """
         _, seconds, nanoseconds, length = _HEADER.unpack_from(raw, start)
         names = raw[start + _HEADER.size - _LENGTH.size : end - _POSE.size]
@@ -150,10 +131,7 @@ class PoseCodec:
 def entries(raw: bytes) -> Iterator[tuple[bytes, int, int]]:
     """Yield child frame, start and end of every transform of a serialized TFMessage.
 
-    Raises
-    ------
-    struct.error, ValueError
-        It is shorter than it says.
+    struct.error or ValueError: it is shorter than it says.
     """
     (count,) = _LENGTH.unpack_from(raw)
     start = _LENGTH.size

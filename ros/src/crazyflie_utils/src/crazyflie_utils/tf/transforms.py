@@ -12,11 +12,10 @@ from crazyflie_utils.tf.frame_tree import FrameTree
 from crazyflie_utils.tf.poses import PoseCodec, RawTransforms, StampedPose
 from crazyflie_utils.topics import Subscriber, Topics
 
+#: How far a stamp may be ahead of now, s. tf's static_transform_publisher stamps 0.1 s ahead.
 MAX_FUTURE_STAMP = 0.2
-"""How far a stamp may be ahead of now, s. tf's static_transform_publisher stamps 0.1 s ahead."""
-
+#: The same in simulated time: pose and /clock come by different ways.
 MAX_FUTURE_STAMP_SIMULATED = 2.0
-"""The same in simulated time: pose and /clock come by different ways."""
 
 
 class _Listener:
@@ -38,19 +37,9 @@ class _Listener:
 
 
 class Transforms:
-    """What the process has received of tf, and sends to it.
+    """What the process has received of tf, and sends to it, on its /tf and /tf_static.
 
-    Parameters
-    ----------
-    topics : Topics
-        Of the process; /tf and /tf_static are among them.
-    warn : callable
-        ``warn(text, key)`` is called about every transform that is dropped; with the same key
-        it is for the same reason.
-    now : callable
-        Returns the present ROS time, ns.
-    ahead : float
-        How far the stamp of a transform may be ahead of it, s.
+    ``warn`` and ``ahead`` are those of `FrameTree`; ``now()`` returns the present ROS time, ns.
     """
 
     def __init__(
@@ -177,25 +166,11 @@ class Transforms:
             self._tree.clear()
 
     def lookup(self, target: str, source: str, stamp: genpy.Time | None = None) -> TransformStamped:
-        """Return the transform from ``source`` to ``target`` coordinates.
+        """Return the pose of frame ``source`` in frame ``target``, with its own stamp.
 
-        Parameters
-        ----------
-        target, source : str
-            Frames.
-        stamp : genpy.Time, optional
-            When; by default (and 0), the latest. Others are known from the first such lookup on,
-            for 10 s, and before it the last 100 transforms of frames that were looked up.
-
-        Returns
-        -------
-        geometry_msgs/TransformStamped
-            The pose of frame ``source`` in frame ``target``, with its own stamp.
-
-        Raises
-        ------
-        TransformError
-            A frame is unknown, the two are not connected, or not at that time.
+        The stamp asked for is by default (and 0) the latest. Others are known from the first such
+        lookup on, for 10 s, and before it the last 100 transforms of frames that were looked up.
+        `TransformError`: a frame is unknown, the two are not connected, or not at that time.
         """
         return self.lookup_pose(target, source, stamp).message()
 

@@ -2,60 +2,35 @@
 
 import bisect
 
-_CAPACITY = 900.0
-"""Charge of the stock battery, C: 250 mAh [Bitcraze, data sheet]."""
-
-_RESISTANCE = 0.14
-"""Of cell and leads, ohm: about 0.3 V of sag at hover, as vehicles log it."""
-
-_HOVER_CURRENT = 2.1
-"""A: the 7 minutes of flight of the data sheet."""
-
-_IDLE_CURRENT = 0.12
-"""Of the electronics, A."""
+_CAPACITY = 900.0  #: Charge of the stock battery, C: 250 mAh [Bitcraze, data sheet].
+_RESISTANCE = 0.14  #: Of cell and leads, ohm: about 0.3 V of sag at hover, as vehicles log it.
+_HOVER_CURRENT = 2.1  #: A: the 7 minutes of flight of the data sheet.
+_IDLE_CURRENT = 0.12  #: Of the electronics, A.
 
 _CHARGES = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
+#: Open-circuit voltage, V, over state of charge; the firmware's table, which is of the stock
+#: battery, and 4.2 V when full.
 OPEN_CIRCUIT_VOLTAGES = (3.00, 3.78, 3.83, 3.87, 3.89, 3.92, 3.96, 4.00, 4.04, 4.10, 4.20)
-"""Open-circuit voltage, V, over state of charge; the firmware's table, which is of the stock
-battery, and 4.2 V when full."""
 
 FULL_VOLTAGE = OPEN_CIRCUIT_VOLTAGES[-1]
 
+#: State of charge at which the voltage in flight is low (3.2 V) but not yet critical (3.0 V).
 LOW_CHARGE = 0.055
-"""State of charge at which the voltage in flight is low (3.2 V) but not yet critical (3.0 V)."""
 
 
 class Battery:
-    """One lithium-polymer cell.
-
-    Parameters
-    ----------
-    charge : float
-        State of charge at the beginning, 0 to 1.
-
-    Attributes
-    ----------
-    charge : float
-    voltage : float
-        Under the load of the last step, V.
-    current : float
-        A.
-    """
+    """One lithium-polymer cell; ``charge`` is the state of charge, 0 to 1."""
 
     def __init__(self, charge: float = 1.0):
         self.charge = charge
-        self.current = _IDLE_CURRENT
-        self.voltage = open_circuit_voltage(charge)
+        self.current = _IDLE_CURRENT  #: A.
+        self.voltage = open_circuit_voltage(charge)  #: Under the load of the last step, V.
 
     def step(self, dt: float, load: float) -> None:
         """Drain for ``dt`` (s).
 
-        Parameters
-        ----------
-        dt : float
-        load : float
-            Mean of the third powers of the rotor speeds over the hover speed's:
-            the power of a rotor goes with the third power of its speed.
+        ``load`` is the mean of the third powers of the rotor speeds over the hover speed's: the
+        power of a rotor goes with the third power of its speed.
         """
         self.current = _IDLE_CURRENT + _HOVER_CURRENT * load
         self.charge = max(0.0, self.charge - self.current * dt / _CAPACITY)

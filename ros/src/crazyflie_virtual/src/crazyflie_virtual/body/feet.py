@@ -19,14 +19,8 @@ def tip(
 ) -> Vector[float]:
     """Return the state of a vehicle on the ground, with the tilt that its feet allow.
 
-    Parameters
-    ----------
-    airframe : Airframe
-    before, after : list, 17 components
-        States before and after a step, of `Airframe.step`, which keeps a vehicle upright that
-        stands.
-    dt : float
-        The step, s.
+    The states before and after a step of ``dt`` s, 17 components, are those of `Airframe.step`,
+    which keeps a vehicle upright that stands.
     """
     parameters = airframe.parameters
     roll, pitch, yaw = zyx_from_quaternion(before[6:10])

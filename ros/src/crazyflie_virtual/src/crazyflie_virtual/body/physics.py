@@ -11,8 +11,7 @@ from crazyflie_virtual.body.battery import FULL_VOLTAGE
 from crazyflie_virtual.body.feet import tip
 from crazyflie_world.world import World
 
-STEP = PERIOD
-"""Step of the integration, s: that of the firmware's attitude controller."""
+STEP = PERIOD  #: Step of the integration, s: that of the firmware's attitude controller.
 
 
 class MotorCommands(NamedTuple):
@@ -26,31 +25,13 @@ class MotorCommands(NamedTuple):
 
 OFF = MotorCommands(0.0, 0.0, 0.0, 0.0)
 
-_OVERTURNING = 0.5
-"""Cosine of the tilt on the ground beyond which a vehicle lies on its back."""
+_OVERTURNING = 0.5  #: Cosine of the tilt on the ground beyond which a vehicle lies on its back.
 
 
 class Physics:
-    """Rigid body, four motors, ground.
+    """Rigid body, four motors, ground; it begins at a position (m) and heading (rad).
 
-    Parameters
-    ----------
-    position : sequence, 3 components
-        m.
-    yaw : float
-        rad.
-    mass_error, thrust_error : float
-        How much more mass and thrust the vehicle has than it should, as a
-        fraction.
-
-    Attributes
-    ----------
-    specific_force : tuple, 3 components
-        What an accelerometer feels, m/s^2, body frame.
-    world : World or None
-        What is around it; None for the ground alone, which is also all that it comes to rest on.
-    is_overturned : bool
-        Came down on its back: lies there until `put_upright`.
+    The errors are how much more mass and thrust the vehicle has than it should, as a fraction.
     """
 
     def __init__(
@@ -65,9 +46,11 @@ class Physics:
         x[6:10] = [0.0, 0.0, math.sin(yaw / 2.0), math.cos(yaw / 2.0)]
         x[13:17] = [0.0] * 4
         self._x = x
+        #: What an accelerometer feels, m/s^2, body frame.
         self.specific_force: Triple = (0.0, 0.0, GRAVITY)
+        #: What is around it; None for the ground alone, which is also all that it comes to rest on.
         self.world: World | None = None
-        self.is_overturned = False
+        self.is_overturned = False  #: Came down on its back: lies there until `put_upright`.
 
     @property
     def position(self) -> Triple:

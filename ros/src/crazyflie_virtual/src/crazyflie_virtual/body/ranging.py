@@ -5,12 +5,10 @@ import math
 from crazyflie_model.angles import Triple, rotate
 from crazyflie_virtual.body.physics import Physics
 
-NOTHING = 32767
-"""What a sensor reports that sees nothing, mm."""
+NOTHING = 32767  #: What a sensor reports that sees nothing, mm.
+_REACH = 4.0  #: m.
 
-_REACH = 4.0
-"""m."""
-
+#: Log variable -> where its sensor looks, body frame.
 _DIRECTIONS: dict[str, Triple] = {
     "front": (1.0, 0.0, 0.0),
     "back": (-1.0, 0.0, 0.0),
@@ -19,19 +17,12 @@ _DIRECTIONS: dict[str, Triple] = {
     "up": (0.0, 0.0, 1.0),
     "zrange": (0.0, 0.0, -1.0),
 }
-"""Log variable -> where its sensor looks, body frame."""
 
 
 class RangingSensors:
     """Distances, mm, as whole numbers; 0 where there is no sensor.
 
-    Parameters
-    ----------
-    physics : Physics
-    has_multiranger : bool
-        Whether there are sensors to all sides and up.
-    has_flow_deck : bool
-        Whether there is one down.
+    A multiranger has sensors to all sides and up, a flow deck has one down.
     """
 
     def __init__(self, physics: Physics, has_multiranger: bool, has_flow_deck: bool):

@@ -6,52 +6,24 @@ import random
 from crazyflie_model.angles import Quaternion, Triple, rotate_back
 from crazyflie_model.units import GRAVITY
 
+#: Standard deviation of a sample, deg/s: the BMI088's noise density, 0.014 deg/s/sqrt(Hz) [data
+#: sheet], in the firmware's bandwidth of about 50 Hz.
 _GYRO_NOISE = 0.1
-"""Standard deviation of a sample, deg/s: the BMI088's noise density, 0.014 deg/s/sqrt(Hz)
-[data sheet], in the firmware's bandwidth of about 50 Hz."""
 
+#: Standard deviation of a sample, g: 190 ug/sqrt(Hz) [data sheet] in about 100 Hz.
 _ACCELEROMETER_NOISE = 0.002
-"""Standard deviation of a sample, g: 190 ug/sqrt(Hz) [data sheet] in about 100 Hz."""
-
-_BAROMETER_NOISE = 0.05
-"""Standard deviation of the height, m."""
-
-_ACCELEROMETER_RANGE = 24.0
-"""g."""
-
-_GYRO_RANGE = 2000.0
-"""deg/s."""
-
+_BAROMETER_NOISE = 0.05  #: Standard deviation of the height, m.
+_ACCELEROMETER_RANGE = 24.0  #: g.
+_GYRO_RANGE = 2000.0  #: deg/s.
+#: Magnetic field, gauss, fixed frame: central Europe, with x to the north.
 _FIELD = (0.2, 0.0, -0.43)
-"""Magnetic field, gauss, fixed frame: central Europe, with x to the north."""
-
-_SEA_LEVEL_PRESSURE = 1013.25
-"""mbar."""
+_SEA_LEVEL_PRESSURE = 1013.25  #: mbar.
 
 _NOISE_SAMPLES = 8191
 
 
 class Sensors:
-    """What the vehicle measures of itself.
-
-    Parameters
-    ----------
-    noise : bool
-        Whether there is any.
-    seed : int
-        Of the noise.
-
-    Attributes
-    ----------
-    gyro_x, gyro_y, gyro_z : float
-        deg/s, body frame (forward-left-up).
-    acc_x, acc_y, acc_z : float
-        g, body frame; (0, 0, 1) at rest.
-    mag_x, mag_y, mag_z : float
-        gauss, body frame.
-    asl, pressure, temperature : float
-        Height above sea level in m, mbar, degrees Celsius.
-    """
+    """What the vehicle measures of itself, with noise or without; ``seed`` is the noise's."""
 
     def __init__(self, noise: bool = True, seed: int = 0):
         source = random.Random(seed)
@@ -59,23 +31,16 @@ class Sensors:
         # controllers; a prime number of samples does not repeat in step.
         self._noise = [source.gauss(0.0, 1.0) if noise else 0.0 for _ in range(_NOISE_SAMPLES)]
         self._next = 0
-        self.gyro_x = self.gyro_y = self.gyro_z = 0.0
-        self.acc_x, self.acc_y, self.acc_z = 0.0, 0.0, 1.0
-        self.mag_x, self.mag_y, self.mag_z = _FIELD
+        self.gyro_x = self.gyro_y = self.gyro_z = 0.0  #: deg/s, body frame (forward-left-up).
+        self.acc_x, self.acc_y, self.acc_z = 0.0, 0.0, 1.0  #: g, body frame; (0, 0, 1) at rest.
+        self.mag_x, self.mag_y, self.mag_z = _FIELD  #: gauss, body frame.
+        #: asl, pressure, temperature: Height above sea level in m, mbar, degrees Celsius.
         self.asl = 0.0
         self.pressure = _SEA_LEVEL_PRESSURE
         self.temperature = 25.0
 
     def sample_inertial(self, rates: Triple, specific_force: Triple) -> None:
-        """Measure.
-
-        Parameters
-        ----------
-        rates : tuple, 3 components
-            Body rates, rad/s.
-        specific_force : tuple, 3 components
-            Acceleration without gravity's, m/s^2, body frame.
-        """
+        """Measure body rates, rad/s, and acceleration without gravity's, m/s^2, body frame."""
         start = self._next
         self._next = start + 6 if start + 12 <= _NOISE_SAMPLES else (start + 6) % 7
         n = self._noise[start : start + 6]

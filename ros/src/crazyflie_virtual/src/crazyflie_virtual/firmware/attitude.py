@@ -7,14 +7,7 @@ modes, parameters and log variables.
 """
 
 from crazyflie_model.angles import Triple
-from crazyflie_model.inner_loops import (
-    HEADING,
-    HEADING_RATE,
-    OUTPUT_LIMIT,
-    PERIOD,
-    TILT,
-    TILT_RATE,
-)
+from crazyflie_model.inner_loops import HEADING, HEADING_RATE, OUTPUT_LIMIT, PERIOD, TILT, TILT_RATE
 from crazyflie_virtual.firmware.pid import FirmwarePid
 from crazyflie_virtual.firmware.states import Estimate
 
@@ -25,26 +18,17 @@ def wrap_degrees(angle: float) -> float:
 
 
 class AttitudeController:
-    """From desired attitude or rates to the outputs about the three axes.
-
-    Attributes
-    ----------
-    roll, pitch, yaw : FirmwarePid
-        deg to deg/s.
-    roll_rate, pitch_rate, yaw_rate : FirmwarePid
-        deg/s to PWM.
-    yaw_max_delta : float
-        How far the desired heading may run ahead of the vehicle's, deg; 0 for
-        no limit.
-    """
+    """From desired attitude or rates to the outputs about the three axes."""
 
     def __init__(self) -> None:
-        self.roll = FirmwarePid(TILT, PERIOD)
+        self.roll = FirmwarePid(TILT, PERIOD)  #: roll, pitch, yaw: deg to deg/s.
         self.pitch = FirmwarePid(TILT, PERIOD)
         self.yaw = FirmwarePid(HEADING, PERIOD)
+        #: roll_rate, pitch_rate, yaw_rate: deg/s to PWM.
         self.roll_rate = FirmwarePid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
         self.pitch_rate = FirmwarePid(TILT_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
         self.yaw_rate = FirmwarePid(HEADING_RATE, PERIOD, output_limit=OUTPUT_LIMIT)
+        #: How far the desired heading may run ahead of the vehicle's, deg; 0 for no limit.
         self.yaw_max_delta = 0.0
 
     def reset(self) -> None:
@@ -65,17 +49,9 @@ class AttitudeController:
         )
 
     def outputs(self, rates: Triple, gyro: Triple) -> Triple:
-        """Return the outputs about roll, pitch and yaw that lead to body rates.
+        """Return the outputs about roll, pitch and yaw that lead to body rates, PWM.
 
-        Parameters
-        ----------
-        rates, gyro : tuple, 3 components
-            Desired and measured, deg/s, pitch in the firmware's sign.
-
-        Returns
-        -------
-        tuple of float
-            PWM.
+        Rates desired and measured (``gyro``) are in deg/s, pitch in the firmware's sign.
         """
         return (
             _or_zero(self.roll_rate.update(rates[0], gyro[0])),

@@ -3,8 +3,8 @@
 from crazyflie_virtual.firmware.planner import Planner
 from crazyflie_virtual.firmware.states import Estimate, Setpoint
 
+#: Priorities, named as in the firmware.
 PRIORITY_DISABLE, PRIORITY_HIGHLEVEL, PRIORITY_CRTP = 0, 1, 2
-"""Priorities, named as in the firmware."""
 
 
 class Commander:
@@ -13,20 +13,14 @@ class Commander:
     A streamed setpoint stops the high-level commander and overrides it until
     `relax_priority`: neither age nor a new client ends that. Afterwards the high-level
     commander holds the motors off until its next command.
-
-    Attributes
-    ----------
-    setpoint : Setpoint
-    priority : int
-        Of the setpoint: `PRIORITY_DISABLE`, `PRIORITY_HIGHLEVEL` or `PRIORITY_CRTP`.
-    high_level_enabled : int
-        Parameter that the firmware has without effect: the commander is on.
     """
 
     def __init__(self, planner: Planner):
         self._planner = planner
         self.setpoint = Setpoint()
+        #: Of the setpoint: `PRIORITY_DISABLE`, `PRIORITY_HIGHLEVEL` or `PRIORITY_CRTP`.
         self.priority = PRIORITY_DISABLE
+        #: Parameter that the firmware has without effect: the commander is on.
         self.high_level_enabled = 1
 
     def stream(self, setpoint: Setpoint) -> None:

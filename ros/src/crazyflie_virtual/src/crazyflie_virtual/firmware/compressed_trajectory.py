@@ -12,37 +12,23 @@ from crazyflie_model.polynomials import PolynomialPiece, bezier
 _START = struct.Struct("<4h")
 _HEADER = struct.Struct("<BH")
 
-_POINTS = (0, 1, 3, 7)
-"""Control points that are stored for each type of curve: all but the first."""
+_POINTS = (0, 1, 3, 7)  #: Control points that are stored for each type of curve: all but the first.
 
 _MILLI = 1e-3
 _TENTH_DEGREE = math.pi / 1800.0
-_UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)
-"""Of x, y, z and yaw: m and rad."""
+_UNITS = (_MILLI, _MILLI, _MILLI, _TENTH_DEGREE)  #: Of x, y, z and yaw: m and rad.
 
 
 def read_compressed(memory: bytes) -> tuple[PolynomialPiece, ...]:
-    """Return the pieces of a compressed trajectory.
+    """Return the pieces of a compressed trajectory; ValueError if there is not even a start point.
 
-    It ends with a segment of no duration, or with the memory.
+    The memory begins with the start point, 4 numbers of 16 bits: x, y, z in mm and yaw in tenths of
+    a degree. Then segments: a byte with two bits for each axis' type of curve, x lowest; the
+    duration in ms, 16 bits; the control points of x, of y, of z and of yaw. The first control point
+    is the last one before and is left out. It ends with a segment of no duration, or with the
+    memory.
 
-    Parameters
-    ----------
-    memory : bytes
-        Beginning with the start point, 4 numbers of 16 bits: x, y, z in mm and yaw in
-        tenths of a degree. Then segments: a byte with two bits for each axis' type of
-        curve, x lowest; the duration in ms, 16 bits; the control points of x, of y, of z
-        and of yaw. The first control point is the last one before and is left out.
-
-    Returns
-    -------
-    tuple of PolynomialPiece
-        At least one: without any segment one of no duration, at the start point.
-
-    Raises
-    ------
-    ValueError
-        There is not even a start point.
+    At least one piece is returned: without any segment one of no duration, at the start point.
     """
     if len(memory) < _START.size:
         raise ValueError("a compressed trajectory begins with 8 bytes")

@@ -5,24 +5,13 @@ from collections.abc import Callable, Hashable
 
 from crazyflie_virtual.link.crtp import MAX_DATA
 
-Warn = Callable[[Hashable, str], bool]
-"""See `Console.warn`."""
-
-_BUFFER_SIZE = 100
-"""Packets kept until a client is connected: the latest."""
-
-_WARNING_PERIOD = 1.0
-"""Between two warnings of one kind, s."""
+Warn = Callable[[Hashable, str], bool]  #: See `Console.warn`.
+_BUFFER_SIZE = 100  #: Packets kept until a client is connected: the latest.
+_WARNING_PERIOD = 1.0  #: Between two warnings of one kind, s.
 
 
 class Console:
-    """Text on its way to the client.
-
-    Parameters
-    ----------
-    time : callable
-        ``time()`` returns the time, s.
-    """
+    """Text on its way to the client; ``time()`` returns the time, s."""
 
     def __init__(self, time: Callable[[], float]) -> None:
         self._time = time
@@ -35,13 +24,7 @@ class Console:
         self._packets.extend(data[i : i + MAX_DATA] for i in range(0, len(data), MAX_DATA))
 
     def warn(self, kind: Hashable, text: str) -> bool:
-        """Print a line, unless there was one of its kind within `_WARNING_PERIOD`.
-
-        Returns
-        -------
-        bool
-            Whether it was printed.
-        """
+        """Print a line; return False if there was one of its kind within `_WARNING_PERIOD`."""
         now = self._time()
         if now - self._last_warning.get(kind, -_WARNING_PERIOD) < _WARNING_PERIOD:
             return False

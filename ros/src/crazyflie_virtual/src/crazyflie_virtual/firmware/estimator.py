@@ -21,46 +21,24 @@ from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.states import Estimate
 from crazyflie_virtual.quaternions import normalized, turned
 
-_ACCELERATION_NOISE = 3.7e-4
-"""Process noise, m^2/s^3: 0.6 m/s^2, held for 1 ms each."""
-
-_RATE_NOISE = 1e-5
-"""Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each."""
-
+_ACCELERATION_NOISE = 3.7e-4  #: Process noise, m^2/s^3: 0.6 m/s^2, held for 1 ms each.
+_RATE_NOISE = 1e-5  #: Process noise, rad^2/s: 0.1 rad/s, held for 1 ms each.
+#: Of position and velocity, m^2 and m^2/s^2 (MAX_COVARIANCE of kalman_core.c).
 _MOST_VARIANCE = 100.0
-"""Of position and velocity, m^2 and m^2/s^2 (MAX_COVARIANCE of kalman_core.c)."""
-
+#: Of the position, with the velocity, of the velocity; m^2, m^2/s, m^2/s^2.
 _FIRST_VARIANCES = (_MOST_VARIANCE, 0.0, 1.0)
-"""Of the position, with the velocity, of the velocity; m^2, m^2/s, m^2/s^2."""
-
-_FIRST_ATTITUDE_VARIANCE = 10.0
-"""rad^2: the first measurement counts in full."""
-
-_LEAST_VARIANCE = 1e-12
-"""Of a measurement, m^2 and rad^2: clients may set its deviation to 0."""
-
+_FIRST_ATTITUDE_VARIANCE = 10.0  #: rad^2: the first measurement counts in full.
+_LEAST_VARIANCE = 1e-12  #: Of a measurement, m^2 and rad^2: clients may set its deviation to 0.
+#: Time constant with which the attitude returns to the initial one at rest, s.
 _REVERSION_TIME = 10.0
-"""Time constant with which the attitude returns to the initial one at rest, s."""
 
 
 class Estimator:
-    """Estimate of position, velocity and attitude.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        Updated in place.
-
-    Attributes
-    ----------
-    initial_x, initial_y, initial_z, initial_yaw : float
-        Pose after `reset`, m and rad.
-    variance_position, variance_velocity, variance_attitude : float
-        m^2, m^2/s^2, rad^2.
-    """
+    """Estimate of position, velocity and attitude, updated in place."""
 
     def __init__(self, estimate: Estimate):
         self._estimate = estimate
+        #: Pose after `reset`, m and rad.
         self.initial_x = self.initial_y = self.initial_z = self.initial_yaw = 0.0
         self._sums = [0.0] * 6
         self._samples = 0

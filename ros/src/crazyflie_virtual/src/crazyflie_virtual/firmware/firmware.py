@@ -20,11 +20,10 @@ from crazyflie_virtual.link.statistics import LinkStatistics
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.tables.memories import MemoryTester
 
+#: The first protocol in which the supervisor has a port and reports the high-level commander.
 SUPERVISOR_PROTOCOL = 12
-"""The first protocol in which the supervisor has a port and reports the high-level commander."""
-
+#: Steps between two updates of position controller and high-level commander: 100 Hz.
 POSITION_STEPS = 5
-"""Steps between two updates of position controller and high-level commander: 100 Hz."""
 
 _SUPERVISOR_STEPS = 20
 _STARTING_UPDATES = 4
@@ -35,43 +34,20 @@ _POSITION_PERIOD = POSITION_STEPS * STEP
 class Firmware:
     """From packets to motor commands.
 
-    Parameters
-    ----------
-    physics : Physics
-        Measured by the sensors.
-    faults : FaultSwitches
-        Also firmware parameters of the group ``virtual``.
-    settings : VehicleSettings
-    failure : str
-        The assertion that has caused this restart. The firmware then does not
-        pass its self test: it answers the client and does not fly (system.c of
-        the firmware) until the power is switched off and on.
-
-    Attributes
-    ----------
-    time : float
-        Since the start, s.
-    setpoint : Setpoint
-        Input of the controllers.
-    info : SupervisorState
-        State of supervisor and high-level commander at the supervisor's last
-        update, as clients see it.
-    is_started : bool
-        Whether the self test has passed.
+    The sensors measure ``physics``; ``faults`` are also firmware parameters of the group
+    ``virtual``. ``failure`` is the assertion that has caused this restart: the firmware then does
+    not pass its self test; it answers the client and does not fly (system.c of the firmware) until
+    the power is switched off and on.
     """
 
     def __init__(
-        self,
-        physics: Physics,
-        faults: FaultSwitches,
-        settings: VehicleSettings,
-        failure: str = "",
+        self, physics: Physics, faults: FaultSwitches, settings: VehicleSettings, failure: str = ""
     ):
         self._physics = physics
         self.faults = faults
         self.protocol = settings.protocol
         self._steps = 0
-        self.time = 0.0
+        self.time = 0.0  #: Since the start, s.
         self.console = Console(lambda: self.time)
         self.warn = self.console.warn
         self.estimate = Estimate()
@@ -88,13 +64,15 @@ class Firmware:
         self.power = PowerMonitor()
         self.link_statistics = LinkStatistics()
         self.memory_tester = MemoryTester()
-        self.setpoint = Setpoint()
+        self.setpoint = Setpoint()  #: Input of the controllers.
         self.reset_estimation = 0
+        #: State of supervisor and high-level commander at the supervisor's last update, as clients
+        #: see it.
         self.info = SupervisorState(0)
         self._warned_state: State | None = None
         self.console.write_line("SYS: ----------------------------")
         self.console.write_line("SYS: Virtual Crazyflie 2.1 is up and running!")
-        self.is_started = not failure
+        self.is_started = not failure  #: Whether the self test has passed.
         if failure:
             self.console.write_line("SYS: The system resumed after a failed assert [WARNING]")
             self.console.write_line(f"SYS: {failure}; no flight before power is off and on")

@@ -9,48 +9,26 @@ from crazyflie_model.angles import Quaternion, Triple
 from crazyflie_virtual.body.physics import Physics
 from crazyflie_virtual.firmware.estimator import Estimator
 
-DECK, NONE = "deck", "none"
-"""Positioning systems."""
-
-EXTERNAL_AGE = 0.5
-"""The deck measures only when there was no external measurement for so long, s."""
-
-_DECK_POSITION_DEVIATION = 0.003
-"""m."""
-
-_DECK_ATTITUDE_DEVIATION = 0.003
-"""rad."""
+DECK, NONE = "deck", "none"  #: Positioning systems.
+EXTERNAL_AGE = 0.5  #: The deck measures only when there was no external measurement for so long, s.
+_DECK_POSITION_DEVIATION = 0.003  #: m.
+_DECK_ATTITUDE_DEVIATION = 0.003  #: rad.
 
 
 class Localization:
-    """Corrects the estimator.
-
-    Parameters
-    ----------
-    estimator : Estimator
-    physics : Physics
-        Measured by the deck.
-    has_deck : bool
-        Whether the vehicle carries a positioning deck.
-
-    Attributes
-    ----------
-    x, y, z, qx, qy, qz, qw : float
-        Last external measurement, m; for the log.
-    time : float or None
-        When it came, s.
-    position_deviation, attitude_deviation : float
-        Standard deviations that external measurements are taken to have, m and rad.
-    """
+    """Corrects the estimator by external measurements, and by those of a positioning deck."""
 
     def __init__(self, estimator: Estimator, physics: Physics, has_deck: bool):
         self._estimator = estimator
         self._physics = physics
         self.has_deck = has_deck
+        #: x, y, z, qx, qy, qz, qw: Last external measurement, m; for the log.
         self.x = self.y = self.z = 0.0
         self.qx = self.qy = self.qz = 0.0
         self.qw = 1.0
-        self.time: float | None = None
+        self.time: float | None = None  #: When it came, s.
+        #: position_deviation, attitude_deviation: Standard deviations that external measurements
+        #: are taken to have, m and rad.
         self.position_deviation = 0.01
         self.attitude_deviation = 0.0045
 

@@ -17,36 +17,21 @@ from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.pid import constrain
 from crazyflie_virtual.firmware.states import ABSOLUTE, DISABLED, VELOCITY, Estimate, Setpoint
 
-TORQUE_LIMIT = 32000.0
-"""Largest output about an axis, PWM."""
+TORQUE_LIMIT = 32000.0  #: Largest output about an axis, PWM.
 
 _AXES: tuple[Triple, ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class MellingerController:
-    """From a setpoint and the estimate to the inputs of the mixer.
-
-    Attributes
-    ----------
-    mass : float
-        kg.
-    mass_thrust : float
-        PWM/N.
-    kp_xy, ki_xy, kd_xy, kp_z, ki_z, kd_z : float
-        Of the position, N/m, N/(m s) and N s/m.
-    i_range_xy, i_range_z : float
-        Limits of the position's integrals, m s.
-    kR_xy, kR_z, kw_xy, kw_z, ki_m_xy, ki_m_z, kd_omega_rp : float
-        Of attitude, body rates, integral of the attitude and body accelerations, PWM per rad,
-        rad/s, rad s and rad/s^2.
-    i_range_m_xy, i_range_m_z : float
-        Limits of the attitude's integrals, rad s.
-    """
+    """From a setpoint and the estimate to the inputs of the mixer."""
 
     def __init__(self) -> None:
-        self.mass, self.mass_thrust = 0.027, 132000.0
+        self.mass, self.mass_thrust = 0.027, 132000.0  #: kg, PWM/N.
+        #: Of the position, N/m, N/(m s) and N s/m; limits of its integrals, m s.
         self.kp_xy, self.ki_xy, self.kd_xy, self.i_range_xy = 0.4, 0.05, 0.2, 2.0
         self.kp_z, self.ki_z, self.kd_z, self.i_range_z = 1.25, 1.5, 0.4, 0.4
+        #: Of attitude, body rates and integral of the attitude, PWM per rad, rad/s and rad s;
+        #: limits of these integrals, rad s; of the body accelerations, PWM per rad/s^2.
         self.kR_xy, self.kw_xy, self.ki_m_xy, self.i_range_m_xy = 70000.0, 20000.0, 0.0, 1.0
         self.kR_z, self.kw_z, self.ki_m_z, self.i_range_m_z = 60000.0, 12000.0, 500.0, 1500.0
         self.kd_omega_rp = 200.0

@@ -8,32 +8,20 @@ from crazyflie_model.pid import Gains, terms
 class FirmwarePid:
     """PID with feed-forward; the derivative is that of the measurement.
 
-    Parameters
-    ----------
-    gains : Gains
-        To begin with: a client may change them.
-    dt : float
-        Time between two updates, s.
-    kff : float
-        Output per desired value.
-    output_limit : float
-        Of the output's magnitude; 0 for none.
-
-    Attributes
-    ----------
-    kp, ki, kd, kff, limit : float
-        Present gains.
-    desired, out_p, out_i, out_d, out_ff : float
-        Of the last update, for the log.
+    ``gains`` hold to begin with: a client may change them. ``dt`` is the time between two updates,
+    s; ``kff`` the output per desired value; ``output_limit`` that of the output's magnitude, 0 for
+    none.
     """
 
     def __init__(self, gains: Gains, dt: float, kff: float = 0.0, output_limit: float = 0.0):
+        #: kp, ki, kd, kff, limit: Present gains.
         self.kp, self.ki, self.kd, self.kff = gains.kp, gains.ki, gains.kd, kff
         self.limit = gains.limit
         self.output_limit = output_limit
         self._dt = dt
         self._integral = 0.0
         self._last: float | None = None
+        #: desired, out_p, out_i, out_d, out_ff: Of the last update, for the log.
         self.desired = 0.0
         self.out_p = self.out_i = self.out_d = self.out_ff = 0.0
 
@@ -43,14 +31,7 @@ class FirmwarePid:
         self._last = None
 
     def update(self, desired: float, measured: float, error: float | None = None) -> float:
-        """Return the output.
-
-        Parameters
-        ----------
-        desired, measured : float
-        error : float, optional
-            In the place of their difference, where it has to be wrapped.
-        """
+        """Return the output; ``error`` replaces a difference that has to be wrapped."""
         self.desired = desired
         if error is None:
             error = desired - measured

@@ -12,29 +12,15 @@ from crazyflie_model.trajectory import Trajectory
 from crazyflie_virtual.firmware.compressed_trajectory import read_compressed
 from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, Estimate, Modes, Setpoint
 
-MEMORY_SIZE = 4096
-"""Bytes of the trajectory memory."""
-
-DEFINITIONS = 31
-"""Trajectories that can be defined at one time."""
-
-IN_MEMORY = 1
-"""The location of trajectories."""
-
-POLYNOMIALS, COMPRESSED = 0, 1
-"""Types of trajectories."""
-
-REFUSED = 1
-"""Returned by a command that the state does not permit."""
-
-_MIN_DURATION = 0.01
-"""Of a plan, s."""
-
+MEMORY_SIZE = 4096  #: Bytes of the trajectory memory.
+DEFINITIONS = 31  #: Trajectories that can be defined at one time.
+IN_MEMORY = 1  #: The location of trajectories.
+POLYNOMIALS, COMPRESSED = 0, 1  #: Types of trajectories.
+REFUSED = 1  #: Returned by a command that the state does not permit.
+_MIN_DURATION = 0.01  #: Of a plan, s.
+#: Result of the firmware's arithmetic for a plan with infinite numbers.
 _NOT_A_NUMBER = PolynomialPiece(1.0, *[(math.nan,)] * 4)
-"""Result of the firmware's arithmetic for a plan with infinite numbers."""
-
-_MIN_SPEED = 0.001
-"""Of a climb, m/s: clients may set the speed to 0."""
+_MIN_SPEED = 0.001  #: Of a climb, m/s: clients may set the speed to 0.
 
 _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 
@@ -42,42 +28,27 @@ _TRACKING = Modes(x=ABSOLUTE, y=ABSOLUTE, z=ABSOLUTE, yaw=ABSOLUTE)
 class TrajectoryState(Enum):
     """States of the planner; names as the firmware's TRAJECTORY_STATE."""
 
-    IDLE = 0
-    """Holds the motors off."""
+    IDLE = 0  #: Holds the motors off.
     FLYING = 1
     LANDING = 2
-    DISABLED = 3
-    """Gives no setpoints: a command contained a number that is not finite."""
+    DISABLED = 3  #: Gives no setpoints: a command contained a number that is not finite.
 
 
-ACTIVE = (TrajectoryState.FLYING, TrajectoryState.LANDING)
-"""States with setpoints."""
+ACTIVE = (TrajectoryState.FLYING, TrajectoryState.LANDING)  #: States with setpoints.
 
 
 class Planner:
     """Plans trajectories and evaluates them.
 
     Commands return 0 or an error number.
-
-    Attributes
-    ----------
-    memory : bytearray
-        Pieces of trajectories, uploaded by the client.
-    state : TrajectoryState
-    blocked : bool
-        Whether the vehicle cannot fly, and plans are refused.
-    takeoff_speed, landing_speed : float
-        Default of commands, m/s.
-    groups : int
-        Groups of vehicles that this one belongs to, a bit each.
     """
 
     def __init__(self) -> None:
-        self.memory = bytearray(MEMORY_SIZE)
+        self.memory = bytearray(MEMORY_SIZE)  #: Pieces of trajectories, uploaded by the client.
         self.state = TrajectoryState.IDLE
-        self.blocked = False
-        self.takeoff_speed = self.landing_speed = 0.5
-        self.groups = 0
+        self.blocked = False  #: Whether the vehicle cannot fly, and plans are refused.
+        self.takeoff_speed = self.landing_speed = 0.5  #: Default of commands, m/s.
+        self.groups = 0  #: Groups of vehicles that this one belongs to, a bit each.
         self._definitions: dict[int, tuple[int, int, int, int]] = {}
         self._trajectory: Trajectory | None = None
         self._begin = 0.0
@@ -193,15 +164,8 @@ class Planner:
     def define(self, trajectory_id: int, location: int, kind: int, offset: int, pieces: int) -> int:
         """Define where a trajectory is; whether there is one shows at its start.
 
-        Parameters
-        ----------
-        trajectory_id : int
-        location, kind : int
-            Only `IN_MEMORY`, and `POLYNOMIALS` or `COMPRESSED`, can be flown.
-        offset : int
-            In the memory, bytes.
-        pieces : int
-            Without meaning for one that is compressed.
+        Only `IN_MEMORY`, and `POLYNOMIALS` or `COMPRESSED`, can be flown. The offset in the memory
+        is in bytes; ``pieces`` has no meaning for one that is compressed.
         """
         if trajectory_id >= DEFINITIONS:
             return errno.ENOEXEC

@@ -13,49 +13,32 @@ from crazyflie_model.pid import Gains
 from crazyflie_virtual.firmware.pid import FirmwarePid, constrain
 from crazyflie_virtual.firmware.states import ABSOLUTE, Estimate, Setpoint
 
-DT = 0.01
-"""Time between two updates, s."""
-
+DT = 0.01  #: Time between two updates, s.
+#: How much of a limit the integral may go beyond it, so that it can leave it again.
 _OVERHEAD = 1.1
-"""How much of a limit the integral may go beyond it, so that it can leave it again."""
-
-_THRUST_SCALE = 1000.0
-"""PWM per unit of the climb controller's output."""
+_THRUST_SCALE = 1000.0  #: PWM per unit of the climb controller's output.
 
 
 class PositionController:
-    """From a setpoint's position or velocity to attitude and thrust.
-
-    Attributes
-    ----------
-    x, y, z : FirmwarePid
-        m to m/s.
-    vx, vy, vz : FirmwarePid
-        m/s to deg, deg and thousands of PWM.
-    roll_limit, pitch_limit : float
-        deg.
-    vx_max, vy_max, vz_max : float
-        m/s.
-    thrust_base, thrust_min : float
-        PWM: what hovers, about, and the least that is given. What the first
-        lacks to the vehicle's hover, the integral of the climb controller adds.
-    body_x, body_y, body_vx, body_vy : float
-        Estimate in the heading frame, for the log.
-    """
+    """From a setpoint's position or velocity to attitude and thrust."""
 
     def __init__(self) -> None:
-        self.x = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)
+        self.x = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)  #: x, y, z: m to m/s.
         self.y = FirmwarePid(Gains(2.0, 0.0, 0.0), DT)
         self.z = FirmwarePid(Gains(2.0, 0.5, 0.0), DT)
+        #: vx, vy, vz: m/s to deg, deg and thousands of PWM.
         self.vx = FirmwarePid(Gains(25.0, 1.0, 0.0), DT)
         self.vy = FirmwarePid(Gains(25.0, 1.0, 0.0), DT)
         self.vz = FirmwarePid(
             Gains(25.0, 15.0, 0.0), DT, output_limit=FULL_PWM / 2.0 / _THRUST_SCALE
         )
-        self.roll_limit = self.pitch_limit = 20.0
-        self.vx_max = self.vy_max = self.vz_max = 1.0
+        self.roll_limit = self.pitch_limit = 20.0  #: deg.
+        self.vx_max = self.vy_max = self.vz_max = 1.0  #: m/s.
+        #: thrust_base, thrust_min: PWM: what hovers, about, and the least that is given. What the
+        #: first lacks to the vehicle's hover, the integral of the climb controller adds.
         self.thrust_base = 36000
         self.thrust_min = 20000
+        #: Estimate in the heading frame, for the log.
         self.body_x = self.body_y = self.body_vx = self.body_vy = 0.0
 
     def reset(self) -> None:

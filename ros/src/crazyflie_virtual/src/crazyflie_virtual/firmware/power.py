@@ -2,35 +2,21 @@
 
 from crazyflie_virtual.body.battery import OPEN_CIRCUIT_VOLTAGES
 
-ON_BATTERY, LOW = 0, 3
-"""States; 1 and 2, charging and charged, do not occur."""
-
-_LOW_AFTER = 5.0
-"""Time of low voltage until the state `LOW`, s."""
-
+ON_BATTERY, LOW = 0, 3  #: States; 1 and 2, charging and charged, do not occur.
+_LOW_AFTER = 5.0  #: Time of low voltage until the state `LOW`, s.
+#: Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C].
 _LEVELS = OPEN_CIRCUIT_VOLTAGES[:-1]
-"""Voltage, V, at 0, 10, ... 90 % of charge [firmware: measured on the stock battery at 25 C]."""
 
 
 class PowerMonitor:
-    """Watches the voltage.
-
-    Attributes
-    ----------
-    voltage : float
-        V.
-    level : int
-        Charge as the firmware estimates it from the voltage, %.
-    state : int
-        `ON_BATTERY` or `LOW`.
-    low_voltage, critical_voltage : float
-        V. The second has no effect: the default build does not switch off.
-    """
+    """Watches the voltage."""
 
     def __init__(self) -> None:
-        self.voltage = 4.1
-        self.level = 90
-        self.state = ON_BATTERY
+        self.voltage = 4.1  #: V.
+        self.level = 90  #: Charge as the firmware estimates it from the voltage, %.
+        self.state = ON_BATTERY  #: `ON_BATTERY` or `LOW`.
+        #: low_voltage, critical_voltage: V. The second has no effect: the default build does not
+        #: switch off.
         self.low_voltage, self.critical_voltage = 3.2, 3.0
         self._good_time: float | None = None
 

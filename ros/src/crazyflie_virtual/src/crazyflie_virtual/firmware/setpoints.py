@@ -12,8 +12,7 @@ from crazyflie_virtual.firmware.commander import PRIORITY_DISABLE
 from crazyflie_virtual.firmware.states import ABSOLUTE, MOTION, VELOCITY, Modes, Setpoint
 from crazyflie_virtual.quaternions import decompress_quaternion
 
-_LEAST_THRUST = 1000
-"""Of an attitude setpoint, PWM: less is none."""
+_LEAST_THRUST = 1000  #: Of an attitude setpoint, PWM: less is none.
 
 _RATE_MODE = 0
 
@@ -27,16 +26,11 @@ class AttitudeDecoder:
     """Attitude setpoints, port 3, and their thrust lock.
 
     Thrust counts only after one setpoint without thrust has come.
-
-    Attributes
-    ----------
-    roll_mode, pitch_mode, yaw_mode : int
-        Whether roll and pitch are angles (1) or rates (0); the yaw rate is a
-        rate always.
-    is_locked : bool
     """
 
     def __init__(self) -> None:
+        #: roll_mode, pitch_mode, yaw_mode: Whether roll and pitch are angles (1) or rates (0); the
+        #: yaw rate is a rate always.
         self.roll_mode = self.pitch_mode = 1
         self.yaw_mode = _RATE_MODE
         self.is_locked = True
@@ -44,15 +38,9 @@ class AttitudeDecoder:
     def decode(self, data: bytes, priority: int, time: float) -> Setpoint | None:
         """Return the setpoint; None when the packet is not one.
 
-        Parameters
-        ----------
-        data : bytes
-            Roll, pitch in deg or deg/s, yaw rate in deg/s, clockwise positive,
-            thrust in PWM.
-        priority : int
-            Of the present setpoint: the lock closes where there is none.
-        time : float
-            s.
+        The packet has roll and pitch in deg or deg/s, yaw rate in deg/s, clockwise positive, and
+        thrust in PWM. ``priority`` is that of the present setpoint: the lock closes where there is
+        none.
         """
         # The firmware does not check the size, and would continue with what an
         # earlier packet has left in the memory behind a short one.
@@ -73,19 +61,9 @@ class AttitudeDecoder:
 
 
 def decode_generic(data: bytes, time: float) -> Setpoint | None:
-    """Return a generic setpoint, port 7; None for a type that there is not.
+    """Return a generic setpoint, port 7, of type and payload; None for a type that there is not.
 
-    Parameters
-    ----------
-    data : bytes
-        Type and payload.
-    time : float
-        s.
-
-    Raises
-    ------
-    FirmwareAssertionError
-        For a payload of a wrong size.
+    `FirmwareAssertionError`: the payload has a wrong size.
     """
     decoder = _DECODERS.get(data[0]) if data else None
     if decoder is None:
@@ -113,17 +91,9 @@ def _with_tilt(setpoint, roll, roll_is_rate, pitch, pitch_is_rate):
 
 
 class _FourFloats(NamedTuple):
-    """A type of setpoint whose payload is four floats.
+    """A type of setpoint whose payload is four floats."""
 
-    Attributes
-    ----------
-    fields : tuple of str
-        Of the setpoint: what the floats are.
-    mode : Modes
-    velocity_body : bool
-    """
-
-    fields: tuple[str, str, str, str]
+    fields: tuple[str, str, str, str]  #: Of the setpoint: what the floats are.
     mode: Modes
     velocity_body: bool = False
 
@@ -190,6 +160,7 @@ def _manual(data):
     return _with_tilt(setpoint, roll, bool(is_rate), pitch, bool(is_rate))
 
 
+#: Type -> decoder. 1, 2 and 5 are 8, 9 and 10 of older clients.
 _DECODERS: dict[int, Callable[[bytes], Setpoint]] = {
     0: _stop,
     1: _VELOCITY_WORLD.decode_clockwise,
@@ -203,4 +174,3 @@ _DECODERS: dict[int, Callable[[bytes], Setpoint]] = {
     10: _HOVER.decode,
     11: _manual,
 }
-"""Type -> decoder. 1, 2 and 5 are 8, 9 and 10 of older clients."""

@@ -19,28 +19,17 @@ from crazyflie_virtual.firmware.states import (
     Setpoint,
 )
 
-IDLE_THRUST = 7000
-"""Of vehicles that the client arms, with brushless motors, PWM."""
-
-
-DEFAULT, PID, MELLINGER = 0, 1, 2
-"""Numbers of controllers; the default one is `PID`."""
+IDLE_THRUST = 7000  #: Of vehicles that the client arms, with brushless motors, PWM.
+DEFAULT, PID, MELLINGER = 0, 1, 2  #: Numbers of controllers; the default one is `PID`.
 
 
 class MotorOverride:
-    """Motor commands set by parameter, for tests on the bench.
-
-    Attributes
-    ----------
-    enable : int
-        0 for none, 1 for each motor its own command, 2 for that of motor 1 on all.
-    m1, m2, m3, m4 : int
-        PWM.
-    """
+    """Motor commands set by parameter, for tests on the bench."""
 
     def __init__(self) -> None:
+        #: 0 for none, 1 for each motor its own command, 2 for that of motor 1 on all.
         self.enable = 0
-        self.m1 = self.m2 = self.m3 = self.m4 = 0
+        self.m1 = self.m2 = self.m3 = self.m4 = 0  #: PWM.
 
     def commands(self) -> MotorCommands | None:
         """Return the commands that hold, or None."""
@@ -50,44 +39,20 @@ class MotorOverride:
 
 
 class Stabilizer:
-    """The controllers of one vehicle.
-
-    Parameters
-    ----------
-    idle_thrust : int
-        To begin with.
-
-    Attributes
-    ----------
-    controller : int
-        `DEFAULT`, `PID` or `MELLINGER`.
-    attitude : AttitudeController
-    position : PositionController
-    mellinger : MellingerController
-    override : MotorOverride
-    roll, pitch, yaw : float
-        Desired attitude, deg.
-    roll_rate, pitch_rate, yaw_rate : float
-        Desired body rates, deg/s.
-    thrust, command_roll, command_pitch, command_yaw : float
-        Inputs of the mixer, PWM.
-    requested, commands : MotorCommands
-        Before and after their limits.
-    idle_thrust : int
-        Least command of an armed motor, PWM.
-    """
+    """The controllers of one vehicle."""
 
     def __init__(self, idle_thrust: int = 0) -> None:
-        self.controller = PID
+        self.controller = PID  #: `DEFAULT`, `PID` or `MELLINGER`.
         self.attitude = AttitudeController()
         self.position = PositionController()
         self.mellinger = MellingerController()
         self.override = MotorOverride()
-        self.idle_thrust = idle_thrust
-        self.roll = self.pitch = self.yaw = 0.0
-        self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0
+        self.idle_thrust = idle_thrust  #: Least command of an armed motor, PWM.
+        self.roll = self.pitch = self.yaw = 0.0  #: Desired attitude, deg.
+        self.roll_rate = self.pitch_rate = self.yaw_rate = 0.0  #: Desired body rates, deg/s.
+        #: Inputs of the mixer, PWM.
         self.thrust = self.command_roll = self.command_pitch = self.command_yaw = 0.0
-        self.requested = self.commands = OFF
+        self.requested = self.commands = OFF  #: Before and after their limits.
         self._automatic = (0.0, 0.0, 0.0)
         self._mode = Modes()
         self._last_controller = self.controller
@@ -102,14 +67,8 @@ class Stabilizer:
     ) -> MotorCommands:
         """Return the motor commands.
 
-        Parameters
-        ----------
-        setpoint, estimate, sensors
-            Inputs of the controllers.
-        with_position : bool
-            Whether the position controller runs in this step.
-        may_run : bool
-            Whether the supervisor lets motors run.
+        The position controller runs in a step ``with_position``; ``may_run`` is whether the
+        supervisor lets motors run.
         """
         if self.controller != self._last_controller:
             self._last_controller = self.controller

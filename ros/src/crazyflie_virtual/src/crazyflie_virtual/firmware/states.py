@@ -13,12 +13,10 @@ from typing import NamedTuple
 from crazyflie_model.angles import Quaternion
 from crazyflie_virtual.quaternions import compress_quaternion
 
+#: Modes of a setpoint's axis: not controlled, to this value, at this rate.
 DISABLED, ABSOLUTE, VELOCITY = 0, 1, 2
-"""Modes of a setpoint's axis: not controlled, to this value, at this rate."""
-
-
+#: Position, velocity and acceleration of setpoint and estimate.
 MOTION = ("x", "y", "z", "vx", "vy", "vz", "ax", "ay", "az")
-"""Position, velocity and acceleration of setpoint and estimate."""
 
 
 class Modes(NamedTuple):
@@ -35,27 +33,20 @@ class Modes(NamedTuple):
 
 @dataclass(slots=True)
 class _Motion:
-    """Position, velocity, acceleration and attitude.
+    """Position, velocity, acceleration and attitude."""
 
-    Attributes
-    ----------
-    x, y, z, vx, vy, vz : float
-        m and m/s, fixed frame.
-    ax, ay, az : float
-        Without gravity, fixed frame; m/s^2 in a setpoint, g in an estimate.
-    roll, pitch, yaw : float
-        deg, ``R = Rz(yaw) Ry(-pitch) Rx(roll)``.
-    """
-
+    #: x, y, z, vx, vy, vz: m and m/s, fixed frame.
     x: float = 0.0
     y: float = 0.0
     z: float = 0.0
     vx: float = 0.0
     vy: float = 0.0
     vz: float = 0.0
+    #: ax, ay, az: Without gravity, fixed frame; m/s^2 in a setpoint, g in an estimate.
     ax: float = 0.0
     ay: float = 0.0
     az: float = 0.0
+    #: roll, pitch, yaw: deg, ``R = Rz(yaw) Ry(-pitch) Rx(roll)``.
     roll: float = 0.0
     pitch: float = 0.0
     yaw: float = 0.0
@@ -63,32 +54,17 @@ class _Motion:
 
 @dataclass(slots=True)
 class Setpoint(_Motion):
-    """A setpoint; with all axes disabled and no thrust, the motors are off.
+    """A setpoint; with all axes disabled and no thrust, the motors are off."""
 
-    Attributes
-    ----------
-    mode : Modes
-        Controllers are reset when it changes.
-    velocity_body : bool
-        Whether the velocity is turned by the heading.
-    roll_rate, pitch_rate, yaw_rate : float
-        deg/s, positive yaw rate is counter-clockwise.
-    quaternion : tuple, 4 components
-        (x, y, z, w).
-    thrust : float
-        PWM, used where z is disabled.
-    time : float
-        Of its reception, s.
-    """
-
-    mode: Modes = Modes()
-    velocity_body: bool = False
+    mode: Modes = Modes()  #: Controllers are reset when it changes.
+    velocity_body: bool = False  #: Whether the velocity is turned by the heading.
+    #: roll_rate, pitch_rate, yaw_rate: deg/s, positive yaw rate is counter-clockwise.
     roll_rate: float = 0.0
     pitch_rate: float = 0.0
     yaw_rate: float = 0.0
-    quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)
-    thrust: float = 0.0
-    time: float = 0.0
+    quaternion: Quaternion = (0.0, 0.0, 0.0, 1.0)  #: (x, y, z, w).
+    thrust: float = 0.0  #: PWM, used where z is disabled.
+    time: float = 0.0  #: Of its reception, s.
 
     @property
     def is_finite(self) -> bool:
@@ -106,14 +82,9 @@ class Setpoint(_Motion):
 
 @dataclass(slots=True)
 class Estimate(_Motion):
-    """The estimated state.
+    """The estimated state."""
 
-    Attributes
-    ----------
-    qx, qy, qz, qw : float
-        Body to fixed frame.
-    """
-
+    #: qx, qy, qz, qw: Body to fixed frame.
     qx: float = 0.0
     qy: float = 0.0
     qz: float = 0.0

@@ -8,17 +8,12 @@ from crazyflie_virtual.body.sensors import Sensors
 from crazyflie_virtual.firmware.states import Setpoint
 from crazyflie_virtual.firmware.supervisor_states import Condition, State, next_state
 
-EMERGENCY_WATCHDOG = 1.0
-"""Longest time between watchdog messages, after the first one, s."""
-
-_LANDED_AFTER = 2.0
-"""How long the motors are off until the vehicle is not flying, s."""
-
+EMERGENCY_WATCHDOG = 1.0  #: Longest time between watchdog messages, after the first one, s.
+_LANDED_AFTER = 2.0  #: How long the motors are off until the vehicle is not flying, s.
+#: Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s.
 _TILTED, _UPSIDE_DOWN = (0.5, 1.0), (-0.2, 0.1)
-"""Accelerometer along up, g, below which the vehicle has tumbled, and after how long, s."""
-
+#: Accelerometer, g, below which in all axes the vehicle is falling and not tumbled.
 _FREE_FALL = 0.1
-"""Accelerometer, g, below which in all axes the vehicle is falling and not tumbled."""
 
 _RUNNING = (State.READY_TO_FLY, State.FLYING, State.LANDED, State.WARNING_LEVEL_OUT)
 _ARMED = (*_RUNNING, State.ARMING)
@@ -26,27 +21,10 @@ _IN_AIR = (State.FLYING, State.WARNING_LEVEL_OUT)
 
 
 class Supervisor:
-    """Decides whether the motors may run.
+    """Decides whether the motors may run; ``write_line(text)`` prints on the console.
 
-    Parameters
-    ----------
-    write_line : callable
-        ``write_line(text)`` prints on the console.
-    auto_arm : bool
-        Arm when the checks have passed, as a Crazyflie 2.1 does; otherwise
-        the client arms, as with brushless motors.
-
-    Attributes
-    ----------
-    state : State
-    is_armed, is_tumbled, is_crashed : bool
-    emergency_stop : int
-        Parameter stabilizer.stop: not 0 stops the motors.
-    tumble_check : int
-        0 for none.
-    preflight_timeout, landed_timeout : int
-        ms after which a vehicle is disarmed when it does not take off, and
-        after landing. With automatic arming it cannot fly for four updates then.
+    With ``auto_arm`` it arms when the checks have passed, as a Crazyflie 2.1 does; otherwise the
+    client arms, as with brushless motors.
     """
 
     def __init__(self, write_line: Callable[[str], None], auto_arm: bool = True):
@@ -54,8 +32,10 @@ class Supervisor:
         self.auto_arm = auto_arm
         self.state = State.PRE_FL_CHECKS_NOT_PASSED
         self.is_armed = self.is_tumbled = self.is_crashed = False
-        self.emergency_stop = 0
-        self.tumble_check = 1
+        self.emergency_stop = 0  #: Parameter stabilizer.stop: not 0 stops the motors.
+        self.tumble_check = 1  #: 0 for none.
+        #: preflight_timeout, landed_timeout: ms after which a vehicle is disarmed when it does not
+        #: take off, and after landing. With automatic arming it cannot fly for four updates then.
         self.preflight_timeout, self.landed_timeout = 30000, 3000
         self._emergency = False
         self._watchdog_time: float | None = None
@@ -115,16 +95,9 @@ class Supervisor:
         self._watchdog_time = time
 
     def update(self, time: float, sensors: Sensors, setpoint_age: float, motors_run: bool) -> None:
-        """Update the state at ``time`` (s).
+        """Update the state at ``time`` (s), with a setpoint of some age (s).
 
-        Parameters
-        ----------
-        time : float
-        sensors : Sensors
-        setpoint_age : float
-            s.
-        motors_run : bool
-            Whether any motor is commanded more than idle.
+        ``motors_run`` is whether any motor is commanded more than idle.
         """
         if motors_run:
             self._thrust_time = time

@@ -35,20 +35,14 @@ class Condition(Flag):
     """Conditions of transitions; names as the firmware's SUPERVISOR_CB."""
 
     ARMED = auto()
-    IS_FLYING = auto()
-    """Some motor ran within the last 2 s."""
+    IS_FLYING = auto()  #: Some motor ran within the last 2 s.
     IS_TUMBLED = auto()
-    COMMANDER_WDT_WARNING = auto()
-    """The setpoint is older than 0.5 s."""
-    COMMANDER_WDT_TIMEOUT = auto()
-    """The setpoint is older than 2 s."""
+    COMMANDER_WDT_WARNING = auto()  #: The setpoint is older than 0.5 s.
+    COMMANDER_WDT_TIMEOUT = auto()  #: The setpoint is older than 2 s.
     EMERGENCY_STOP = auto()
-    CRASHED = auto()
-    """Not recovered since the crash."""
-    PREFLIGHT_TIMEOUT = auto()
-    """Armed for `Supervisor.preflight_timeout`."""
-    LANDING_TIMEOUT = auto()
-    """Landed for `Supervisor.landed_timeout`."""
+    CRASHED = auto()  #: Not recovered since the crash.
+    PREFLIGHT_TIMEOUT = auto()  #: Armed for `Supervisor.preflight_timeout`.
+    LANDING_TIMEOUT = auto()  #: Landed for `Supervisor.landed_timeout`.
     ALWAYS = auto()
 
 
@@ -62,6 +56,7 @@ class Transition(NamedTuple):
 
 _S, _C = State, Condition
 
+#: The first transition whose condition is met is taken, one in each update.
 TRANSITIONS: dict[State, tuple[Transition, ...]] = {
     _S.PRE_FL_CHECKS_NOT_PASSED: (
         Transition(_S.EXCEPT_FREE_FALL, when=_C.EMERGENCY_STOP),
@@ -111,7 +106,6 @@ TRANSITIONS: dict[State, tuple[Transition, ...]] = {
     ),
     _S.LOCKED: (),
 }
-"""The first transition whose condition is met is taken, one in each update."""
 
 
 def next_state(state: State, conditions: Condition) -> State:

@@ -7,19 +7,11 @@ from random import Random
 from crazyflie_virtual.faults import FaultSwitches
 from crazyflie_virtual.server import Address
 
-Item = tuple[bytes, Address]
-"""Datagram, and its sender or receiver."""
+Item = tuple[bytes, Address]  #: Datagram, and its sender or receiver.
 
 
 class Channel:
-    """Datagrams on their way.
-
-    Parameters
-    ----------
-    faults : FaultSwitches
-    random : random.Random
-        Decides what is lost.
-    """
+    """Datagrams on their way; ``random`` decides which are lost."""
 
     def __init__(self, faults: FaultSwitches, random: Random):
         self._faults = faults

@@ -3,11 +3,8 @@
 from enum import IntEnum
 from typing import NamedTuple
 
-MAX_DATA = 30
-"""Bytes that a packet holds beside its header."""
-
-_RESERVED = 3 << 2
-"""Bits of the header that are set, but in broadcast packets."""
+MAX_DATA = 30  #: Bytes that a packet holds beside its header.
+_RESERVED = 3 << 2  #: Bits of the header that are set, but in broadcast packets.
 
 
 class Port(IntEnum):
@@ -27,28 +24,15 @@ class Port(IntEnum):
 
 
 class Packet(NamedTuple):
-    """One packet.
+    """One packet."""
 
-    Attributes
-    ----------
-    port, channel : int
-        0 to 15 and 0 to 3.
-    data : bytes
-        At most `MAX_DATA`.
-    """
-
+    #: port, channel: 0 to 15 and 0 to 3.
     port: int
     channel: int
-    data: bytes
+    data: bytes  #: At most `MAX_DATA`.
 
     def encode(self) -> bytes:
-        """Return the packet as a datagram.
-
-        Raises
-        ------
-        ValueError
-            There is too much data for one packet.
-        """
+        """Return the packet as a datagram; ValueError if there is too much data for one."""
         if len(self.data) > MAX_DATA:
             raise ValueError(f"a packet holds {MAX_DATA} bytes, got {len(self.data)}")
         return bytes([self.port << 4 | _RESERVED | self.channel]) + self.data

@@ -12,23 +12,14 @@ vehicle (syslink, 1 Mbit/s).
 
 from dataclasses import dataclass
 
-BIT_RATE = 2e6
-"""bit/s on air, of radio://.../2M."""
-
-TURNAROUND = 130e-6
-"""Of a transceiver, from standby or reception to transmission, s."""
-
+BIT_RATE = 2e6  #: bit/s on air, of radio://.../2M.
+TURNAROUND = 130e-6  #: Of a transceiver, from standby or reception to transmission, s.
+#: Of an acknowledged packet with its USB transfers, without setup requests, s.
 ROUND_TRIP = 1.0 / 1370
-"""Of an acknowledged packet with its USB transfers, without setup requests, s."""
-
-SETUP_REQUEST = 2.5e-3 / 3
-"""A USB control transfer that changes address or acknowledgement, s."""
-
+SETUP_REQUEST = 2.5e-3 / 3  #: A USB control transfer that changes address or acknowledgement, s.
+#: From one broadcast to the next, s: 37 bytes of 10 bits on the vehicle's serial line.
 BROADCAST_GAP = 0.5e-3
-"""From one broadcast to the next, s: 37 bytes of 10 bits on the vehicle's serial line."""
-
-_OVERHEAD_BITS = 8 * (1 + 5 + 2) + 9
-"""Preamble, address, check sum; packet control field."""
+_OVERHEAD_BITS = 8 * (1 + 5 + 2) + 9  #: Preamble, address, check sum; packet control field.
 
 
 def air_time(data: int) -> float:
@@ -40,25 +31,15 @@ def air_time(data: int) -> float:
 
 @dataclass
 class RadioChannel:
-    """The time that one dongle spends on its channel.
+    """The time that one dongle spends on its channel."""
 
-    Attributes
-    ----------
-    has_setup_requests : bool
-        Whether each change of the address or of the acknowledgement is a USB request of its own,
-        as with the Crazyradio PA, and with cflib 0.1.34 for all. Otherwise they come with the
-        packet (the Crazyradio 2.0's inline mode).
-    free : float
-        When the dongle is free again, s.
-    busy : float
-        For how long it has been at work, s.
-    unicasts, broadcasts : int
-        Packets so far.
-    """
-
+    #: Whether each change of the address or of the acknowledgement is a USB request of its own, as
+    #: with the Crazyradio PA, and with cflib 0.1.34 for all. Otherwise they come with the packet
+    #: (the Crazyradio 2.0's inline mode).
     has_setup_requests: bool = True
-    free: float = 0.0
-    busy: float = 0.0
+    free: float = 0.0  #: When the dongle is free again, s.
+    busy: float = 0.0  #: For how long it has been at work, s.
+    #: unicasts, broadcasts: Packets so far.
     unicasts: int = 0
     broadcasts: int = 0
     _address: int | None = None
@@ -89,41 +70,23 @@ class RadioChannel:
 
 @dataclass(frozen=True)
 class Load:
-    """What is sent on a channel.
-
-    Attributes
-    ----------
-    vehicles : int
-    pose_rate : float
-        Frames of the motion capture, Hz.
-    frame : tuple of int
-        Bytes of each broadcast packet of a frame.
-    polls : float
-        Packets with acknowledgement to each vehicle, Hz: each brings one of its packets.
-    poll_size : tuple of int
-        Bytes of the packet, and of the answer.
-    """
+    """What is sent on a channel."""
 
     vehicles: int
-    pose_rate: float
-    frame: tuple[int, ...]
+    pose_rate: float  #: Frames of the motion capture, Hz.
+    frame: tuple[int, ...]  #: Bytes of each broadcast packet of a frame.
+    #: Packets with acknowledgement to each vehicle, Hz: each brings one of its packets.
     polls: float = 20.0
-    poll_size: tuple[int, int] = (1, 31)
+    poll_size: tuple[int, int] = (1, 31)  #: Bytes of the packet, and of the answer.
 
 
 @dataclass(frozen=True)
 class Usage:
-    """How a load of a channel is carried.
+    """How a load of a channel is carried."""
 
-    Attributes
-    ----------
-    share : float
-        Of the time that the dongle is at work; more than 1 is too much.
-    frame_delay, poll_delay : float
-        Longest time from when a frame, or a packet to a vehicle, is due until it is there, s.
-    """
-
-    share: float
+    share: float  #: Of the time that the dongle is at work; more than 1 is too much.
+    #: frame_delay, poll_delay: Longest time from when a frame, or a packet to a vehicle, is due
+    #: until it is there, s.
     frame_delay: float
     poll_delay: float
 

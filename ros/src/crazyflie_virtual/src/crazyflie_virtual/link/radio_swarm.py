@@ -7,8 +7,7 @@ from crazyflie_virtual.link.radio import RadioChannel
 from crazyflie_virtual.settings import VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 
-SPACING = 1.0
-"""Between two vehicles, m."""
+SPACING = 1.0  #: Between two vehicles, m.
 
 
 class RadioSwarm:

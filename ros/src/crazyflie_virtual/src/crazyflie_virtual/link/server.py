@@ -14,41 +14,22 @@ from crazyflie_virtual.server import Address, Server, open_socket, received, sen
 from crazyflie_virtual.settings import FIRST_PORT, VehicleSettings
 from crazyflie_virtual.vehicle import VirtualVehicle
 
-_TICK = 0.005
-"""How long the vehicle may be behind the clock when nothing happens, s."""
-
+_TICK = 0.005  #: How long the vehicle may be behind the clock when nothing happens, s.
+#: What is simulated at once, s; beyond that the vehicle loses time instead of its link.
 _GREATEST_LAG = 0.25
-"""What is simulated at once, s; beyond that the vehicle loses time instead of its link."""
-
-_NULL = b"\xff"
-"""What a scanner sends: it is no client."""
+_NULL = b"\xff"  #: What a scanner sends: it is no client.
 
 
 class VehicleServer(Server):
-    """A vehicle behind a socket.
+    """A vehicle behind a socket; OSError if the port is taken.
 
-    Parameters
-    ----------
-    settings : VehicleSettings
-    warn : callable
-        ``warn(text)`` is called when the vehicle cannot keep up with the clock.
-
-    Attributes
-    ----------
-    vehicle : VirtualVehicle
-    address : tuple of str and int
-        Host and port.
-
-    Raises
-    ------
-    OSError
-        The port is taken.
+    ``warn(text)`` is called when the vehicle cannot keep up with the clock.
     """
 
     def __init__(self, settings: VehicleSettings, warn: Callable[[str], None] = lambda text: None):
         self._socket = open_socket(settings.host, settings.port)
         super().__init__(self._socket)
-        self.address = self._socket.getsockname()
+        self.address = self._socket.getsockname()  #: Host and port.
         self._warn = warn
         self.vehicle = VirtualVehicle(settings)
         self.switches = self.vehicle.faults

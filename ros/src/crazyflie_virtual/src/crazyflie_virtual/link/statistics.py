@@ -1,26 +1,16 @@
 """Packets counted."""
 
-_ACTIVE = 2.0
-"""How long after the last packet the client counts as connected, s."""
+_ACTIVE = 2.0  #: How long after the last packet the client counts as connected, s.
 
 
 class LinkStatistics:
-    """Traffic of the link, for the log.
-
-    Attributes
-    ----------
-    is_connected : bool
-        Whether a packet came lately.
-    received, received_broadcasts : int
-        Packets since the start, to this vehicle and to all, modulo 2^16.
-    received_rate, sent_rate : float
-        Packets per second, over the last second.
-    """
+    """Traffic of the link, for the log."""
 
     def __init__(self) -> None:
-        self.is_connected = False
+        self.is_connected = False  #: Whether a packet came lately.
+        #: Packets since the start, to this vehicle and to all, modulo 2^16.
         self.received = self.received_broadcasts = 0
-        self.received_rate = self.sent_rate = 0.0
+        self.received_rate = self.sent_rate = 0.0  #: Packets per second, over the last second.
         self._last: float | None = None
         self._window = 0.0
         self._in = self._out = 0

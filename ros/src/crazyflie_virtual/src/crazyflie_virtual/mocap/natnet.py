@@ -19,37 +19,24 @@ UNRECOGNIZED = 100
 
 VERSIONS = ("2.9", "3.1", "4.1")
 
-CLOCK_FREQUENCY = 1_000_000_000
-"""Ticks per second of the server's clock."""
+CLOCK_FREQUENCY = 1_000_000_000  #: Ticks per second of the server's clock.
 
 _RIGID_BODY = 1
 _TRACKED = 1
 _NO_PARENT = -1
 _POINT_CLOUD_SOLVED, _UNLABELLED = 0x02, 0x10
-_MARKER_SIZE = 0.0095
-"""Diameter of a marker, m."""
+_MARKER_SIZE = 0.0095  #: Diameter of a marker, m.
 _HEADER = struct.Struct("<HH")
 
 
 class BodyPose(NamedTuple):
-    """A rigid body in a frame.
-
-    Attributes
-    ----------
-    body_id, name : int, str
-    position : tuple, 3 components
-        m.
-    quaternion : tuple, 4 components
-        (x, y, z, w).
-    is_tracked : bool
-        Otherwise the pose is an old one.
-    """
+    """A rigid body in a frame."""
 
     body_id: int
     name: str
-    position: Triple
-    quaternion: Quaternion
-    is_tracked: bool
+    position: Triple  #: m.
+    quaternion: Quaternion  #: (x, y, z, w).
+    is_tracked: bool  #: Otherwise the pose is an old one.
 
 
 def parse(datagram: bytes) -> tuple[int, bytes] | None:
@@ -61,13 +48,7 @@ def parse(datagram: bytes) -> tuple[int, bytes] | None:
 
 
 class Encoder:
-    """Writes the messages of one version.
-
-    Parameters
-    ----------
-    version : str
-        One of `VERSIONS`.
-    """
+    """Writes the messages of one version, of `VERSIONS`."""
 
     def __init__(self, version: str):
         self._parts = tuple(int(part) for part in version.split("."))
@@ -116,17 +97,9 @@ class Encoder:
     ) -> bytes:
         """Return a frame.
 
-        Parameters
-        ----------
-        number : int
-            Of the frame.
-        bodies : sequence of BodyPose
-        exposure, received, sent : float
-            Middle of the cameras' exposure, arrival of their data, dispatch of the frame; s
-            of the server's clock.
-        markers : sequence of tuple
-            Markers of no rigid body, m. Motive sends them twice: as other markers, and flagged
-            as unlabelled among the labelled ones.
+        Middle of the cameras' exposure, arrival of their data and dispatch of the frame are s of
+        the server's clock. ``markers`` are those of no rigid body, m; Motive sends them twice: as
+        other markers, and flagged as unlabelled among the labelled ones.
         """
         rigid_bodies = b"".join(self._rigid_body(body) for body in bodies)
         others = b"".join(struct.pack("<3f", *marker) for marker in markers)

@@ -9,38 +9,21 @@ from crazyflie_virtual.mocap.natnet import BodyPose
 from crazyflie_virtual.observer import Observation
 from crazyflie_virtual.quaternions import turned
 
-OCCLUSION = 0.3
-"""Longest time for which a vehicle is hidden, s."""
-
-_GHOST_MARGIN = 0.3
-"""How far from the vehicles reflections may be, m."""
-
-_STALE = 0.5
-"""How long after the last observation a body counts as gone, s."""
+OCCLUSION = 0.3  #: Longest time for which a vehicle is hidden, s.
+_GHOST_MARGIN = 0.3  #: How far from the vehicles reflections may be, m.
+_STALE = 0.5  #: How long after the last observation a body counts as gone, s.
 
 
 @dataclass
 class MocapSwitches:
-    """What can be made to go wrong, at any time.
+    """What can be made to go wrong, at any time."""
 
-    Attributes
-    ----------
-    dropout : float
-        Probability with which a body is not tracked in a frame.
-    invalid : str
-        Numbers of bodies that are not tracked, separated by commas; or "all".
-    silent : bool
-        Whether frames are held back.
-    ghosts : float
-        Mean number of markers in a frame that are none: reflections, anywhere between the vehicles.
-    occlusions : float
-        How often a vehicle begins to be hidden, 1/s; each time for up to `OCCLUSION` s.
-    """
-
-    dropout: float = 0.0
-    invalid: str = ""
-    silent: bool = False
+    dropout: float = 0.0  #: Probability with which a body is not tracked in a frame.
+    invalid: str = ""  #: Numbers of bodies that are not tracked, separated by commas; or "all".
+    silent: bool = False  #: Whether frames are held back.
+    #: Mean number of markers in a frame that are none: reflections, anywhere between the vehicles.
     ghosts: float = 0.0
+    #: How often a vehicle begins to be hidden, 1/s; each time for up to `OCCLUSION` s.
     occlusions: float = 0.0
 
     def hides(self, body_id: int) -> bool:
@@ -57,17 +40,9 @@ def is_listed(body_id: int, text: str) -> bool:
 class Scene:
     """Rigid bodies, as observed last.
 
-    Parameters
-    ----------
-    switches : MocapSwitches
-    position_noise, attitude_noise : float
-        Standard deviations along and about each axis, m and rad.
-    seed : int
-    single_markers : str
-        Numbers of the vehicles with one marker, separated by commas; or "all". They are no rigid
-        bodies.
-    rate : float
-        Frames per second.
+    The noise is in standard deviations along and about each axis, m and rad. ``single_markers`` are
+    numbers of the vehicles with one marker, separated by commas, or "all": they are no rigid
+    bodies. ``rate`` is in frames per second.
     """
 
     def __init__(

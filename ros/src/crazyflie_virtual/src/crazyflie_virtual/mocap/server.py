@@ -16,34 +16,14 @@ from crazyflie_virtual.mocap.settings import MocapSettings
 from crazyflie_virtual.observer import decode
 from crazyflie_virtual.server import Address, Server, open_socket, received, send
 
-_CLIENT_LIMIT = 5.0
-"""How long after its last message a client is sent frames, s."""
-
-_LONGEST_WAIT = 0.1
-"""s."""
+_CLIENT_LIMIT = 5.0  #: How long after its last message a client is sent frames, s.
+_LONGEST_WAIT = 0.1  #: s.
 
 
 class MocapServer(Server):
-    """Streams what a `Scene` shows.
+    """Streams what a `Scene` shows; OSError if a port is taken, or an address is none.
 
-    Parameters
-    ----------
-    settings : MocapSettings
-    warn : callable, optional
-        Not used: the server does not fall behind.
-
-    Attributes
-    ----------
-    address : tuple of str and int
-        Host and port for commands.
-    observer_port : int
-        Where the vehicles' true poses arrive.
-    switches : MocapSwitches
-
-    Raises
-    ------
-    OSError
-        A port is taken, or an address is none.
+    ``warn`` is not used: the server does not fall behind.
     """
 
     def __init__(self, settings: MocapSettings, warn: Callable[[str], None] | None = None):
@@ -62,7 +42,8 @@ class MocapServer(Server):
             self._commands.close()
             raise
         super().__init__(self._commands, self._observations)
-        self.address = self._commands.getsockname()
+        self.address = self._commands.getsockname()  #: Host and port for commands.
+        #: Where the vehicles' true poses arrive.
         self.observer_port = self._observations.getsockname()[1]
         if settings.multicast:
             interface = socket.inet_aton(settings.host)

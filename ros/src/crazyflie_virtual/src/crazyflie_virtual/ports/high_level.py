@@ -82,6 +82,7 @@ def _start(f, relative, relative_yaw, backwards, trajectory_id, time_scale):
     return f.planner.start(f.time, trajectory_id, time_scale, backwards, relative, relative_yaw)
 
 
+#: Command -> (fields, handler). 1, 2, 4 and 5 are those of older clients.
 _COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
     0: ("B", _set_groups),
     1: ("Bff", lambda f, height, duration: _take_off(f, height, 0.0, False, duration)),
@@ -98,10 +99,7 @@ _COMMANDS: dict[int, tuple[str, Callable[..., int]]] = {
     12: ("B??5f", _go_to),
     13: ("B???Bf", _start),
 }
-"""Command -> (fields, handler). 1, 2, 4 and 5 are those of older clients."""
 
+#: Commands that are refused while the vehicle cannot fly, for any group.
 _PLANS = tuple(command for command in _COMMANDS if command not in (0, 3, 6))
-"""Commands that are refused while the vehicle cannot fly, for any group."""
-
-_FOR_ALL = (0, 6)
-"""Commands that do not begin with the group of vehicles that they are for."""
+_FOR_ALL = (0, 6)  #: Commands that do not begin with the group of vehicles that they are for.

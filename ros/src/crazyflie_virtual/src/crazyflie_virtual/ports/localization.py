@@ -18,13 +18,8 @@ _PACKED_POSE = struct.Struct("<B3hI")
 class LocalizationPort:
     """Hands external measurements to the estimator.
 
-    Parameters
-    ----------
-    firmware : Firmware
-    address : int
-        Last byte of the radio's address: packed positions and poses of several
-        vehicles are marked with it.
-    lighthouse : LighthouseMemory
+    ``address`` is the last byte of the radio's: packed positions and poses of several vehicles are
+    marked with it.
     """
 
     def __init__(self, firmware: Firmware, address: int, lighthouse: LighthouseMemory):

@@ -9,14 +9,13 @@ from crazyflie_virtual.tables.log_table import LogVariable, log_variables
 from crazyflie_virtual.tables.number_types import I32, LOG_CODES, LOG_TYPES, NumberType
 from crazyflie_virtual.tables.toc import Table
 
+#: Blocks at one time, variables in all of them, bytes of values in one.
 MAX_BLOCKS, MAX_VARIABLES, MAX_BYTES = 16, 128, 26
-"""Blocks at one time, variables in all of them, bytes of values in one."""
 
 _TABLE, _CONTROL, _DATA = 0, 1, 2
 _DELETE, _START, _STOP, _RESET, _CREATE, _APPEND, _START_2 = 2, 3, 4, 5, 6, 7, 8
 
-_PERIOD_UNIT = 10
-"""Of the period on the wire, ms."""
+_PERIOD_UNIT = 10  #: Of the period on the wire, ms.
 
 
 def packed(value: float, stored: NumberType, sent: NumberType) -> bytes:

@@ -11,20 +11,11 @@ from crazyflie_virtual.tables.memories import Memory
 _INFO, _READ, _WRITE = 0, 1, 2
 _COUNT, _DETAILS = 1, 2
 
-_MOST = 24
-"""Bytes read at once."""
+_MOST = 24  #: Bytes read at once.
 
 
 class MemoryPort:
-    """Reads and writes memories.
-
-    Parameters
-    ----------
-    memories : iterable of Memory
-        In the order of their numbers.
-    warn : callable
-        See `Console.warn`.
-    """
+    """Reads and writes memories, in the order of their numbers; for ``warn`` see `Console.warn`."""
 
     def __init__(self, memories: Iterable[Memory], warn: Warn):
         self._memories = tuple(memories)

@@ -15,14 +15,9 @@ _TABLE, _READ, _WRITE, _MISC = 0, 1, 2, 3
 _SET_BY_NAME, _EXTENDED_TYPE, _STORE, _STATE, _CLEAR = 0, 2, 3, 4, 5
 _DEFAULT, _EXTENDED_TYPE_2, _DEFAULT_2 = 6, 7, 8
 
-_WORD = 4
-"""Bytes of a request in which the answer to a write has the value as it is."""
-
-_PERSISTENT = 1
-"""The only extended type."""
-
-_EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40
-"""Flags beside the type's code."""
+_WORD = 4  #: Bytes of a request in which the answer to a write has the value as it is.
+_PERSISTENT = 1  #: The only extended type.
+_EXTENDED, _CORE, _READ_ONLY = 0x10, 0x20, 0x40  #: Flags beside the type's code.
 
 _NO_ENTRY = bytes([errno.ENOENT])
 
@@ -52,13 +47,7 @@ class Parameter:
         return self._owner is not None
 
     def set(self, value: float) -> None:
-        """Change the value.
-
-        Raises
-        ------
-        ValueError
-            It is out of its limits; the text says so.
-        """
+        """Change the value; ValueError if it is out of its limits."""
         low, high = self.spec.limits
         if not low <= value <= high and self.spec.limits != NO_LIMITS:
             raise ValueError(f"is {low:g} to {high:g}, not {value:g}")
@@ -79,11 +68,7 @@ class Parameter:
 class ParameterPort:
     """Reads and writes parameters, and stores the persistent ones.
 
-    Parameters
-    ----------
-    firmware : Firmware
-    stored : dict
-        Full name -> value; outlives a restart of the vehicle. Applied at once.
+    What is ``stored``, by full name, outlives a restart of the vehicle; it is applied at once.
     """
 
     def __init__(self, firmware: Firmware, stored: dict[str, float]):

@@ -10,8 +10,8 @@ _COMMAND, _VERSION = 0, 1
 _CONTINUOUS_WAVE, _NOTIFY = 0, 3
 _PROTOCOL, _FIRMWARE, _DEVICE = 0, 1, 2
 
+#: The firmware is the release whose behaviour is imitated.
 _NAMES = {_FIRMWARE: "2026.08 virtual", _DEVICE: "Crazyflie 2.1"}
-"""The firmware is the release whose behaviour is imitated."""
 
 
 def handle(firmware: Firmware, channel: int, data: bytes) -> bytes | None:

@@ -4,30 +4,17 @@ import struct
 import zlib
 from typing import NamedTuple
 
-_SIZE = 112
-"""Of a one-wire memory, bytes."""
-
-_BITCRAZE = 0xBC
-"""Vendor."""
-
-_FAMILY = 0x0D
-"""First byte of the serial numbers of this kind of memory."""
+_SIZE = 112  #: Of a one-wire memory, bytes.
+_BITCRAZE = 0xBC  #: Vendor.
+_FAMILY = 0x0D  #: First byte of the serial numbers of this kind of memory.
 
 _HEADER_MARK, _NAME, _REVISION = 0xEB, 1, 2
 
 
 class Deck(NamedTuple):
-    """A deck.
+    """A deck."""
 
-    Attributes
-    ----------
-    name : str
-        Also of its parameter in the group ``deck``.
-    product : int
-    revision : str
-    """
-
-    name: str
+    name: str  #: Also of its parameter in the group ``deck``.
     product: int
     revision: str
 

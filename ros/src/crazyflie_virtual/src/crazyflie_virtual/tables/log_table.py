@@ -10,25 +10,16 @@ from crazyflie_virtual.firmware.states import MOTION
 from crazyflie_virtual.tables.number_types import FLOAT, I8, I16, I32, U8, U16, U32, NumberType
 from crazyflie_virtual.tables.toc import pid_paths
 
-Read = Callable[[Firmware], float]
-"""Returns a value."""
+Read = Callable[[Firmware], float]  #: Returns a value.
 
 
 class LogVariable(NamedTuple):
-    """A log variable.
-
-    Attributes
-    ----------
-    group, name : str
-    number_type : NumberType
-    read : callable
-        ``read(firmware)`` returns the value.
-    """
+    """A log variable."""
 
     group: str
     name: str
     number_type: NumberType
-    read: Read
+    read: Read  #: ``read(firmware)`` returns the value.
 
 
 def log_variables() -> list[LogVariable]:
@@ -71,9 +62,9 @@ _POSITION_OUTPUTS = ("p", "i", "d", "ff")
 
 _RADIAN = math.pi / 180.0
 _MILLIRADIAN = 1000.0 * _RADIAN
-_STANDARD_GRAVITY = 9810.0
-"""mm/s^2."""
+_STANDARD_GRAVITY = 9810.0  #: mm/s^2.
 
+#: Group -> (name, type, value).
 _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
     "stateEstimate": _rows(FLOAT, **_of("estimate", *MOTION, *_ANGLES, *_QUATERNION)),
     "stateEstimateZ": [
@@ -115,9 +106,7 @@ _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
     "radio": [
         *_rows(U8, rssi=40, isConnected="link_statistics.is_connected"),
         *_rows(
-            U16,
-            numRxBc="link_statistics.received_broadcasts",
-            numRxUc="link_statistics.received",
+            U16, numRxBc="link_statistics.received_broadcasts", numRxUc="link_statistics.received"
         ),
     ],
     "motor": [
@@ -210,4 +199,3 @@ _GROUPS: dict[str, list[tuple[str, NumberType, Read]]] = {
     "memTst": _rows(U32, errCntW="memory_tester.errors"),
     "crtp": _rows(U16, rxRate="link_statistics.received_rate", txRate="link_statistics.sent_rate"),
 }
-"""Group -> (name, type, value)."""

@@ -6,36 +6,23 @@ from collections.abc import Iterable
 from typing_extensions import override
 
 EEPROM, ONE_WIRE, LED_RING, TRAJECTORY, LIGHTHOUSE = 0x00, 0x01, 0x10, 0x12, 0x14
-TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19
-"""Types."""
+TESTER, LED_TIMINGS, DECKS = 0x15, 0x17, 0x19  #: Types.
 
 NO_SERIAL = bytes(8)
 
-EEPROM_SERIAL = bytes(7) + b"\x50"
-"""Its I2C address takes the place of a serial number."""
+EEPROM_SERIAL = bytes(7) + b"\x50"  #: Its I2C address takes the place of a serial number.
 
 _TESTER_SIZE = 4096
 _EEPROM_SIZE = 8191
 
-LED_RING_SIZE = 24
-"""Twelve colours of 16 bits."""
-
-LED_TIMINGS_SIZE = 40
-"""Ten steps of 4 bytes."""
+LED_RING_SIZE = 24  #: Twelve colours of 16 bits.
+LED_TIMINGS_SIZE = 40  #: Ten steps of 4 bytes.
 
 
 class Memory:
-    """One memory.
+    """One memory with a serial number of 8 bytes; one of type bytes cannot be written.
 
-    Parameters
-    ----------
-    memory_type : int
-    buffer : bytes or bytearray
-        The content; bytes cannot be written.
-    serial : bytes
-        8 bytes.
-    size : int, optional
-        What clients see, bytes; that of the buffer by default.
+    ``size`` is what clients see, bytes; that of the buffer by default.
     """
 
     def __init__(
@@ -65,17 +52,11 @@ class Memory:
 
 
 class MemoryTester(Memory):
-    """A memory that holds its addresses; what is written is compared with them.
-
-    Attributes
-    ----------
-    errors : int
-        Bytes that were not as they should have been.
-    """
+    """A memory that holds its addresses; what is written is compared with them."""
 
     def __init__(self) -> None:
         super().__init__(TESTER, bytes(address & 0xFF for address in range(_TESTER_SIZE)))
-        self.errors = 0
+        self.errors = 0  #: Bytes that were not as they should have been.
 
     @property
     def reset_writes(self) -> int:
@@ -99,14 +80,10 @@ class MemoryTester(Memory):
 class LighthouseMemory(Memory):
     """Geometry and calibration of base stations; kept, but nothing is located with them.
 
-    Parameters
-    ----------
-    stored : dict
-        Page -> content, which outlives a restart.
+    What is ``stored``, by page, outlives a restart.
     """
 
-    STATIONS = 4
-    """As many as the firmware is built for unless it is configured otherwise."""
+    STATIONS = 4  #: As many as the firmware is built for unless it is configured otherwise.
 
     _CALIBRATION_PAGE = 16
     _PAGE_SIZE = 0x100
@@ -163,13 +140,7 @@ def memories(
 ) -> list[Memory]:
     """Return all memories in the order of their numbers.
 
-    Parameters
-    ----------
-    eeprom, trajectories : bytearray
-    tester : MemoryTester
-    lighthouse : LighthouseMemory
-    one_wire : iterable of (bytes, bytearray)
-        Serial number and content of the decks' memories.
+    ``one_wire`` has serial number and content of the decks' memories.
     """
     return [
         Memory(EEPROM, eeprom, EEPROM_SERIAL),

@@ -7,18 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class NumberType:
-    """A number's type.
+    """A number's type."""
 
-    Attributes
-    ----------
-    name : str
-        As in C.
-    format : str
-        As in the module struct, without byte order.
-    """
-
-    name: str
-    format: str
+    name: str  #: As in C.
+    format: str  #: As in the module struct, without byte order.
 
     @property
     def is_float(self) -> bool:
@@ -62,9 +54,10 @@ FLOAT = NumberType("float", "f")
 FP16 = NumberType("FP16", "e")
 U64 = NumberType("uint64_t", "Q")
 
+#: Code of a log variable on the wire -> type.
 LOG_TYPES = {1: U8, 2: U16, 3: U32, 4: I8, 5: I16, 6: I32, 7: FLOAT, 8: FP16}
-"""Code of a log variable on the wire -> type."""
 
+#: Code of a parameter on the wire -> type.
 PARAMETER_TYPES = {
     0x8: U8,
     0x9: U16,
@@ -75,7 +68,6 @@ PARAMETER_TYPES = {
     0x2: I32,
     0x6: FLOAT,
 }
-"""Code of a parameter on the wire -> type."""
 
 LOG_CODES = {number_type: code for code, number_type in LOG_TYPES.items()}
 PARAMETER_CODES = {number_type: code for code, number_type in PARAMETER_TYPES.items()}

@@ -12,32 +12,20 @@ from crazyflie_virtual.firmware.stabilizer import DEFAULT, MELLINGER
 from crazyflie_virtual.tables.number_types import FLOAT, I8, U8, U16, U32, NumberType
 from crazyflie_virtual.tables.toc import pid_paths
 
+#: Those of the firmware's parameters, which stores also what is no number.
 NO_LIMITS = (-math.inf, math.inf)
-"""Those of the firmware's parameters, which stores also what is no number."""
 
 
 class ParameterSpec(NamedTuple):
-    """A parameter.
-
-    Attributes
-    ----------
-    group, name : str
-    number_type : NumberType
-    source : str or float
-        Path to the attribute, or the first value of one without effect.
-    persistent : bool
-        Can be stored on the vehicle.
-    read_only : bool
-    limits : tuple of float
-        Least and greatest value; a write of any other is without effect.
-    """
+    """A parameter."""
 
     group: str
     name: str
     number_type: NumberType
-    source: str | float
-    persistent: bool = False
+    source: str | float  #: Path to the attribute, or the first value of one without effect.
+    persistent: bool = False  #: Can be stored on the vehicle.
     read_only: bool = False
+    #: Least and greatest value; a write of any other is without effect.
     limits: tuple[float, float] = NO_LIMITS
 
 
@@ -77,6 +65,8 @@ _MELLINGER = (
     *("i_range_m_xy", "i_range_m_z"),
 )
 
+#: Group -> rows, as `ParameterSpec` without the group. The group "virtual" is not the firmware's:
+#: its parameters are the fault switches.
 _GROUPS = {
     "stabilizer": [
         *_rows(U8, estimator=2),
@@ -254,5 +244,3 @@ _GROUPS = {
         *_limited(U8, 0, 4, motorFailure="faults.motor_failure"),
     ],
 }
-"""Group -> rows, as `ParameterSpec` without the group. The group "virtual" is not the
-firmware's: its parameters are the fault switches."""

@@ -10,13 +10,9 @@ _ITEM, _INFO = 2, 3
 class Table:
     """A numbered list of entries and the answers to questions about it.
 
-    Parameters
-    ----------
-    entries : sequence of tuple
-        (group, name, code) in the order of their numbers. Group and name have together at
-        most 24 characters: an item is one packet. The code is type and flags, a byte.
-    limits : bytes
-        What follows number of entries and checksum in the table's description.
+    Entries are (group, name, code) in the order of their numbers. Group and name have together at
+    most 24 characters: an item is one packet. The code is type and flags, a byte. ``limits`` is
+    what follows number of entries and checksum in the table's description.
     """
 
     def __init__(self, entries: Sequence[tuple[str, str, int]], limits: bytes = b""):
@@ -25,8 +21,8 @@ class Table:
         ]
         self._limits = limits
         self._index = {(group, name): i for i, (group, name, _) in enumerate(entries)}
+        #: Changes with the table: clients keep tables by it.
         self.crc = zlib.crc32(b"".join(self._items))
-        """Changes with the table: clients keep tables by it."""
 
     def index(self, group: str, name: str) -> int | None:
         """Return the number of an entry; None when there is none."""
@@ -51,14 +47,8 @@ def pid_paths(
 ) -> Iterable[tuple[str, str]]:
     """Yield (name, path from the `Firmware`) of attributes of PID controllers.
 
-    Parameters
-    ----------
-    owner : str
-        Path to the object that has the controllers.
-    pids : dict
-        Prefix of names -> the owner's attribute.
-    attributes : dict
-        Suffix of names -> the controller's attribute.
+    ``owner`` is the path to the object that has the controllers. Prefixes of names lead to the
+    owner's attributes (``pids``), suffixes to the controller's (``attributes``).
     """
     for prefix, pid in pids.items():
         for suffix, attribute in attributes.items():

@@ -1,0 +1,1 @@
+"""Images in which faces are blurred."""

@@ -1,0 +1,31 @@
+"""The node: a filter of crazyflie_vision."""
+
+from typing_extensions import override
+
+from crazyflie_utils import parameter
+from crazyflie_vision import filters
+from crazyflie_vision.blur_node import KERNEL
+from crazyflie_vision.face_detector import FaceDetector
+from crazyflie_vision.filter_node import FilterNode, FilterParameters
+from hide_faces.hide import hide
+
+
+class HideFacesParameters(FilterParameters):
+    """Parameters of `HideFacesNode`."""
+
+    size: int = parameter(KERNEL, "of the square that is blurred", 75, live=True)
+
+
+class HideFacesNode(FilterNode):
+    """Publish images in which the largest face cannot be told."""
+
+    parameters_type = HideFacesParameters
+    _parameters: HideFacesParameters
+
+    def __init__(self) -> None:
+        self._detector = FaceDetector()
+
+    @override
+    def apply(self, image: filters.Image) -> filters.Image:
+        face = self._detector.find(image)
+        return image if face is None else hide(image, face, self._parameters.size)

@@ -1,0 +1,1 @@
+"""A mission of four vehicles."""

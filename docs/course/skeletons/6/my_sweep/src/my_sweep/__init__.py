@@ -1,0 +1,1 @@
+"""A sweep of an area, step by step."""

@@ -1,0 +1,17 @@
+"""Step 2: the service that answers with the velocity."""
+
+from typing_extensions import override
+
+from crazyflie_utils import Node, NodeHandle
+
+
+class OscillatorNode(Node):
+    """Answer calls of /my_oscillator."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        """There are none."""
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        """Step 2: advertise my_oscillator (VelocityAt), which returns a VelocityAtResponse."""

@@ -1,0 +1,70 @@
+"""Step 4: the mission, with a vehicle that is where its reference is."""
+
+from concurrent.futures import Future
+
+import pytest
+from std_srvs.srv import EmptyResponse
+
+from crazyflie_msgs.msg import (
+    FlightStatus,
+    PositionVelocityYawState,
+    PositionVelocityYawStateStamped,
+)
+from crazyflie_utils.testing import FakeProcess
+from my_sweep.oscillator_node import OscillatorNode
+from my_sweep.sweep_node import SweepNode
+
+
+@pytest.fixture
+def process():
+    """Return a process with both nodes and a vehicle at the origin that may fly and land."""
+    fake = FakeProcess()
+    fake.landings = []
+
+    def land(_):
+        fake.landings.append(True)
+        reply = Future()
+        reply.set_result(EmptyResponse())
+        return reply
+
+    fake.transport.services["/land"] = land
+    assert fake.launch(OscillatorNode(), "/oscillator")
+    assert fake.launch(SweepNode(), "/sweep")
+    fake.publish("/state", PositionVelocityYawStateStamped(state=PositionVelocityYawState(z=1.0)))
+    return fake
+
+
+def references(process):
+    """Return the positions (x, y, z) that were published."""
+    return [(m.state.x, m.state.y, m.state.z) for m in process.published("/ref")]
+
+
+def test_is_silent_on_the_ground(process):
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.TAKING_OFF))
+    process.advance(2.0)
+    assert references(process) == []
+
+
+def test_flies_all_lanes_then_lands_once(process):
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    process.advance(60.0)
+    points = references(process)
+    assert points[0] == pytest.approx((0.0, 0.0, 1.0), abs=0.1)
+    for corner in ((-1.5, -1.0), (1.5, -1.0), (1.5, 0.0), (-1.5, 0.0), (-1.5, 1.0)):
+        assert min((x - corner[0]) ** 2 + (y - corner[1]) ** 2 for x, y, _ in points) < 0.1**2
+    assert points[-1] == pytest.approx((1.5, 1.0, 1.0))
+    steps = [abs(b[0] - a[0]) for a, b in zip(points, points[1:], strict=False)]
+    assert max(steps) == pytest.approx(0.07, abs=1e-6)
+    assert process.landings == [True]
+
+
+def test_hovers_without_the_service():
+    process = FakeProcess()
+    assert process.launch(SweepNode(), "/sweep")
+    process.publish(
+        "/state", PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=0.3))
+    )
+    process.publish("/in_flight_flight_status", FlightStatus(state=FlightStatus.FLYING))
+    process.advance(5.0)
+    assert references(process)[-1] == pytest.approx((0.3, 0.0, 1.0))
+    assert "/my_oscillator" in process.logged("warn")[0]

@@ -1,0 +1,22 @@
+"""Step 2: the service that answers with the velocity."""
+
+from typing_extensions import override
+
+from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtResponse
+from crazyflie_utils import Node, NodeHandle
+from my_sweep.oscillator import velocity
+
+
+class OscillatorNode(Node):
+    """Answer calls of /my_oscillator."""
+
+    @override
+    def load_parameters(self, handle: NodeHandle) -> None:
+        """There are none."""
+
+    @override
+    def register_callbacks(self, handle: NodeHandle) -> None:
+        handle.advertise_service("my_oscillator", VelocityAt, self._on_call)
+
+    def _on_call(self, request):
+        return VelocityAtResponse(velocity(request.x))

@@ -1,6 +1,0 @@
-"""Tells catkin where the Python modules are."""
-
-from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
-
-setup(**generate_distutils_setup(packages=["triangle_velocity"], package_dir={"": "src"}))

@@ -1,1 +1,0 @@
-"""Another velocity for the sweep mission."""

@@ -1,0 +1,38 @@
+"""The driver of a fleet, with what crazyswarm2's files say about the radio."""
+
+from crazyflie_driver.server_node import CrazyflieServerNode
+from crazyflie_fleet import server_file
+from crazyflie_fleet.fleet_parameters import FleetParameters
+from crazyflie_utils import Node, NodeHandle, parameter
+from crazyflie_utils.parameters.types import Text
+
+
+class DriverFleetParameters(FleetParameters):
+    """Which vehicles there are, and when the driver warns."""
+
+    server: str = parameter(
+        Text(may_be_empty=True),
+        "crazyswarm2's server.yaml; its limits of communication replace the driver's",
+        "",
+        "fleet/server",
+    )
+
+
+def make_nodes(handle: NodeHandle) -> dict[str, Node]:
+    """Return the driver, and set the parameters that the files say.
+
+    Raises
+    ------
+    ParameterError
+        A parameter, or a file, is wrong.
+    """
+    config = handle.load(DriverFleetParameters)
+    given = config.fleet().broadcasts
+    if config.server:
+        server = server_file.load(config.server)
+        given = {**given, **server.driver}
+        for remark in server.remarks:
+            handle.warn(remark)
+    for key, value in given.items():
+        handle.set_param(f"{handle.name}/{key}", value)
+    return {handle.name: CrazyflieServerNode()}

@@ -72,7 +72,7 @@ PATCHES = {
     "harden_subscribers": Patch(
         "all that comes is decoded; if a message cannot be, rospy connects again, for ever",
         "it is dropped and named once; a flood is decoded in part, so that control goes on",
-        "no figure: it guards flights (docs/safety.md, Peers)",
+        "no figure: it guards flights (docs/faults.md, Peers)",
         "publishers that send nonsense, or floods, delay the nodes of this process",
         {
             f"{_TCP}TCPROSTransport.receive_once": "self: read_buff protocol is_latched latch",
@@ -95,7 +95,7 @@ PATCHES = {
     "harden_tcp_server": Patch(
         "headers of connections are read one after the other, without a limit of time",
         "each in a thread, within 5 s: a peer that connects and is silent keeps /emergency waiting",
-        "no figure: it guards flights (docs/safety.md, Peers)",
+        "no figure: it guards flights (docs/faults.md, Peers)",
         "a peer that connects and says nothing blocks all others",
         {
             f"{_TCP}TCPROSServer._tcp_server_callback": "self sock client_addr: "

@@ -1,4 +1,4 @@
-"""The tables of docs/safety.md name tests that exist, and limits as they are declared."""
+"""The tables of docs/faults.md name tests that exist, and limits as they are declared."""
 
 import ast
 import functools
@@ -9,7 +9,7 @@ import pytest
 from test_any_input import declared_classes
 from workspaces import TOP
 
-PAGE = TOP / "docs" / "safety.md"
+PAGE = TOP / "docs" / "faults.md"
 LIMIT = re.compile(r"`([a-z_]+/[a-z_/]+)` (-?[0-9.]+)")
 FLAG = re.compile(r"`([a-z_]+)` (false|true)")
 

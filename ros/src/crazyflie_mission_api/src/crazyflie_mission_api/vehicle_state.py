@@ -8,12 +8,12 @@ from geometry_msgs.msg import PoseStamped
 from typing_extensions import override
 
 from crazyflie_fleet.conversions import heading
-from crazyflie_fleet.flight_words import WORDS
 from crazyflie_mission_api.mission_vehicle import MissionVehicle
 from crazyflie_model.angles import Triple, quaternion_from_rpy
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
 from crazyflie_utils import NodeHandle, TransformError
+from crazyflie_utils.flight_status import WORDS
 
 MAX_POSITION_AGE = 0.5
 """A position older than this is not known, s; as `commanded_references.MAX_STATE_AGE`."""

@@ -7,10 +7,12 @@ import platform
 import sys
 from pathlib import Path
 
-from crazyflie_dev.bench import batch, hover, machine, simulated, start, swarm
+from crazyflie_dev.bench import batch, dashboard, hover, machine, simulated, start, swarm
 from crazyflie_dev.bench.row import NotMeasuredError, Row
 
-ROWS = [*machine.ROWS, *hover.ROWS, *simulated.ROWS, *start.ROWS, *swarm.ROWS, *batch.ROWS]
+_PARTS = (machine, hover, simulated, start, swarm, batch, dashboard)
+
+ROWS = [row for part in _PARTS for row in part.ROWS]
 
 
 def measure(rows: list[Row]) -> list[dict[str, object]]:

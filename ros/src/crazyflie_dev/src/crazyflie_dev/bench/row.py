@@ -24,6 +24,8 @@ class Row:
         Returns the figure, a float. Raises `NotMeasuredError`.
     least, most : float
         The goal: where the figure is to be.
+    seconds : float
+        About how long it takes to measure, s.
     """
 
     name: str
@@ -32,6 +34,7 @@ class Row:
     measure: Callable[[], float]
     least: float = -math.inf
     most: float = math.inf
+    seconds: float = 12.0
 
     @property
     def goal(self) -> str:

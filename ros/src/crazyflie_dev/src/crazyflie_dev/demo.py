@@ -50,6 +50,17 @@ def eight(moment: float) -> PositionVelocityYawState:
     )
 
 
+def say_if_busy(load: float, processors: int) -> None:
+    """Print what a load (programs that run or want to) means for a flight in real time."""
+    if load > processors:
+        print(
+            f"this computer is too busy: {load:.1f} programs want its {processors} processors, and "
+            "the flight may be a bad one; ./run demo sim_time:=true real_time_factor:=0 does not "
+            "depend on that",
+            file=sys.stderr,
+        )
+
+
 def fly_and_land() -> None:
     """Fly on the master that runs."""
     process = begin("demo")
@@ -141,6 +152,8 @@ def main() -> int:
     )
     parser.add_argument("launch_arguments", nargs="*", help="such as composed:=true")
     options = parser.parse_args()
+    if "sim_time:=true" not in options.launch_arguments:
+        say_if_busy(os.getloadavg()[0], len(os.sched_getaffinity(0)))
     try:
         return fly(options.out.resolve(), options.launch_arguments)
     except LaunchError as error:

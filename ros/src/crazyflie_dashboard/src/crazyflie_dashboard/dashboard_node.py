@@ -2,6 +2,7 @@
 
 import contextlib
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import rospkg
@@ -12,6 +13,9 @@ from crazyflie_dashboard.access import Access, AccessError, expect_free_port, is
 from crazyflie_dashboard.live_dashboard import LiveDashboard
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import Integer, Text
+
+
+_NOT_INSTALLED = "NiceGUI, which the page is made with, is not installed: ./run install dashboard"
 
 
 class DashboardParameters(Parameters):
@@ -43,12 +47,12 @@ class DashboardNode(Node):
             expect_free_port(parameters.host, parameters.port)
         except AccessError as error:
             raise ParameterError(f"{handle.name}: {error}") from None
+        if find_spec("nicegui") is None:
+            raise ParameterError(f"{handle.name}: {_NOT_INSTALLED}")
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        folders = [
-            path for path in self._parameters.folders.split(":") if path
-        ] or example_folders()
+        folders = [path for path in self._parameters.folders.split(":") if path]
         self._dashboard = LiveDashboard(
             handle,
             lambda: master.read(handle.name),

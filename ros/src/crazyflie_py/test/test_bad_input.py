@@ -44,7 +44,10 @@ WRONG = [
     (lambda s, cf: cf.startTrajectory(0, timescale=0.0), "timescale is 0.0; .* >= 0.001"),
     (lambda s, cf: cf.uploadTrajectory(0, 0, trajectory(32)), "32 pieces .* no more than 31"),
     (lambda s, cf: cf.uploadTrajectory(0, 20, trajectory(12)), "from pieceOffset 20 on"),
-    (lambda s, cf: cf.uploadTrajectory(0, 0, Trajectory()), "trajectory is .* with pieces"),
+    (
+        lambda s, cf: cf.uploadTrajectory(0, 0, Trajectory()),
+        "has no pieces; expected one at least",
+    ),
     (lambda s, cf: cf.uploadTrajectory(0, 0, "figure8.csv"), "trajectory is 'figure8.csv'"),
     (lambda s, cf: cf.uploadTrajectory(0, 0, trajectory(x=[NAN])), "x of piece 0 is .*nan"),
     (lambda s, cf: cf.uploadTrajectory(0, 0, trajectory(x=[1] * 9)), "at most 8 finite"),
@@ -133,3 +136,24 @@ def test_without_a_fleet_file_the_vehicles_of_the_examples_fly(tmp_path, monkeyp
     monkeypatch.setattr("sys.argv", ["script.py"])
     assert [cf.id for cf in simulated(fleet=None).allcfs.crazyflies] == [1, 2]
     assert "no fleet file: none of ../launch/crazyflies.yaml" in caplog.text
+
+
+@pytest.mark.parametrize("key", [99, "cf99"])
+def test_a_vehicle_that_is_not_there(swarm, key):
+    found = swarm.allcfs.crazyfliesById if key == 99 else swarm.allcfs.crazyfliesByName
+    with pytest.raises(KeyError, match=f"there is no vehicle {key!r}; expected one of "):
+        found[key]
+
+
+def test_what_a_real_vehicle_refuses_is_a_warning(swarm, caplog):
+    cf = swarm.allcfs.crazyflies[0]
+    cf.setParam("stabilizer/controller", 9)
+    cf.setParam("ring/effect", 300)
+    cf.setParam("ring/effect", 7)
+    swarm.allcfs.takeoff(1.0, 2.0, groupMask=64)
+    assert [record.getMessage() for record in caplog.records] == [
+        "cf1.setParam: stabilizer.controller is 9; expected 0 to 2: a real vehicle refuses it",
+        "cf1.setParam: ring.effect is 300; expected a uint8_t: a real vehicle refuses it",
+        "allcfs.takeoff: groupMask is 64, and no vehicle is in one of these groups by "
+        "setGroupMask; they ignore the command",
+    ]

@@ -76,7 +76,9 @@ def _triple(value):
 def pieces(where: str, trajectory: Any) -> list[PolynomialPiece]:
     """Return the pieces of a `uav_trajectory.Trajectory`."""
     found = getattr(trajectory, "polynomials", None)
-    if not found:
+    if found is not None and len(found) == 0:
+        raise ValueError(f"{where}: trajectory has no pieces; expected one at least")
+    if found is None:
         raise _error(where, "trajectory", trajectory, "a uav_trajectory.Trajectory with pieces")
     result = []
     for index, piece in enumerate(found):

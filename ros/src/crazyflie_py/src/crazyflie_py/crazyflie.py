@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from typing_extensions import override
 from uav_trajectory import Trajectory
 
 from crazyflie_model.angles import quaternion_from_rpy
@@ -54,15 +55,16 @@ class Crazyflie(ScriptCommands):
         self.prefix = f"/{vehicle.name}"
         self.initialPosition: Array = np.array(vehicle.initial_position)
         self.ledRGB = DEFAULT_COLOR
+        self._group_mask = 0
 
     def setGroupMask(self, groupMask: int) -> None:
         """Make the vehicle a member of up to 8 groups, a bit each.
 
         A command with a mask other than 0 concerns vehicles that have a bit in common with it.
         """
-        self._vehicle.set_group_mask(
-            check.byte(self._where("setGroupMask"), "groupMask", groupMask)
-        )
+        mask = check.byte(self._where("setGroupMask"), "groupMask", groupMask)
+        self._vehicle.set_group_mask(mask)
+        self._group_mask = mask
 
     def goTo(
         self,
@@ -239,6 +241,13 @@ class Crazyflie(ScriptCommands):
         self._vehicle.disable_avoidance()
 
 
+class _Found(dict[Any, Crazyflie]):
+    """Vehicles by a key; the error about one that is not there names those that are."""
+
+    def __missing__(self, key: object) -> Crazyflie:
+        raise KeyError(f"there is no vehicle {key!r}; expected one of {', '.join(map(str, self))}")
+
+
 class CrazyflieServer(ScriptCommands):
     """All vehicles; its commands are broadcast and concern all at the same moment.
 
@@ -252,8 +261,15 @@ class CrazyflieServer(ScriptCommands):
     def __init__(self, backend: SwarmBackend):
         super().__init__("allcfs", backend)
         self.crazyflies = [Crazyflie(vehicle) for vehicle in backend.vehicles]
-        self.crazyfliesById = {cf.id: cf for cf in self.crazyflies}
-        self.crazyfliesByName = {cf.name: cf for cf in self.crazyflies}
+        self.crazyfliesById = _Found({cf.id: cf for cf in self.crazyflies})
+        self.crazyfliesByName = _Found({cf.name: cf for cf in self.crazyflies})
+
+    @override
+    def _groups(self) -> int:
+        groups = 0
+        for crazyflie in self.crazyflies:
+            groups |= crazyflie._group_mask
+        return groups
 
     def goTo(self, goal: ArrayLike, yaw: float, duration: float, groupMask: int = 0) -> None:
         """Fly by an offset (m) and an angle (rad); see `Crazyflie.goTo`."""

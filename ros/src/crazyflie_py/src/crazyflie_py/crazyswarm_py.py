@@ -90,8 +90,17 @@ class Crazyswarm:
         self.input = Input(self.timeHelper, options.sim)
 
 
+def _print_warnings() -> None:
+    # On a handler of its own: rospy replaces those of the root.
+    log = logging.getLogger("crazyflie_py")
+    if not log.handlers:
+        handler = logging.StreamHandler()
+        handler.setFormatter(logging.Formatter("[%(levelname)s] %(message)s"))
+        log.addHandler(handler)
+
+
 def _backend(crazyflies_yaml: str | Path | None, options: argparse.Namespace) -> SwarmBackend:
-    logging.basicConfig(format="[%(levelname)s] %(message)s")
+    _print_warnings()
     if options.sim:
         from crazyflie_py.simulation import Simulation
 

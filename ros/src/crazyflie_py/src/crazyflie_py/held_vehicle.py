@@ -3,7 +3,6 @@
 import math
 
 from geometry_msgs.msg import Point
-from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.separation import LOOK_AHEAD
@@ -12,7 +11,6 @@ from crazyflie_mission_api.vehicle_state import Pose
 from crazyflie_model.angles import Triple
 from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_py.ros_connection import Connection
-from crazyflie_py.separation_watch import WatchedVehicle
 from crazyflie_py.setpoints import Attitude, MotorsOff, Position, Setpoint, led_to
 
 _HOLD_DURATION = 0.8
@@ -22,22 +20,20 @@ _SETPOINT_TIMEOUT = 0.5
 """Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE)."""
 
 
-class HeldVehicle(WatchedVehicle):
+class HeldVehicle:
     """One vehicle.
 
     Attributes
     ----------
     is_landing, avoids : bool
         Whether it lands, and whether its firmware avoids collisions; it is not held then.
-    takeoff_end : float
-        Before this time it is not held, s.
     """
 
     def __init__(self, vehicle: RosVehicle, connection: Connection):
         self.name = vehicle.name
         self.is_landing = False
         self.avoids = False
-        self.takeoff_end = -math.inf
+        self._free_until = -math.inf
         self._vehicle = vehicle
         self._connection = connection
         # The last setpoint, and when it came, s; where the vehicle is held, m.
@@ -51,23 +47,27 @@ class HeldVehicle(WatchedVehicle):
             return setpoint
         return Position(self._held_at, self._vehicle.heading())
 
+    def free(self, duration: float) -> None:
+        """Note that it takes off or lands, for a duration (s)."""
+        self._free_until = self._connection.fleet.time() + duration
+
     def end_setpoints(self) -> None:
         """Note that a command follows setpoints."""
         self._streamed = self._held_at = None
 
     @property
-    @override
     def may_be_held(self) -> bool:
+        """Whether it flies, and neither takes off, nor lands, nor avoids others by itself."""
         is_flying = bool(self._vehicle.driver_status.supervisor & VehicleStatus.FLYING)
-        has_taken_off = self._connection.fleet.time() > self.takeoff_end
-        return is_flying and has_taken_off and not self.is_landing and not self.avoids
+        is_free = self._connection.fleet.time() < self._free_until
+        return is_flying and not is_free and not self.is_landing and not self.avoids
 
-    @override
     def pose(self) -> Pose | None:
+        """Return where it is; None if that is not known."""
         return self._vehicle.pose()
 
-    @override
     def streamed_goal(self, place: Triple) -> Triple | None:
+        """Return where setpoints lead it from a place (m); None if none are sent."""
         if self._streamed is None:
             return None
         setpoint, time = self._streamed
@@ -75,16 +75,16 @@ class HeldVehicle(WatchedVehicle):
             return None
         return led_to(setpoint, place, self._vehicle.heading(), LOOK_AHEAD)
 
-    @override
     def hold(self, place: Triple) -> None:
+        """Have it stay at a place, m."""
         if self.streamed_goal(place) is not None:
             self._held_at = place
             return
         arguments = (0, False, Point(*place), self._vehicle.heading(), seconds(_HOLD_DURATION))
         self._vehicle.call("go_to", srv.GoTo, *arguments).add_done_callback(self._note_hold)
 
-    @override
     def release(self) -> None:
+        """Have it follow setpoints again."""
         self._held_at = None
 
     def _note_hold(self, answer):

@@ -107,7 +107,12 @@ class RosBackend(EachVehicle, SwarmBackend):
         radii = [buffers.get(vehicle.name, RobotSettings.buffer) for vehicle in watched]
         if len(watched) > 1:
             watch = SeparationWatch([vehicle.held for vehicle in watched], radii, self._connection)
-            self._connection.handle.timer(_WATCH_PERIOD, watch.update)
+            self._connection.handle.timer(_WATCH_PERIOD, lambda: self._look(watch))
+
+    def _look(self, watch):
+        # The landing at the end keeps vehicles apart itself.
+        if not self._is_closed:
+            watch.update()
 
     def _on_held(self, message):
         if message.data:
@@ -137,6 +142,9 @@ class RosBackend(EachVehicle, SwarmBackend):
 
     @override
     def land(self, height: float, duration: float, group_mask: int) -> None:
+        for vehicle in self._vehicles:
+            if vehicle.is_member(group_mask):
+                vehicle.held.free(duration)
         self._call("land", srv.Land, group_mask, height, seconds(duration))
         for vehicle in self._vehicles:
             vehicle.note_landing(group_mask)

@@ -31,17 +31,14 @@ class Connection:
     ----------
     handle : NodeHandle
     fleet : Fleet
+    is_unchecked : bool
+        Whether what is refused is a warning.
     """
 
     def __init__(self, handle: NodeHandle, fleet: Fleet, is_unchecked: bool):
         self.handle = handle
         self.fleet = fleet
-        self._is_unchecked = is_unchecked
-
-    @property
-    def is_unchecked(self) -> bool:
-        """Whether what is refused is a warning."""
-        return self._is_unchecked
+        self.is_unchecked = is_unchecked
 
     def call(self, service: str, service_type: Any, *arguments: Any) -> "Future[Any]":
         """Call a service by its absolute name; return the future of the answer."""
@@ -50,7 +47,7 @@ class Connection:
 
     def refuse(self, text: str) -> None:
         """Raise `CommandRefusedError`; with --unchecked warn."""
-        if not self._is_unchecked:
+        if not self.is_unchecked:
             raise CommandRefusedError(f"{text}; with --unchecked this is a warning")
         self.handle.warn(text)
 

@@ -65,7 +65,7 @@ class RosVehicleBackend(VehicleBackend):
     def begin_takeoff(self, height: float, duration: float, group_mask: int) -> "Future[Any]":
         """Call takeoff; the future is done when the vehicle takes off, or has refused."""
         self.check_takeoff(height)
-        self.held.takeoff_end = self._connection.fleet.time() + duration
+        self.held.free(duration)
         self.held.end_setpoints()
         return self._vehicle.take_off(height, duration, group_mask)
 
@@ -81,6 +81,7 @@ class RosVehicleBackend(VehicleBackend):
 
     @override
     def land(self, height: float, duration: float, group_mask: int) -> None:
+        self.held.free(duration)
         self._command("land", srv.Land, group_mask, height, seconds(duration))
         self.note_landing(group_mask)
 

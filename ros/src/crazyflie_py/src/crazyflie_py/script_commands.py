@@ -1,10 +1,14 @@
 """Commands of scripts with the same arguments for one vehicle and for all."""
 
+import logging
+
 from numpy.typing import ArrayLike
 
 from crazyflie_py import arguments as check
 from crazyflie_py.backend import Commands
 from crazyflie_py.setpoints import FullState
+
+_log = logging.getLogger(__name__)
 
 
 class ScriptCommands:
@@ -24,6 +28,21 @@ class ScriptCommands:
 
     def _where(self, method: str) -> str:
         return f"{self._name}.{method}"
+
+    def _mask(self, where: str, mask: int) -> int:
+        mask = check.byte(where, "groupMask", mask)
+        if mask and not mask & self._groups():
+            _log.warning(
+                "%s: groupMask is %d, and no vehicle is in one of these groups by setGroupMask; "
+                "they ignore the command",
+                where,
+                mask,
+            )
+        return mask
+
+    def _groups(self) -> int:
+        """Return all groups that any vehicle may be in."""
+        return 0xFF
 
     def takeoff(self, targetHeight: float, duration: float, groupMask: int = 0) -> None:
         """Fly straight up to a height in a duration; returns at once.
@@ -48,12 +67,12 @@ class ScriptCommands:
         return (
             check.number(where, "targetHeight", height),
             check.number(where, "duration", duration, 0.0),
-            check.byte(where, "groupMask", mask),
+            self._mask(where, mask),
         )
 
     def stop(self, groupMask: int = 0) -> None:
         """Stop the motors: after a landing, as a vehicle in the air falls."""
-        self._commands.stop(check.byte(self._where("stop"), "groupMask", groupMask))
+        self._commands.stop(self._mask(self._where("stop"), groupMask))
 
     def _go_to(self, goal, yaw, duration, relative, mask):
         where = self._where("goTo")
@@ -62,7 +81,7 @@ class ScriptCommands:
             check.number(where, "yaw", yaw),
             check.number(where, "duration", duration, 0.0),
             bool(relative),
-            check.byte(where, "groupMask", mask),
+            self._mask(where, mask),
         )
 
     def startTrajectory(
@@ -94,7 +113,7 @@ class ScriptCommands:
             check.number(where, "timescale", timescale, 1e-3, 1e3),
             bool(reverse),
             bool(relative),
-            check.byte(where, "groupMask", groupMask),
+            self._mask(where, groupMask),
         )
 
     def notifySetpointsStop(self, remainValidMillisecs: int = 100, groupMask: int = 0) -> None:
@@ -109,7 +128,7 @@ class ScriptCommands:
         """
         where = self._where("notifySetpointsStop")
         remain = check.integer(where, "remainValidMillisecs", remainValidMillisecs, 0, 2**31 - 1)
-        self._commands.notify_setpoints_stop(remain, check.byte(where, "groupMask", groupMask))
+        self._commands.notify_setpoints_stop(remain, self._mask(where, groupMask))
 
     def emergency(self) -> None:
         """Stop the motors at once; until a restart, nothing has an effect any more."""

@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
 from crazyflie_fleet.separation import LOOK_AHEAD, Separation
 from crazyflie_mission_api.vehicle_state import Pose, velocity_between
-from crazyflie_model.angles import Triple
+from crazyflie_py.held_vehicle import HeldVehicle
 from crazyflie_py.ros_connection import Connection
 
 _SHORTEST_SPAN = 0.02
@@ -20,31 +19,8 @@ _LONGEST_SPAN = 0.3
 _LOWEST_SPEED = 0.05
 """A slower vehicle hovers, m/s."""
 
-
 _REPEAT = 2.0
 """Between two warnings of a vehicle, s."""
-
-
-class WatchedVehicle(Protocol):
-    """A vehicle that can be held."""
-
-    name: str
-
-    @property
-    def may_be_held(self) -> bool:
-        """Whether it flies, and neither takes off, nor lands, nor avoids others by itself."""
-
-    def pose(self) -> Pose | None:
-        """Return where it is; None if that is not known."""
-
-    def streamed_goal(self, place: Triple) -> Triple | None:
-        """Return where setpoints lead it from a place (m); None if none are sent."""
-
-    def hold(self, place: Triple) -> None:
-        """Have it stay at a place, m."""
-
-    def release(self) -> None:
-        """Have it follow setpoints again."""
 
 
 class SeparationWatch:
@@ -54,7 +30,7 @@ class SeparationWatch:
 
     Parameters
     ----------
-    vehicles : sequence of WatchedVehicle
+    vehicles : sequence of HeldVehicle
     buffers : sequence of float
         Radii of their own space, m.
     connection : Connection
@@ -63,7 +39,7 @@ class SeparationWatch:
 
     def __init__(
         self,
-        vehicles: Sequence[WatchedVehicle],
+        vehicles: Sequence[HeldVehicle],
         buffers: Sequence[float],
         connection: Connection,
     ):

@@ -2,6 +2,7 @@
 
 import functools
 import logging
+import math
 from collections.abc import Mapping
 from typing import Protocol
 
@@ -49,7 +50,28 @@ class SimulatedParameters:
                     self._name,
                     key,
                 )
+            self._check(key, value)
             self._values[key] = value
+
+    def _check(self, key, value):
+        spec = _specs().get(key)
+        if spec is None:
+            return
+        low, high = spec.limits
+        kind = spec.number_type
+        if spec.limits != (-math.inf, math.inf) and not low <= value <= high:
+            expected = f"{low:g} to {high:g}"
+        elif not kind.is_float and kind.convert(value) != value:
+            expected = f"a {kind.name}"
+        else:
+            return
+        _log.warning(
+            "%s.setParam: %s is %g; expected %s: a real vehicle refuses it",
+            self._name,
+            key,
+            value,
+            expected,
+        )
 
     def __getitem__(self, key: str) -> float:
         """Return a value; ValueError for a name that is not known and was not set."""
@@ -71,6 +93,14 @@ class SimulatedParameters:
             return DEFAULT_COLOR
         red, green, blue = (min(max(self[key] / 255.0, 0.0), 1.0) for key in _COLOR)
         return red, green, blue
+
+
+@functools.cache
+def _specs():
+    # Here, as they take as long to import as all else.
+    from crazyflie_virtual.tables.parameter_table import parameter_specs
+
+    return {f"{spec.group}.{spec.name}": spec for spec in parameter_specs()}
 
 
 @functools.cache

@@ -21,7 +21,8 @@ def check_positive(what: str, value: float) -> None:
     """Raise `ValueRangeError` unless the value is positive and finite, in single precision, too."""
     if not SMALLEST_FLOAT <= value <= LARGEST_FLOAT:
         raise ValueRangeError(
-            f"{what}: {value} is not a positive number from {SMALLEST_FLOAT:g} to {LARGEST_FLOAT:g}"
+            f"{what} is {value:g}; expected a finite number above 0 ({SMALLEST_FLOAT:g} to "
+            f"{LARGEST_FLOAT:g})"
         )
 
 

@@ -285,5 +285,5 @@ class HighLevel(Subsystem):
 
 def _check(what: str, duration: float, group_mask: int, *values: float) -> None:
     check_finite(what, *values)
-    check_positive(what, duration)
+    check_positive(f"{what}: duration", duration)
     check_byte("group mask", group_mask)

@@ -1,5 +1,6 @@
 """Calls of services, answered and made, that end."""
 
+import ast
 import contextlib
 import threading
 from collections.abc import Callable
@@ -81,12 +82,25 @@ def _call(name, service_type, request, limit, future, calls, own):
             response = rospy.ServiceProxy(name, service_type)(request)
     except Exception as error:
         # rospy has many, of which not all are its own.
-        _fail(future, str(error))
+        _fail(future, _reason(error))
     else:
         with contextlib.suppress(InvalidStateError):
             future.set_result(response)
     finally:
         calls.release()
+
+
+def _reason(error):
+    """Return what a service says; rospy puts its own words around that."""
+    text = str(error)
+    _, found, said = text.partition(" responded with an error: ")
+    if not found:
+        return text
+    try:
+        words = ast.literal_eval(said).decode()
+    except (SyntaxError, ValueError, AttributeError):
+        return text
+    return words.removeprefix("service cannot process request: ")
 
 
 def _answers(own):

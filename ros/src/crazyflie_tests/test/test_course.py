@@ -1,4 +1,4 @@
-"""The exercises of the course: the tests of a skeleton fail, those of its solution pass."""
+"""The exercises of the course, and the word that opens a lesson."""
 
 import os
 import re
@@ -49,3 +49,43 @@ def test_a_solution_differs_from_its_skeleton(path):
     skeleton = COURSE / "skeletons" / path.relative_to(COURSE / "solutions")
     if path.parts[path.parts.index("solutions") + 2] not in GENERATED:
         assert skeleton.read_text() != path.read_text()
+
+
+@pytest.mark.parametrize("lesson", ["", "0", "99", "3x"])
+def test_a_lesson_that_there_is_not_is_refused(lesson):
+    result = subprocess.run(
+        [TOP / "run", "course", lesson], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert result.returncode == 1
+    assert f"course '{lesson}': expected the number of a lesson" in result.stderr
+
+
+def in_a_terminal(home, commands):
+    """Run commands in a terminal of the course that builds nothing; return what it prints."""
+    return subprocess.run(
+        ["bash", "-c", f"source {COURSE}/setup.bash; build() {{ true; }}; {commands}"],
+        env={**os.environ, "HOME": str(home)},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+
+
+def test_no_file_of_a_student_is_lost(tmp_path):
+    mine = tmp_path / "my_workspace/src/four_vehicles/src/four_vehicles/mission.py"
+    in_a_terminal(tmp_path, "exercise 12")
+    assert "step 1" in mine.read_text()
+    mine.write_text("mine")
+    in_a_terminal(tmp_path, "exercise 12")
+    assert mine.read_text() == "mine"
+    in_a_terminal(tmp_path, "solution 12")
+    assert "formation" in mine.read_text()
+    assert mine.with_name("mission.py.mine").read_text() == "mine"
+
+
+def test_an_exercise_that_needs_a_package_of_the_lesson_says_so(tmp_path):
+    result = in_a_terminal(tmp_path, "exercise 2")
+    assert result.returncode == 1
+    assert "make the package spike_filter first" in result.stderr
+    assert not (tmp_path / "my_workspace").exists()

@@ -159,12 +159,12 @@ def follow_object(path: Path) -> None:
     top.set_ylabel("x, m")
     top.legend(loc="upper right", fontsize=8)
     bottom.plot(time, [each.ranges["front"] for each in moments], color=VEHICLE)
-    for distance, text, at, side in (
-        (0.6, "follows beyond", time[-1], "right"),
-        (0.3, "backs off below", time[-1], "right"),
+    for distance, text, side in (
+        (0.6, "follows beyond", "bottom"),
+        (0.3, "backs off below", "top"),
     ):
         bottom.axhline(distance, color=GREY, ls="--", lw=0.8)
-        bottom.text(at, distance + 0.01, text, fontsize=8, color=GREY, ha=side)
+        bottom.text(time[-1], distance, text, fontsize=8, color=GREY, ha="right", va=side)
     command = [each.command for each in moments]
     for name, colour, is_sent in (
         ("0.3 m/s ahead", "#8fd19e", [v > 0.0 for v in command]),

@@ -76,7 +76,9 @@ def followed(workspace, request, tmp_path_factory):
     """Return the pages to test, each with a future that is done when it has been followed."""
     ports = threading.Lock()
     params = [getattr(item, "callspec", None) for item in request.session.items]
+    # The picture of the graph, if it is tested alone, needs them all.
     chosen = [spec.params["path"] for spec in params if spec and "path" in spec.params]
+    chosen = chosen or PAGES_WITH_COMMANDS
 
     def follow(path):
         page = Page(path)

@@ -271,7 +271,7 @@ class VehicleModel:
             return _FILTER_WORDS[self._filter.state], self._filter.reason
         if self._status.state != FlightStatus.UNKNOWN:
             words = WORDS[self._status.state]
-            reason = self._status.reason or self._filter.reason or self._status.takeoff_refusal
+            reason = self._status.reason or self._filter.reason
             return words, reason
         if driver is not None:
             return driver.text or "connected", driver.link_text

@@ -37,13 +37,14 @@ def free_port():
 
 
 @contextlib.contextmanager
-def chromium():
+def chromium(*arguments):
     """Yield a headless Chromium that draws in software."""
     options = webdriver.ChromeOptions()
     options.binary_location = "/usr/bin/chromium"
     for argument in (
         *("--headless=new", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader"),
         *("--enable-unsafe-swiftshader", "--window-size=1100,800"),
+        *arguments,
     ):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})

@@ -93,6 +93,16 @@ def test_one_escape_is_no_emergency(browser, server):
     assert actions(server) == [(Action.TAKEOFF, ("cf1",))]
 
 
+def test_boxes_show_what_is_chosen(browser):
+    browser.press("All")
+    browser.has("3 of 3 chosen")
+    browser.press("None")
+    browser.choose("cf2")
+    browser.has("1 of 3 chosen")
+    boxes = [browser.find(f"{browser.card(name)} input") for name in ("cf1", "cf2", "cf3")]
+    wait_for(lambda: [each.is_selected() for each in boxes] == [False, True, False], "boxes")
+
+
 def test_a_refusal_is_shown_in_the_words_of_the_service(browser, server):
     server.dashboard.refusals["cf2"] = "battery at 3.05 V; expected at least 3.20 V"
     browser.take_control()
@@ -184,7 +194,7 @@ def test_parameters_right_and_wrong(browser, server):
     browser.has("K/gain is 'much'; expected a number", row)
     assert server.dashboard.gain.value == 0.75
     browser.select("node or vehicle", "cf1")
-    browser.has("300 of 300 parameters; the first 50 are shown")
+    browser.has("300 of 300 parameters; the first 30 are shown")
     browser.enter(".search input", "value123")
     browser.has("1 of 300 parameters")
 

@@ -25,7 +25,8 @@ export default {
 
   methods: {
     choose(vehicle, event) {
-      const add = event.ctrlKey || event.shiftKey || event.target.type === "checkbox";
+      const isBox = event.target.type === "checkbox", add = isBox || event.ctrlKey || event.shiftKey;
+      if (isBox) event.preventDefault();  // The box shows what is chosen, not that it was clicked.
       this.$emit("choose", { name: vehicle.name, add });
     },
     act(vehicle, action, event) {

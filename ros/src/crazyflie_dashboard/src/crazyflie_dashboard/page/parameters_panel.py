@@ -10,7 +10,7 @@ from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils.refusal import RefusalError
 
-MAX_ROWS = 50
+MAX_ROWS = 30
 """Parameters that are shown at once; a search finds the others."""
 
 
@@ -24,7 +24,7 @@ class ParametersPanel:
             self._owner = ui.select([], label="node or vehicle", on_change=self._ask)
             self._owner.props("dense outlined options-dense").classes("number")
             self._search = ui.input("search", on_change=self._build)
-            self._search.props("dense outlined clearable").classes("number search")
+            self._search.props("dense outlined clearable debounce=300").classes("number search")
         self._count = ui.label().classes("hint")
         self._rows = ui.element("div").classes("parameters")
 

@@ -1,7 +1,7 @@
 """Cards of the vehicles, and what the chosen ones can be told."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from nicegui import ui
@@ -23,8 +23,10 @@ class VehiclesPanel:
         self._scene_view = scene_view
         with ui.element("div").classes("tools"):
             self._choice = ui.label().classes("choice")
-            ui.button("All", on_click=lambda: session.choose(session.vehicles)).props("flat dense")
-            ui.button("None", on_click=lambda: session.choose(())).props("flat dense")
+            ui.button("All", on_click=lambda: self._choose_only(session.vehicles)).props(
+                "flat dense"
+            )
+            ui.button("None", on_click=lambda: self._choose_only(())).props("flat dense")
         with ui.element("div").classes("tools"):
             self._button("Take off", self._take_off).props("icon=flight_takeoff color=positive")
             self._height = _number("height, m", 1.0)
@@ -56,6 +58,11 @@ class VehiclesPanel:
 
     def _choose(self, event: GenericEventArguments) -> None:
         self._session.choose([event.args["name"]], event.args["add"])
+        self.refresh(self._session.dashboard.scene())
+
+    def _choose_only(self, names: Iterable[str]) -> None:
+        self._session.choose(names)
+        self.refresh(self._session.dashboard.scene())
 
     async def _act(self, event: GenericEventArguments) -> None:
         details = {}

@@ -1,7 +1,9 @@
 """The pages as Sphinx gets them."""
 
+import subprocess
 import sys
 
+import pytest
 from workspaces import TOP
 
 sys.path.insert(0, str(TOP / "docs" / "site"))
@@ -57,3 +59,18 @@ def test_a_flowchart_is_a_graph():
     assert '"t" -> "s" [label="label"];' in lines
     assert '"t" -> "a" [label=""];' in lines
     assert lines[-3:] == ["}", "```", "after"]
+
+
+# Links are found by test_pages.py; the rest is what Sphinx and the docstrings make of each other.
+@pytest.mark.long
+def test_sphinx_has_no_warning(tmp_path):
+    pytest.importorskip("sphinx", reason="./run docs installs it")
+    folders = ["-c", TOP / "docs" / "site", "-d", tmp_path / "doctrees", TOP, tmp_path / "site"]
+    result = subprocess.run(
+        [sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", *map(str, folders)],
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "site" / "index.html").is_file()

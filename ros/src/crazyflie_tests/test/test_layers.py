@@ -45,7 +45,7 @@ LAYERS = [
         "crazyflie_tools",
         "crazyflie_virtual",
     },
-    {"crazyflie_fleet"},
+    {"crazyflie_dashboard", "crazyflie_fleet"},
     {"crazyflie_demo", "crazyflie_examples", "crazyflie_ranging", "crazyflie_vision"},
     {"crazyflie_mission_api", "uav_trajectory"},
     {"crazyflie", "crazyflie_dev", "crazyflie_py"},

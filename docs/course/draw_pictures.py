@@ -8,7 +8,6 @@ It needs a workspace that is built and sourced, and packages of docs/course/solu
 
 import argparse
 import os
-import subprocess
 import sys
 import tempfile
 import time
@@ -17,17 +16,16 @@ from pathlib import Path
 
 import numpy as np
 import rosgraph
+import rospy
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 from PIL import Image
+from plots import draw_four_vehicles, draw_lanes, draw_main_loop, draw_sweep
+from std_srvs.srv import Empty
 
 from crazyflie_dev.render_rviz import background_of, crop_to_scene
 from crazyflie_dev.virtual_display import screenshot, virtual_display
-from crazyflie_mission_api import DryRun
-from crazyflie_mission_api.group_state import Rules
 from crazyflie_reports.flight_operator import FlightOperator
 from crazyflie_reports.flight_record import FlightRecord
-from crazyflie_reports.node_graph import dot, example_graph
 from crazyflie_utils.main import begin
 from crazyflie_utils.testing.launching import roslaunch
 from crazyflie_utils.testing.programs import running
@@ -72,86 +70,22 @@ def draw_figure_eight(path: Path, log: Path) -> None:
     times = record.state.times
     flying = (times >= record.events["flying"]) & (times <= record.events["land"])
     x, y = record.state.column("x")[flying], record.state.column("y")[flying]
-    figure = Figure(figsize=(5, 3), layout="constrained")
+    seconds = times[flying] - times[flying][0]
+    figure = Figure(figsize=(6.4, 4.0), layout="constrained")
     axes = figure.subplots()
-    axes.plot(y, x)
-    axes.plot(y[0], x[0], "o")
+    path_line = axes.scatter(y, x, c=seconds, s=6, cmap="viridis")
+    figure.colorbar(path_line, label="time since it flies (s)")
+    for second in range(0, 21, 2):
+        k = int(np.searchsorted(seconds, second))
+        axes.plot(y[k], x[k], "k.")
+        axes.annotate(f"{second} s", (y[k], x[k]), (4, 4), textcoords="offset points", fontsize=8)
+        later = min(k + 40, len(x) - 1)
+        arrow = {"arrowstyle": "-|>", "color": "black"}
+        axes.annotate("", (y[later], x[later]), (y[k], x[k]), arrowprops=arrow)
     axes.invert_xaxis()
-    axes.set(xlabel="y (m)", ylabel="x (m)", aspect="equal")
+    axes.set(xlabel="y (m), to the left", ylabel="x (m), ahead", aspect="equal")
+    axes.margins(0.1)
     axes.grid(alpha=0.3)
-    figure.savefig(path, dpi=90)
-
-
-def draw_main_loop(path: Path, _log: Path) -> None:
-    """Draw the nodes and topics of the software example through which the state goes round."""
-    published, subscribed = (
-        [(topic, sorted(MAIN_LOOP & set(nodes))) for topic, nodes in part if topic in LOOP_TOPICS]
-        for part in example_graph()
-    )
-    graph = dot(published, subscribed).replace("rankdir=LR", "rankdir=LR; nodesep=0.1")
-    subprocess.run(
-        ["dot", "-Tpng", "-Gdpi=80", "-o", str(path)], input=graph, text=True, check=True
-    )
-
-
-MAIN_LOOP = {"/simulator", "/state_estimator", "/lqr_controller", "/takeoff_control_filter"}
-LOOP_TOPICS = {"/tf", "/state", "/control/lqr", "/control/final"}
-
-
-def draw_four_vehicles(path: Path, _log: Path) -> None:
-    """Draw where the mission of lesson 12 sends its vehicles, by a dry run."""
-    sys.path.insert(0, str(COURSE / "solutions" / "12" / "four_vehicles" / "src"))
-    from four_vehicles.mission import LIMITS, ROOM, mission
-
-    class Recorder(DryRun):
-        def go_to(self, goals, *arguments, **options):
-            for name, goal in goals.items():
-                ways[name].append(goal)
-            super().go_to(goals, *arguments, **options)
-
-    starts = {f"cf{k + 1}": (k // 2 - 0.5, k % 2 - 0.5, 0.0) for k in range(4)}
-    ways = {name: [start] for name, start in starts.items()}
-    with Recorder(starts, Rules(bounds=ROOM, limits=LIMITS)) as fleet:
-        mission(fleet)
-    figure = Figure(figsize=(4.4, 4.2), layout="constrained")
-    axes = figure.subplots()
-    for k, (name, way) in enumerate(ways.items()):
-        points = np.array(way)[:, :2] * (1.0 - 0.06 * k)  # beside each other, to be told apart
-        axes.plot(*points.T, color=f"C{k}", alpha=0.5)
-        axes.plot(*points[0], "o", color=f"C{k}", label=f"{name}, where it takes off")
-        for p, q in zip(points, points[1:3], strict=False):
-            arrow = {"arrowstyle": "-|>", "color": f"C{k}"}
-            axes.annotate("", 0.4 * p + 0.6 * q, 0.6 * p + 0.4 * q, arrowprops=arrow)
-    axes.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", xlim=(-0.9, 0.9), ylim=(-0.9, 0.9))
-    axes.grid(alpha=0.3)
-    axes.legend(loc="center", fontsize="small")
-    figure.savefig(path, dpi=90)
-
-
-def draw_lanes(path: Path, _log: Path) -> None:
-    """Draw the lanes of lesson 6, and the oscillator's velocity along one of them."""
-    sys.path.insert(0, str(COURSE / "solutions" / "6" / "my_sweep" / "src"))
-    from my_sweep.lanes import corners
-    from my_sweep.oscillator import velocity
-    from my_sweep.sweep_node import AREA, WIDTH
-
-    figure = Figure(figsize=(8, 3.4), layout="constrained")
-    plan, graph = figure.subplots(1, 2)
-    lanes = np.array([(0.0, 0.0), *corners(AREA, WIDTH)])
-    plan.add_patch(Rectangle((-1.5, -1.5), 3.0, 3.0, color="0.93"))
-    arrow = {"arrowstyle": "-|>", "color": "C0"}
-    for p, q in zip(lanes, lanes[1:], strict=False):
-        plan.plot(*zip(p, q, strict=True), color="C0")
-        plan.annotate("", (0.4 * p + 0.6 * q), (0.6 * p + 0.4 * q), arrowprops=arrow)
-    plan.plot(0.0, 0.0, "o", color="C2")
-    plan.annotate("take off", (0.0, 0.0), (6, 6), textcoords="offset points")
-    plan.plot(*lanes[-1], "s", color="C3")
-    plan.annotate("land", lanes[-1], (-30, 8), textcoords="offset points")
-    plan.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="the path, seen from above")
-    x = np.linspace(2.0, 9.0, 100)
-    graph.plot(x, [velocity(value) for value in x])
-    graph.set(xlabel="x of the service", ylabel="vel", title="what the service answers")
-    graph.grid(alpha=0.3)
     figure.savefig(path, dpi=90)
 
 
@@ -224,20 +158,6 @@ def draw_scene(path: Path, log: Path, arguments: list[str], config: Path, fly: C
     image.quantize(COLOURS).save(path, optimize=True)
 
 
-def draw_sweep(path: Path, log: Path) -> None:
-    """Draw a sweep when about half of the area is covered."""
-    package = COURSE.parents[1] / "ros/src/crazyflie_tutorials/crazyflie_sweep"
-
-    def fly():
-        operator = operate()
-        operator.hover(35.0)
-        time.sleep(3.0)
-        return operator
-
-    arguments = ["crazyflie_sweep", "sweep.launch"]
-    draw_scene(path, log, arguments, package / "launch" / "sweep.rviz", fly)
-
-
 def draw_pole(path: Path, log: Path) -> None:
     """Draw the circle around the pole."""
 
@@ -252,12 +172,51 @@ def draw_pole(path: Path, log: Path) -> None:
     draw_scene(path, log, arguments, COURSE / "launch" / "pole.rviz", fly)
 
 
+def draw_rviz_panel(path: Path, log: Path) -> None:
+    """Draw the whole window of RViz, with the panel of the displays."""
+    with virtual_display(*SCREEN) as display:
+        os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
+        config = COURSE / "launch" / "pole.rviz"
+        with roslaunch(
+            ["crazyflie_teleop", "circle.launch", f"config:={config}", "rviz:=true", *QUICK], log
+        ):
+            operator = operate()
+            with running("rosrun", "pole", "pole_node"):
+                operator.hover(25.0)
+                time.sleep(5.0)
+                window = screenshot(display)
+            operator.land()
+    Image.fromarray(window).resize((1050, 675)).quantize(128).save(path, optimize=True)
+
+
+def draw_swarm(path: Path, log: Path) -> None:
+    """Draw nine vehicles that hover, from so near that they can be seen."""
+    fleet_view = COURSE.parents[1] / "ros/src/crazyflie_fleet/config/fleet.rviz"
+    near = log.with_name("near.rviz")
+    near.write_text(fleet_view.read_text().replace("Distance: 7", "Distance: 2.3"))
+    arguments = ["crazyflie_examples", "sw_swarm.launch", "n:=9", "spacing:=0.5", *QUICK[:2]]
+    with virtual_display(*SCREEN) as display:
+        os.environ.update(DISPLAY=display, LIBGL_ALWAYS_SOFTWARE="1")
+        with roslaunch([*arguments, "rviz:=true", f"config:={near}"], log):
+            wait_for_service("/all/takeoff")
+            rospy.init_node("draw_swarm")
+            rospy.ServiceProxy("/all/takeoff", Empty)()
+            time.sleep(10.0)
+            scene = crop_to_scene(screenshot(display), background_of(near))
+            rospy.ServiceProxy("/all/land", Empty)()
+    image = Image.fromarray(scene)
+    image.thumbnail((900, 700))
+    image.quantize(COLOURS).save(COURSE.parent / "images" / path.name, optimize=True)
+
+
 PICTURES = {
     "figure_eight": draw_figure_eight,
     "four_vehicles": draw_four_vehicles,
     "lanes": draw_lanes,
     "main_loop": draw_main_loop,
+    "rviz_panel": draw_rviz_panel,
     "sweep": draw_sweep,
+    "sw_swarm": draw_swarm,
     "pole": draw_pole,
     "steps": draw_steps,
 }
@@ -273,7 +232,7 @@ def main() -> int:
             with tempfile.TemporaryDirectory() as folder:
                 picture = COURSE / "images" / f"{name}.png"
                 PICTURES[name](picture, Path(folder) / "roslaunch.log")
-                print(f"{picture}: {picture.stat().st_size / 1000:.0f} kB", flush=True)
+                print(picture, flush=True)
             os._exit(0)
         status |= os.wait()[1]
     return int(status != 0)

@@ -1,4 +1,7 @@
 # How every terminal of the course begins: source docs/course/setup.bash
+case $(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd) in
+  *[[:space:]]*) echo "catkin cannot build in a path with a space; move the workspace to one without" >&2; return 1 ;;
+esac
 # It knows the workspace, and what is built in ~/my_workspace.
 COURSE=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 if ! source "$COURSE/../../ros/devel/setup.bash"; then

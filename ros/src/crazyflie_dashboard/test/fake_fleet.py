@@ -105,9 +105,9 @@ class FakeFleet:
         self.process.advance(2.1)
         self.send_poses()
 
-    def report(self, name, state, reason=""):
+    def report(self, name, state, reason="", takeoff_refusal=""):
         """Publish the state of a flight."""
-        message = FlightStatus(state=state, reason=reason)
+        message = FlightStatus(state=state, reason=reason, takeoff_refusal=takeoff_refusal)
         self.process.publish(f"/{name}/{STATUS}", message)
         self.process.advance(0.05)
 

@@ -14,7 +14,7 @@ from selenium.webdriver.common.keys import Keys
 from crazyflie_dashboard.access import Access
 from crazyflie_dashboard.page import open_page
 
-LONGEST_WAIT = 30.0
+LONGEST_WAIT = 60.0
 """s, for what a loaded machine does in one."""
 
 
@@ -146,11 +146,11 @@ class Browser:
 
 
 class Server:
-    """The page of a `FakeDashboard`."""
+    """The page of a dashboard, of a `FakeDashboard` by default."""
 
-    def __init__(self, token=""):
+    def __init__(self, dashboard=None, token=""):
         self.port = free_port()
-        self.dashboard = FakeDashboard()
+        self.dashboard = dashboard or FakeDashboard()
         access = Access("127.0.0.1", self.port, token)
-        self.url = f"http://127.0.0.1:{self.port}/"
+        self.url = access.url
         self.page = open_page(self.dashboard, access, "127.0.0.1", self.port)

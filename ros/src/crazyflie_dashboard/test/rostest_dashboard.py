@@ -12,6 +12,7 @@ import rosgraph
 from crazyflie_dashboard import master
 from crazyflie_dashboard.control import ControlError
 from crazyflie_dashboard.dashboard import Command
+from crazyflie_dashboard.dashboard_node import example_folders
 from crazyflie_dashboard.live_dashboard import LiveDashboard
 from crazyflie_dashboard.snapshot import Action, Kind
 from crazyflie_utils.main import ros_process
@@ -27,7 +28,10 @@ def dashboard():
     process = ros_process()
     handle = process.handle("/dashboard")
     found = LiveDashboard(
-        handle, partial(master.read, "/dashboard"), partial(master.is_answering, "/dashboard"), []
+        handle,
+        partial(master.read, "/dashboard"),
+        partial(master.is_answering, "/dashboard"),
+        example_folders(),
     )
     process.start()
     yield found
@@ -108,6 +112,18 @@ def test_vehicles_fly_and_land(dashboard, operator):
     assert dashboard.scene().vehicles["cf1"].control.thrust == pytest.approx(9.81, abs=3.0)
     assert command(dashboard, operator, Action.LAND) == dict.fromkeys(NAMES, "")
     wait_until(lambda: all(height(dashboard, n) < 0.05 for n in NAMES), "all down", LIMIT)
+
+
+def test_a_trajectory_is_rehearsed_flown_and_stopped(dashboard, operator):
+    (mission,) = [each for each in dashboard.mission_files() if each.title == "figure8.csv"]
+    result = dashboard.dry_run(operator, mission, ("cf2",)).result(LIMIT)
+    assert result.passed, result.text
+    wait_until(lambda: len(dashboard.scene().paths.get("cf2", ())) > 20, "its path", LIMIT)
+    end = dashboard.fly(operator, mission, ("cf2",), time.monotonic())
+    wait_until(lambda: height(dashboard, "cf2") > 0.5, "cf2 in the air", LIMIT)
+    dashboard.stop_mission(operator, time.monotonic()).result(LIMIT)
+    assert end.result(LIMIT) == ""
+    assert height(dashboard, "cf2") < 0.1
 
 
 def test_fields_of_topics_are_plotted(dashboard, page):

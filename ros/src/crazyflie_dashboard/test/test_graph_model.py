@@ -32,6 +32,13 @@ def test_states_are_words_with_their_reason(fleet):
     assert not fleet.vehicles["cf2"].is_in_flight
 
 
+def test_why_a_takeoff_is_refused_is_said_on_the_ground(fleet):
+    fleet.report("cf1", FlightStatus.ON_GROUND, takeoff_refusal="the battery is low")
+    assert fleet.vehicles["cf1"].reason == "the battery is low"
+    fleet.report("cf1", FlightStatus.FLYING, takeoff_refusal="the vehicle is in flight")
+    assert fleet.vehicles["cf1"].reason == ""
+
+
 def test_one_of_three_is_stale(fleet):
     for _ in range(20):
         fleet.send_poses(["cf1", "cf2"])

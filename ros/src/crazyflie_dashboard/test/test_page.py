@@ -1,5 +1,9 @@
 """The page in headless Chromium, with vehicles that are only numbers."""
 
+import threading
+from functools import partial
+from http.server import HTTPServer, SimpleHTTPRequestHandler
+
 import pytest
 from fake_dashboard import vehicle
 from pages import Browser, Server, chromium, wait_for
@@ -158,10 +162,10 @@ def test_a_click_that_has_waited_moves_nothing(browser, server, driver):
     browser.take_control()
     browser.choose("cf1")
     # A click waits while the browser is busy.
-    button = "[...document.querySelectorAll('button')].find((each) => each.innerText.includes('Take off'))"
     driver.execute_script(
-        f"const b = {button}, event = new MouseEvent('click', {{ bubbles: true }});"
-        "setTimeout(() => b.dispatchEvent(event), 1500)"
+        "const event = new MouseEvent('click', { bubbles: true });"
+        "setTimeout(() => arguments[0].dispatchEvent(event), 1500)",
+        browser.button("Take off"),
     )
     browser.has("s old")
     assert server.dashboard.commands == []
@@ -212,6 +216,27 @@ def test_messages_and_plots(browser):
     browser.press("Stop")
     browser.has("height, m", ".q-table")
     browser.has("0.599", ".q-table")  # The height has risen by so much.
+
+
+HOSTILE = """<script>
+const seen = [], url = "127.0.0.1:PORT/_nicegui_ws/socket.io/?EIO=4&transport=";
+const socket = new WebSocket("ws://" + url + "websocket");
+socket.onopen = () => seen.push("open");
+socket.onclose = () => fetch("http://" + url + "polling").then(
+  () => seen.push("answer"), () => {}).finally(() => { document.title = "tried:" + seen; });
+</script>"""
+
+
+def test_a_hostile_page_in_the_same_browser_opens_no_websocket(browser, server, driver, tmp_path):
+    (tmp_path / "index.html").write_text(HOSTILE.replace("PORT", str(server.port)))
+    files = partial(SimpleHTTPRequestHandler, directory=tmp_path)
+    with HTTPServer(("127.0.0.1", 0), files) as other:
+        threading.Thread(target=other.serve_forever, daemon=True).start()
+        driver.get(f"http://127.0.0.1:{other.server_port}/")
+        wait_for(lambda: driver.title.startswith("tried:"), "the attack")
+        assert driver.title == "tried:"
+        other.shutdown()
+    driver.get_log("browser")
 
 
 def test_an_old_browser_is_told_so(browser, driver, server):

@@ -5,13 +5,19 @@ import math
 import numpy as np
 import pytest
 
-from crazyflie_dev.demo import EIGHT_DURATION, HOVER, eight
+from crazyflie_dev.demo import EIGHT_DURATION, HOVER, eight, say_if_busy
 
 
 def position(moment):
     """Return x, y, z at a time since the begin of the figure."""
     reference = eight(moment)
     return np.array([reference.x, reference.y, reference.z])
+
+
+@pytest.mark.parametrize(("load", "is_busy"), [(1.9, False), (2.1, True)])
+def test_a_busy_computer_is_said(load, is_busy, capsys):
+    say_if_busy(load, processors=2)
+    assert ("too busy: 2.1 programs" in capsys.readouterr().err) == is_busy
 
 
 @pytest.mark.parametrize(("moment", "yaw"), [(0.0, 0.0), (EIGHT_DURATION, 2.0 * math.pi)])

@@ -44,7 +44,7 @@ def test_is_a_good_flight(record):
 def test_calls_out_of_place_are_refused(flight):
     land_on_ground, takeoff_in_flight, land_again = flight[1]
     assert "ground" in land_on_ground
-    assert "flying" in takeoff_in_flight
+    assert "in flight; land first" in takeoff_in_flight
     assert "ground" in land_again
 
 

@@ -73,6 +73,8 @@ def landed(tracks):
     return all(track[-1][2] < 0.05 for track in tracks.values())
 
 
+# test_dry_run.py flies such a script, and test_landing.py kills one.
+@pytest.mark.long
 def test_the_script_of_the_readme(tmp_path):
     text = re.search(r"```python\n(.*?)```", (PACKAGE / "README.md").read_text(), re.S).group(1)
     with recorded(["cf1", "cf2"]) as tracks:
@@ -119,6 +121,7 @@ with Fleet(["cf1", "cf2"]) as fleet:
 """
 
 
+@pytest.mark.long
 def test_the_fleet_lands_the_vehicles_of_a_script_that_is_killed(tmp_path):
     with recorded(["cf1", "cf2"]) as tracks, script(written(tmp_path, KILLED)) as process:
         try:

@@ -4,6 +4,7 @@ import pytest
 from fake_fleet import fake_process
 from fake_vehicles import ControllerVehicle, DriverVehicle
 
+from crazyflie_driver.srv import StartTrajectory, StartTrajectoryResponse
 from crazyflie_mission_api import Bounds, Fleet, MissionError, plan
 
 NAMES = ["cf1", "cf2"]
@@ -184,6 +185,31 @@ def test_vehicles_behind_the_driver_do_not_begin_at_the_same_moment(process):
         fleet.dry_run(mission)
     with pytest.raises(MissionError, match=text), fleet:
         mission(fleet)
+
+
+def test_all_vehicles_of_a_driver_start_by_its_service_for_all(process):
+    vehicles = [DriverVehicle(process, f"cf{k}", (k - 1.0, 0.0, 0.0)) for k in (1, 2)]
+    handle = process.handle("/this_process")
+    requests = []
+
+    def answer(request):
+        requests.append(request)
+        return StartTrajectoryResponse()
+
+    for name in ("start_trajectory", "go_to"):
+        handle.advertise_service(f"~all/{name}", StartTrajectory, answer)
+    path = plan([(0, 0, 1), (0.2, 0, 1)])
+    with Fleet(NAMES, process=process, startup_timeout=0.5) as fleet:
+        fleet.takeoff(1.0)
+        for vehicle in vehicles:
+            vehicle.position[0] += 0.2
+        fleet.follow(path, relative=True)
+        (request,) = requests
+        assert (request.trajectoryId, request.relative, request.timescale) == (0, False, 1.0)
+        assert "start_trajectory" not in vehicles[0].called() + vehicles[1].called()
+        fleet["cf1"].follow(path, relative=True)
+        assert vehicles[0].called()[-1] == "start_trajectory"
+        assert len(requests) == 1
 
 
 def test_a_fence_counts(process, controlled, driven):

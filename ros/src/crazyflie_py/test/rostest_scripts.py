@@ -39,6 +39,8 @@ def test_nice_hover():
     assert lands(track)
 
 
+# What these examples call is tested without a master; one flight and its ends remain.
+@pytest.mark.long
 def test_groups():
     track = fly("group_mask.py")
     assert track[0, :, 2] == pytest.approx([1.0, 0.0], abs=NEAR)
@@ -47,17 +49,20 @@ def test_groups():
     assert lands(track)
 
 
+@pytest.mark.long
 def test_trajectories():
     track = fly("multi_trajectory.py")
     assert track[1] == pytest.approx(track[0] + [0.8, 0.0, 0.0], abs=NEAR)
     assert track[2] == pytest.approx(track[0], abs=NEAR)
 
 
+@pytest.mark.long
 def test_swap():
     track = fly("swap.py")
     assert track[1, :, :2] == pytest.approx(track[0, ::-1, :2], abs=NEAR)
 
 
+@pytest.mark.long
 def test_setpoints():
     # A figure eight, and back to where it began.
     track = fly("full_state.py")[:, 0]

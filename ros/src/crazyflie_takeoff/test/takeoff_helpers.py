@@ -14,7 +14,7 @@ from crazyflie_msgs.msg import (
 from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNode
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils.node import Node
-from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing.fake_graph import FakeGraph
 
 GRAVITY = 9.81
 
@@ -158,63 +158,34 @@ class ControllerNode(Node):
             self._control.publish(control(thrust))
 
 
-class Network:
-    """Nodes in fake processes of their own, connected as on a ROS master.
+class Network(FakeGraph):
+    """Processes that remember what they have said; their names are those of their nodes."""
 
-    They share the parameter server. Messages on the topics in ``unheard``, (name, topic), do not
-    reach the process of this name.
-
-    All live by one clock. A process can be killed at any moment, and another
-    one be started in its place, which is told what is latched by those alive.
-    """
-
-    LATCHED = ("/ref", "/in_flight_state", "/in_flight_flight_status", "/in_flight_filter_status")
     TICK = 0.01
 
     def __init__(self):
-        self.time = 100.0
+        super().__init__({})
         self.heard = []
-        self.unpublished = set()
-        self.unheard = set()
-        self.parameters = {}
-        self._processes = {}
-        self._sent = {}
 
     def start(self, name, node, parameters=None):
         """Start a node in a process of its own; return the node."""
-        process = FakeProcess(start=self.time)
-        process.transport.unpublished |= self.unpublished
-        process.transport.parameters = self.parameters
-        assert process.launch(node, f"/{name}", parameters), process.logged("error")
-        for other in self._processes.values():
-            for topic in self.LATCHED:
-                outlet = other.transport.publishers.get(topic)
-                if outlet and outlet.messages and topic in process.transport.subscribers:
-                    process.publish(topic, outlet.messages[-1])
-        self._processes[name] = process
-        self._sent[name] = {}
-        self._exchange()
+        for key, value in (parameters or {}).items():
+            self._parameters[f"/{name}/{key}"] = value
+        super().start(f"/{name}", node)
         return node
 
     def kill(self, name):
         """End a process without a word."""
-        del self._processes[name]
+        super().kill(f"/{name}")
 
     def call(self, service):
-        """Call a service of the server."""
-        return self._processes["server"].call(service, EmptyRequest())
+        """Call a service; return a future if it takes time."""
+        answer = super().call(service, EmptyRequest())
+        return answer.result() if answer.done() else answer
 
     def process(self, name):
         """Return a process."""
-        return self._processes[name]
-
-    def advance(self, duration):
-        """Let time pass, s."""
-        for _ in range(round(duration / self.TICK)):
-            self.time += self.TICK
-            for process in list(self._processes.values()):
-                process.advance(self.time - process.clock.time())
-                self._exchange()
+        return self._processes[f"/{name}"]
 
     def advance_until(self, condition, limit=30.0):
         """Let time pass until a condition holds."""
@@ -223,34 +194,26 @@ class Network:
             assert self.time < end, "the condition never came true"
             self.advance(self.TICK)
 
+    def subscribes(self, topic, besides):
+        """Return that all topics are listened to, as by rosbag."""
+        return True
+
+    def send(self, name, topic, message, latch):
+        """Send a message of a process, and remember it."""
+        self.heard.append((self.time, name, topic, message))
+        super().send(name, topic, message, latch)
+
     def on(self, topic, since=0.0):
         """Return what was said on a topic after a moment, as (time, message)."""
-        return [(time, m) for time, name, m in self.heard if name == topic and time > since]
+        return [(time, m) for time, _, name, m in self.heard if name == topic and time > since]
 
     def last(self, topic):
         """Return the last text on a topic."""
         return self.on(topic)[-1][1].data
 
-    def _exchange(self):
-        moved = True
-        while moved:
-            moved = False
-            for name, process in list(self._processes.items()):
-                for topic, outlet in process.transport.publishers.items():
-                    first = self._sent[name].get(topic, 0)
-                    self._sent[name][topic] = len(outlet.messages)
-                    for message in outlet.messages[first:]:
-                        moved = True
-                        self.heard.append((self.time, topic, message))
-                        self._deliver(process, topic, message)
-
-    def _deliver(self, sender, topic, message):
-        names = {id(process): name for name, process in self._processes.items()}
-        message._connection_header = {"callerid": f"/{names[id(sender)]}", "topic": topic}
-        for name, other in self._processes.items():
-            if other is not sender and topic in other.transport.subscribers:
-                if (name, topic) not in self.unheard:
-                    other.publish(topic, message)
+    def last_of(self, name, topic):
+        """Return the last message of a process on a topic."""
+        return [m for _, by, at, m in self.heard if (by, at) == (f"/{name}", topic)][-1]
 
 
 class HoverNetwork(Network):

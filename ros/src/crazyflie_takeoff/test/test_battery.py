@@ -121,15 +121,14 @@ def test_diagnostics(network):
     network.kill("controller")
     network.advance(4.0)
     for name in ("server", "filter"):
-        status = network.process(name).published("/diagnostics")[-1].status[0]
+        status = network.last_of(name, "/diagnostics").status[0]
         assert status.name == name
         assert status.level == 2
         assert "no control came for 3.1 s" in status.message
     until_on_ground(network)
     network.advance(1.0)
     levels = [
-        network.process(name).published("/diagnostics")[-1].status[0].level
-        for name in ("server", "filter")
+        network.last_of(name, "/diagnostics").status[0].level for name in ("server", "filter")
     ]
     assert levels == [1, 0]
 

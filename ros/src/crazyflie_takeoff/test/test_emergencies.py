@@ -22,7 +22,7 @@ G = 9.81
 def test_emergency_stops_at_once_and_stays(network):
     called = network.time
     network.process("filter").call("/emergency", EmptyRequest())
-    assert network.process("filter").published("/control/final")[-1].control.thrust == 0.0
+    assert network.last_of("filter", "/control/final").control.thrust == 0.0
     network.advance(3.0)
     assert network.vehicle.z == 0.0
     assert set(thrusts(network, called)) == {0.0}

@@ -50,7 +50,6 @@ def test_a_short_loss_changes_nothing(network):
 
 def test_the_controller_dies(network):
     network.kill("controller")
-    network.process("filter").transport.unpublished.add("/control/lqr")
     until_on_ground(network)
     assert network.vehicle.touchdown_speed < 0.6
     assert states(network)[-2:] == ["landing", "on_ground"]
@@ -104,13 +103,12 @@ def test_a_filter_that_is_to_hold_at_once_flies_all_the_same():
     network.advance(5.0)
     assert network.last("/in_flight_state") == "flying"
     assert network.vehicle.z == pytest.approx(1.0, abs=0.01)
-    figures = network.process("filter").published("/diagnostics")[-1].status[0].values
+    figures = network.last_of("filter", "/diagnostics").status[0].values
     assert {each.key: each.value for each in figures}["takeovers"] == "0"
 
 
 def test_a_frozen_controller_keeps_takeoff_refused_until_it_speaks(network):
-    """It is still connected, as a process that was stopped is."""
-    network.kill("controller")
+    network.freeze("/controller")
     until_on_ground(network)
     network.advance(1.0)
     with pytest.raises(ServiceError, match="no commanded controls come"):
@@ -199,7 +197,7 @@ def test_the_pose_is_lost_in_a_landing(network):
 
 def test_takeoff_without_a_controller_that_follows():
     network = HoverNetwork(SERVER)
-    network.kill("controller")
+    network.freeze("/controller")
     network.advance(0.5)
     future = network.call("/takeoff")
     network.advance_until(future.done, 4.0)

@@ -28,7 +28,6 @@ def test_server_with_a_foreign_filter_in_flight():
 def test_filter_with_a_foreign_server():
     """Toggles alone decide, and a restart in flight costs the time of listening."""
     network = Network()
-    network.unpublished.add("/in_flight_flight_status")
     network.start("filter", TakeoffControlFilterNode(), FILTER)
     process = network.process("filter")
     for _ in range(50):

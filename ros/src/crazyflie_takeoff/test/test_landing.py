@@ -44,7 +44,7 @@ def test_a_landing_whose_states_do_not_reach_the_server(network, gap):
     """The controller sees, and flies what is asked for."""
     land = network.call("/land")
     network.advance(1.0)
-    network.unheard.add(("server", "/state"))
+    network.unheard.add(("/server", "/state"))
     network.advance_until(land.done, gap) if gap > 8.0 else network.advance(gap)
     network.unheard.clear()
     network.advance_until(land.done)
@@ -57,7 +57,7 @@ def test_a_height_that_is_old_is_no_touchdown(network):
     """Such as one that has waited in a socket: the vehicle stood on the ground then."""
     network.call("/land")
     network.advance(0.5)
-    network.unheard.add(("server", "/state"))
+    network.unheard.add(("/server", "/state"))
     server = network.process("server")
     for _ in range(100):
         server.publish("/state", state(0.0, stamp=server.clock.stamp(network.time - 2.0)))
@@ -69,7 +69,7 @@ def test_a_height_that_is_old_is_no_touchdown(network):
 
 
 def test_a_landing_that_begins_while_no_states_reach_the_server(network):
-    network.unheard.add(("server", "/state"))
+    network.unheard.add(("/server", "/state"))
     network.advance(5.0)
     land = network.call("/land")
     network.advance_until(land.done)

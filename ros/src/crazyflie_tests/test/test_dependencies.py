@@ -19,6 +19,9 @@ from xml.etree import ElementTree
 import pytest
 from workspaces import TOP
 
+from crazyflie_doctor.computer import package_sections
+from crazyflie_utils.testing.launch_files import composed_nodes, expand
+
 ROS = TOP / "ros"
 SOURCES = ROS / "src"
 SHARE = Path("/usr/share")
@@ -36,12 +39,11 @@ def output(*command):
 
 
 @functools.cache
-def installed_by_the_list():
-    """Return the Debian packages that ros/debian.txt brings: those in it, and what they need."""
-    text = output(
-        *("apt-cache", "depends", "--recurse", "--important", "--installed"),
-        *lines(ROS / "debian.txt"),
-    )
+def installed_by_the_list(*sections):
+    """Return the Debian packages that sections of ros/debian.txt bring, by default all of them."""
+    listed = package_sections("debian.txt")
+    packages = [package for name in sections or listed for package in listed[name]]
+    text = output("apt-cache", "depends", "--recurse", "--important", "--installed", *packages)
     return {line.strip() for line in text.splitlines() if not line.startswith((" ", "<", "|"))}
 
 
@@ -128,11 +130,13 @@ MODULES = sorted(imports() - OWN_MODULES - own_packages())
 @pytest.mark.parametrize("name", SYSTEM_PACKAGES)
 def test_packages_of_launch_files_and_manifests_are_in_the_list(name):
     # It is a ROS package, with a manifest or with messages only, or one of Debian's, or PyPI's.
+    # The manifest may be in a -dev package that is installed for something else, as ros-core is.
     manifest = SHARE / name / "package.xml"
-    if manifest.exists():
-        assert owner(manifest) in installed_by_the_list()
-    elif importlib.util.find_spec(name):
-        assert owner(debian_file(name)) in installed_by_the_list()
+    owners = {owner(manifest)} if manifest.exists() else set()
+    if importlib.util.find_spec(name):
+        owners.add(owner(debian_file(name)))
+    if owners:
+        assert owners & installed_by_the_list()
     else:
         pip_name = re.sub("^python3-|-pip$", "", name)
         assert OF_DEBIAN.get(name, name) in installed_by_the_list() or pip_name in locked_versions()
@@ -154,6 +158,40 @@ def test_programs_are_in_the_list(program):
     assert path, f"{program} is not installed"
     base = {"git"}  # There is no clone without it.
     assert program in base or owner(Path(path).resolve()) in installed_by_the_list()
+
+
+FLIGHTS = {
+    "sw_controller": (["demo"], ["crazyflie_dev.demo"]),
+    "virtual_hw_hover": (
+        ["demo", "vehicles"],
+        ["crazyflie_driver.server_node", "crazyflie_virtual.server_node"],
+    ),
+    "sw_swarm": (
+        ["demo", "vehicles"],
+        ["crazyflie_dev.mission", "crazyflie_dev.mission_script", "crazyflie_fleet.fleet_process"],
+    ),
+}
+"""A launch file -> sections of debian.txt that suffice, modules of the flight beside its nodes."""
+
+
+@pytest.mark.parametrize("flight", FLIGHTS)
+def test_a_flight_needs_no_other_section(flight):
+    sections, programs = FLIGHTS[flight]
+    brought = installed_by_the_list(*sections)
+    launch_file = SOURCES / "crazyflie_examples" / "launch" / f"{flight}.launch"
+    composed = {} if flight == "sw_swarm" else {"composed": True}
+    nodes, parameters = expand(launch_file, rviz=False, record=True, **composed)
+    for package in {node.package for node in nodes.values()} - own_packages():
+        assert owner(SHARE / package / "package.xml") in brought
+    # A module that is None in sys.modules is one that is not installed.
+    absent = [m for m in MODULES if (file := debian_file(m)) and owner(file) not in brought]
+    assert {"cv2", "llvmlite", "pytest"} <= set(absent)
+    modules = {path.partition(":")[0] for path in composed_nodes(parameters).values()}
+    output(
+        *(sys.executable, "-c"),
+        f"import importlib, sys; sys.modules.update(dict.fromkeys({absent}))\n"
+        f"for name in {[*programs, *modules]}: importlib.import_module(name)",
+    )
 
 
 def locked_versions():

@@ -98,14 +98,18 @@ def test_defaults(tmp_path, entry):
 
 
 @pytest.mark.parametrize("path", RECORDABLE, ids=lambda path: path.name)
-def test_a_flight_is_recorded_if_asked(path):
+def test_what_is_beside_a_flight_is_started_once_if_asked(path):
     given = {
         arg.get("name"): "given"
         for arg in ElementTree.parse(path).getroot().findall("arg")
         if not {"default", "value"} & set(arg.keys())
     }
-    nodes, _ = launch_files.expand(path, **given, record="true")
-    assert [name for name in nodes if name.endswith("/recorder")] == ["/recorder"]
+    beside = {"/recorder": "record", "/dashboard": "dashboard"}
+    if path.name == "record.launch":
+        del beside["/dashboard"]
+    nodes, _ = launch_files.expand(path, **given, **dict.fromkeys(beside.values(), "true"))
+    found = [name for name in nodes if name.endswith(("/recorder", "/dashboard"))]
+    assert sorted(found) == sorted(beside)
 
 
 @pytest.mark.parametrize("entry", DOCUMENTED)

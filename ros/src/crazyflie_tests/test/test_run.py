@@ -1,6 +1,7 @@
 """The script ``run``: its words, and what ``./run test`` says and returns when tests fail."""
 
 import re
+import shutil
 import subprocess
 
 import pytest
@@ -71,6 +72,19 @@ def test_what_cannot_be_tested_is_said(run_test, argument, complaint):
     status, printed = run_test(argument)
     assert status == 1
     assert complaint in printed
+
+
+@pytest.mark.parametrize("command", ["./run demo", "source setup.bash"])
+def test_a_path_with_a_space_is_refused(command, tmp_path):
+    folder = tmp_path / "a workspace"
+    folder.mkdir()
+    for file in ("run", "docs/course/setup.bash"):
+        shutil.copy(TOP / file, folder)
+    result = subprocess.run(
+        ["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=10
+    )
+    assert result.returncode == 1
+    assert "catkin cannot build in a path with a space" in result.stderr
 
 
 def test_words_used_elsewhere_exist():

@@ -8,6 +8,7 @@ import struct
 from typing import Any
 
 import numpy as np
+import pytest
 from swarm_scenes import RATE
 from test_single_markers import VirtualCameras
 
@@ -75,6 +76,8 @@ class Swarm:
         self.command("<BB??5f", 12, 0, False, False, x, y, 1.0, 0.0, duration)
 
 
+# test_single_markers.py moves them without flying.
+@pytest.mark.long
 def test_twenty_virtual_vehicles_exchange_their_places():
     n = 20
     swarm = Swarm(n)

@@ -37,17 +37,11 @@ class ArrayProgram:
     ) -> None:
         """Fly a group.
 
-        Parameters
-        ----------
-        memory : ndarray, shape (sum of memory_dims, lanes)
-            At the beginning; replaced by that at the end.
-        parameters : ndarray, shape (sum of parameter_dims, lanes)
-        noise_samples : ndarray, shape (ticks, NOISE_DIM, lanes)
-        record : ndarray, shape (ticks or 1, sum of memory_dims, lanes)
-            Replaced by the memory of every tick, when its controls have been given; with one
-            row, by that of the last tick.
-        slots : int
-            The longest delay, in ticks, and 1.
+        ``memory``, shape (sum of memory_dims, lanes), is replaced by that at the end. The noise
+        samples have the shape (ticks, NOISE_DIM, lanes). ``record``, shape (ticks or 1, sum of
+        memory_dims, lanes), is replaced by the memory of every tick, when its controls have been
+        given; with one row, by that of the last tick. ``slots`` is the longest delay, in ticks, and
+        1.
         """
         plan, dims = self._plan, self._plan.memory_dims()
         values = flight.components(parameters, plan.parameter_dims())

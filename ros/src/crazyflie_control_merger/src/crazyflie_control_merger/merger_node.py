@@ -28,19 +28,12 @@ class MergerNode(Node):
     """Publish each regular control with the prioritised one mixed in.
 
     A subclass names its prioritised control in class attributes and implements `split`.
-
-    Attributes
-    ----------
-    prioritized_type : type
-        Stamped message with a field ``control``.
-    entries : tuple of int
-        Entries of the control that it decides on.
     """
 
     needed_in_flight = True
 
-    prioritized_type: type[genpy.Message]
-    entries: tuple[int, ...] = ALL_ENTRIES
+    prioritized_type: type[genpy.Message]  #: Stamped message with a field ``control``.
+    entries: tuple[int, ...] = ALL_ENTRIES  #: Entries of the control that it decides on.
 
     def split(self, prioritized: genpy.Message) -> tuple[ArrayLike, float]:
         """Return the control, shape (len(entries),), and priority of a message's ``control``."""

@@ -11,12 +11,10 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 MERGE = "MERGE"
 LQR = "LQR"
 PRIORITIZED = "PRIORITIZED"
-MODES = (MERGE, LQR, PRIORITIZED)
-"""How much of the prioritised control: its priority, none, all."""
+MODES = (MERGE, LQR, PRIORITIZED)  #: How much of the prioritised control: its priority, none, all.
 
 ALL_ENTRIES = (0, 1, 2, 3)
-NO_YAW_ENTRIES = (0, 1, 3)
-"""Entries of the control that the prioritised controller decides on."""
+NO_YAW_ENTRIES = (0, 1, 3)  #: Entries of the control that the prioritised controller decides on.
 
 
 class Merger:

@@ -1,7 +1,10 @@
 """ROS interface of the dashboard."""
 
+import contextlib
 from functools import partial
+from pathlib import Path
 
+import rospkg
 from typing_extensions import override
 
 from crazyflie_dashboard import master
@@ -23,7 +26,7 @@ class DashboardParameters(Parameters):
     )
     folders: str = parameter(
         Text(may_be_empty=True),
-        "with mission scripts and trajectories (CSV), one colon between two",
+        "with missions and trajectories (CSV), one colon between two; empty for the examples",
         "",
     )
 
@@ -43,12 +46,14 @@ class DashboardNode(Node):
 
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
-        folders = [path for path in self._parameters.folders.split(":") if path]
+        folders = [
+            path for path in self._parameters.folders.split(":") if path
+        ] or example_folders()
         self._dashboard = LiveDashboard(
             handle,
             lambda: master.read(handle.name),
             partial(master.is_answering, handle.name),
-            folders,
+            folders or example_folders(),
         )
         # NiceGUI takes a second to import: not for what only reads the parameters' declaration.
         from crazyflie_dashboard.page import open_page
@@ -63,3 +68,13 @@ class DashboardNode(Node):
     def shutdown(self) -> None:
         self._page.close()
         self._dashboard.close()
+
+
+def example_folders() -> list[str]:
+    """Return the folders of what this workspace has to fly, as far as it is installed."""
+    packages = rospkg.RosPack()
+    folders = []
+    for package, folder in (("crazyflie_mission_api", "examples"), ("crazyflie_demo", "data")):
+        with contextlib.suppress(rospkg.ResourceNotFound):
+            folders.append(str(Path(packages.get_path(package)) / folder))
+    return folders

@@ -14,8 +14,8 @@ from pathlib import Path
 from crazyflie_dashboard.dashboard import DryRunResult, MissionFile
 from crazyflie_utils.refusal import RefusalError
 
-RESULT = "dry run: "
-"""Before the result of a dry run, as JSON, in a line of its output."""
+_RESULT = '{"dry_run": '
+"""How the line with the result of `crazyflie_mission_api.mission_runner` begins."""
 
 _DRY_RUN_TIMEOUT = 60.0
 """s."""
@@ -69,7 +69,7 @@ class Missions:
     def dry_run(self, mission: MissionFile, vehicles: tuple[str, ...]) -> "Future[DryRunResult]":
         """Fly a mission with ideal vehicles."""
         result: Future[DryRunResult] = Future()
-        module = "-m", "crazyflie_dashboard.mission_runner", "dry_run"
+        module = "-m", "crazyflie_mission_api.mission_runner", "dry_run"
         command = [self._python, *module, mission.path, *vehicles]
         if not mission.is_trajectory and _is_crazyswarm(mission.path):
             command = [self._python, mission.path, "--sim"]
@@ -96,7 +96,7 @@ class Missions:
         end: Future[str] = Future()
         command = [self._python, mission.path, *vehicles]
         if mission.is_trajectory:
-            module = "-m", "crazyflie_dashboard.mission_runner", "fly"
+            module = "-m", "crazyflie_mission_api.mission_runner", "fly"
             command = [self._python, *module, mission.path, *vehicles]
         elif _is_crazyswarm(mission.path):
             command = [self._python, mission.path]
@@ -146,8 +146,8 @@ def _run(command: list[str], limit: float) -> DryRunResult:
         _kill(process)
         return DryRunResult(False, f"the dry run did not end within {limit:g} s")
     for line in output.splitlines():
-        if line.startswith(RESULT):
-            found = json.loads(line.removeprefix(RESULT))
+        if line.startswith(_RESULT):
+            found = json.loads(line)["dry_run"]
             paths = tuple((name, tuple(map(tuple, path))) for name, path in found["paths"].items())
             return DryRunResult(found["passed"], found["text"], found["duration"], paths)
     if process.returncode == 0 and "--sim" in command:

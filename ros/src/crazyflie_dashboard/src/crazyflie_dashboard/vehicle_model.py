@@ -12,11 +12,11 @@ from crazyflie_dashboard.discovery import Vehicle
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.snapshot import STALE_AGE, Control, Kind, Reference, VehicleSnapshot
 from crazyflie_driver.msg import GenericLogData
-from crazyflie_fleet.flight_words import WORDS
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
 from crazyflie_reports.bag_topics import FLOATS, ROLES
 from crazyflie_utils import NodeHandle
+from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.vectors import to_tuple
 
 _ROWS: dict[str, dict[str, Callable[[Any], Any]]] = defaultdict(dict)
@@ -271,7 +271,10 @@ class VehicleModel:
             return _FILTER_WORDS[self._filter.state], self._filter.reason
         if self._status.state != FlightStatus.UNKNOWN:
             words = WORDS[self._status.state]
-            reason = self._status.reason or self._filter.reason or self._status.takeoff_refusal
+            reason = self._status.reason or self._filter.reason
+            # In flight a takeoff is refused as a matter of course.
+            if not reason and self._status.state == FlightStatus.ON_GROUND:
+                reason = self._status.takeoff_refusal
             return words, reason
         if driver is not None:
             return driver.text or "connected", driver.link_text

@@ -47,6 +47,17 @@ def eight(moment: float) -> PositionVelocityYawState:
     )
 
 
+def say_if_busy(load: float, processors: int) -> None:
+    """Print what a load (programs that run or want to) means for a flight in real time."""
+    if load > processors:
+        print(
+            f"this computer is too busy: {load:.1f} programs want its {processors} processors, and "
+            "the flight may be a bad one; ./run demo sim_time:=true real_time_factor:=0 does not "
+            "depend on that",
+            file=sys.stderr,
+        )
+
+
 def fly_and_land() -> None:
     """Fly on the master that runs."""
     process = begin("demo")
@@ -81,28 +92,33 @@ def fly(folder: Path, launch_arguments: list[str]) -> int:
         *LAUNCH_FILE, *ARGUMENTS, f"record_folder:={recordings}", f"rviz:={rviz}", *launch_arguments
     ]  # fmt: skip
     print(f"launching {' '.join(arguments)}  (its output: {log})", flush=True)
-    before = _folders(recordings)
+    before = set(recordings.glob("*/"))
     with roslaunch(arguments, log):
         print(f"watch it with  export ROS_MASTER_URI={os.environ['ROS_MASTER_URI']}", flush=True)
         try:
-            wait_for_recording()
+            wait_for_recording(STATUS)
             fly_and_land()
         except FlightError as error:
             print(f"the flight failed: {error}; see {log}", file=sys.stderr)
             print(*complaints(log), sep="\n", file=sys.stderr)
             return 1
-    (recording,) = _folders(recordings) - before
-    return report(recording, folder, log)
+    return report(new_recording(recordings, before), folder, log)
 
 
-def wait_for_recording() -> None:
-    """Wait until the recorder has subscribed to the state of the flight."""
+def wait_for_recording(topic: str) -> None:
+    """Wait until the recorder has subscribed to a topic; raises `FlightError` after `LIMIT`."""
     deadline = time.monotonic() + LIMIT
     graph = rosgraph.Master("/demo")
-    while "/recorder" not in dict(graph.getSystemState()[1]).get(STATUS, []):
+    while "/recorder" not in dict(graph.getSystemState()[1]).get(topic, []):
         if time.monotonic() > deadline:
-            raise FlightError(f"/recorder has not subscribed to {STATUS} for {LIMIT:g} s")
+            raise FlightError(f"/recorder has not subscribed to {topic} for {LIMIT:g} s")
         time.sleep(0.05)
+
+
+def new_recording(recordings: Path, before: set[Path]) -> Path:
+    """Return the folder of a recording that was not there before."""
+    (recording,) = set(recordings.glob("*/")) - before
+    return recording
 
 
 def report(recording: Path, folder: Path, log: Path) -> int:
@@ -133,15 +149,13 @@ def main() -> int:
     )
     parser.add_argument("launch_arguments", nargs="*", help="such as composed:=true")
     options = parser.parse_args()
+    if "sim_time:=true" not in options.launch_arguments:
+        say_if_busy(os.getloadavg()[0], len(os.sched_getaffinity(0)))
     try:
         return fly(options.out.resolve(), options.launch_arguments)
     except LaunchError as error:
         print(error, file=sys.stderr)
         return 1
-
-
-def _folders(recordings):
-    return set(recordings.glob("*/"))
 
 
 if __name__ == "__main__":

@@ -109,6 +109,7 @@ def run_ctest(build: Path, everything: bool) -> set[str]:
     command = ["ctest", "--test-dir", str(build), "--timeout", "3600", "--output-on-failure"]
     command += ["-j", str(2 * (os.cpu_count() or 1))]
     environment = dict(os.environ)
+    environment.pop("PYTEST_ADDOPTS", None)
     if not everything:
         command += ["-LE", LONG]
         environment["PYTEST_ADDOPTS"] = f"-m 'not {LONG}'"

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 
 from crazyflie_model.units import GRAVITY
-from crazyflie_msgs.msg import FlightStatus
+from crazyflie_takeoff.flight_state import flight_state
 from crazyflie_takeoff.safe_control import SINK_SPEED
 from crazyflie_utils.testing import FakeGraph
 
@@ -37,15 +37,6 @@ FLY_AWAY = 8.0
 #: Most speed at which it may meet the ground unless its motors were switched off, m/s.
 HARD_LANDING = 2.0
 _AIRBORNE = 0.05  #: Height from which on a vehicle is in the air, m.
-
-_STATES = {
-    FlightStatus.UNKNOWN: "",
-    FlightStatus.ON_GROUND: "on_ground",
-    FlightStatus.TAKING_OFF: "taking_off",
-    FlightStatus.FLYING: "flying",
-    FlightStatus.DESCENDING: "descending",
-    FlightStatus.LANDING: "landing",
-}
 
 _LEGAL = {
     # A takeoff that is aborted at once is never told.
@@ -173,6 +164,7 @@ class Watch:
             self.say(f"thrust without a takeoff: {control.thrust:.2f} m/s^2")
 
     def _on_status(self, message):
-        before, self.state = self.state, _STATES[message.state]
+        state = flight_state(message.state)
+        before, self.state = self.state, "" if state is None else state.word
         if before and self.state != before and self.state not in _LEGAL.get(before, ()):
             self.say(f"flight state went from {before} to {self.state}")

@@ -4,6 +4,7 @@ import contextlib
 import grp
 import importlib.metadata
 import os
+import re
 import shutil
 import socket
 import subprocess
@@ -20,7 +21,7 @@ from crazyflie_doctor.installation import Network, Python, Radio
 _RESOLVER_LIMIT = 2.0  #: Of the wait for the address of a host, s.
 _PROGRAM_LIMIT = 20.0  #: How long another program may take, s.
 
-_MODULES = ("rospy", "tf2_ros", "numpy", "scipy", "cflib", "control", "natnet")
+_MODULES = ("rospy", "tf2_ros", "numpy", "cflib", "natnet")
 
 _PRINT_VERSION = "import sys; print('%d.%d' % sys.version_info[:2])"
 
@@ -59,14 +60,22 @@ def _run(*command):
     return done.stdout if done.returncode == 0 else ""
 
 
-def package_list(name: str) -> list[str]:
-    """Return the entries of a list of packages above this package; none if it is not there."""
+def package_sections(name: str) -> dict[str, list[str]]:
+    """Return the packages of a list above this package by section; none if it is not there.
+
+    A section begins with a line ``# [NAME] ...``; what stands before the first is of section "".
+    """
     place = Path(rospkg.RosPack().get_path("crazyflie_doctor")).resolve()
-    for folder in place.parents:
-        if (folder / name).is_file():
-            lines = (folder / name).read_text().splitlines()
-            return [text for line in lines if (text := line.partition("#")[0].strip())]
-    return []
+    found = (folder / name for folder in place.parents if (folder / name).is_file())
+    path = next(found, None)
+    sections: dict[str, list[str]] = {}
+    section = ""
+    for line in path.read_text().splitlines() if path else ():
+        if begin := re.match(r"# \[(\w+)\]", line):
+            section = begin[1]
+        elif text := line.partition("#")[0].strip():
+            sections.setdefault(section, []).append(text)
+    return sections
 
 
 def debian_packages() -> dict[str, str]:

@@ -86,13 +86,24 @@ def _of_the_computer() -> Iterator[Check]:
     first = computer.first_python()
     found = installation.check_python(first, computer.python_of_ros())
     yield Check("Python", f"{first.path}, {first.version}", found)
-    debian = dict.fromkeys(computer.package_list("debian.txt"), "")
-    yield _packages("Debian", debian, computer.debian_packages())
-    yield _packages("PyPI", *computer.python_packages(computer.package_list("requirements.txt")))
+    yield from _debian_packages()
+    pypi = computer.package_sections("requirements.txt").get("", [])
+    yield _packages("PyPI", *computer.python_packages(pypi))
     yield Check("network", "can be reached", installation.check_network(computer.network()))
     path, is_writable, free = computer.log_directory()
     found = installation.check_log_directory(path, is_writable, free)
     yield Check("logs", f"{path}, {free / 1e9:.0f} GB free", found)
+
+
+def _debian_packages():
+    sections = computer.package_sections("debian.txt")
+    installed = computer.debian_packages()
+    yield _packages("Debian", dict.fromkeys(sections.pop("demo", []), ""), installed)
+    # ./run installs these when they are first used.
+    absent = [name for name, packages in sections.items() if not installed.keys() >= set(packages)]
+    if absent:
+        fine = f"not installed: {', '.join(absent)}; ./run install {' '.join(absent)}"
+        yield Check("sections of debian.txt", fine, [])
 
 
 def _packages(origin: str, required: Mapping[str, str], installed: Mapping[str, str]) -> Check:

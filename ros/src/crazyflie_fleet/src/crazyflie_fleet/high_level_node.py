@@ -13,7 +13,6 @@ from typing_extensions import override
 from crazyflie_driver import srv
 from crazyflie_fleet.commanded_references import CommandedReferences
 from crazyflie_fleet.conversions import from_message
-from crazyflie_fleet.flight_words import WORDS
 from crazyflie_fleet.follower import Follower
 from crazyflie_fleet.groups import Groups
 from crazyflie_fleet.high_level_parameters import HighLevelParameters
@@ -22,6 +21,7 @@ from crazyflie_fleet.setpoint_subscribers import SetpointSubscribers
 from crazyflie_model.polynomials import Goal, at_rest
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import Node, NodeHandle, ServiceError, flight_status
+from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer

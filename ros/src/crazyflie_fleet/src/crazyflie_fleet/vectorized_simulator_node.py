@@ -34,6 +34,7 @@ from crazyflie_msgs.msg import (
     PositionVelocityStateStamped,
     PositionVelocityYawStateStamped,
 )
+from crazyflie_simulator.real_time_watch import RealTimeWatch
 from crazyflie_simulator.simulator_node import MAX_CATCH_UP
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TIME_STEP, Number
@@ -161,7 +162,8 @@ class VectorizedSimulatorNode(Node):
             period = parameters.time_step / factor if factor > 0.0 else 0.0
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
-            handle.timer(parameters.time_step, lambda: self._fly_to(handle.time()))
+            self._watch = RealTimeWatch(handle)
+            handle.timer(parameters.time_step, self._on_timer)
 
     def _register_vehicle(self, handle, number, below):
         def warn(text: str) -> None:
@@ -204,6 +206,11 @@ class VectorizedSimulatorNode(Node):
         reference.descend((*to_tuple(message.state), 0.0), self._handle.time())
 
     # Time steps.
+
+    def _on_timer(self):
+        if not self._handle.uses_sim_time:
+            self._watch.tick(self._parameters.time_step)
+        self._fly_to(self._handle.time())
 
     def _on_clock_timer(self):
         self._ticks += 1

@@ -34,33 +34,24 @@ from crazyflie_model.angles import rotate_by_yaw
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MIN_THRUST
 from crazyflie_model.units import GRAVITY
 
+#: Horizontal acceleration that the fence asks for at most, m/s^2.
 MAX_HORIZONTAL = GRAVITY * math.tan(MAX_TILT)
-"""Horizontal acceleration that the fence asks for at most, m/s^2."""
-
+#: What of it is left for an axis when both brake, in a corner of the box, m/s^2.
 MAX_HORIZONTAL_BRAKING = MAX_HORIZONTAL / math.sqrt(2.0)
-"""What of it is left for an axis when both brake, in a corner of the box, m/s^2."""
-
+#: What thrust can do upwards as well as downwards, m/s^2.
 MAX_VERTICAL_BRAKING = min(GRAVITY - MIN_THRUST, MAX_THRUST - GRAVITY)
-"""What thrust can do upwards as well as downwards, m/s^2."""
 
 Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Braking:
-    """How the vehicle can be stopped along an axis.
+    """How the vehicle can be stopped along an axis."""
 
-    Attributes
-    ----------
-    deceleration : float
-        What can be counted on, m/s^2: along x and y at most `MAX_HORIZONTAL_BRAKING`,
-        along z at most `MAX_VERTICAL_BRAKING`.
-    reaction_time : float
-        From a state until the vehicle decelerates because of it, s.
-    """
-
+    #: What can be counted on, m/s^2: along x and y at most `MAX_HORIZONTAL_BRAKING`, along z at
+    #: most `MAX_VERTICAL_BRAKING`.
     deceleration: float
-    reaction_time: float
+    reaction_time: float  #: From a state until the vehicle decelerates because of it, s.
 
 
 class Geofence:

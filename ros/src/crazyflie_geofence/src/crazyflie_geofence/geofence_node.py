@@ -27,8 +27,7 @@ from crazyflie_utils.vectors import from_vector, to_vector
 # Without these bounds the fence's equations overflow or divide by nothing.
 _COORDINATE = Number("m", minimum=-1e9, maximum=1e9)
 _REACTION_TIME = Number("s", minimum=0.001, maximum=100.0)
-_MIN_BRAKING = 0.01
-"""m/s^2"""
+_MIN_BRAKING = 0.01  #: m/s^2
 
 
 _CORNER_HELP = "lowest and highest corner, in the frame of the state"

@@ -148,24 +148,12 @@ def design_gains(
 def sampled(
     model: LinearModel, sample_time: float, delay: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return one step of a model whose control is held and comes late.
+    """Return A and B of one step of a model whose control is held and comes late.
 
-    Parameters
-    ----------
-    model : LinearModel
-    sample_time, delay : float
-        s; the delay may be any multiple or fraction of the sample time.
-
-    Returns
-    -------
-    A : ndarray, shape (n, n)
-        n = x_dim + d u_dim with d = ceil(delay / sample_time): the state and the
-        last d controls, latest first.
-    B : ndarray, shape (n, u_dim)
-
-    Notes
-    -----
-    Exact; see Astrom and Wittenmark, Computer-Controlled Systems, section 2.3.
+    The delay may be any multiple or fraction of the sample time, s. A has the shape (n, n), B (n,
+    u_dim), with n = x_dim + d u_dim and d = ceil(delay / sample_time): the state and the last d
+    controls, latest first. Exact; see Astrom and Wittenmark, Computer-Controlled Systems, section
+    2.3.
     """
     x_dim, u_dim = model.x_dim, model.u_dim
     steps = math.ceil(delay / sample_time - _ROUNDOFF)

@@ -115,24 +115,17 @@ class LinearFeedback:
 class IntegralStateFeedback(LinearFeedback):
     """Linear feedback with an integral of the position error, saturated.
 
-    To the linear feedback it adds ``k I`` for each axis: that of x to the pitch,
-    that of y to the roll, that of z to the thrust. I is the integral of the
-    position error in the heading frame, where a badly trimmed attitude stays
-    the same when the vehicle turns. Roll and pitch are then limited to
-    `MAX_TILT`, thrust to `MIN_THRUST` ... `MAX_THRUST`.
+    To the linear feedback it adds ``k I`` for each axis: that of x to the pitch, that of y to the
+    roll, that of z to the thrust. I is the integral of the position error in the heading frame,
+    where a badly trimmed attitude stays the same when the vehicle turns; it stays within +-
+    ``integrator_limit``, m s. The gains k are in rad/(m s), rad/(m s) and 1/s^3, with the signs of
+    the position gains in K. Roll and pitch are then limited to `MAX_TILT`, thrust to `MIN_THRUST`
+    ... `MAX_THRUST`.
 
     While a control is at its limit, its integral does not grow into the limit. From
     `reset_integrator` to the next flight it is zero. After `take_off`, height reference and height
     integral are those of a `Climb` until the vehicle has arrived; but not where a step of the
     reference does no harm, with a height loop that is well damped and has no integrator.
-
-    Parameters
-    ----------
-    integrator_k : sequence, 3 components, optional
-        Gains of x, y, z in rad/(m s), rad/(m s), 1/s^3, with the signs of the
-        position gains in K.
-    integrator_limit : sequence, 3 components, optional
-        The integral of each axis stays within +- this, m s.
     """
 
     def __init__(

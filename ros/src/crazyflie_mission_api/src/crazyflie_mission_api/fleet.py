@@ -21,9 +21,15 @@ from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
 from crazyflie_mission_api.ros_clock import RosClock
-from crazyflie_mission_api.ros_vehicle import RosVehicle, prefix
-from crazyflie_mission_api.synchronized_start import SynchronizedStart
+from crazyflie_mission_api.ros_vehicle import RosVehicle
+from crazyflie_mission_api.synchronized_start import (
+    ALL_OF_FLEET,
+    BroadcastStart,
+    SynchronizedStart,
+    common_services,
+)
 from crazyflie_mission_api.vehicle_group import VehicleGroup
+from crazyflie_mission_api.vehicle_state import prefix
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, Number
@@ -225,6 +231,11 @@ def _connect(process, handle, names, timeout):
             )
         if missing:
             time.sleep(_POLL)
+    top = common_services(services, names)
+    if top is not None and top != ALL_OF_FLEET:
+        broadcast = BroadcastStart(handle, top, names)
+        for vehicle in found.values():
+            vehicle.broadcast = broadcast
     return [found[name] for name in names]
 
 

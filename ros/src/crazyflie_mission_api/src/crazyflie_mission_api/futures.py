@@ -15,6 +15,18 @@ def done(error: Exception | None) -> "Future[Any]":
     return future
 
 
+def forward(source: "Future[Any]", target: "Future[Any]") -> None:
+    """Complete a future as another one."""
+
+    def complete(answer):
+        if (error := answer.exception()) is not None:
+            target.set_exception(error)
+        else:
+            target.set_result(answer.result())
+
+    source.add_done_callback(complete)
+
+
 def in_turn(*calls: Callable[[], "Future[Any]"]) -> "Future[Any]":
     """Make calls one after the other; return the future of the last one, or of one that fails."""
     outcome: Future[Any] = Future()

@@ -1,28 +1,24 @@
 """Vehicles of a mission by ROS services and topics."""
 
-import math
 from concurrent.futures import Future
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import genpy
-from geometry_msgs.msg import Point, PoseStamped
+from geometry_msgs.msg import Point
 from std_srvs.srv import Empty, EmptyRequest
 from typing_extensions import override
 
 from crazyflie_driver import srv
-from crazyflie_fleet.conversions import heading, to_message
-from crazyflie_fleet.flight_words import WORDS
+from crazyflie_fleet.conversions import to_message
 from crazyflie_mission_api.futures import done, in_turn
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds
-from crazyflie_mission_api.mission_vehicle import MissionVehicle
 from crazyflie_mission_api.stream import SetpointStream
-from crazyflie_mission_api.synchronized_start import SynchronizedStart
+from crazyflie_mission_api.synchronized_start import BroadcastStart, SynchronizedStart
 from crazyflie_mission_api.timed_trajectory import START_SKEW
-from crazyflie_model.angles import Triple, quaternion_from_rpy
+from crazyflie_mission_api.vehicle_state import RosVehicleState, prefix
+from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces
-from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, VehicleStatus
-from crazyflie_utils import NodeHandle, ServiceError, TransformError
+from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.parameters.types import FINITE
 
 CALL_TIMEOUT = 60.0
@@ -31,23 +27,11 @@ CALL_TIMEOUT = 60.0
 MEMORY = 31
 """Pieces that the memory of a vehicle holds."""
 
-MAX_POSITION_AGE = 0.5
-"""A position older than this is not known, s; as `commanded_references.MAX_STATE_AGE`."""
-
-_LANDED_HEIGHT = 0.1
-"""Above the start, m: a vehicle below has landed."""
-
-_FAULTS = VehicleStatus.TUMBLED | VehicleStatus.LOCKED | VehicleStatus.CRASHED
-"""States of the supervisor in which a vehicle cannot fly."""
-
 _SETTLING_TIME = 0.5
 """After the planned end of a landing, s."""
 
 _HIGH_LEVEL = "commander/enHighLevel"
 """The firmware parameter that enables high-level commands."""
-
-_ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
-"""States after a flight."""
 
 _HOLD_DURATION = 0.5
 """Of the go_to at the end of a stream, to where the vehicle is, s."""
@@ -60,21 +44,12 @@ _LANDING_RETRY_TIME = 10.0
 with the mission, and the vehicle would fall."""
 
 
-class Pose(NamedTuple):
-    """Position (m), rotation (quaternion x, y, z, w) and their time (s)."""
-
-    position: Triple
-    rotation: tuple[float, float, float, float]
-    time: float
-
-
-class RosVehicle(MissionVehicle):
+class RosVehicle(RosVehicleState):
     """A vehicle by the services of the driver, or by those of `HighLevelNode`.
 
     ``services`` are short names, such as go_to, to absolute names. Vehicles that a controller
-    flies, and not the driver, have a ``synchronized_start``. ``frames`` are the fixed and its own
-    frame, if its position comes by tf; with the driver only as long as there are no poses.
-    ``has_yaw`` is whether it can have another heading than 0.
+    flies, and not the driver, have a ``synchronized_start``. The attribute ``broadcast`` starts
+    those of the driver together, if it is not None.
     """
 
     def __init__(
@@ -86,110 +61,24 @@ class RosVehicle(MissionVehicle):
         frames: tuple[str, str] | None = None,
         has_yaw: bool = True,
     ):
-        self.name = name
+        uses_driver = synchronized_start is None
+        super().__init__(name, handle, uses_driver, frames, has_yaw)
         self.bounds = fence(handle, prefix(name))
-        self.start_skew = START_SKEW if synchronized_start is None else 0.0
-        self._handle = handle
+        self.start_skew = START_SKEW if uses_driver else 0.0
         self.services = services
         self._synchronized_start = synchronized_start
-        self.uses_driver = uses_driver = synchronized_start is None
-        self.has_yaw = has_yaw
-        self._pose: Pose | None = None
-        self._seen_at = -math.inf
-        self._ground = 0.0
-        self._landing_end = 0.0
-        self.flight_status = FlightStatus()
-        self.driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
+        self.broadcast: BroadcastStart | None = None
         self._stream: SetpointStream | None = None
         self._prepared: Pieces | None = None
-        top = prefix(name)
-        self._lookup = None if frames is None else partial(handle.listen_to_poses(), *frames)
         if uses_driver:
-            handle.subscribe(f"{top}/pose", PoseStamped, self._on_pose, finite="pose")
-            handle.subscribe(f"{top}/vehicle_status", VehicleStatus, self._on_driver_status)
             frame = "" if frames is None else frames[0]
-            self._stream = SetpointStream(handle, f"{top}/cmd_full_state", frame, self._hold)
-        else:
-            if frames is None:
-                state = PositionVelocityYawStateStamped
-                handle.subscribe(f"{top}/state", state, self._on_state, finite="state")
-            topic = f"{top}/in_flight_flight_status"
-            handle.subscribe(topic, FlightStatus, self._on_flight_status)
-
-    # State.
-
-    @override
-    def position(self) -> Triple | None:
-        pose = self.pose()
-        return None if pose is None else pose.position
-
-    @override
-    def heading(self) -> float:
-        pose = self.pose() if self.has_yaw else None
-        return 0.0 if pose is None else heading(*pose.rotation)
-
-    def pose(self) -> Pose | None:
-        """Return where the vehicle is; None when that is not known."""
-        if self._handle.time() - self._seen_at < MAX_POSITION_AGE:
-            return self._pose
-        if self._lookup is None:
-            return None
-        try:
-            pose = self._lookup()
-        except TransformError:
-            return None
-        # tf keeps the last pose of a vehicle that is not tracked any more.
-        age = (self._handle.nanoseconds() - pose.stamp) * 1e-9
-        if age >= MAX_POSITION_AGE:
-            return None
-        return Pose(pose.position, pose.rotation, pose.stamp * 1e-9)
+            self._stream = SetpointStream(
+                handle, f"{prefix(name)}/cmd_full_state", frame, self._hold
+            )
 
     @override
     def fault(self) -> str:
-        if self._stream is not None:
-            status = self.driver_status
-            is_cut_off = status.link in (VehicleStatus.LOST, VehicleStatus.DISCONNECTED)
-            is_bad = is_cut_off or status.is_emergency or status.supervisor & _FAULTS
-            return status.text if is_bad else self._stream.fault()
-        status = self.flight_status
-        if status.state in _ENDED:
-            return f"it does not fly any more: {status.reason or WORDS[status.state]}"
-        return ""
-
-    @override
-    def has_landed(self) -> bool:
-        if not self.uses_driver:
-            return self.flight_status.state == FlightStatus.ON_GROUND
-        place = self.position()
-        if place is None:
-            status = self.driver_status
-            is_down = (
-                status.link == VehicleStatus.CONNECTED
-                and status.has_supervisor
-                and not status.is_emergency
-                and not status.supervisor & (_FAULTS | VehicleStatus.FLYING)
-            )
-        else:
-            is_down = place[2] < self._ground + _LANDED_HEIGHT
-        # Then the mission stops the motors: not in the last centimetres.
-        return is_down and self._handle.time() >= self._landing_end
-
-    def _on_pose(self, message):
-        p, q = message.pose.position, message.pose.orientation
-        self._seen_at = self._handle.time()
-        self._pose = Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w), self._seen_at)
-
-    def _on_state(self, message):
-        s = message.state
-        self._seen_at = self._handle.time()
-        rotation = quaternion_from_rpy(0.0, 0.0, s.yaw)
-        self._pose = Pose((s.x, s.y, s.z), rotation, self._seen_at)
-
-    def _on_flight_status(self, message):
-        self.flight_status = message
-
-    def _on_driver_status(self, message):
-        self.driver_status = message
+        return super().fault() or ("" if self._stream is None else self._stream.fault())
 
     # Commands.
 
@@ -199,7 +88,7 @@ class RosVehicle(MissionVehicle):
         self._ground = 0.0 if place is None else place[2]
 
         def climb():
-            return self.call("takeoff", srv.Takeoff, group_mask, height, _seconds(duration))
+            return self.call("takeoff", srv.Takeoff, group_mask, height, seconds(duration))
 
         if not self.uses_driver:
             return climb()
@@ -216,7 +105,7 @@ class RosVehicle(MissionVehicle):
     def land(self, duration: float) -> "Future[Any]":
         self._landing_end = self._handle.time() + duration + _SETTLING_TIME
         return self._hand_over(
-            lambda: self.call("land", srv.Land, 0, self._ground, _seconds(duration)),
+            lambda: self.call("land", srv.Land, 0, self._ground, seconds(duration)),
             _LANDING_RETRY_TIME,
         )
 
@@ -227,7 +116,7 @@ class RosVehicle(MissionVehicle):
 
     @override
     def go_to(self, goal: Triple, yaw: float, duration: float) -> "Future[Any]":
-        request = (0, False, Point(*goal), yaw, _seconds(duration))
+        request = (0, False, Point(*goal), yaw, seconds(duration))
         return self._hand_over(lambda: self.call("go_to", srv.GoTo, *request))
 
     @override
@@ -252,8 +141,13 @@ class RosVehicle(MissionVehicle):
         if self._synchronized_start is not None:
             self._synchronized_start.start(self.services["start_trajectory"].rpartition("/")[0])
             return done(None)
-        request = (0, 0, 1.0, False, False)
-        return self._hand_over(lambda: self.call("start_trajectory", srv.StartTrajectory, *request))
+        return self._hand_over(self._start_with_others)
+
+    def _start_with_others(self):
+        def start():
+            return self.call("start_trajectory", srv.StartTrajectory, 0, 0, 1.0, False, False)
+
+        return start() if self.broadcast is None else self.broadcast.start(self.name, start)
 
     @override
     def emergency(self) -> "Future[Any]":
@@ -274,13 +168,8 @@ class RosVehicle(MissionVehicle):
         return send() if self._stream is None else self._stream.hand_over(send, retry_time)
 
     def _hold(self, goal):
-        request = (0, False, Point(*goal.position), goal.yaw, _seconds(_HOLD_DURATION))
+        request = (0, False, Point(*goal.position), goal.yaw, seconds(_HOLD_DURATION))
         return self.call("go_to", srv.GoTo, *request, limit=_HOLD_TIMEOUT)
-
-
-def prefix(name: str) -> str:
-    """Return the namespace of a vehicle; that of "/" is the root."""
-    return "" if name == "/" else f"/{name}"
 
 
 def fence(handle: NodeHandle, top: str) -> Bounds:
@@ -294,5 +183,6 @@ def fence(handle: NodeHandle, top: str) -> Bounds:
     return Bounds((corners[0][0], corners[0][1], corners[0][2]), tuple(corners[1]))
 
 
-def _seconds(duration):
+def seconds(duration: float) -> genpy.Duration:
+    """Return a duration, s, as ROS has it."""
     return genpy.Duration.from_sec(duration)

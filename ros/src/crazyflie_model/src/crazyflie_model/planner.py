@@ -51,26 +51,15 @@ def spiral_piece(
 ) -> PolynomialPiece:
     """Return the piece that approximates a spiral about a vertical axis.
 
-    On the spiral, angle, radius, height and heading change evenly. Each axis is the
-    polynomial of the 7th degree that meets its position, velocity and acceleration
-    at both ends, without jerk: close up to a quarter of a turn, and not far beyond.
+    On the spiral, angle, radius, height and heading change evenly. Each axis is the polynomial of
+    the 7th degree that meets its position, velocity and acceleration at both ends, without jerk:
+    close up to a quarter of a turn, and not far beyond.
 
-    Parameters
-    ----------
-    start : Goal
-        Its position and heading determine the axis.
-    angle : float
-        rad; negative to fly backwards.
-    radii : tuple, 2 components
-        Distance from the axis at the beginning and at the end, m.
-    ascent : float
-        m.
-    duration : float
-        s, > 0.
-    sideways : bool
-        With the axis ahead or behind, and not to the side.
-    clockwise : bool
-        Seen from above; then the axis is to the right or ahead, otherwise to the left or behind.
+    Position and heading of the start determine the axis; ``angle`` is in rad, negative to fly
+    backwards; ``radii`` are the distances from the axis at both ends, m; ``ascent`` is in m,
+    ``duration`` in s, > 0. ``sideways`` is with the axis ahead or behind, and not to the side;
+    ``clockwise`` is seen from above: then the axis is to the right or ahead, otherwise to the left
+    or behind.
     """
     sense = -1.0 if clockwise else 1.0
     rate = sense * angle / duration

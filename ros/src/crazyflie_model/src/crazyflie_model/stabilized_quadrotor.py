@@ -21,24 +21,15 @@ def still_air(t: float) -> Triple:
 class StabilizedQuadrotor(Dynamics):
     """A quadrotor that takes the control (roll, pitch, yaw_dot, thrust) to its motors.
 
-    State: the airframe's (see `quadrotor`), the memory of the inner loops (see
-    `inner_loops`), and the four motor speeds commanded last, rad/s. The inner
-    loops sample every second step; between samples the latter two stay.
+    State: the airframe's (see `quadrotor`), the memory of the inner loops (see `inner_loops`), and
+    the four motor speeds commanded last, rad/s. The inner loops sample every second step; between
+    samples the latter two stay.
 
-    Thrust is normalised with the *nominal* mass and thrust constant, as is the
-    radio link's: a true vehicle that differs from them hovers at
-    ``GRAVITY * (1 + mass_error) / (1 + thrust_error)``. Roll and pitch are
-    those in the heading frame.
-
-    Parameters
-    ----------
-    parameters : QuadrotorParameters
-        Nominal.
-    mass_error, thrust_error : float
-        How much more mass and thrust constant the true vehicle has, as a
-        fraction of the nominal ones, > -1.
-    wind : callable
-        ``wind(t)``, velocity of the air (3 components) at time t (s), m/s, fixed frame.
+    Thrust is normalised with the *nominal* mass and thrust constant, as is the radio link's: a true
+    vehicle, which has more of both by ``mass_error`` and ``thrust_error`` (fractions of the nominal
+    ones, > -1), hovers at ``GRAVITY * (1 + mass_error) / (1 + thrust_error)``. Roll and pitch are
+    those in the heading frame. ``wind(t)`` is the velocity of the air (3 components) at time t (s),
+    m/s, fixed frame.
     """
 
     x_dim = BODY_DIM + inner_loops.MEMORY_DIM + 4

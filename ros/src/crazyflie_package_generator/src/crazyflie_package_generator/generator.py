@@ -13,8 +13,8 @@ from pathlib import Path
 
 import rospkg
 
+#: The package, with ``@name@`` for what is filled in.
 TEMPLATE = Path(rospkg.RosPack().get_path("crazyflie_package_generator")) / "template"
-"""The package, with ``@name@`` for what is filled in."""
 
 _NAME = re.compile(r"[a-z](_?[a-z0-9])+")
 _FIELD = re.compile(r"@(\w+)@")
@@ -50,19 +50,12 @@ def check_name(what: str, name: str) -> None:
 
 @dataclass(frozen=True)
 class Package:
-    """What is filled in.
+    """What is filled in."""
 
-    Attributes
-    ----------
-    name, node : str
-        Of the package, and of its node without ``_node``.
-    messages : bool
-        Whether it has a message of its own.
-    """
-
+    #: name, node: Of the package, and of its node without ``_node``.
     name: str
     node: str
-    messages: bool = False
+    messages: bool = False  #: Whether it has a message of its own.
     maintainer: str = "nobody yet"
     email: str = "nobody@example.com"
 

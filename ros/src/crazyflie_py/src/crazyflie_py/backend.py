@@ -132,7 +132,7 @@ class Visualizer(Protocol):
 class SwarmBackend(Commands, Protocol):
     """All vehicles and the clock.
 
-    Commands are broadcast; `Commands.go_to` is relative then.
+    Commands are for all vehicles; `Commands.go_to` is relative then.
 
     Attributes
     ----------
@@ -167,3 +167,28 @@ class SwarmBackend(Commands, Protocol):
 
     def close(self) -> None:
         """End what is left to do, once, at the end of the script, also after an exception."""
+
+
+def _to_each(name: str) -> Any:
+    """Return a method that calls that of each vehicle."""
+
+    def command(self: SwarmBackend, *arguments: Any) -> None:
+        for vehicle in self.vehicles:
+            getattr(vehicle, name)(*arguments)
+
+    return command
+
+
+class EachVehicle:
+    """`Commands` to all vehicles, one after the other."""
+
+    take_off: Any = _to_each("take_off")
+    land: Any = _to_each("land")
+    stop: Any = _to_each("stop")
+    go_to: Any = _to_each("go_to")
+    start_trajectory: Any = _to_each("start_trajectory")
+    notify_setpoints_stop: Any = _to_each("notify_setpoints_stop")
+    emergency: Any = _to_each("emergency")
+    arm: Any = _to_each("arm")
+    set_parameters: Any = _to_each("set_parameters")
+    send: Any = _to_each("send")

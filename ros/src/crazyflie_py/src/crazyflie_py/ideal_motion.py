@@ -75,10 +75,8 @@ class IdealMotion:
         if isinstance(setpoint, VelocityWorld):
             return self._at_velocity(np.array(setpoint.velocity), setpoint.yaw_rate, dt)
         if isinstance(setpoint, Hover):
-            c, s = math.cos(self.now.yaw), math.sin(self.now.yaw)
-            ahead, left = setpoint.vx, setpoint.vy
             climb = (setpoint.height - self.now.position[2]) / dt
-            velocity = np.array([c * ahead - s * left, s * ahead + c * left, climb])
+            velocity = np.array([*setpoint.velocity(self.now.yaw), climb])
             return self._at_velocity(velocity, setpoint.yaw_rate, dt)
         return self.held()
 

@@ -3,40 +3,44 @@
 import argparse
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import rosgraph
 from geometry_msgs.msg import Point
 from std_msgs.msg import String
+from std_srvs.srv import Empty
 from typing_extensions import override
 
 from crazyflie_driver import srv
 from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
+from crazyflie_fleet.settings import RobotSettings
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.fleet import catch_signals
+from crazyflie_mission_api.ros_vehicle import seconds
+from crazyflie_mission_api.synchronized_start import ALL_OF_FLEET, common_services
 from crazyflie_model.angles import Triple
 from crazyflie_py import fleet as fleet_files
-from crazyflie_py.backend import SwarmBackend, Visualizer
+from crazyflie_py.backend import EachVehicle, SwarmBackend, Visualizer
 from crazyflie_py.ros_connection import Connection, running_vehicles
-from crazyflie_py.ros_vehicle import RosVehicleBackend, seconds
-from crazyflie_py.setpoints import Setpoint
+from crazyflie_py.ros_vehicle import RosVehicleBackend
+from crazyflie_py.separation_watch import SeparationWatch
 from crazyflie_py.visualizer import NullVisualizer
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.process import Process
 
-_FLEET = f"/all/{HIGH_LEVEL}"
-"""Namespace of a fleet's services for all."""
-
 _FIND_LIMIT = 10.0
 """For the vehicles of a file, s of the machine's clock."""
+
+_WATCH_PERIOD = 0.05
+"""Between two looks at the distances of vehicles, s; as a fleet's."""
 
 _LANDING_LIMIT = 15.0
 """For landings of the script at its end, s."""
 
 
-class RosBackend(SwarmBackend):
+class RosBackend(EachVehicle, SwarmBackend):
     """All vehicles; see `crazyflie_py.backend.SwarmBackend`.
 
     ``crazyflies_yaml`` says which of the vehicles that run take part, by default all do. The
@@ -81,7 +85,8 @@ class RosBackend(SwarmBackend):
             )
             for name, number, place in zip(names, ids, places, strict=True)
         ]
-        self._top = _common_services(services, names)
+        self._top = common_services(services, names)
+        self._watch_separation(vehicles or [])
         handle.subscribe("/fleet/waiting", String, self._on_held)
 
     @property
@@ -94,6 +99,16 @@ class RosBackend(SwarmBackend):
     def visualizer(self) -> Visualizer:
         return self._visualizer
 
+    def _watch_separation(self, configured):
+        # A fleet's process keeps apart what it flies.
+        watched = [vehicle for vehicle in self._vehicles if vehicle.uses_driver]
+        own = {vehicle.name: vehicle.buffer for vehicle in configured}
+        buffers = {**own, **self._connection.fleet.rules.buffers}
+        radii = [buffers.get(vehicle.name, RobotSettings.buffer) for vehicle in watched]
+        if len(watched) > 1:
+            watch = SeparationWatch([vehicle.held for vehicle in watched], radii, self._connection)
+            self._connection.handle.timer(_WATCH_PERIOD, watch.update)
+
     def _on_held(self, message):
         if message.data:
             text = f"held by the fleet, since another vehicle is too near: {message.data}"
@@ -105,7 +120,7 @@ class RosBackend(SwarmBackend):
     def take_off(self, height: float, duration: float, group_mask: int) -> None:
         members = {v.name: v for v in self._vehicles if v.is_member(group_mask)}
         begun = [vehicle.has_begun for vehicle in members.values()]
-        if self._top == _FLEET:
+        if self._top == ALL_OF_FLEET:
             # One call: a hundred of them would keep the fleet from flying.
             for vehicle in members.values():
                 vehicle.check_takeoff(height)
@@ -145,38 +160,23 @@ class RosBackend(SwarmBackend):
         self._call("start_trajectory", srv.StartTrajectory, *arguments)
 
     @override
-    def notify_setpoints_stop(self, remain_valid_ms: int, group_mask: int) -> None:
-        for vehicle in self._vehicles:
-            vehicle.notify_setpoints_stop(remain_valid_ms, group_mask)
-
-    @override
     def emergency(self) -> None:
-        for vehicle in self._vehicles:
-            vehicle.emergency()
-
-    @override
-    def arm(self, arm: bool) -> None:
-        for vehicle in self._vehicles:
-            vehicle.arm(arm)
-
-    @override
-    def set_parameters(self, values: Mapping[str, float]) -> None:
-        for vehicle in self._vehicles:
-            vehicle.set_parameters(values)
-
-    @override
-    def send(self, setpoint: Setpoint) -> None:
-        for vehicle in self._vehicles:
-            vehicle.send(setpoint)
+        if self._top is None:
+            calls = {vehicle.name: vehicle.begin_emergency() for vehicle in self._vehicles}
+        else:
+            # That of a fleet is not one of its high-level services.
+            service = f"{self._top.removesuffix(f'/{HIGH_LEVEL}')}/emergency"
+            calls = {"allcfs": self._connection.call(service, Empty)}
+        self._connection.finish("emergency", calls)
 
     def _call(self, name, service_type, *arguments, has_begun=lambda: False):
         if self._top is None:
             calls = {v.name: v.call(name, service_type, *arguments) for v in self._vehicles}
         else:
-            request = service_type._request_class(*arguments)
+            for vehicle in self._vehicles:
+                vehicle.held.end_setpoints()
             service = f"{self._top}/{name}"
-            call = self._connection.handle.call_service(service, service_type, request, 60.0)
-            calls = {"allcfs": call}
+            calls = {"allcfs": self._connection.call(service, service_type, *arguments)}
         self._connection.finish(name, calls, lambda _: has_begun())
 
     # Time.
@@ -221,7 +221,7 @@ class RosBackend(SwarmBackend):
     def _land(self):
         fleet = self._connection.fleet
         vehicles = {v.name: v for v in self._vehicles if v.name in fleet.flying}
-        landing = [v for v in vehicles.values() if v.is_landing]
+        landing = [v for v in vehicles.values() if v.held.is_landing]
         limit = fleet.time() + _LANDING_LIMIT
         fleet.clock.wait_until(lambda: all(v.has_landed() for v in landing), limit)
         for name, vehicle in vehicles.items():
@@ -252,21 +252,3 @@ def _begin():
     process, end = begin_script("crazyswarm")
     catch_signals()
     return process, end
-
-
-def _common_services(services: Mapping[str, str], names: list[str]) -> str | None:
-    """Return the namespace of services for exactly these vehicles, if there is one."""
-    fleet = {s.split("/")[1] for s in services if s.endswith(f"/{HIGH_LEVEL}/go_to")} - {"all"}
-    if fleet:
-        is_there = f"/all/{HIGH_LEVEL}/go_to" in services and fleet == {*names}
-        return _FLEET if is_there else None
-    drivers = {
-        s.rpartition("/")[0].strip("/"): node
-        for s, node in services.items()
-        if s.endswith("/upload_trajectory")
-    }
-    nodes = {*drivers.values()}
-    if {*drivers} == {*names} and len(nodes) == 1:
-        top = f"{nodes.pop()}/all"
-        return top if f"{top}/go_to" in services else None
-    return None

@@ -10,6 +10,7 @@ from typing import Any
 from crazyflie_fleet.high_level_parameters import HIGH_LEVEL
 from crazyflie_mission_api import Fleet, MissionError
 from crazyflie_mission_api.mission_vehicle import never
+from crazyflie_mission_api.ros_vehicle import CALL_TIMEOUT
 from crazyflie_utils import NodeHandle
 
 _SEARCH_LIMIT = 5.0
@@ -36,6 +37,16 @@ class Connection:
         self.handle = handle
         self.fleet = fleet
         self._is_unchecked = is_unchecked
+
+    @property
+    def is_unchecked(self) -> bool:
+        """Whether what is refused is a warning."""
+        return self._is_unchecked
+
+    def call(self, service: str, service_type: Any, *arguments: Any) -> "Future[Any]":
+        """Call a service by its absolute name; return the future of the answer."""
+        request = service_type._request_class(*arguments)
+        return self.handle.call_service(service, service_type, request, CALL_TIMEOUT)
 
     def refuse(self, text: str) -> None:
         """Raise `CommandRefusedError`; with --unchecked warn."""

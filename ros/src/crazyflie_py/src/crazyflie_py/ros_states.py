@@ -4,7 +4,8 @@ import math
 from collections.abc import Callable
 
 from crazyflie_mission_api.mission_vehicle import Clock
-from crazyflie_mission_api.ros_vehicle import Pose, RosVehicle
+from crazyflie_mission_api.ros_vehicle import RosVehicle
+from crazyflie_mission_api.vehicle_state import Pose, velocity_between
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_py.backend import VehicleState
 
@@ -37,10 +38,8 @@ class RosStates:
         pose, last = self._wait(lambda pose: True), self._last
         if last is None or pose.time - last.time > _VELOCITY_SPAN:
             last, pose = pose, self._wait(lambda new: new.time > pose.time)
-        if (span := pose.time - last.time) > 0.0:
-            change = zip(pose.position, last.position, strict=True)
-            vx, vy, vz = ((after - before) / span for after, before in change)
-            self._velocity = vx, vy, vz
+        if pose.time > last.time:
+            self._velocity = velocity_between(last, pose)
         self._last = pose
         rpy = rpy_from_quaternion(*pose.rotation)
         return VehicleState(pose.position, self._velocity, _UNKNOWN, rpy)

@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from typing import Any
 
-import genpy
 from geometry_msgs.msg import Point
 from std_srvs.srv import SetBool
 from typing_extensions import override
@@ -13,13 +12,14 @@ from typing_extensions import override
 from crazyflie_driver import srv
 from crazyflie_fleet.conversions import to_message
 from crazyflie_fleet.settings import FirmwareNumber
-from crazyflie_mission_api.ros_vehicle import RosVehicle
+from crazyflie_mission_api.ros_vehicle import RosVehicle, seconds
 from crazyflie_model.angles import Triple
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_msgs.msg import FlightStatus, VehicleStatus
 from crazyflie_py.avoidance_parameters import avoidance_parameters
 from crazyflie_py.backend import VehicleBackend, VehicleState
+from crazyflie_py.held_vehicle import HeldVehicle
 from crazyflie_py.ros_connection import Connection
 from crazyflie_py.ros_setpoints import SetpointPublishers
 from crazyflie_py.ros_states import RosStates
@@ -47,7 +47,7 @@ class RosVehicleBackend(VehicleBackend):
         self._connection = connection
         self._setpoints = SetpointPublishers(connection.handle, vehicle)
         self._states = RosStates(vehicle, connection.fleet.clock)
-        self._is_landing = False
+        self.held = HeldVehicle(vehicle, connection)
         self._groups = 0
         self._parameters = None if has_firmware else SimulatedParameters(self.name, self)
         if position is None:
@@ -65,6 +65,8 @@ class RosVehicleBackend(VehicleBackend):
     def begin_takeoff(self, height: float, duration: float, group_mask: int) -> "Future[Any]":
         """Call takeoff; the future is done when the vehicle takes off, or has refused."""
         self.check_takeoff(height)
+        self.held.takeoff_end = self._connection.fleet.time() + duration
+        self.held.end_setpoints()
         return self._vehicle.take_off(height, duration, group_mask)
 
     def check_takeoff(self, height: float) -> None:
@@ -111,11 +113,15 @@ class RosVehicleBackend(VehicleBackend):
 
     @override
     def emergency(self) -> None:
-        self._connection.finish("emergency", {self.name: self._vehicle.emergency()})
+        self._connection.finish("emergency", {self.name: self.begin_emergency()})
+
+    def begin_emergency(self) -> "Future[Any]":
+        """Stop the motors; the future is done when the answer has come."""
+        return self._vehicle.emergency()
 
     @override
     def arm(self, arm: bool) -> None:
-        if self._vehicle.uses_driver:
+        if self.uses_driver:
             self._command("arm", SetBool, arm)
 
     @override
@@ -146,7 +152,7 @@ class RosVehicleBackend(VehicleBackend):
     @override
     def send(self, setpoint: Setpoint) -> None:
         self.note_flight()
-        self._setpoints.publish(setpoint)
+        self._setpoints.publish(self.held.passed(setpoint))
 
     def call(self, service: str, service_type: Any, *arguments: Any) -> "Future[Any]":
         """Call a service; return the future of the answer."""
@@ -162,6 +168,7 @@ class RosVehicleBackend(VehicleBackend):
         return 0.0
 
     def _command(self, service, service_type, *arguments):
+        self.held.end_setpoints()
         call = self.call(service, service_type, *arguments)
         self._connection.finish(service, {self.name: call})
 
@@ -179,17 +186,17 @@ class RosVehicleBackend(VehicleBackend):
 
     def note_flight(self) -> None:
         """Note that the vehicle is landed at the end of the script."""
-        self._is_landing = False
+        self.held.is_landing = False
         self._connection.fleet.adopt(self.name)
 
     def note_landing(self, group_mask: int) -> None:
         """Note that the script has vehicles of groups land."""
-        self._is_landing = self._is_landing or self.is_member(group_mask)
+        self.held.is_landing = self.held.is_landing or self.is_member(group_mask)
 
     @property
-    def is_landing(self) -> bool:
-        """Whether the script has it land."""
-        return self._is_landing
+    def uses_driver(self) -> bool:
+        """Whether the driver flies it, and no controller of the workspace."""
+        return self._vehicle.uses_driver
 
     def has_begun(self) -> bool:
         """Return whether a takeoff under the workspace's controller is under way."""
@@ -212,8 +219,7 @@ class RosVehicleBackend(VehicleBackend):
         paths = {key.replace(".", "/"): value for key, value in values.items()}
         for path, value in paths.items():
             self._connection.handle.set_param(f"/{self.name}/{path}", value)
-        service, request = f"/{self.name}/update_params", srv.UpdateParamsRequest([*paths])
-        call = self._connection.handle.call_service(service, srv.UpdateParams, request, 10.0)
+        call = self.call("update_params", srv.UpdateParams, [*paths])
         self._connection.finish("update_params", {self.name: call})
 
     @override
@@ -234,7 +240,7 @@ class RosVehicleBackend(VehicleBackend):
     def enable_avoidance(
         self, others: Sequence[VehicleBackend], settings: AvoidanceSettings
     ) -> None:
-        if not self._vehicle.uses_driver:
+        if not self.uses_driver:
             self._connection.handle.warn(
                 f"{self.name}: enableCollisionAvoidance has no effect: the fleet keeps vehicles "
                 "that its controllers fly apart, by the buffers of the fleet file"
@@ -242,13 +248,15 @@ class RosVehicleBackend(VehicleBackend):
             return
         try:
             self.set_parameters({**avoidance_parameters(settings), "colAv.enable": 1})
+            self.held.avoids = True
         except ValueError as error:
             self._connection.refuse(f"{self.name}: enableCollisionAvoidance: {error}")
 
     @override
     def disable_avoidance(self) -> None:
-        if self._vehicle.uses_driver:
+        if self.uses_driver:
             self.set_parameters({"colAv.enable": 0})
+            self.held.avoids = False
 
     # State.
 
@@ -260,7 +268,7 @@ class RosVehicleBackend(VehicleBackend):
     def status(self) -> dict[str, Any]:
         status = self._vehicle.driver_status
         supervisor, battery = status.supervisor, status.battery_voltage
-        if not self._vehicle.uses_driver:
+        if not self.uses_driver:
             is_flying = self._vehicle.flight_status.state not in _NOT_FLYING
             ready = VehicleStatus.CAN_BE_ARMED | VehicleStatus.ARMED | VehicleStatus.CAN_FLY
             supervisor, battery = ready | is_flying * VehicleStatus.FLYING, math.nan
@@ -276,8 +284,3 @@ class RosVehicleBackend(VehicleBackend):
             "latency_unicast": round(1e3 * status.latency) if status.latency > 0.0 else 0,
             **{name: getattr(status, name, 0) for name in names},
         }
-
-
-def seconds(duration: float) -> genpy.Duration:
-    """Return a duration, s, as ROS has it."""
-    return genpy.Duration.from_sec(duration)

@@ -1,5 +1,6 @@
 """Low-level setpoints: what the cmd... methods of a Crazyflie send, once each."""
 
+import math
 from dataclasses import dataclass
 
 from crazyflie_model.angles import Triple
@@ -41,6 +42,11 @@ class Hover:
     yaw_rate: float
     height: float
 
+    def velocity(self, yaw: float) -> tuple[float, float]:
+        """Return the velocity along x and y of the world, m/s, at a yaw (rad)."""
+        c, s = math.cos(yaw), math.sin(yaw)
+        return c * self.vx - s * self.vy, s * self.vx + c * self.vy
+
 
 @dataclass(frozen=True)
 class Attitude:
@@ -58,3 +64,20 @@ class MotorsOff:
 
 
 Setpoint = FullState | Position | VelocityWorld | Hover | Attitude | MotorsOff
+
+
+def led_to(setpoint: Setpoint, place: Triple, yaw: float, duration: float) -> Triple | None:
+    """Return where a setpoint leads a vehicle from a place (m) and yaw (rad) in a duration (s).
+
+    None where that is not known.
+    """
+    x, y, z = place
+    if isinstance(setpoint, FullState | Position):
+        return setpoint.position
+    if isinstance(setpoint, VelocityWorld):
+        vx, vy, vz = setpoint.velocity
+        return x + vx * duration, y + vy * duration, z + vz * duration
+    if isinstance(setpoint, Hover):
+        vx, vy = setpoint.velocity(yaw)
+        return x + vx * duration, y + vy * duration, setpoint.height
+    return None

@@ -4,11 +4,11 @@ import argparse
 import logging
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
 from crazyflie_fleet.fleet_config import close_pairs
+from crazyflie_py.backend import EachVehicle
 from crazyflie_py.csv_output import CsvOutput
 from crazyflie_py.fleet import FleetVehicle
 from crazyflie_py.simulated_vehicle import SimulatedVehicle
@@ -20,17 +20,7 @@ _ROUNDING = 1e-9
 """Part of a step by which a sleep may be too short for it, due to rounding."""
 
 
-def _broadcast(name: str) -> Any:
-    """Return a method that calls that of each vehicle."""
-
-    def command(self: "Simulation", *arguments: Any) -> None:
-        for vehicle in self.vehicles:
-            getattr(vehicle, name)(*arguments)
-
-    return command
-
-
-class Simulation:
+class Simulation(EachVehicle):
     """A swarm of `crazyflie_py.backend.SwarmBackend` without ROS.
 
     Parameters
@@ -114,16 +104,3 @@ class Simulation:
         self.visualizer.finishVideoOutput()
         if self._output is not None:
             self._output.close()
-
-    # Broadcasts.
-
-    take_off = _broadcast("take_off")
-    land = _broadcast("land")
-    stop = _broadcast("stop")
-    go_to = _broadcast("go_to")
-    start_trajectory = _broadcast("start_trajectory")
-    notify_setpoints_stop = _broadcast("notify_setpoints_stop")
-    emergency = _broadcast("emergency")
-    arm = _broadcast("arm")
-    set_parameters = _broadcast("set_parameters")
-    send = _broadcast("send")

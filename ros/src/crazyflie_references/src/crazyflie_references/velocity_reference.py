@@ -56,21 +56,13 @@ class LimitParameters(Parameters):
 
 
 class VelocityReference:
-    """Integrates velocities, within limits.
-
-    Attributes
-    ----------
-    limits : LimitParameters
-    silence : float
-        A velocity that is older than this, s, counts no more: the reference comes to rest.
-    pose : Pose or None
-        None before the first `place`.
-    """
+    """Integrates velocities, within limits."""
 
     def __init__(self, limits: LimitParameters, silence: float):
         self.limits = limits
+        #: A velocity that is older than this, s, counts no more: the reference comes to rest.
         self.silence = silence
-        self.pose: Pose | None = None
+        self.pose: Pose | None = None  #: None before the first `place`.
         self._velocity = Velocity()
         self._command = Velocity()
         self._command_time = -math.inf

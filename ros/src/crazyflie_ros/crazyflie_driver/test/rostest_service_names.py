@@ -84,6 +84,8 @@ def test_without_a_controller_the_driver_has_the_names(uri):
     remove(uri)
 
 
+# test_service_names.py has them in a fake process; both_are_in_a_launch_file remains.
+@pytest.mark.long
 def test_the_controller_comes_first(uri):
     with controller():
         rospy.wait_for_service("/cf1/land", LIMIT)
@@ -104,6 +106,7 @@ def test_both_are_in_a_launch_file(uri, tmp_path):
         remove(uri)
 
 
+@pytest.mark.long
 def test_the_controller_comes_later(uri):
     add(uri)
     assert type_of("takeoff") == DRIVERS["takeoff"]

@@ -150,3 +150,28 @@ def test_a_vehicle_that_will_not_fly_is_pointed_out(server, info, text):
         if vehicle.wait_for(lambda: warned(process), limit=0.05):
             break
     assert warned(process)
+
+
+def test_the_rate_is_that_of_the_last_second(flying):
+    server, vehicle = flying
+    setpoints = server.node._vehicles[vehicle.uri].setpoints
+    server.process.advance(2.0)
+    for _ in range(5):
+        server.process.publish("/cf1/cmd_vel", cmd_vel(z=1000.0))
+        server.process.advance(0.1)
+    assert setpoints.rate() == 5.0
+    server.process.advance(0.75)
+    assert setpoints.rate() == 2.0
+    server.process.advance(1.0)
+    assert setpoints.rate() == 0.0
+
+
+def test_poses_that_have_ended_do_not_let_a_vehicle_land_by_itself(flying):
+    server, vehicle = flying
+    setpoints = server.node._vehicles[vehicle.uri].setpoints
+    server.process.publish("/cf1/cmd_vel", cmd_vel(z=1000.0))
+    assert not setpoints.can_land_autonomously()
+    server.process.publish("/cf1/external_position", PointStamped(point=Point(1.0, 2.0, 3.0)))
+    assert setpoints.can_land_autonomously()
+    server.process.advance(1.1)
+    assert not setpoints.can_land_autonomously()

@@ -10,6 +10,7 @@ from typing_extensions import override
 from crazyflie_model.dynamics import Coupled7D, Dynamics, NearHover
 from crazyflie_msgs.msg import ControlStamped
 from crazyflie_simulator.motion_capture import MotionCapture
+from crazyflie_simulator.real_time_watch import RealTimeWatch
 from crazyflie_simulator.vehicle import SimulatedVehicle
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, StampedPose, parameter
 from crazyflie_utils.parameters.declaration import group
@@ -145,6 +146,7 @@ class SimulatorNode(Node):
             period = parameters.time_step / factor if factor > 0.0 else 0.0
             handle.timer(period, self._on_clock_timer, steady=True)
         else:
+            self._watch = RealTimeWatch(handle)
             self._timer = handle.varying_timer(parameters.time_step, self._on_timer)
 
     def _on_control(self, message):
@@ -164,6 +166,7 @@ class SimulatorNode(Node):
             self._advance_to(self._handle.time())
             self._broadcast_pose()
         else:
+            self._watch.tick(max(IDLE_PERIOD, self._parameters.time_step))
             self._catch_up()
 
     def _catch_up(self):

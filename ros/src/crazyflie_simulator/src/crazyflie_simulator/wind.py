@@ -14,22 +14,11 @@ _WAVES = 64  #: Waves that a gust is made of, along each axis.
 class Wind:
     """Velocity of the air, everywhere the same, as a function of time.
 
-    Along each axis the gust is a sum of cosines of equal amplitude and random
-    phase, whose frequencies are spread over the spectrum of a first-order
-    Gauss-Markov process (M. Shinozuka and G. Deodatis, Simulation of stochastic
-    processes by spectral representation, 1991): zero mean, standard deviation
-    ``gust``, autocorrelation ``exp(-|t| / gust_time)``.
-
-    Parameters
-    ----------
-    mean : array_like, shape (3,)
-        m/s, fixed frame.
-    gust : float
-        Standard deviation along each axis, m/s.
-    gust_time : float
-        Correlation time, s.
-    seed : int or sequence of int
-        The same seed gives the same gust.
+    Along each axis the gust is a sum of cosines of equal amplitude and random phase, whose
+    frequencies are spread over the spectrum of a first-order Gauss-Markov process (M. Shinozuka and
+    G. Deodatis, Simulation of stochastic processes by spectral representation, 1991): zero mean,
+    standard deviation ``gust`` (m/s), autocorrelation ``exp(-|t| / gust_time)`` (s). ``mean`` is in
+    m/s, fixed frame, shape (3,). The same ``seed`` gives the same gust.
     """
 
     def __init__(

@@ -29,32 +29,22 @@ UNKNOWN_RATE, UNKNOWN_ACCELERATION = 10.0, 10.0
 class ConstantAccelerationFilter(RateFilter):
     """Kalman filter on the model of constant acceleration, one for each axis.
 
-    Each axis has the state (signal, rate, acceleration). The acceleration is a
-    random walk, the samples carry independent noise. Model and covariance of
-    the random walk are those of Y. Bar-Shalom, X. R. Li, T. Kirubarajan,
-    Estimation with Applications to Tracking and Navigation, 2001, section 6.2.3
-    (continuous Wiener process acceleration). The noise is the same on all axes,
-    so one covariance serves them all.
+    Each axis has the state (signal, rate, acceleration). The acceleration is a random walk: its
+    unknown part changes in a second by the standard deviation ``acceleration_walk``, in units / s^2
+    / sqrt(s). The samples carry independent ``noise``, a standard deviation in units of the signal.
+    Model and covariance of the random walk are those of Y. Bar-Shalom, X. R. Li, T. Kirubarajan,
+    Estimation with Applications to Tracking and Navigation, 2001, section 6.2.3 (continuous Wiener
+    process acceleration). The noise is the same on all axes, so one covariance serves them all. At
+    the first sample rate and acceleration have the standard deviations ``first_rate`` and
+    ``first_acceleration``.
 
-    An acceleration that is known (from the control) enters by its changes only:
-    the estimate takes each of them over, and the random walk makes up for what
-    differs between model and vehicle. An offset, such as a weak battery or the
-    ground under a vehicle that has too little thrust to leave it, is thereby
-    found from the samples, and knowledge that comes or goes causes no jump.
+    An acceleration that is known (from the control) enters by its changes only: the estimate takes
+    each of them over, and the random walk makes up for what differs between model and vehicle. An
+    offset, such as a weak battery or the ground under a vehicle that has too little thrust to leave
+    it, is thereby found from the samples, and knowledge that comes or goes causes no jump.
 
-    In between samples of period T the filter follows signals up to about
-    ``(walk**2 / (noise**2 T)) ** (1/6)`` rad/s and averages out what is faster.
-
-    Parameters
-    ----------
-    noise : float
-        Standard deviation of a sample, in units of the signal.
-    acceleration_walk : float
-        How much the unknown part of the acceleration changes in a second: the
-        standard deviation, in units / s^2 / sqrt(s).
-    first_rate, first_acceleration : float, optional
-        Standard deviations of rate and acceleration at the first sample, in units / s and
-        units / s^2.
+    In between samples of period T the filter follows signals up to about ``(walk**2 / (noise**2 T))
+    ** (1/6)`` rad/s and averages out what is faster.
     """
 
     def __init__(

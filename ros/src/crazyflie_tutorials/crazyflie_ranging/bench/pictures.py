@@ -161,10 +161,17 @@ def follow_object(path: Path) -> None:
     bottom.plot(time, [each.ranges["front"] for each in moments], color=VEHICLE)
     for distance, text, at, side in (
         (0.6, "follows beyond", time[-1], "right"),
-        (0.3, "backs off below", 0.0, "left"),
+        (0.3, "backs off below", time[-1], "right"),
     ):
         bottom.axhline(distance, color=GREY, ls="--", lw=0.8)
         bottom.text(at, distance + 0.01, text, fontsize=8, color=GREY, ha=side)
+    command = [each.command for each in moments]
+    for name, colour, is_sent in (
+        ("0.3 m/s ahead", "#8fd19e", [v > 0.0 for v in command]),
+        ("0.3 m/s back", "#f2b5b5", [v < 0.0 for v in command]),
+    ):
+        bottom.fill_between(time, 0.0, 0.9, is_sent, color=colour, alpha=0.6, lw=0, label=name)
+    bottom.legend(loc="lower left", fontsize=8, title="command, else 0", title_fontsize=8)
     bottom.set_ylim(0.0, 0.9)
     bottom.set_ylabel("sensor in front, m")
     figure.savefig(path, dpi=110)

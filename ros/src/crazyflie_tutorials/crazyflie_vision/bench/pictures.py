@@ -126,8 +126,9 @@ def basics(folder: Path) -> None:
     flight.advance(1.0)
     topics = ("/camera/image_raw", *(f"/{name}/image" for name in FILTERS))
     tiles = [cv2.resize(flight.image(topic), (240, 180)) for topic in topics]
-    for tile, name in zip(tiles, ("image_raw", *FILTERS), strict=True):
-        cv2.putText(tile, name, (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 160, 255), 1, 16)
+    for k, name in enumerate(("image_raw", *FILTERS)):
+        tiles[k] = cv2.copyMakeBorder(tiles[k], 28, 4, 4, 4, cv2.BORDER_CONSTANT, value=(255,) * 3)
+        cv2.putText(tiles[k], name, (8, 19), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (0, 0, 0), 1, 16)
     cv2.imwrite(str(folder / "vision_basics.png"), np.hstack(tiles))
 
 

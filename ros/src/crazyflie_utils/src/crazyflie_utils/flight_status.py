@@ -7,6 +7,16 @@ from std_msgs.msg import String
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils.handle import NodeHandle
 
+WORDS = {
+    FlightStatus.UNKNOWN: "not known to fly",
+    FlightStatus.ON_GROUND: "on the ground",
+    FlightStatus.TAKING_OFF: "taking off",
+    FlightStatus.FLYING: "flying",
+    FlightStatus.DESCENDING: "descending",
+    FlightStatus.LANDING: "landing",
+}
+"""Constant of `FlightStatus` to words."""
+
 
 def subscribe(
     handle: NodeHandle, topic: str, text_topic: str | None, callback: Callable[[FlightStatus], None]

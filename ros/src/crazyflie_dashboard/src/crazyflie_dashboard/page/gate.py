@@ -40,6 +40,8 @@ class Gate:
         headers = {
             name.decode("latin-1"): text.decode("latin-1") for name, text in scope["headers"]
         }
+        if scope["type"] == "websocket":
+            headers["upgrade"] = "websocket"
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
         cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
         refusal = self._access.refusal(headers, given or (cookie.value if cookie else None))

@@ -60,7 +60,9 @@ class ParameterRow:
     def __init__(self, session: Session, parameter: ParameterInfo):
         self._session, self._parameter = session, parameter
         self._is_showing = False
-        with ui.element("div").classes("parameter").props(f'data-name="{_attribute(parameter.name)}"'):
+        row = ui.element("div").classes("parameter")
+        row.props["data-name"] = parameter.name
+        with row:
             with ui.element("div").classes("about"):
                 ui.label(parameter.name).classes("name")
                 ui.label(description(parameter)).classes("hint")
@@ -93,9 +95,7 @@ class ParameterRow:
         self._tell(f"is {_text(self._parameter.value)} now", "good")
         self._is_showing = True
         is_text = self._parameter.kind != "bool" and not self._parameter.choices
-        self._field.set_value(
-            _text(self._parameter.value) if is_text else self._parameter.value
-        )
+        self._field.set_value(_text(self._parameter.value) if is_text else self._parameter.value)
         self._is_showing = False
 
     def _tell(self, text: str, look: str) -> None:
@@ -119,7 +119,3 @@ def description(parameter: ParameterInfo) -> str:
 
 def _text(value: object) -> str:
     return str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _attribute(text: str) -> str:
-    return "".join(letter for letter in text if letter.isalnum() or letter in "._/-")

@@ -3,6 +3,8 @@
 import { CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
 import { Goal, Surroundings, Vehicles } from "dashboard-objects";
 
+const LABEL_PERIOD = 0.2;  // Between two layouts of more names than FEW, s: they cost more than all else.
+const FEW = 20;
 const CLICK = 5;  // A pointer that has moved further, px, has turned the view.
 
 export default {
@@ -77,6 +79,8 @@ export default {
       this.isOld = false;
       this.vehicles.place(this.camera, time);
       this.renderer.render(this.scene, this.camera);
+      if (this.vehicles.names.length > FEW && time < (this.nextLabels ?? 0)) return;
+      this.nextLabels = time + LABEL_PERIOD;
       this.labels.render(this.scene, this.camera);
     },
 

@@ -1,7 +1,7 @@
 """The three-dimensional scene: what the browser's part, scene_view.js, is told."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import roslib.packages
 from nicegui import ui
 from nicegui.element import Element
 
-from crazyflie_dashboard.snapshot import Scene, Triple, VehicleSnapshot
+from crazyflie_dashboard.snapshot import Rotation, Scene, Triple, VehicleSnapshot
 
 FOLDER = Path(__file__).parent
 DIGITS = 4
@@ -31,7 +31,7 @@ def vehicle_model() -> list[list[Any]]:
         (m) and roll, pitch, yaw (rad), and color. A propeller begins with its hub.
     """
     folder = Path(roslib.packages.get_pkg_dir("crazyflie_description"))
-    robot = ElementTree.parse(folder / "urdf" / "crazyflie2.urdf").getroot()
+    robot: Any = ElementTree.parse(folder / "urdf" / "crazyflie2.urdf").getroot()
     colors = {
         material.get("name"): _numbers(material.find("color"), "rgba")
         for material in robot.findall("material")
@@ -98,7 +98,7 @@ class SceneView(
 
 
 def vehicle_rows(scene: Scene, chosen: set[str]) -> list[list[Any]]:
-    """Return for each vehicle its pose, condition, whether it is chosen, a remark, its reference."""
+    """Return the vehicles as scene_view.js draws them."""
     rows = []
     for name, vehicle in scene.vehicles.items():
         pose = _pose(vehicle.position, vehicle.rotation)
@@ -123,10 +123,11 @@ def _solid(solid):
     return [solid.shape, solid.position, solid.rotation, solid.size, color, opacity]
 
 
-def _pose(position: Triple | None, rotation) -> list[float | None]:
-    is_known = position is not None and all(map(math.isfinite, (*position, *rotation)))
-    return _rounded((*position, *rotation)) if is_known else [None, None, None, 0, 0, 0, 1]
+def _pose(position: Triple | None, rotation: Rotation) -> list[Any]:
+    if position is None or not all(map(math.isfinite, (*position, *rotation))):
+        return [None, None, None, 0, 0, 0, 1]
+    return _rounded((*position, *rotation))
 
 
-def _rounded(numbers):
+def _rounded(numbers: Iterable[float]) -> list[float]:
     return [round(number, DIGITS) for number in numbers]

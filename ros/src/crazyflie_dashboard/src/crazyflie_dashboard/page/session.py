@@ -73,7 +73,7 @@ class Session:
 
     @property
     def chosen_names(self) -> tuple[str, ...]:
-        """Names of the chosen vehicles that are still there, in the order in which they are shown."""
+        """Names of the chosen vehicles that are still there, in the order of the cards."""
         return tuple(name for name in self.vehicles if name in self.chosen)
 
     def choose(self, names: Iterable[str], is_added: bool = False) -> None:

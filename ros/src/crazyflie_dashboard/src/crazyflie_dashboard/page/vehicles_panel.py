@@ -27,7 +27,7 @@ class VehiclesPanel:
             ui.button("None", on_click=lambda: session.choose(())).props("flat dense")
         with ui.element("div").classes("tools"):
             self._button("Take off", self._take_off).props("icon=flight_takeoff color=positive")
-            self._height = _number("height, m", 1.0, 0.1, 3.0)
+            self._height = _number("height, m", 1.0)
             self._button("Land", self._land).props("icon=flight_land color=primary")
         with ui.element("div").classes("tools goal"):
             self._goal = [_number(f"{axis}, m") for axis in "xyz"]
@@ -36,8 +36,8 @@ class VehiclesPanel:
         for field in (*self._goal, self._yaw):
             field.on_value_change(self._draw_goal)
         ui.label(
-            "Click on the floor to set a goal, drag its handle, then press Go. Several vehicles keep "
-            "their formation."
+            "Click on the floor to set a goal, drag its handle, then press Go. Several vehicles "
+            "keep their formation."
         ).classes("hint")
         self._cards = Cards()
         self._cards.on("choose", self._choose)
@@ -96,7 +96,9 @@ class VehiclesPanel:
             await self._session.command(Action.GO_TO, (), event.args)
 
 
-def formation(vehicles: list[VehicleSnapshot], goal: Sequence[float]) -> dict[str, tuple[float, float, float]]:
+def formation(
+    vehicles: list[VehicleSnapshot], goal: Sequence[float]
+) -> dict[str, tuple[float, float, float]]:
     """Return where each vehicle goes, m, so that their middle comes to the goal.
 
     A vehicle whose position is not known goes nowhere, since it could hit another one.
@@ -147,7 +149,10 @@ def _age(age: float | None) -> str:
 
 
 def _number(
-    label: str, value: float | None = None, minimum: float | None = None, maximum: float | None = None
+    label: str,
+    value: float | None = None,
+    minimum: float | None = None,
+    maximum: float | None = None,
 ) -> ui.number:
     field = ui.number(label, value=value, min=minimum, max=maximum, step=0.1)
     return field.props("dense outlined hide-bottom-space").classes("number")

@@ -131,6 +131,4 @@ class View:
         await self._session.command(Action.EMERGENCY, self._session.vehicles, event.args)
 
     async def _stop_mission(self, event: GenericEventArguments) -> None:
-        await self._session.succeeds(
-            self._dashboard.stop_mission(self._session.page, event.args)
-        )
+        await self._session.succeeds(self._dashboard.stop_mission(self._session.page, event.args))

@@ -20,6 +20,7 @@ class Row:
     #: least, most: The goal: where the figure is to be.
     least: float = -math.inf
     most: float = math.inf
+    seconds: float = 12.0  #: About how long it takes to measure, s.
 
     @property
     def goal(self) -> str:

@@ -102,5 +102,6 @@ ROWS = [
         "",
         vehicles_in_real_time,
         least=100.0,
+        seconds=240.0,
     ),
 ]

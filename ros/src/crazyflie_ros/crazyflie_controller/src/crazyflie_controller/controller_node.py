@@ -16,8 +16,7 @@ from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Number
 from crazyflie_utils.refusal import RefusalError
 
-_DESCENT_LIMIT = 7.0
-"""Longest descent at a shutdown, s: the process is killed after 10 s."""
+_DESCENT_LIMIT = 7.0  #: Longest descent at a shutdown, s: the process is killed after 10 s.
 
 
 class ControllerParameters(PoseParameters):

@@ -12,11 +12,9 @@ from crazyflie_model.units import GRAVITY, HOVER_PWM
 from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
 
-TAKEOFF_RATE = 10000.0
-"""Rate of the thrust in a takeoff, PWM/s."""
-
+TAKEOFF_RATE = 10000.0  #: Rate of the thrust in a takeoff, PWM/s.
+#: Height above the start, m, at which a takeoff ends, and a landing's last part begins.
 LIFT_OFF_HEIGHT = 0.05
-"""Height above the start, m, at which a takeoff ends, and a landing's last part begins."""
 
 LIFT_OFF_EXCESS = TAKEOFF_RATE * (6.0 * LIFT_OFF_HEIGHT * HOVER_PWM / (GRAVITY * TAKEOFF_RATE)) ** (
     1.0 / 3.0
@@ -26,24 +24,17 @@ LIFT_OFF_EXCESS = TAKEOFF_RATE * (6.0 * LIFT_OFF_HEIGHT * HOVER_PWM / (GRAVITY *
 With a thrust that grows at a constant rate it climbs by g rate t^3 / (6 hover), so that
 the time since it left the ground depends on its weight by the cube root only."""
 
-HOVER_HEIGHT = 0.5
-"""Height above the start at which a vehicle hovers before the first goal, m."""
+HOVER_HEIGHT = 0.5  #: Height above the start at which a vehicle hovers before the first goal, m.
+DESCENT_SPEED = 0.3  #: Speed of a landing, m/s.
 
-DESCENT_SPEED = 0.3
-"""Speed of a landing, m/s."""
-
+#: Depth of a landing's last goal below the start, m, so that the vehicle touches down with the
+#: speed of the descent also when it flies above the goal.
 PRESS_DEPTH = 0.3
-"""Depth of a landing's last goal below the start, m, so that the vehicle touches down with the
-speed of the descent also when it flies above the goal."""
 
+#: Longest delay of a descent over its calculated duration, s: the floor may be higher there.
 DESCENT_MARGIN = 3.0
-"""Longest delay of a descent over its calculated duration, s: the floor may be higher there."""
-
-TOUCHDOWN_RATE = 20000.0
-"""Rate of the decreasing thrust in the last part of a landing, PWM/s."""
-
-TOUCHDOWN_DURATION = 1.0
-"""Duration of that part, s; zero thrust follows."""
+TOUCHDOWN_RATE = 20000.0  #: Rate of the decreasing thrust in the last part of a landing, PWM/s.
+TOUCHDOWN_DURATION = 1.0  #: Duration of that part, s; zero thrust follows.
 
 
 class State(Enum):

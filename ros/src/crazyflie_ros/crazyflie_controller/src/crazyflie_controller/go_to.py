@@ -5,8 +5,7 @@ from typing import NamedTuple
 from crazyflie_controller.pid import PidParameters, SaturatedPid
 from crazyflie_model.angles import rotate_by_yaw, wrap_to_pi
 
-AXES = ("X", "Y", "Z", "Yaw")
-"""Names of the four controllers."""
+AXES = ("X", "Y", "Z", "Yaw")  #: Names of the four controllers.
 
 
 class Pose(NamedTuple):

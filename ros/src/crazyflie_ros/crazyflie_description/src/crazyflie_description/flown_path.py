@@ -10,16 +10,11 @@ class FlownPath:
 
     A position nearer than the spacing (m) to the last one kept is dropped; of more positions than
     the capacity the oldest are dropped.
-
-    Attributes
-    ----------
-    positions : deque of (x, y, z)
-        m, oldest first.
     """
 
     def __init__(self, spacing: float, capacity: int):
         self._spacing = spacing
-        self.positions: deque[tuple[float, ...]] = deque(maxlen=capacity)
+        self.positions: deque[tuple[float, ...]] = deque(maxlen=capacity)  #: m, oldest first.
         self._stamp: float | None = None
 
     def add(self, stamp: float, position: Sequence[float]) -> bool:

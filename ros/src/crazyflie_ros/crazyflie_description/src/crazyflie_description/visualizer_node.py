@@ -12,14 +12,9 @@ from crazyflie_utils import Node, NodeHandle, Parameters, TransformError, parame
 from crazyflie_utils.last_valid import LastValid
 from crazyflie_utils.parameters.types import BOOLEAN, FRAME, TOPIC
 
-PERIOD = 0.05
-"""Between two looks at the vehicle's pose, s."""
-
-SPACING = 0.01
-"""Between two points of the path, m."""
-
-CAPACITY = 2000
-"""Points of the path that are kept: at least 20 m of flight."""
+PERIOD = 0.05  #: Between two looks at the vehicle's pose, s.
+SPACING = 0.01  #: Between two points of the path, m.
+CAPACITY = 2000  #: Points of the path that are kept: at least 20 m of flight.
 
 PATH_COLOUR = ColorRGBA(0.05, 0.45, 0.90, 1.0)
 REFERENCE_COLOUR = ColorRGBA(0.00, 0.55, 0.30, 1.0)

@@ -10,14 +10,9 @@ from collections.abc import Callable
 from crazyflie_link.address import Address
 from crazyflie_link.errors import AddressError, CrazyflieError
 
-FINE, FAILED = 0, 1
-"""Exit statuses; argparse's own for wrong usage is 2."""
-
-DEFAULT_URI = "radio://0/80/2M/E7E7E7E7E7"
-"""Address that a vehicle has when it is new."""
-
-LIMIT = 40.0
-"""When to give up, s: later than a connection does by itself."""
+FINE, FAILED = 0, 1  #: Exit statuses; argparse's own for wrong usage is 2.
+DEFAULT_URI = "radio://0/80/2M/E7E7E7E7E7"  #: Address that a vehicle has when it is new.
+LIMIT = 40.0  #: When to give up, s: later than a connection does by itself.
 
 
 def make_parser(

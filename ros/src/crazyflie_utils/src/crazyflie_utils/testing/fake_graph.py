@@ -31,6 +31,8 @@ class FakeGraph:
         #: What a fault makes of the messages on a topic: ``fault(message)`` returns those that
         #: arrive in its place.
         self.faults: dict[str, Callable[[Any], list[Any]]] = {}
+        #: Process and topic: messages that do not reach this process.
+        self.unheard: set[tuple[str, str]] = set()
         self.log: list[tuple[str, str]] = []  #: Level and text of what nodes have logged.
         self._parameters = parameters
         self._processes: dict[str, _GraphProcess] = {}
@@ -155,7 +157,7 @@ class FakeGraph:
         for arriving in [message] if fault is None else fault(message):
             arriving._connection_header = {"callerid": sender, "topic": topic}
             for name, process in list(self._processes.items()):
-                if name != sender:
+                if name != sender and (name, topic) not in self.unheard:
                     for deliver in tuple(process.transport.subscribers.get(topic, ())):
                         process.receive(deliver, arriving)
 
@@ -232,4 +234,5 @@ class _GraphTransport(FakeTransport):
         return self.graph.call(name, request)
 
     def log(self, level: str, text: str) -> None:
+        super().log(level, text)
         self.graph.log.append((level, text))

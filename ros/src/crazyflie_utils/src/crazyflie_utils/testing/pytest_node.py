@@ -36,9 +36,15 @@ def pytest_arguments(arguments: list[str]) -> list[str]:
 class InterruptIsFailure:
     """Plugin of pytest: an interrupt fails the test that runs, and is the end of all.
 
+    It also knows the marker of long tests.
+
     roslaunch interrupts the tests when a required node dies. To pytest by itself that is
     no failure, so that rostest would count the tests that were not run as passed.
     """
+
+    def pytest_configure(self, config: pytest.Config) -> None:
+        """Declare the marker of what `./run tests` leaves out."""
+        config.addinivalue_line("markers", "long: takes long; only in ./run tests --all")
 
     def pytest_sessionstart(self, session: pytest.Session) -> None:
         """Take over the signal."""

@@ -7,6 +7,8 @@ const LENGTH = 0.13;        // Of a vehicle with its propellers, m.
 const SPIN = 25;            // Turning of drawn propellers, rad/s: real ones are too fast to be seen.
 const SAMPLES = 120;        // Points of a trail.
 const TRAIL_PERIOD = 0.25;  // Between two of them, s.
+const DETAILED = 20;        // Vehicles that are drawn with all details; more have only the large parts.
+const DETAIL = 0.008;       // Size of a part that is a detail, m.
 const CONDITIONS = ["ground", "flight", "stale", "emergency"];
 // By a vehicle's condition, its number in the list above.
 const TINTS = ["#ffffff", "#ffffff", "#5b6068", "#ff4040"].map((text) => new THREE.Color(text));
@@ -22,11 +24,11 @@ export function label(text, kind) {
 }
 
 // Return one geometry with the colors of several primitives: [shape, size, position, rpy, color].
-function merged(parts) {
+function merged(parts, sides) {
   const arrays = { position: [], normal: [], color: [] };
   for (const [shape, size, position, rpy, color] of parts) {
     const made = shape === "box" ? new THREE.BoxGeometry(...size)
-      : shape === "cylinder" ? new THREE.CylinderGeometry(size[0], size[0], size[1], 10).rotateX(Math.PI / 2)
+      : shape === "cylinder" ? new THREE.CylinderGeometry(size[0], size[0], size[1], sides).rotateX(Math.PI / 2)
       : new THREE.SphereGeometry(size[0], 6, 4);
     made.applyMatrix4(new THREE.Matrix4().makeRotationFromEuler(new THREE.Euler(...rpy, "ZYX"))
       .setPosition(...position));
@@ -42,15 +44,17 @@ function merged(parts) {
 
 // Return the body and the propellers of a vehicle's model: parts with the number of a propeller in
 // front (0 for the body), those of a propeller around the center of its hub.
-function bodyParts(model) {
-  const of = (number) => model.filter((part) => part[0] === number).map((part) => part.slice(1));
+function bodyParts(model, isDetailed) {
+  const sides = isDetailed ? 10 : 4;
+  const of = (number) => model.filter((part) => part[0] === number).map((part) => part.slice(1))
+    .filter(([, size]) => isDetailed || Math.max(...size) > DETAIL);
   const propellers = [1, 2, 3, 4].filter((number) => of(number).length).map((number) => {
     const parts = of(number), center = parts[0][2];
     const moved = parts.map(([shape, size, position, ...rest]) =>
       [shape, size, position.map((value, k) => value - center[k]), ...rest]);
-    return { center: new THREE.Vector3(...center), geometry: merged(moved) };
+    return { center: new THREE.Vector3(...center), geometry: merged(moved, sides) };
   });
-  return { body: merged(of(0)), propellers };
+  return { body: merged(of(0), sides), propellers };
 }
 
 // Where vehicles have been in the last half minute, as one object: it is drawn at once.
@@ -95,7 +99,7 @@ export class Vehicles extends THREE.Group {
     super();
     this.names = names;
     this.poses = [];
-    const parts = bodyParts(model);
+    const parts = bodyParts(model, names.length <= DETAILED);
     const look = new THREE.MeshLambertMaterial({ vertexColors: true });
     this.body = this.instances(parts.body, look);
     this.propellers = parts.propellers.map(({ center, geometry }) =>

@@ -1,8 +1,10 @@
 """The program that flies a trajectory, or makes the dry run of a mission.
 
-    python3 -m crazyflie_dashboard.mission_runner dry_run|fly FILE VEHICLE...
+    python3 -m crazyflie_mission_api.mission_runner dry_run|fly FILE VEHICLE...
 
-A dry run is made where the script says ``fleet.fly(mission)``; nothing moves.
+A dry run is made where the script says ``fleet.fly(mission)``; nothing moves. Its last line of
+output is the result as JSON: {"dry_run": {"passed": bool, "text": str, "duration": s, "paths":
+{vehicle: [[x, y, z], ...]}}}.
 """
 
 import json
@@ -11,14 +13,16 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from crazyflie_dashboard.missions import RESULT
 from crazyflie_demo import trajectory_file
-from crazyflie_mission_api import Fleet, MissionError
+from crazyflie_mission_api import Fleet, Limits, MissionError
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 
 _HEIGHT = 1.0
 """Of a trajectory's takeoff, m."""
+
+_LIMITS = Limits(speed=1.5, acceleration=2.5)
+"""Of trajectories in files: they are flown as they are, or not at all."""
 
 _PERIOD = 0.2
 """From one point of a path that is shown to the next, s."""
@@ -40,7 +44,7 @@ def main(arguments: list[str]) -> int:
     try:
         if path.endswith(".csv"):
             pieces = trajectory_file.load(path)
-            with Fleet(names) as fleet:
+            with Fleet(names, limits=_LIMITS) as fleet:
                 fly(fleet, lambda group: _follow(group, pieces))
         else:
             runpy.run_path(path, run_name="__main__")
@@ -96,7 +100,7 @@ def _rehearse(fleet: Fleet, mission: Callable[[VehicleGroup], Any]) -> None:
 
 def _report(passed, text, duration=0.0, paths=None):
     result = {"passed": passed, "text": text, "duration": duration, "paths": paths or {}}
-    print(RESULT + json.dumps(result), flush=True)
+    print(json.dumps({"dry_run": result}), flush=True)
 
 
 if __name__ == "__main__":

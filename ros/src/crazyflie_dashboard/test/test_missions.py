@@ -1,0 +1,107 @@
+"""Missions: programs that are listed, rehearsed, flown and stopped."""
+
+import os
+import sys
+
+import pytest
+
+from crazyflie_dashboard.dashboard import MissionFile
+from crazyflie_dashboard.missions import Missions, listed
+from crazyflie_utils.refusal import RefusalError
+
+LIMIT = 30.0
+
+STAND_IN = """#!{python}
+import json, sys, time
+if "crazyflie_mission_api.mission_runner" in sys.argv:
+    path = sys.argv[4]
+    passed = "bad" not in path
+    result = dict(passed=passed, text="far" if passed else "cf1: y is 3 m", duration=4.0)
+    result["paths"] = dict(cf1=[[0, 0, 0], [0, 0, 1]])
+    print("from crazyflie_mission_api: loading")
+    print(json.dumps(dict(dry_run=result)))
+    sys.exit(0 if passed else 1)
+if "waits" in sys.argv[1]:
+    print("flies", flush=True)
+    try:
+        time.sleep({limit})
+    except KeyboardInterrupt:
+        print("has landed")
+        sys.exit(130)
+print("cf1 is lost")
+sys.exit(1 if "fails" in sys.argv[1] else 0)
+"""
+
+
+@pytest.fixture
+def missions(tmp_path):
+    """Missions whose interpreter is a program that answers as the runner and scripts do."""
+    program = tmp_path / "python"
+    program.write_text(STAND_IN.format(python=sys.executable, limit=LIMIT))
+    program.chmod(0o755)
+    return Missions(str(program))
+
+
+@pytest.fixture
+def script(tmp_path):
+    def write(name, text="import crazyflie_mission_api\n"):
+        path = tmp_path / "missions" / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+        return MissionFile(str(path), name, name.endswith(".csv"))
+
+    return write
+
+
+def test_scripts_of_missions_and_trajectories_are_listed(script, tmp_path):
+    mission, trajectory = script("one.py"), script("two.csv", "1,2\n")
+    script("other.py", "print('hello')\n")
+    script("notes.txt")
+    assert listed([tmp_path / "missions", tmp_path / "missing"]) == (mission, trajectory)
+
+
+def test_a_dry_run_has_a_result_and_paths(missions, script):
+    result = missions.dry_run(script("one.py"), ("cf1",)).result(LIMIT)
+    assert (result.passed, result.text, result.duration) == (True, "far", 4.0)
+    assert result.paths == (("cf1", ((0, 0, 0), (0, 0, 1))),)
+
+
+def test_what_has_not_passed_does_not_fly(missions, script):
+    bad = script("bad.py")
+    with pytest.raises(RefusalError, match=r"bad.py: expected a dry run of it that has passed"):
+        missions.fly(bad, ("cf1",))
+    result = missions.dry_run(bad, ("cf1",)).result(LIMIT)
+    assert (result.passed, result.text) == (False, "cf1: y is 3 m")
+    with pytest.raises(RefusalError, match="expected a dry run"):
+        missions.fly(bad, ("cf1",))
+
+
+def test_another_script_or_other_vehicles_need_another_dry_run(missions, script):
+    mission = script("one.py")
+    missions.dry_run(mission, ("cf1",)).result(LIMIT)
+    with pytest.raises(RefusalError, match="expected a dry run"):
+        missions.fly(mission, ("cf2",))
+    os.utime(mission.path, (1.0, 1.0))
+    with pytest.raises(RefusalError, match="expected a dry run"):
+        missions.fly(mission, ("cf1",))
+
+
+def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
+    mission = script("waits.py")
+    missions.dry_run(mission, ("cf1",)).result(LIMIT)
+    end = missions.fly(mission, ("cf1",))
+    assert missions.running == ("waits.py",)
+    with pytest.raises(RefusalError, match=r"waits.py flies; expected it to have ended"):
+        missions.fly(mission, ("cf1",))
+    missions.stop()
+    assert end.result(LIMIT) == ""
+    assert missions.running == ()
+    with pytest.raises(RefusalError, match="no mission flies"):
+        missions.stop()
+
+
+def test_why_a_mission_has_failed_is_what_it_said_last(missions, script):
+    mission = script("fails.py")
+    missions.dry_run(mission, ("cf1",)).result(LIMIT)
+    with pytest.raises(RefusalError, match="cf1 is lost"):
+        missions.fly(mission, ("cf1",)).result(LIMIT)

@@ -1,0 +1,125 @@
+"""Flies a mission script with simulated vehicles: dry run, flight, report, picture from above.
+
+The vehicles are those of sw_swarm.launch: cf1, cf2, ... in a square on the ground, 1 m apart.
+"""
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from crazyflie_dev.demo import new_recording, wait_for_recording
+from crazyflie_reports import bag_log, bag_report
+from crazyflie_reports.bag_flights import Flight
+from crazyflie_reports.flight_operator import FlightError
+from crazyflie_utils.testing.launching import LaunchError, complaints, roslaunch
+
+PICTURE = "from_above.png"
+
+_DEFAULT_COUNT = 5
+"""Vehicles of a script that names none."""
+
+
+def vehicles_of(script: str) -> int:
+    """Return how many vehicles a script needs: the highest k of the names cfk in its text."""
+    numbers = [int(number) for number in re.findall(r"\bcf([1-9][0-9]*)\b", script)]
+    return max(numbers, default=_DEFAULT_COUNT)
+
+
+def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) -> int:
+    """Fly a script (path and its arguments) with n vehicles; return the exit status."""
+    folder.mkdir(parents=True, exist_ok=True)
+    log, recordings = folder / "swarm.log", folder / "recordings"
+    rviz = "true" if os.environ.get("DISPLAY") else "false"
+    # By simulated time in step with the clock: a busy computer flies more slowly, but as well. As
+    # fast as it goes, the recording would lack messages.
+    arguments = [
+        *("crazyflie_examples", "sw_swarm.launch", f"n:={n}", "sim_time:=true", f"rviz:={rviz}"),
+        *("record:=true", f"record_folder:={recordings}"),
+        *launch_arguments,
+    ]
+    before = set(recordings.glob("*/"))
+    print(f"launching {' '.join(arguments)}  (its output: {log})", flush=True)
+    begin = time.monotonic()
+    with roslaunch(arguments, log):
+        wait_for_recording(f"/cf{n}/state")
+        command = [sys.executable, "-m", "crazyflie_dev.mission_script", *script]
+        with subprocess.Popen(command) as process:
+            try:
+                status = process.wait()
+            except KeyboardInterrupt:
+                # The script lands its vehicles first.
+                status = process.wait()
+    print(f"flown in {time.monotonic() - begin:.0f} s; writing the report", flush=True)
+    if status:
+        print(*complaints(log), sep="\n", file=sys.stderr)
+    report(new_recording(recordings, before), folder)
+    return status
+
+
+def report(recording: Path, folder: Path) -> None:
+    """Write report and picture of a recording into a folder."""
+    page = bag_report.Report()
+    with tempfile.TemporaryDirectory(dir=folder) as series:
+        recorded = bag_log.read(recording, Path(series))
+        page.add(recorded)
+        picture = draw_from_above(list(bag_report.flights_of(recorded)))
+    page.write(folder)
+    picture.savefig(folder / PICTURE, dpi=150)
+    print(page.table())
+    print(f"report: {folder / bag_report.PAGE}\npicture: {folder / PICTURE}")
+
+
+def draw_from_above(flights: list[Flight]) -> Figure:
+    """Return a figure of the paths in x and y (m); a circle is a start, a cross an end."""
+    figure = Figure(figsize=(6.4, 6.4), layout="constrained")
+    axes = figure.add_subplot(aspect="equal", xlabel="x (m)", ylabel="y (m)")
+    for flight in flights:
+        x, y = flight.record.state.column("x"), flight.record.state.column("y")
+        (line,) = axes.plot(x, y, linewidth=1.0, label=flight.vehicle)
+        axes.plot(x[:1], y[:1], "o", color=line.get_color())
+        axes.plot(x[-1:], y[-1:], "x", color=line.get_color())
+    axes.grid(visible=True, linewidth=0.3)
+    if 0 < len(flights) <= 12:
+        axes.legend(fontsize="small")
+    return figure
+
+
+def main() -> int:
+    """Fly what the command line names; return the exit status."""
+    arguments = sys.argv[1:]
+    # What stands behind -- is the script's own.
+    cut = arguments.index("--") if "--" in arguments else len(arguments)
+    parser = argparse.ArgumentParser(prog="run mission", description=__doc__)
+    parser.add_argument("script", type=Path, metavar="FILE.py", help="see crazyflie_mission_api")
+    parser.add_argument("n", nargs="*", metavar="n", help="number of vehicles, arguments of "
+                        "sw_swarm.launch such as spacing:=1.8; n is by default the highest of the "
+                        f"names cf1, cf2, ... in the script, or {_DEFAULT_COUNT}")  # fmt: skip
+    parser.add_argument("--out", type=Path, help="folder for report, picture, log (out/NAME)")
+    options = parser.parse_args(arguments[:cut])
+    script = options.script
+    if not script.is_file():
+        parser.error(f"there is no file {script}; expected a mission script")
+    launch_arguments = [each for each in options.n if ":=" in each]
+    numbers = [each for each in options.n if ":=" not in each] or [vehicles_of(script.read_text())]
+    if len(numbers) > 1 or not str(numbers[0]).isdecimal() or int(numbers[0]) < 1:
+        parser.error(
+            f"n is {' '.join(map(str, numbers))}; expected one number of vehicles, 1 or more"
+        )
+    folder = (options.out or Path("out") / script.stem).resolve()
+    try:
+        command = [str(script), *arguments[cut + 1 :]]
+        return fly(command, int(numbers[0]), folder, launch_arguments)
+    except (LaunchError, FlightError) as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,122 @@
+"""Keeps vehicles of a script apart that the driver alone flies, as a fleet's process does."""
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+
+from crazyflie_fleet.separation import LOOK_AHEAD, Separation
+from crazyflie_mission_api.vehicle_state import Pose, velocity_between
+from crazyflie_model.angles import Triple
+from crazyflie_py.ros_connection import Connection
+
+_SHORTEST_SPAN = 0.02
+"""Between two poses from which a velocity follows, s."""
+
+_LONGEST_SPAN = 0.3
+"""After it the first pose says nothing about a velocity, s."""
+
+_LOWEST_SPEED = 0.05
+"""A slower vehicle hovers, m/s."""
+
+
+_REPEAT = 2.0
+"""Between two warnings of a vehicle, s."""
+
+
+class WatchedVehicle(Protocol):
+    """A vehicle that can be held."""
+
+    name: str
+
+    @property
+    def may_be_held(self) -> bool:
+        """Whether it flies, and neither takes off, nor lands, nor avoids others by itself."""
+
+    def pose(self) -> Pose | None:
+        """Return where it is; None if that is not known."""
+
+    def streamed_goal(self, place: Triple) -> Triple | None:
+        """Return where setpoints lead it from a place (m); None if none are sent."""
+
+    def hold(self, place: Triple) -> None:
+        """Have it stay at a place, m."""
+
+    def release(self) -> None:
+        """Have it follow setpoints again."""
+
+
+class SeparationWatch:
+    """Holds vehicles that come too near to another, by the rule of a fleet.
+
+    The goal of a vehicle without setpoints is where its velocity leads it.
+
+    Parameters
+    ----------
+    vehicles : sequence of WatchedVehicle
+    buffers : sequence of float
+        Radii of their own space, m.
+    connection : Connection
+        Warns; unchecked, there are only the warnings.
+    """
+
+    def __init__(
+        self,
+        vehicles: Sequence[WatchedVehicle],
+        buffers: Sequence[float],
+        connection: Connection,
+    ):
+        self._vehicles = vehicles
+        self._separation = Separation(buffers)
+        self._connection = connection
+        self._poses: list[Pose | None] = [None] * len(vehicles)
+        self._velocities = np.zeros((len(vehicles), 3))
+        self._held: set[int] = set()
+
+    def update(self) -> None:
+        """Look at all vehicles, and hold or release them."""
+        positions = np.full((len(self._vehicles), 3), math.nan)
+        goals = positions.copy()
+        for k, vehicle in enumerate(self._vehicles):
+            pose = vehicle.pose()
+            self._measure(k, pose)
+            if pose is not None:
+                positions[k] = pose.position
+                streamed = vehicle.streamed_goal(pose.position)
+                ahead = positions[k] + LOOK_AHEAD * self._velocities[k]
+                goals[k] = ahead if streamed is None else streamed
+        approaching, pairs = self._separation.update(positions, self._velocities, goals)
+        held = {int(k) for k in np.flatnonzero(approaching) if self._vehicles[int(k)].may_be_held}
+        for k in sorted(held - self._held):
+            self._begin(k, pairs, positions[k])
+        for k in self._held - held:
+            self._vehicles[k].release()
+        self._held = held
+
+    def _measure(self, k, pose):
+        last = self._poses[k]
+        span = math.inf if pose is None or last is None else pose.time - last.time
+        if 0.0 <= span < _SHORTEST_SPAN:
+            return
+        self._poses[k] = pose
+        self._velocities[k] = 0.0
+        if 0.0 < span <= _LONGEST_SPAN:
+            velocity = velocity_between(last, pose)
+            if np.linalg.norm(velocity) > _LOWEST_SPEED:
+                self._velocities[k] = velocity
+
+    def _begin(self, k, pairs, position):
+        (pair, *_) = [pair for pair in pairs if k in pair[:2]]
+        other = self._vehicles[pair.second if pair.first == k else pair.first]
+        x, y, z = position.tolist()
+        is_held = not self._connection.is_unchecked
+        self._connection.handle.warn(
+            f"{self._vehicles[k].name} comes too near to {other.name}: {pair.distance:.2f} m, or "
+            f"so it will be in {LOOK_AHEAD:g} s; expected at least {pair.limit:.2f} m (a metre of "
+            f"height counts half); {'it is held there' if is_held else 'it flies on'}",
+            throttle=_REPEAT,
+            key=f"separation {self._vehicles[k].name}",
+        )
+        if is_held:
+            self._vehicles[k].hold((x, y, z))

@@ -197,7 +197,13 @@ def test_a_flight_needs_no_other_section(flight):
 def locked_versions():
     """Return name -> version of ros/requirements.txt, for this machine."""
     requirements = [line.partition(";")[0].strip() for line in lines(ROS / "requirements.txt")]
-    return dict(requirement.split("==") for requirement in requirements)
+    pairs = (requirement.split("==") for requirement in requirements)
+    return {normalized(name): version for name, version in pairs}
+
+
+def normalized(name):
+    """Return the name of a PyPI package as PEP 503 compares names."""
+    return re.sub(r"[-_.]+", "-", name).lower()
 
 
 TOOLS = {"pip", "setuptools"}
@@ -206,7 +212,9 @@ TOOLS = {"pip", "setuptools"}
 
 def test_the_virtual_environment_is_the_list():
     folder = next((ROS / ".venv" / "lib").glob("python3.*/site-packages"))
-    found = {d.name: d.version for d in importlib.metadata.distributions(path=[str(folder)])}
+    found = {
+        normalized(d.name): d.version for d in importlib.metadata.distributions(path=[str(folder)])
+    }
     assert {name: version for name, version in found.items() if name not in TOOLS} == {
         name: version for name, version in locked_versions().items() if name in found
     }
@@ -221,7 +229,7 @@ def test_the_list_has_all_that_its_packages_pull_in(name):
         needed, _, condition = requirement.partition(";")
         if "extra ==" not in condition and "python_version" not in condition:
             # Raises PackageNotFoundError when it is neither locked nor from Debian.
-            assert importlib.metadata.version(re.split("[<>=!~ (]", needed)[0])
+            assert importlib.metadata.version(re.split(r"[<>=!~ (\[]", needed)[0])
 
 
 @pytest.mark.parametrize("module", ["cv2", "cv_bridge", "cv_bridge.boost.cv_bridge_boost"])

@@ -14,7 +14,6 @@ from crazyflie_dashboard.live_dashboard import LiveDashboard
 from crazyflie_utils import Node, NodeHandle, ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import Integer, Text
 
-
 _NOT_INSTALLED = "NiceGUI, which the page is made with, is not installed: ./run install dashboard"
 
 

@@ -48,10 +48,17 @@ export default {
     this.observer.observe(this.$el);
     this.controls.addEventListener("change", () => { this.isOld = true; });
     this.renderer.setAnimationLoop((time) => this.draw(time / 1000));
-    this.$emit("ready");
+    // The connection is made after all parts of the page.
+    this.waiting = setInterval(() => {
+      if (!window.socket) return;
+      clearInterval(this.waiting);
+      window.socket.on("vehicles", (rows) => this.update(rows));
+      this.$emit("ready");
+    }, 20);
   },
 
   beforeUnmount() {
+    clearInterval(this.waiting);
     this.observer?.disconnect();
     this.renderer?.setAnimationLoop(null);
     this.renderer?.dispose();
@@ -96,8 +103,14 @@ export default {
       act();
       this.isOld = true;
     },
-    update(poses) { this.change(() => this.vehicles.update(poses)); },
-    setNames(names) { this.change(() => this.setVehicles(names)); },
+    update(poses) {
+      this.poses = poses;  // They may come before the names that they belong to.
+      this.change(() => this.vehicles.update(poses));
+    },
+    setNames(names) {
+      this.change(() => this.setVehicles(names));
+      if (this.poses) this.update(this.poses);
+    },
     setWorld(solids, fence) { this.change(() => this.surroundings.setWorld(solids, fence)); },
     setPaths(paths) { this.change(() => this.surroundings.setPaths(paths)); },
     setFrames(frames) { this.change(() => this.surroundings.setFrames(frames)); },

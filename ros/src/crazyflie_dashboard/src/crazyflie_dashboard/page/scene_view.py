@@ -8,7 +8,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 import roslib.packages
-from nicegui import ui
+from nicegui import core, ui
 from nicegui.element import Element
 
 from crazyflie_dashboard.snapshot import Rotation, Scene, Triple, VehicleSnapshot
@@ -74,14 +74,18 @@ class SceneView(
         self._shown: dict[str, Any] = {}
         self.on("ready", lambda: self._shown.clear())
 
-    def show(self, scene: Scene, chosen: set[str], extra_paths: Mapping[str, Any]) -> None:
+    async def show(self, scene: Scene, chosen: set[str], extra_paths: Mapping[str, Any]) -> None:
         """Draw a scene; what has not changed since the last one is not sent."""
         self._send("setNames", [list(scene.vehicles)])
         self._send("setWorld", [[_solid(each) for each in scene.solids], scene.fence])
         self._send("setPaths", [[*scene.paths.values(), *extra_paths.values()]])
         frames = [[each.name, *_pose(each.position, each.rotation)] for each in scene.frames]
         self._send("setFrames", [frames])
-        self._send("update", [vehicle_rows(scene, chosen)])
+        rows = vehicle_rows(scene, chosen)
+        if self._shown.get("update") != rows:
+            self._shown["update"] = rows
+            # As an event: the browser would compile, and keep for long, each call of a method.
+            await core.sio.emit("vehicles", rows, room=self.client.id)
 
     def show_goal(self, goal: dict[str, float | None] | None) -> None:
         """Draw where a go to leads: x, y, z (m) and yaw (rad, or None)."""

@@ -93,9 +93,9 @@ class View:
     def _watched(self) -> str | None:
         return self._session.watched or next(iter(self._session.vehicles), None)
 
-    def _draw(self) -> None:
+    async def _draw(self) -> None:
         scene = self._dashboard.scene()
-        self._scene_view.show(scene, self._session.chosen, self._panels["Missions"].paths)
+        await self._scene_view.show(scene, self._session.chosen, self._panels["Missions"].paths)
 
     def _refresh(self) -> None:
         ui.run_javascript(f"setBeat({time.monotonic()})")

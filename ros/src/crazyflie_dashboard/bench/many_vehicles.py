@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "test"))
 from fake_dashboard import vehicle
 from pages import Browser, Server, chromium
 
+#: Counts frames a second and the memory of the page's JavaScript, MiB.
 FRAMES = """
 const done = arguments[0], start = performance.now();
 let count = 0;
@@ -31,7 +32,6 @@ let count = 0;
   }
 })();
 """
-"""Counts frames a second and the memory of the page's JavaScript, MiB."""
 
 
 def fly(server: Server, count: int, is_over: threading.Event) -> None:

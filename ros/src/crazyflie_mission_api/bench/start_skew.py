@@ -29,15 +29,13 @@ from crazyflie_utils.main import begin_script
 from crazyflie_utils.testing.programs import free_port, running
 from crazyflie_utils.testing.waiting import wait_until
 
-COMMANDS = (8, 0, b"\x0c")
-"""Port, channel and first byte of a go_to."""
+COMMANDS = (8, 0, b"\x0c")  #: Port, channel and first byte of a go_to.
 
 ALL = "/crazyflie_server/all/go_to"
 _RELATIVE = GoToRequest(relative=True, duration=genpy.Duration(1))
 
 SERVICES = ("go_to", "emergency")
-PAUSE = 0.2
-"""From one command to all to the next, s."""
+PAUSE = 0.2  #: From one command to all to the next, s.
 
 
 class Vehicle(FakeVehicle):

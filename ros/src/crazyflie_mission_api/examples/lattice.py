@@ -15,11 +15,8 @@ from crazyflie_mission_api.formations import Array, circle, lattice
 from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 
-SPACING = 0.7
-"""Between neighbours, m."""
-
-LAYERS = DOWNWASH * SPACING
-"""From one layer of the lattice to the next, m."""
+SPACING = 0.7  #: Between neighbours, m.
+LAYERS = DOWNWASH * SPACING  #: From one layer of the lattice to the next, m.
 
 LIMITS = Limits(speed=1.0, acceleration=1.5)
 

@@ -14,8 +14,7 @@ MIN_TOKEN_LENGTH = 16
 
 COOKIE = "dashboard_token"
 
-_LISTENING = "0A"
-"""Of a socket in /proc/net/tcp."""
+_LISTENING = "0A"  #: Of a socket in /proc/net/tcp.
 
 
 class AccessError(Exception):

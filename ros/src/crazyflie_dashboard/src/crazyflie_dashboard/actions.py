@@ -22,23 +22,12 @@ from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.parameters.types import BOOLEAN
 from crazyflie_utils.refusal import RefusalError
 
-_FLIGHT_TIMEOUT = 60.0
-"""Of services that answer when the vehicle flies or has landed, s."""
-
-_TIMEOUT = 10.0
-"""Of the others, s."""
-
-_CLIMB_SPEED = 0.5
-"""Mean speed of a takeoff, m/s."""
-
-_UNKNOWN_HEIGHT = 1.0
-"""From which a vehicle lands whose position is not known, m."""
-
-_MIN_DURATION = 1.0
-"""Of a move, s."""
-
-_MAX_SPEED = 2.0
-"""m/s."""
+_FLIGHT_TIMEOUT = 60.0  #: Of services that answer when the vehicle flies or has landed, s.
+_TIMEOUT = 10.0  #: Of the others, s.
+_CLIMB_SPEED = 0.5  #: Mean speed of a takeoff, m/s.
+_UNKNOWN_HEIGHT = 1.0  #: From which a vehicle lands whose position is not known, m.
+_MIN_DURATION = 1.0  #: Of a move, s.
+_MAX_SPEED = 2.0  #: m/s.
 
 _YAW_REFERENCE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 

@@ -16,15 +16,11 @@ class PageControl:
 
     A page that is loaded again, or has lost its connection, is a new page and has no control until
     it takes it. That a page goes changes nothing else.
-
-    Attributes
-    ----------
-    on_first, on_close, on_empty : callable
-        ``on_first()`` is called when the first page has come, ``on_close(page)`` when one has gone,
-        and then ``on_empty()`` if it was the last.
     """
 
     def __init__(self) -> None:
+        #: on_first, on_close, on_empty: ``on_first()`` is called when the first page has come,
+        #: ``on_close(page)`` when one has gone, and then ``on_empty()`` if it was the last.
         self.on_first: Callable[[], None] = lambda: None
         self.on_close: Callable[[int], None] = lambda page: None
         self.on_empty: Callable[[], None] = lambda: None

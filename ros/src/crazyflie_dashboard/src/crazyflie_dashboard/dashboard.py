@@ -12,38 +12,21 @@ from dataclasses import dataclass
 from crazyflie_dashboard.control import PageControl
 from crazyflie_dashboard.snapshot import Action, Scene, Triple
 
+#: An older command, s, is not carried out: it has waited in a browser or a network.
 MAX_COMMAND_AGE = 1.0
-"""An older command, s, is not carried out: it has waited in a browser or a network."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """What an operator has asked vehicles for.
-
-    Attributes
-    ----------
-    action : Action
-    vehicles : tuple of str
-        Names.
-    clicked : float
-        When the operator did, by time.monotonic() of this computer.
-    goal : tuple or None
-        Of go to: x, y, z in m.
-    yaw : float or None
-        Of go to, rad; None keeps the heading.
-    height : float
-        Of a takeoff, m.
-    speed : float
-        Of go to, m/s.
-    """
+    """What an operator has asked vehicles for."""
 
     action: Action
-    vehicles: tuple[str, ...]
-    clicked: float
-    goal: Triple | None = None
-    yaw: float | None = None
-    height: float = 1.0
-    speed: float = 0.5
+    vehicles: tuple[str, ...]  #: Names.
+    clicked: float  #: When the operator did, by time.monotonic() of this computer.
+    goal: Triple | None = None  #: Of go to: x, y, z in m.
+    yaw: float | None = None  #: Of go to, rad; None keeps the heading.
+    height: float = 1.0  #: Of a takeoff, m.
+    speed: float = 0.5  #: Of go to, m/s.
 
 
 @dataclass(frozen=True)
@@ -56,33 +39,17 @@ class Outcome:
 
 @dataclass(frozen=True)
 class ParameterInfo:
-    """A parameter that can be changed.
+    """A parameter that can be changed."""
 
-    Attributes
-    ----------
-    owner : str
-        Node, or the vehicle of a firmware parameter.
-    name : str
-        As in topics/state, or group.name of a firmware parameter.
-    kind : str
-        "bool", "int", "float" or "str".
-    value : bool, int, float, str
-    unit, help : str
-    minimum, maximum : float or None
-    choices : tuple of str
-        Of a text; any if there are none.
-    is_firmware : bool
-    """
-
-    owner: str
-    name: str
-    kind: str
+    owner: str  #: Node, or the vehicle of a firmware parameter.
+    name: str  #: As in topics/state, or group.name of a firmware parameter.
+    kind: str  #: "bool", "int", "float" or "str".
     value: bool | int | float | str
     unit: str = ""
     help: str = ""
     minimum: float | None = None
     maximum: float | None = None
-    choices: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()  #: Of a text; any if there are none.
     is_firmware: bool = False
 
 
@@ -119,15 +86,9 @@ class Series:
 
 
 class Dashboard(ABC):
-    """The graph, as pages see and command it.
+    """The graph, as pages see and command it."""
 
-    Attributes
-    ----------
-    pages : PageControl
-        Every page is opened and closed there; a method's ``page`` is its number.
-    """
-
-    pages: PageControl
+    pages: PageControl  #: Every page is opened and closed there; a method's ``page`` is its number.
 
     @abstractmethod
     def scene(self) -> Scene:

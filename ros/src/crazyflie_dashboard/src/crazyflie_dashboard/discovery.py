@@ -9,16 +9,16 @@ from enum import Enum
 from crazyflie_dashboard.snapshot import Action
 from crazyflie_reports.bag_topics import ROLES
 
+#: Beside the roles of recordings: names below the vehicle's namespace, and types.
 _STATUS = {
     "flight_status": (r"in_flight_flight_status|flight_status", "crazyflie_msgs/FlightStatus"),
     "filter_status": (r"in_flight_filter_status|filter_status", "crazyflie_msgs/FilterStatus"),
     "flight_state": (r"in_flight_state", "std_msgs/String"),
     "vehicle_status": (r"vehicle_status", "crazyflie_msgs/VehicleStatus"),
 }
-"""Beside the roles of recordings: names below the vehicle's namespace, and types."""
 
+#: Last names of namespaces that have services of vehicles, and are none.
 _NO_VEHICLES = {"all", "high_level"}
-"""Last names of namespaces that have services of vehicles, and are none."""
 
 
 class Request(Enum):
@@ -58,27 +58,14 @@ class Graph:
 
 @dataclass(frozen=True)
 class Vehicle:
-    """A vehicle on the graph.
+    """A vehicle on the graph."""
 
-    Attributes
-    ----------
-    namespace : str
-        Absolute, without a slash at its end: "" or /cf1.
-    driver : str
-        That of its driver, which is another one in the hardware example.
-    topics : dict
-        Role -> topic and type.
-    services : dict
-        `Action` -> services that are called for it, all of them.
-    has_driver : bool
-        A driver connects it.
-    """
-
-    namespace: str
-    driver: str = ""
-    topics: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    namespace: str  #: Absolute, without a slash at its end: "" or /cf1.
+    driver: str = ""  #: That of its driver, which is another one in the hardware example.
+    topics: Mapping[str, tuple[str, str]] = field(default_factory=dict)  #: Role -> topic and type.
+    #: `Action` -> services that are called for it, all of them.
     services: Mapping[Action, tuple[Service, ...]] = field(default_factory=dict)
-    has_driver: bool = False
+    has_driver: bool = False  #: A driver connects it.
 
     @property
     def name(self) -> str:

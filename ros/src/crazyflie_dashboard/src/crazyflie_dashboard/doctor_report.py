@@ -6,8 +6,7 @@ import roslib.packages
 
 from crazyflie_dashboard.snapshot import Sentence
 
-_TIMEOUT = 60.0
-"""s; the doctor gives up after 40."""
+_TIMEOUT = 60.0  #: s; the doctor gives up after 40.
 
 
 def examine() -> tuple[Sentence, ...]:

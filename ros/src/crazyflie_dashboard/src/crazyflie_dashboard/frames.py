@@ -9,8 +9,7 @@ from crazyflie_dashboard.snapshot import Rotation, Triple
 from crazyflie_model.angles import rotate
 from crazyflie_utils.tf.poses import PoseCodec, entries
 
-_MAX_DEPTH = 10
-"""Frames above a frame that are followed: a loop has no end."""
+_MAX_DEPTH = 10  #: Frames above a frame that are followed: a loop has no end.
 
 _MAX_FRAMES = 1000
 

@@ -23,23 +23,12 @@ from crazyflie_dashboard.vehicle_model import VehicleModel, frame_of
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.tf.poses import RawTransforms
 
-SCENE_PERIOD = 0.05
-"""From one scene to the next, s."""
-
-_POLL_PERIOD = 2.0
-"""From one look at the master to the next, s; longer where it takes long:"""
-
-_POLL_SHARE = 0.02
-"""of the time at most."""
-
-_FORGET_AFTER = 30.0
-"""A vehicle whose topics are gone is shown for so long, s."""
-
-_MAX_REFERENCES = 10
-"""With more vehicles the references of watched ones are shown only."""
-
-_MAX_LINES = 500
-"""Of the log."""
+SCENE_PERIOD = 0.05  #: From one scene to the next, s.
+_POLL_PERIOD = 2.0  #: From one look at the master to the next, s; longer where it takes long:
+_POLL_SHARE = 0.02  #: of the time at most.
+_FORGET_AFTER = 30.0  #: A vehicle whose topics are gone is shown for so long, s.
+_MAX_REFERENCES = 10  #: With more vehicles the references of watched ones are shown only.
+_MAX_LINES = 500  #: Of the log.
 
 
 class GraphModel:
@@ -52,19 +41,6 @@ class GraphModel:
         Its threads may wait for the master.
     read_graph : callable
         Returns the `Graph`; it may wait.
-
-    Attributes
-    ----------
-    scene : Scene
-        The newest one.
-    graph : Graph
-        The newest one.
-    models : dict of str to VehicleModel
-        By name of the vehicle.
-    plots : dict of str to VehiclePlots
-        Of watched vehicles.
-    paths, sentences, missions
-        Parts of the scene that are set from outside.
     """
 
     def __init__(
@@ -74,10 +50,11 @@ class GraphModel:
         read_graph: Callable[[], Graph],
         clock: Callable[[], float] = time.monotonic,
     ):
-        self.scene = Scene()
-        self.graph = Graph()
-        self.models: dict[str, VehicleModel] = {}
-        self.plots: dict[str, VehiclePlots] = {}
+        self.scene = Scene()  #: The newest one.
+        self.graph = Graph()  #: The newest one.
+        self.models: dict[str, VehicleModel] = {}  #: By name of the vehicle.
+        self.plots: dict[str, VehiclePlots] = {}  #: Of watched vehicles.
+        #: paths, sentences, missions: Parts of the scene that are set from outside.
         self.paths: Mapping[str, tuple[Triple, ...]] = {}
         self.sentences: tuple[Sentence, ...] = ()
         self.missions: Callable[[], tuple[str, ...]] = tuple

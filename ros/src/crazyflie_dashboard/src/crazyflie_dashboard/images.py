@@ -6,11 +6,8 @@ from typing import Any
 import cv2
 import numpy as np
 
-_MAX_WIDTH = 640
-"""Larger pictures are made smaller, pixels."""
-
-_QUALITY = 80
-"""Of JPEG, percent."""
+_MAX_WIDTH = 640  #: Larger pictures are made smaller, pixels.
+_QUALITY = 80  #: Of JPEG, percent.
 
 _CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1, "8UC1": 1, "8UC3": 3}
 

@@ -8,8 +8,7 @@ import rosgraph
 
 from crazyflie_dashboard.discovery import Graph
 
-_LIMIT = 0.5
-"""Of a connection to a service, s."""
+_LIMIT = 0.5  #: Of a connection to a service, s.
 
 
 def read(caller: str) -> Graph:

@@ -14,17 +14,11 @@ from pathlib import Path
 from crazyflie_dashboard.dashboard import DryRunResult, MissionFile
 from crazyflie_utils.refusal import RefusalError
 
+#: How the line with the result of `crazyflie_mission_api.mission_runner` begins.
 _RESULT = '{"dry_run": '
-"""How the line with the result of `crazyflie_mission_api.mission_runner` begins."""
-
-_DRY_RUN_TIMEOUT = 60.0
-"""s."""
-
-_LAND_TIMEOUT = 60.0
-"""From the end of a mission that is stopped until its process is killed, s."""
-
-_MAX_OUTPUT = 2000
-"""Of the text of a failure, characters."""
+_DRY_RUN_TIMEOUT = 60.0  #: s.
+_LAND_TIMEOUT = 60.0  #: From the end of a mission that is stopped until its process is killed, s.
+_MAX_OUTPUT = 2000  #: Of the text of a failure, characters.
 
 _CRAZYSWARM = ("pycrazyswarm", "crazyflie_py")
 

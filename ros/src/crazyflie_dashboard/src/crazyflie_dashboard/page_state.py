@@ -10,29 +10,18 @@ from crazyflie_dashboard.plots import Ring, expect_field, number_in, split_path
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.refusal import RefusalError
 
-IMAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")
-"""Types of the topics of cameras."""
-
-_IMAGE_PERIOD = 0.2
-"""Between two pictures of a camera, s."""
+IMAGES = ("sensor_msgs/Image", "sensor_msgs/CompressedImage")  #: Types of the topics of cameras.
+_IMAGE_PERIOD = 0.2  #: Between two pictures of a camera, s.
 
 _MAX_FIELDS = 20
 
 
 class PageState:
-    """What a page sees beside the scene.
-
-    Attributes
-    ----------
-    vehicle : str or None
-        The one whose plots it shows.
-    image : bytes or None
-        The camera's newest picture.
-    """
+    """What a page sees beside the scene."""
 
     def __init__(self, handle: NodeHandle, clock: Callable[[], float]) -> None:
-        self.vehicle: str | None = None
-        self.image: bytes | None = None
+        self.vehicle: str | None = None  #: The one whose plots it shows.
+        self.image: bytes | None = None  #: The camera's newest picture.
         self._handle, self._clock = handle, clock
         self._fields: dict[str, tuple[NodeHandle, Ring]] = {}
         self._camera: NodeHandle | None = None

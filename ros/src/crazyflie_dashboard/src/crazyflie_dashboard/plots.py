@@ -13,19 +13,15 @@ from crazyflie_dashboard.snapshot import VehicleSnapshot
 from crazyflie_model.angles import rpy_from_quaternion
 from crazyflie_utils.refusal import RefusalError
 
-DURATION = 60.0
-"""s."""
+DURATION = 60.0  #: s.
+_PERIOD = 0.05  #: From one number that is kept to the next, s.
 
-_PERIOD = 0.05
-"""From one number that is kept to the next, s."""
-
+#: Types of fields that can be plotted.
 _NUMBERS = {"bool", "byte", "char", "time", "duration", "float32", "float64"} | {
     f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)
 }
-"""Types of fields that can be plotted."""
 
-_MAX_SERIES = 100
-"""Of one vehicle: a log topic may have any number of values."""
+_MAX_SERIES = 100  #: Of one vehicle: a log topic may have any number of values.
 
 
 class Ring:

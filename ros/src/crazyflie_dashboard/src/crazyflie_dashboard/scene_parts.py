@@ -11,11 +11,8 @@ from crazyflie_dashboard.discovery import Vehicle
 from crazyflie_dashboard.frames import Frames
 from crazyflie_dashboard.snapshot import Kind, LogLine, Sentence, Solid
 
-WORLD_MARKERS = "world/markers"
-"""How topics of crazyflie_world end."""
-
-_MAX_AGE = 10.0
-"""A diagnostic that is older, s, is not true any more."""
+WORLD_MARKERS = "world/markers"  #: How topics of crazyflie_world end.
+_MAX_AGE = 10.0  #: A diagnostic that is older, s, is not true any more.
 
 _SHAPES = {Marker.CUBE: "box", Marker.CYLINDER: "cylinder", Marker.SPHERE: "ball"}
 
@@ -27,8 +24,7 @@ _LEVELS = {
     Log.FATAL: "fatal",
 }
 
-_MAX_TEXT = 2000
-"""Of a line of the log, characters."""
+_MAX_TEXT = 2000  #: Of a line of the log, characters.
 
 
 def log_line(number: int, message: Log) -> LogLine:

@@ -10,8 +10,7 @@ from enum import Enum
 Triple = tuple[float, float, float]
 Rotation = tuple[float, float, float, float]
 
-STALE_AGE = 0.5
-"""A vehicle whose pose is older, s, is stale."""
+STALE_AGE = 0.5  #: A vehicle whose pose is older, s, is stale.
 
 
 class Kind(Enum):
@@ -57,67 +56,34 @@ class Reference:
 
 @dataclass(frozen=True)
 class VehicleSnapshot:
-    """A vehicle.
+    """A vehicle."""
 
-    Attributes
-    ----------
-    name : str
-        Its namespace without a slash in front, such as cf1; "/" without a namespace.
-    kind : Kind
-    frame : str or None
-        Of /tf.
-    position, rotation
-        m, and a quaternion (x, y, z, w).
-    velocity : tuple or None
-        m/s.
-    pose_age : float or None
-        s.
-    is_stale : bool
-        The pose is older than `STALE_AGE`, or there is none.
-    reference : Reference or None
-        Of all vehicles if there are few, otherwise of watched ones.
-    control : Control or None
-        Of watched vehicles, as the rates of state and control.
-    control_age : float or None
-        s.
-    state, reason : str
-        State of the flight in words, and why it is what it is; "" for an ordinary one.
-    takeoff_refusal : str
-        Why a takeoff would be refused.
-    is_in_flight : bool
-    is_emergency : bool
-    battery : float or None
-        V.
-    is_battery_low : bool
-    link_quality : float or None
-        0 to 1.
-    rates : dict of str to float
-        Hz, of pose, state, reference, control.
-    actions : frozenset of Action
-        What it offers.
-    """
-
-    name: str
+    name: str  #: Its namespace without a slash in front, such as cf1; "/" without a namespace.
     kind: Kind = Kind.SIMULATED
-    frame: str | None = None
+    frame: str | None = None  #: Of /tf.
+    #: position, rotation: m, and a quaternion (x, y, z, w).
     position: Triple | None = None
     rotation: Rotation = (0.0, 0.0, 0.0, 1.0)
-    velocity: Triple | None = None
-    pose_age: float | None = None
-    is_stale: bool = True
+    velocity: Triple | None = None  #: m/s.
+    pose_age: float | None = None  #: s.
+    is_stale: bool = True  #: The pose is older than `STALE_AGE`, or there is none.
+    #: Of all vehicles if there are few, otherwise of watched ones.
     reference: Reference | None = None
-    control: Control | None = None
-    control_age: float | None = None
+    control: Control | None = None  #: Of watched vehicles, as the rates of state and control.
+    control_age: float | None = None  #: s.
+    #: state, reason: State of the flight in words, and why it is what it is; "" for an ordinary
+    #: one.
     state: str = "not known"
     reason: str = ""
-    takeoff_refusal: str = ""
+    takeoff_refusal: str = ""  #: Why a takeoff would be refused.
     is_in_flight: bool = False
     is_emergency: bool = False
-    battery: float | None = None
+    battery: float | None = None  #: V.
     is_battery_low: bool = False
-    link_quality: float | None = None
+    link_quality: float | None = None  #: 0 to 1.
+    #: Hz, of pose, state, reference, control.
     rates: Mapping[str, float] = field(default_factory=dict)
-    actions: frozenset[Action] = frozenset()
+    actions: frozenset[Action] = frozenset()  #: What it offers.
 
 
 @dataclass(frozen=True)
@@ -176,40 +142,18 @@ class LogLine:
 
 @dataclass(frozen=True)
 class Scene:
-    """All that there is at one moment.
+    """All that there is at one moment."""
 
-    Attributes
-    ----------
-    time : float
-        ROS time, s.
-    fixed_frame : str
-    vehicles : dict of str to VehicleSnapshot
-        By name, in the order in which they are shown.
-    solids : tuple of Solid
-        Changes rarely: compare it by ``is``.
-    fence : tuple of Triple or None
-        Lower and upper corner of the geofence.
-    frames : tuple of Frame
-    paths : dict of str to tuple of Triple
-        Planned trajectories, by the vehicle's name. Changes rarely.
-    sentences : tuple of Sentence
-        Of the doctor and of /diagnostics, errors first.
-    log : tuple of LogLine
-        The newest ones, oldest first.
-    images : tuple of str
-        Topics of cameras.
-    missions : tuple of str
-        What runs, as `missions.Run.text` says.
-    """
-
-    time: float = 0.0
+    time: float = 0.0  #: ROS time, s.
     fixed_frame: str = "world"
+    #: By name, in the order in which they are shown.
     vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)
-    solids: tuple[Solid, ...] = ()
-    fence: tuple[Triple, Triple] | None = None
+    solids: tuple[Solid, ...] = ()  #: Changes rarely: compare it by ``is``.
+    fence: tuple[Triple, Triple] | None = None  #: Lower and upper corner of the geofence.
     frames: tuple[Frame, ...] = ()
+    #: Planned trajectories, by the vehicle's name. Changes rarely.
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
-    sentences: tuple[Sentence, ...] = ()
-    log: tuple[LogLine, ...] = ()
-    images: tuple[str, ...] = ()
-    missions: tuple[str, ...] = ()
+    sentences: tuple[Sentence, ...] = ()  #: Of the doctor and of /diagnostics, errors first.
+    log: tuple[LogLine, ...] = ()  #: The newest ones, oldest first.
+    images: tuple[str, ...] = ()  #: Topics of cameras.
+    missions: tuple[str, ...] = ()  #: What runs, as `missions.Run.text` says.

@@ -19,8 +19,8 @@ from crazyflie_utils import NodeHandle
 from crazyflie_utils.flight_status import WORDS
 from crazyflie_utils.vectors import to_tuple
 
+#: Role -> type -> what makes a row of a message.
 _ROWS: dict[str, dict[str, Callable[[Any], Any]]] = defaultdict(dict)
-"""Role -> type -> what makes a row of a message."""
 for _role in ROLES:
     _ROWS[_role.name].update(_role.rows)
 
@@ -35,17 +35,16 @@ _FILTER_WORDS = {
 }
 _ON_GROUND = (FlightStatus.UNKNOWN, FlightStatus.ON_GROUND)
 
+#: For so long, s, a vehicle without a frame may get one: its topics cost more.
 _FRAME_TIMEOUT = 3.0
-"""For so long, s, a vehicle without a frame may get one: its topics cost more."""
 
+#: Types of the driver's log topics, and their numbers.
 _LOGS: dict[str, tuple[Any, Callable[[Any], list[float]]]] = {
     "crazyflie_driver/GenericLogData": (GenericLogData, lambda message: list(message.values)),
     "std_msgs/Float32": (Float32, lambda message: [message.data]),
 }
-"""Types of the driver's log topics, and their numbers."""
 
-_LOW_BATTERY = 3.2
-"""V, where no driver says what is low; as the fleet's warning."""
+_LOW_BATTERY = 3.2  #: V, where no driver says what is low; as the fleet's warning.
 
 
 class VehicleModel:

@@ -12,11 +12,11 @@ from crazyflie_msgs.msg import (
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import TOPIC, Text
 
+#: What a reference can be converted to, by the value of the parameter ``state``.
 TYPES = {
     "position_velocity_yaw": PositionVelocityYawStateStamped,
     "full_state": FullStateStamped,
 }
-"""What a reference can be converted to, by the value of the parameter ``state``."""
 
 
 class ReferenceConverterParameters(Parameters):

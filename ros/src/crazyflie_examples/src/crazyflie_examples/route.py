@@ -8,9 +8,9 @@ from typing_extensions import override
 from crazyflie_utils.messages import shown
 from crazyflie_utils.parameters.types import METRES, ParameterType
 
-Point = tuple[float, float, float]
-"""x, y, z in m."""
+Point = tuple[float, float, float]  #: x, y, z in m.
 
+#: Around the default hover point and back to it, m.
 DEFAULT_POINTS: tuple[Point, ...] = (
     (0.5, 0.5, 1.0),
     (-0.5, 0.5, 1.0),
@@ -18,7 +18,6 @@ DEFAULT_POINTS: tuple[Point, ...] = (
     (0.5, -0.5, 1.0),
     (0.0, 0.0, 1.0),
 )
-"""Around the default hover point and back to it, m."""
 
 
 class Points(ParameterType):

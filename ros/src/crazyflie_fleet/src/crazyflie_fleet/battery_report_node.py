@@ -9,8 +9,7 @@ from typing_extensions import override
 from crazyflie_fleet.fleet_config import VehicleConfig
 from crazyflie_utils import Node, NodeHandle
 
-_PERIOD = 30.0
-"""Between two reports about one vehicle, s."""
+_PERIOD = 30.0  #: Between two reports about one vehicle, s.
 
 
 class BatteryReportNode(Node):

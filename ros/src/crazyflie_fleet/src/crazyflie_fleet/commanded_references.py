@@ -13,11 +13,9 @@ from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer
 
+#: Of a state that says where the vehicle is, and of the last setpoint of a stream, s.
 MAX_STATE_AGE = 0.5
-"""Of a state that says where the vehicle is, and of the last setpoint of a stream, s."""
-
-_HOLD_DURATION = 0.5
-"""Of the move to the goal of the last setpoint, s."""
+_HOLD_DURATION = 0.5  #: Of the move to the goal of the last setpoint, s.
 
 
 class CommandedReferences:

@@ -21,8 +21,7 @@ from crazyflie_utils.parameters.types import TEXT, ListOf
 
 ADD = "/add_crazyflie"
 
-TIMEOUT = 60.0
-"""Of the driver to start, to connect, and to write parameters, s."""
+TIMEOUT = 60.0  #: Of the driver to start, to connect, and to write parameters, s.
 
 
 def connection(vehicle: VehicleConfig) -> VehicleParameters:

@@ -12,8 +12,7 @@ from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters.types import Integer
 from crazyflie_utils.parameters.yaml_file import Entry
 
-VEHICLES, TYPES = "crazyflies", "crazyflieTypes"
-"""Keys at the top of the two files."""
+VEHICLES, TYPES = "crazyflies", "crazyflieTypes"  #: Keys at the top of the two files.
 
 _TYPE_KEYS = {
     "bigQuad": ("big_quad",),

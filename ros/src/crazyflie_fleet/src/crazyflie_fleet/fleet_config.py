@@ -10,9 +10,9 @@ from scipy.spatial import cKDTree
 
 from crazyflie_fleet.settings import MachineSettings, RobotSettings
 
+#: How much farther apart one above the other two vehicles have to be than side by side: the air
+#: that rotors throw down takes lift from a vehicle below.
 DOWNWASH = 2.0
-"""How much farther apart one above the other two vehicles have to be than side by side: the
-air that rotors throw down takes lift from a vehicle below."""
 
 
 @dataclass(frozen=True)

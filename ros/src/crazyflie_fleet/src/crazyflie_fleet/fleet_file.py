@@ -10,11 +10,8 @@ from crazyflie_fleet.settings import RobotSettings
 from crazyflie_utils import ParameterError
 from crazyflie_utils.parameters import yaml_file
 
-FIRST_PORT = 19850
-"""UDP port of a grid's first vehicle."""
-
-TYPES_FILE = "crazyflieTypes.yaml"
-"""Name of Crazyswarm 1's second file, beside the first."""
+FIRST_PORT = 19850  #: UDP port of a grid's first vehicle.
+TYPES_FILE = "crazyflieTypes.yaml"  #: Name of Crazyswarm 1's second file, beside the first.
 
 
 def load(path: str | Path) -> FleetConfig:

@@ -9,13 +9,12 @@ from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces, Trajectory
 from crazyflie_utils.refusal import RefusalError
 
+#: A move begins at the present goal if the vehicle is this near to it, m; otherwise where the
+#: vehicle is, since another node has moved it.
 NEAR = 0.5
-"""A move begins at the present goal if the vehicle is this near to it, m; otherwise where the
-vehicle is, since another node has moved it."""
 
 
-_MAX_STEP = 0.1
-"""Longest time between two setpoints of a velocity for which the goal moves on, s."""
+_MAX_STEP = 0.1  #: Longest time between two setpoints of a velocity for which the goal moves on, s.
 
 
 class Velocity(NamedTuple):

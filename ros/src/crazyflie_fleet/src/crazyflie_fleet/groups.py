@@ -5,8 +5,7 @@ from typing import Any
 
 from crazyflie_driver import srv
 
-_ALL = 0
-"""Mask of a command to all vehicles."""
+_ALL = 0  #: Mask of a command to all vehicles.
 
 
 class Groups:

@@ -26,8 +26,7 @@ from crazyflie_utils.last_valid import HOLD_LIMIT
 from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.timers import Timer
 
-CLIMB_SPEED = 0.7
-"""Largest mean speed of a takeoff, m/s."""
+CLIMB_SPEED = 0.7  #: Largest mean speed of a takeoff, m/s.
 
 
 @dataclass

@@ -4,12 +4,12 @@ from crazyflie_msgs.msg import PositionVelocityStateStamped, PositionVelocityYaw
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, SERVICE, TIME_STEP, TOPIC
 
+#: Namespace, below a vehicle's name, of the node; below /all of the same services for all.
 HIGH_LEVEL = "high_level"
-"""Namespace, below a vehicle's name, of the node; below /all of the same services for all."""
 
+#: Nodes, one space between two, that begin what was uploaded to them as trajectory 0: vehicles that
+#: are called one after the other do not begin together.
 START_TOPIC = "/all/start_trajectory"
-"""Nodes, one space between two, that begin what was uploaded to them as trajectory 0: vehicles that
-are called one after the other do not begin together."""
 
 
 class HighLevelParameters(Parameters):

@@ -19,24 +19,17 @@ from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_msgs.msg import FlightStatus
 from crazyflie_utils import NodeHandle
 
-SERVICE_TIMEOUT = 60.0
-"""Of a takeoff or landing, s of the machine's clock."""
-
-LANDING_TOPIC = "/fleet/landing"
-"""Names of vehicles that only the fleet moves, until they land."""
-
-_PERIOD = 0.1
-"""Between two updates of a landing, s."""
-
+SERVICE_TIMEOUT = 60.0  #: Of a takeoff or landing, s of the machine's clock.
+LANDING_TOPIC = "/fleet/landing"  #: Names of vehicles that only the fleet moves, until they land.
+_PERIOD = 0.1  #: Between two updates of a landing, s.
+#: A round begins when all vehicles are slower than this, m/s, or after this time, s.
 _SLOW, _BRAKING_TIMEOUT = 0.3, 3.0
-"""A round begins when all vehicles are slower than this, m/s, or after this time, s."""
 
+#: A vehicle lands within this distance of its free place, m; within the second one if it takes
+#: longer than the timeout beyond the planned duration, s.
 _ARRIVED, _NEAR, _ARRIVAL_TIMEOUT = 0.05, 0.1, 5.0
-"""A vehicle lands within this distance of its free place, m; within the second one if it takes
-longer than the timeout beyond the planned duration, s."""
 
-_SHORTEST_MOVE = 2.0
-"""s."""
+_SHORTEST_MOVE = 2.0  #: s.
 
 _UP = (FlightStatus.FLYING, FlightStatus.TAKING_OFF)
 

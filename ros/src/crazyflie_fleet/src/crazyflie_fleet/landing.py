@@ -16,24 +16,16 @@ from crazyflie_fleet.fleet_config import DOWNWASH
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-SIDE_SPEED = 0.5
-"""Mean speed at which vehicles fly to free places, m/s."""
+SIDE_SPEED = 0.5  #: Mean speed at which vehicles fly to free places, m/s.
+MAX_DETOUR = 3.0  #: How far aside along x and y a vehicle lands that descends already, m.
 
-MAX_DETOUR = 3.0
-"""How far aside along x and y a vehicle lands that descends already, m."""
-
+#: Distance of a free place from other vehicles, in distances that they must keep: for the errors of
+#: their positions.
 _MARGIN = 1.05
-"""Distance of a free place from other vehicles, in distances that they must keep: for the errors
-of their positions."""
 
-_PITCH = 0.5
-"""Between two candidates for a free place, in distances that vehicles must keep."""
-
-_MAX_CANDIDATES = 400
-"""Candidates, the nearest first, that are checked for a free way."""
-
-_ROUNDING = 1e-6
-"""m."""
+_PITCH = 0.5  #: Between two candidates for a free place, in distances that vehicles must keep.
+_MAX_CANDIDATES = 400  #: Candidates, the nearest first, that are checked for a free way.
+_ROUNDING = 1e-6  #: m.
 
 
 def next_round(

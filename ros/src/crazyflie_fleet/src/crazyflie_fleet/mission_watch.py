@@ -6,14 +6,11 @@ from std_msgs.msg import String
 
 from crazyflie_utils import NodeHandle
 
+#: Published by missions in flight: their name, and the names of the vehicles in flight.
 MISSION_TOPIC = "/all/mission"
-"""Published by missions in flight: their name, and the names of the vehicles in flight."""
-
-MISSION_PERIOD = 0.5
-"""Between two of these messages, s of the machine's clock."""
-
+MISSION_PERIOD = 0.5  #: Between two of these messages, s of the machine's clock.
+#: A mission without a message for so long has died, s of the machine's clock.
 MISSION_TIMEOUT = 5.0
-"""A mission without a message for so long has died, s of the machine's clock."""
 
 
 class MissionWatch:

@@ -11,8 +11,8 @@ from crazyflie_utils import Node, NodeHandle, ParameterError, parameter
 from crazyflie_utils.parameters.types import Text
 from mocap_optitrack.mocap_node import MocapNode
 
+#: Name to configuration, as crazyswarm2's motion_capture.yaml has them.
 Configurations = Mapping[str, Mapping[str, Any]]
-"""Name to configuration, as crazyswarm2's motion_capture.yaml has them."""
 
 
 class MocapFleetParameters(FleetParameters):

@@ -9,6 +9,7 @@ from crazyflie_utils.parameters.types import TEXT, Text
 
 _CONFIGURATIONS = ("marker_configurations", "dynamics_configurations")
 
+#: Their type -> backend of mocap_node.
 _BACKENDS = {
     "optitrack": "natnet",
     "optitrack_closed_source": "natnet",
@@ -16,7 +17,6 @@ _BACKENDS = {
     "qualisys": "qualisys",
     "vrpn": "vrpn",
 }
-"""Their type -> backend of mocap_node."""
 
 
 class MotionCaptureSettings(Parameters):

@@ -10,8 +10,7 @@ from crazyflie_fleet.vehicle_nodes import INHIBITION
 from crazyflie_fleet.vehicle_states import VehicleStates
 from crazyflie_utils import Node, NodeHandle
 
-_PERIOD = 0.2
-"""Between two looks, s."""
+_PERIOD = 0.2  #: Between two looks, s.
 
 
 class PlacementNode(Node):

@@ -24,8 +24,7 @@ from crazyflie_utils.refusal import RefusalError
 from crazyflie_utils.topics import Publisher
 from crazyflie_utils.vectors import is_finite, to_tuple
 
-SILENCE_PERIOD = 5.0
-"""Between two warnings about a vehicle whose states do not come, s."""
+SILENCE_PERIOD = 5.0  #: Between two warnings about a vehicle whose states do not come, s.
 
 
 class ReferencesParameters(Parameters):

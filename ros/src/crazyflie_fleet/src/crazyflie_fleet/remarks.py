@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 from crazyflie_utils.parameters.yaml_file import Entry
 
+#: How much an unknown key resembles a known one that it is a misspelling of, 0 to 1.
 _SIMILAR = 0.8
-"""How much an unknown key resembles a known one that it is a misspelling of, 0 to 1."""
 
 
 class Remarks:

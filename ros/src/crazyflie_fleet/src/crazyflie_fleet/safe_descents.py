@@ -10,11 +10,8 @@ from crazyflie_fleet.landing import free_place
 from crazyflie_fleet.straight_move import shortest_duration
 from crazyflie_model.trajectory import minimum_jerk
 
-_MARGIN = 1.1
-"""Duration of the move sideways, in the shortest possible ones."""
-
-_MAX_GAP = 0.5
-"""Between two references of one descent, s."""
+_MARGIN = 1.1  #: Duration of the move sideways, in the shortest possible ones.
+_MAX_GAP = 0.5  #: Between two references of one descent, s.
 
 
 @dataclass

@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from crazyflie_fleet.fleet_config import DOWNWASH, close_pairs
 
+#: How far ahead vehicles are extrapolated, s: what a controller needs to stop one.
 LOOK_AHEAD = 0.5
-"""How far ahead vehicles are extrapolated, s: what a controller needs to stop one."""
-
+#: Vehicles that are held are released at this distance, in sums of their buffers.
 RELEASE_RATIO = 1.1
-"""Vehicles that are held are released at this distance, in sums of their buffers."""
 
 
 class ClosePair(NamedTuple):

@@ -10,14 +10,14 @@ from crazyflie_utils.parameters.types import ListOf, Number
 
 _LINK = "warnings/communication/"
 _SHARE = Number("", minimum=0.0, maximum=1.0)
+#: The driver's diagnostics come once a second, and have the figures of each link; it reads all
+#: parameters; a simulation here is another launch file.
 _WITHOUT_EFFECT = (
     "warnings/frequency",
     _LINK + "publish_stats",
     "firmware_params",
     "sim",
 )
-"""The driver's diagnostics come once a second, and have the figures of each link; it reads all
-parameters; a simulation here is another launch file."""
 
 
 class ServerSettings(Parameters):

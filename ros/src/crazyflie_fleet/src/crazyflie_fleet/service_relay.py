@@ -7,8 +7,7 @@ from std_srvs.srv import Empty, EmptyRequest
 
 from crazyflie_utils import NodeHandle
 
-_CALL_TIMEOUT = 58.0
-"""Of a takeoff or landing of the takeoff server, s of the machine's clock."""
+_CALL_TIMEOUT = 58.0  #: Of a takeoff or landing of the takeoff server, s of the machine's clock.
 
 
 def relay(handle: NodeHandle, service: str, response_type: type) -> "Future[Any]":

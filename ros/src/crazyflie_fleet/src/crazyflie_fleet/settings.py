@@ -20,18 +20,15 @@ from crazyflie_utils.parameters.types import (
 )
 from crazyflie_utils.text_input import number_from_text
 
+#: Help of settings that are read, and of which a remark is made.
 WITHOUT_EFFECT = "crazyswarm2's; has no effect here"
-"""Help of settings that are read, and of which a remark is made."""
-
+#: How motion capture knows a vehicle: its system does, or by the only marker of the vehicle.
 VENDOR, SINGLE_MARKER = "vendor", "single_marker"
-"""How motion capture knows a vehicle: its system does, or by the only marker of the vehicle."""
-
+#: Marker configurations with one marker.
 _SINGLE_MARKERS = ("default_single_marker", SINGLE_MARKER)
-"""Marker configurations with one marker."""
+LOCAL = "local"  #: Default machine of vehicles.
 
-LOCAL = "local"
-"""Default machine of vehicles."""
-
+#: Key in ``default_topics`` -> standard topic of the driver; empty where it has none.
 DEFAULT_TOPICS = {
     "imu": "imu",
     "temperature": "temperature",
@@ -44,7 +41,6 @@ DEFAULT_TOPICS = {
     "odom": "",
     "scan": "",
 }
-"""Key in ``default_topics`` -> standard topic of the driver; empty where it has none."""
 
 
 class _Pattern(ParameterType):
@@ -67,11 +63,11 @@ class _Pattern(ParameterType):
         return self._expected
 
 
+#: Of its namespace and of its frame; /all/takeoff is a service for all.
 VEHICLE_NAME = _Pattern(
     re.compile(r"(?!all$)[A-Za-z][A-Za-z0-9_]*"),
     "letters, digits and underscores, the first a letter, and not 'all'",
 )
-"""Of its namespace and of its frame; /all/takeoff is a service for all."""
 
 _URI = re.compile(
     r"radio://(?P<dongle>[0-9A-Fa-f*]+)/(?P<channel>\d+)/(?P<rate>250K|1M|2M)"

@@ -14,15 +14,10 @@ from crazyflie_model.trajectory import (
 )
 from crazyflie_utils.refusal import RefusalError
 
-MAX_SPEED = 2.0
-"""Peak speed of a move, m/s: controllers with the default gains follow it."""
-
+MAX_SPEED = 2.0  #: Peak speed of a move, m/s: controllers with the default gains follow it.
+#: Peak acceleration of a move, m/s^2: controllers tilt by 15 degrees at most, which is 2.6 m/s^2.
 MAX_ACCELERATION = 2.0
-"""Peak acceleration of a move, m/s^2: controllers tilt by 15 degrees at most, which is
-2.6 m/s^2."""
-
-_PEAK_BRAKING = 3.94
-"""Peak acceleration of the braking, in speeds per duration."""
+_PEAK_BRAKING = 3.94  #: Peak acceleration of the braking, in speeds per duration.
 
 
 def braking_time(speed: float) -> float:
@@ -51,24 +46,17 @@ class StraightMove:
     the velocity and ends where it began, both without acceleration. The braking time, and so the
     distance it takes, does not depend on the duration.
 
-    Attributes
-    ----------
-    start, goal : (3,) array
-        m.
-    duration : float
-        s, > 0.
-    velocity : (3,) array
-        At the start, m/s.
-
     Raises
     ------
     RefusalError
         It asks for too much speed or acceleration.
     """
 
+    #: start, goal: m.
     start: NDArray[np.float64]
     goal: NDArray[np.float64]
-    duration: float
+    duration: float  #: s, > 0.
+    #: At the start, m/s.
     velocity: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:

@@ -44,12 +44,12 @@ from crazyflie_utils.vectors import to_tuple
 
 YAW = 6
 
+#: Topic, below the node's name, of all its vehicles' states in one message: for each in the order
+#: of the file a row of x, y, z, x_dot, y_dot, z_dot and yaw.
 ALL_STATES = "states"
-"""Topic, below the node's name, of all its vehicles' states in one message: for each in the order
-of the file a row of x, y, z, x_dot, y_dot, z_dot and yaw."""
 
+#: Models of which vehicles can be flown together.
 MODELS: dict[str, type[SevenDimensional]] = {"near_hover": NearHover, "coupled_7d": Coupled7D}
-"""Models of which vehicles can be flown together."""
 
 
 def batch_control(

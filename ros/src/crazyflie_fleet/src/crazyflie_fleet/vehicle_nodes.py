@@ -18,22 +18,18 @@ from crazyflie_takeoff.takeoff_control_filter_node import TakeoffControlFilterNo
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
 from crazyflie_utils import Node
 
-Tree = dict[str, Any]
-"""Parameters as the parameter server has them."""
+Tree = dict[str, Any]  #: Parameters as the parameter server has them.
 
 REFERENCE, SAFE_REFERENCE = "ref", "ref_safe"
 DESCENT, SAFE_DESCENT = f"{REFERENCE}_descent", f"{REFERENCE}_descent_safe"
 STATE, LQR_CONTROL = "state", "control/lqr"
 TAKEOFF_CONTROL, FINAL_CONTROL = "control/takeoff", "control/final"
 IN_FLIGHT = "in_flight"
-FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"
-"""Topics and services of a vehicle, below its name."""
-
+FLIGHT_STATUS = f"{IN_FLIGHT}_flight_status"  #: Topics and services of a vehicle, below its name.
+#: Topic below a vehicle's name: why its takeoffs are refused; empty if they are not.
 INHIBITION = "takeoff_inhibition"
-"""Topic below a vehicle's name: why its takeoffs are refused; empty if they are not."""
-
+#: Parameter below a vehicle's name: its collision buffer, m, by which missions are planned.
 BUFFER = "buffer"
-"""Parameter below a vehicle's name: its collision buffer, m, by which missions are planned."""
 
 SIMULATORS: dict[str, type[Node]] = {
     "near_hover": NearHoverSimulatorNode,

@@ -14,8 +14,7 @@ from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.vectors import to_tuple
 
-MAX_STATE_AGE = 0.5
-"""Of a state that counts for the position of its vehicle, s."""
+MAX_STATE_AGE = 0.5  #: Of a state that counts for the position of its vehicle, s.
 
 _IN_FLIGHT = (FlightStatus.TAKING_OFF, FlightStatus.FLYING, FlightStatus.DESCENDING)
 
@@ -24,11 +23,6 @@ class VehicleStates:
     """The last states and flight states of vehicles, which have numbers in the order given.
 
     ``vectorized`` are topics that have the states of several of them in one message.
-
-    Attributes
-    ----------
-    flight_states : ndarray, shape (n,)
-        `FlightStatus.state` of each; UNKNOWN before the first.
     """
 
     def __init__(
@@ -37,6 +31,7 @@ class VehicleStates:
         vectorized: Mapping[str, Sequence[VehicleConfig]],
     ):
         self.names = [vehicle.name for vehicle in vehicles]
+        #: Shape (n,); `FlightStatus.state` of each; UNKNOWN before the first.
         self.flight_states = np.full(len(vehicles), FlightStatus.UNKNOWN)
         self._vectorized = vectorized
         self._states = np.full((len(vehicles), 6), np.nan)

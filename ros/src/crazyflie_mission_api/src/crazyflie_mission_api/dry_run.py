@@ -17,8 +17,7 @@ from crazyflie_mission_api.vehicle_group import VehicleGroup
 from crazyflie_model.angles import Triple
 from crazyflie_model.trajectory import Pieces
 
-_STEP = 0.05
-"""Of time, s."""
+_STEP = 0.05  #: Of time, s.
 
 
 class DryRunClock(Clock):

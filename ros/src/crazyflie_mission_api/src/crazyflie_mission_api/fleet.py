@@ -49,8 +49,7 @@ _SERVICES = (
     "arm",
 )
 
-_POLL = 0.2
-"""Between two searches for vehicles, s."""
+_POLL = 0.2  #: Between two searches for vehicles, s.
 
 _YAW_STATE = "crazyflie_msgs/PositionVelocityYawStateStamped"
 

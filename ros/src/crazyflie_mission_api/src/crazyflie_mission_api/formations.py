@@ -10,8 +10,8 @@ from scipy.spatial.distance import cdist
 from crazyflie_fleet.fleet_config import DOWNWASH
 from crazyflie_mission_api.limits import Array
 
+#: Factors of positions before distances are calculated.
 SCALE = np.array([1.0, 1.0, 1.0 / DOWNWASH])
-"""Factors of positions before distances are calculated."""
 
 Point = tuple[float, float, float]
 

@@ -11,18 +11,15 @@ from crazyflie_mission_api.mission_vehicle import never
 from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_with_skew
 from crazyflie_mission_api.trajectories import straight
 
-_DESCENT_SPEED = 0.3
-"""Mean speed of landings, m/s."""
+_DESCENT_SPEED = 0.3  #: Mean speed of landings, m/s.
+_SHORTEST_LANDING = 2.0  #: s.
 
-_SHORTEST_LANDING = 2.0
-"""s."""
-
+#: A moving vehicle stops at its goal of this much later, within this duration, s: so it begins with
+#: the speed that it has.
 _STOP_AHEAD, _STOP_DURATION = 1.0, 2.0
-"""A moving vehicle stops at its goal of this much later, within this duration, s: so it begins
-with the speed that it has."""
 
+#: Distances from a free place, m: arrived; and near enough to land there after the timeout.
 _ARRIVED, _NEAR = 0.05, 0.1
-"""Distances from a free place, m: arrived; and near enough to land there after the timeout."""
 
 Point = tuple[float, float, float]
 

@@ -19,24 +19,15 @@ class MissionError(Exception):
 
 @dataclass(frozen=True)
 class Limits:
-    """Largest demands of a trajectory on a vehicle.
+    """Largest demands of a trajectory on a vehicle."""
 
-    Attributes
-    ----------
-    speed, acceleration : float
-        m/s, m/s^2.
-    yaw_rate : float
-        rad/s.
-    tilt : float
-        Of the thrust against the vertical, rad; as much as controllers ask for.
-    min_thrust, max_thrust : float
-        m/s^2, as much as controllers ask for.
-    """
-
+    #: speed, acceleration: m/s, m/s^2.
     speed: float = 0.5
     acceleration: float = 1.0
-    yaw_rate: float = 1.5
+    yaw_rate: float = 1.5  #: rad/s.
+    #: Of the thrust against the vertical, rad; as much as controllers ask for.
     tilt: float = MAX_TILT
+    #: min_thrust, max_thrust: m/s^2, as much as controllers ask for.
     min_thrust: float = MIN_THRUST
     max_thrust: float = MAX_THRUST
 
@@ -53,14 +44,9 @@ class Limits:
 
 @dataclass(frozen=True)
 class Bounds:
-    """The box that vehicles may fly in.
+    """The box that vehicles may fly in."""
 
-    Attributes
-    ----------
-    lower, upper : tuple, 3 components
-        Its corners, m, in the frame of the vehicles' states.
-    """
-
+    #: lower, upper: Its corners, m, in the frame of the vehicles' states.
     lower: tuple[float, float, float]
     upper: tuple[float, float, float]
 
@@ -105,8 +91,8 @@ class Bounds:
                     )
 
 
+#: Above the ground.
 EVERYWHERE = Bounds((-math.inf, -math.inf, 0.0), (math.inf, math.inf, math.inf))
-"""Above the ground."""
 
 
 def point(value: Sequence[float], what: str) -> Array:

@@ -25,14 +25,10 @@ from crazyflie_model.polynomials import COEFFICIENTS, PolynomialPiece
 
 _REST = [(order, np.zeros(4)) for order in (1, 2, 3)]
 
+#: Gauss's rule of 4 points is exact up to degree 7; squared snap has degree 6.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
-"""Gauss's rule of 4 points is exact up to degree 7; squared snap has degree 6."""
-
-_ITERATIONS = 20
-"""Of the search for the times; later ones change little."""
-
-_NEAREST = 1e-3
-"""Distance of two waypoints below which they are the same, m or rad."""
+_ITERATIONS = 20  #: Of the search for the times; later ones change little.
+_NEAREST = 1e-3  #: Distance of two waypoints below which they are the same, m or rad.
 
 
 def plan(

@@ -18,14 +18,10 @@ from crazyflie_mission_api import Fleet, Limits, MissionError
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.vehicle_group import VehicleGroup
 
-_HEIGHT = 1.0
-"""Of a trajectory's takeoff, m."""
-
+_HEIGHT = 1.0  #: Of a trajectory's takeoff, m.
+#: Of trajectories in files: they are flown as they are, or not at all.
 _LIMITS = Limits(speed=1.5, acceleration=2.5)
-"""Of trajectories in files: they are flown as they are, or not at all."""
-
-_PERIOD = 0.2
-"""From one point of a path that is shown to the next, s."""
+_PERIOD = 0.2  #: From one point of a path that is shown to the next, s.
 
 _COMMANDS = ("takeoff", "go_to", "follow", "formation", "land", "emergency", "adopt")
 

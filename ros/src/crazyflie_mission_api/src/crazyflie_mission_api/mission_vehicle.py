@@ -14,18 +14,11 @@ class MissionVehicle(Protocol):
 
     A command returns a future, which is done when the vehicle has accepted it, not when it has
     carried it out; its exception says why it was refused.
-
-    Attributes
-    ----------
-    name : str
-    bounds : Bounds
-        Its fence.
-    start_skew : float
-        How much later than others that are called to `start` in a row it may begin, s.
     """
 
     name: str
-    bounds: Bounds
+    bounds: Bounds  #: Its fence.
+    #: How much later than others that are called to `start` in a row it may begin, s.
     start_skew: float
 
     def position(self) -> Triple | None:

@@ -10,8 +10,7 @@ from crazyflie_mission_api.limits import MissionError
 from crazyflie_mission_api.mission_vehicle import Clock
 from crazyflie_utils import NodeHandle
 
-_FROZEN = 10.0
-"""How long simulated time may stand still, s of the machine's clock."""
+_FROZEN = 10.0  #: How long simulated time may stand still, s of the machine's clock.
 
 
 class RosClock(Clock):

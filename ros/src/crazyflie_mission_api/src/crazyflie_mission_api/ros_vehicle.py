@@ -21,27 +21,16 @@ from crazyflie_model.trajectory import Pieces
 from crazyflie_utils import NodeHandle, ServiceError
 from crazyflie_utils.parameters.types import FINITE
 
-CALL_TIMEOUT = 60.0
-"""Of a service, s of the machine's clock."""
+CALL_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
+MEMORY = 31  #: Pieces that the memory of a vehicle holds.
+_SETTLING_TIME = 0.5  #: After the planned end of a landing, s.
+_HIGH_LEVEL = "commander/enHighLevel"  #: The firmware parameter that enables high-level commands.
+_HOLD_DURATION = 0.5  #: Of the go_to at the end of a stream, to where the vehicle is, s.
+_HOLD_TIMEOUT = 3.0  #: Of its answer, s of the machine's clock; the driver's own timeout is 1 s.
 
-MEMORY = 31
-"""Pieces that the memory of a vehicle holds."""
-
-_SETTLING_TIME = 0.5
-"""After the planned end of a landing, s."""
-
-_HIGH_LEVEL = "commander/enHighLevel"
-"""The firmware parameter that enables high-level commands."""
-
-_HOLD_DURATION = 0.5
-"""Of the go_to at the end of a stream, to where the vehicle is, s."""
-
-_HOLD_TIMEOUT = 3.0
-"""Of its answer, s of the machine's clock; the driver's own timeout is 1 s."""
-
+#: How long a landing is tried while setpoints are streamed, s: without an answer they would end
+#: with the mission, and the vehicle would fall.
 _LANDING_RETRY_TIME = 10.0
-"""How long a landing is tried while setpoints are streamed, s: without an answer they would end
-with the mission, and the vehicle would fall."""
 
 
 class RosVehicle(RosVehicleState):

@@ -16,15 +16,13 @@ from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces
 from crazyflie_utils import NodeHandle
 
-STEP = 0.02
-"""From one setpoint to the next, s."""
+STEP = 0.02  #: From one setpoint to the next, s.
 
+#: Of a command, s. From `OVERLAP` after it the driver passes setpoints on again, which take the
+#: vehicle back from the command: one that is accepted later than this is sent again.
 MAX_ANSWER_TIME = OVERLAP / 2.0
-"""Of a command, s. From `OVERLAP` after it the driver passes setpoints on again, which take the
-vehicle back from the command: one that is accepted later than this is sent again."""
 
-RETRY_PERIOD = 1.0
-"""From a command that has failed to the next try, s."""
+RETRY_PERIOD = 1.0  #: From a command that has failed to the next try, s.
 
 Send = Callable[[], "Future[Any]"]
 

@@ -11,15 +11,9 @@ from crazyflie_fleet.high_level_parameters import HIGH_LEVEL, START_TOPIC
 from crazyflie_mission_api.futures import forward
 from crazyflie_utils import NodeHandle
 
-_STEP = 0.02
-"""Vehicles that are to start within this time, s, are named in one message."""
-
-
-ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"
-"""Namespace of a fleet's services for all."""
-
-_TIMEOUT = 60.0
-"""Of a service, s of the machine's clock."""
+_STEP = 0.02  #: Vehicles that are to start within this time, s, are named in one message.
+ALL_OF_FLEET = f"/all/{HIGH_LEVEL}"  #: Namespace of a fleet's services for all.
+_TIMEOUT = 60.0  #: Of a service, s of the machine's clock.
 
 
 class SynchronizedStart:

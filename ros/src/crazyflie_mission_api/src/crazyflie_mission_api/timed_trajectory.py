@@ -12,8 +12,7 @@ from crazyflie_model.angles import Triple
 from crazyflie_model.polynomials import Goal
 from crazyflie_model.trajectory import Pieces, Trajectory
 
-_STEP = 0.05
-"""Between two times at which distances are checked, s."""
+_STEP = 0.05  #: Between two times at which distances are checked, s.
 
 START_SKEW = 0.15
 """Largest difference between the starts of vehicles behind the driver, s.

@@ -13,8 +13,7 @@ from crazyflie_model.units import GRAVITY
 
 __all__ = ["Pieces", "check", "moved", "straight", "stretched", "within_limits"]
 
-SAMPLES = 30
-"""Points of a piece that are evaluated."""
+SAMPLES = 30  #: Points of a piece that are evaluated.
 
 
 def sampled(pieces: Pieces) -> tuple[Array, Array]:
@@ -131,8 +130,7 @@ def straight(
     return [smooth_piece(at_rest(start, start_yaw), goal, yaw, seconds)]
 
 
-_SHORTEST = 1e-3
-"""Of a trajectory, s: one that does not move has no demands."""
+_SHORTEST = 1e-3  #: Of a trajectory, s: one that does not move has no demands.
 
 
 def within_limits(pieces: Pieces, limits: Limits) -> list[PolynomialPiece]:

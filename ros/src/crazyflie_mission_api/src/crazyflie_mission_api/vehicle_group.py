@@ -17,14 +17,9 @@ from crazyflie_model.trajectory import Pieces, duration
 
 Point = Sequence[float]
 
-_SHORTEST_CLIMB = 2.0
-"""s."""
-
-_MIN_CLIMB = 0.1
-"""Lowest takeoff, above the start, m."""
-
-_CLIMB_STEP = 0.1
-"""Between two heights of a climb at which distances are checked, m."""
+_SHORTEST_CLIMB = 2.0  #: s.
+_MIN_CLIMB = 0.1  #: Lowest takeoff, above the start, m.
+_CLIMB_STEP = 0.1  #: Between two heights of a climb at which distances are checked, m.
 
 
 class VehicleGroup(LandingGroup):

@@ -15,14 +15,11 @@ from crazyflie_msgs.msg import FlightStatus, PositionVelocityYawStateStamped, Ve
 from crazyflie_utils import NodeHandle, TransformError
 from crazyflie_utils.flight_status import WORDS
 
+#: A position older than this is not known, s; as `commanded_references.MAX_STATE_AGE`.
 MAX_POSITION_AGE = 0.5
-"""A position older than this is not known, s; as `commanded_references.MAX_STATE_AGE`."""
-
-_LANDED_HEIGHT = 0.1
-"""Above the start, m: a vehicle below has landed."""
-
+_LANDED_HEIGHT = 0.1  #: Above the start, m: a vehicle below has landed.
+#: States after a flight.
 _ENDED = (FlightStatus.ON_GROUND, FlightStatus.LANDING, FlightStatus.DESCENDING)
-"""States after a flight."""
 
 
 class Pose(NamedTuple):
@@ -47,11 +44,6 @@ class RosVehicleState(MissionVehicle):
     estimator its state. ``frames`` are the fixed and its own frame, if its position comes by tf;
     with the driver only as long as there are no poses. ``has_yaw`` is whether it can have another
     heading than 0.
-
-    Attributes
-    ----------
-    flight_status, driver_status
-        The last ones.
     """
 
     def __init__(
@@ -66,6 +58,7 @@ class RosVehicleState(MissionVehicle):
         self._handle = handle
         self.uses_driver = uses_driver
         self.has_yaw = has_yaw
+        #: flight_status, driver_status: The last ones.
         self.flight_status = FlightStatus()
         self.driver_status = VehicleStatus(link=VehicleStatus.CONNECTING)
         self._pose: Pose | None = None

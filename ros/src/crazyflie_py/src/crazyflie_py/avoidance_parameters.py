@@ -2,8 +2,8 @@
 
 from crazyflie_model.collision_avoidance import AvoidanceSettings
 
+#: In place of an infinite corner, m: the parameter server has no infinity.
 _FIRMWARE_INFINITY = 1e9
-"""In place of an infinite corner, m: the parameter server has no infinity."""
 
 
 def avoidance_parameters(settings: AvoidanceSettings) -> dict[str, float]:

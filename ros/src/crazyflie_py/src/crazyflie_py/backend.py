@@ -12,8 +12,8 @@ from crazyflie_model.collision_avoidance import AvoidanceSettings
 from crazyflie_model.polynomials import PolynomialPiece
 from crazyflie_py.setpoints import Setpoint
 
+#: Of vehicles in pictures, as Crazyswarm draws them: red, green and blue, 0 to 1.
 DEFAULT_COLOR = (0.5, 0.5, 1.0)
-"""Of vehicles in pictures, as Crazyswarm draws them: red, green and blue, 0 to 1."""
 
 
 class VehicleState(NamedTuple):
@@ -71,21 +71,11 @@ class Commands(Protocol):
 
 
 class VehicleBackend(Commands, Protocol):
-    """One vehicle.
+    """One vehicle."""
 
-    Attributes
-    ----------
-    name : str
-        "cf1".
-    id : int
-        Last byte of the radio address.
-    initial_position : tuple, 3 components
-        As the fleet file has it, m.
-    """
-
-    name: str
-    id: int
-    initial_position: Triple
+    name: str  #: "cf1".
+    id: int  #: Last byte of the radio address.
+    initial_position: Triple  #: As the fleet file has it, m.
 
     def set_group_mask(self, group_mask: int) -> None:
         """Make the vehicle a member of groups, a bit each."""
@@ -133,14 +123,9 @@ class SwarmBackend(Commands, Protocol):
     """All vehicles and the clock.
 
     Commands are for all vehicles; `Commands.go_to` is relative then.
-
-    Attributes
-    ----------
-    dt : float
-        Period of the clock's steps, s; of the real clock 0.
     """
 
-    dt: float
+    dt: float  #: Period of the clock's steps, s; of the real clock 0.
 
     @property
     def vehicles(self) -> Sequence[VehicleBackend]:

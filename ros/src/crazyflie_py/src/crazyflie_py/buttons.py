@@ -15,20 +15,12 @@ from crazyflie_py.crazyflie import TimeHelper
 
 _log = logging.getLogger(__name__)
 
-BUTTON = 5
-"""Number of Crazyswarm's button: right shoulder of a gamepad."""
-
-BUTTONS = (3, 4, 5)
-"""Any of these counts for `Input.checkIfAnyButtonIsPressed`."""
-
+BUTTON = 5  #: Number of Crazyswarm's button: right shoulder of a gamepad.
+BUTTONS = (3, 4, 5)  #: Any of these counts for `Input.checkIfAnyButtonIsPressed`.
+#: After this time (s) --sim presses the button itself, without a joystick and a terminal.
 UNATTENDED_DELAY = 3.0
-"""After this time (s) --sim presses the button itself, without a joystick and a terminal."""
-
-_POLL_PERIOD = 0.01
-"""s."""
-
-_KEY = [0] * BUTTON + [1]
-"""A key is the button."""
+_POLL_PERIOD = 0.01  #: s.
+_KEY = [0] * BUTTON + [1]  #: A key is the button.
 
 
 class Device(Protocol):

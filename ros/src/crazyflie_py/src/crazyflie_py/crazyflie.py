@@ -33,27 +33,18 @@ Array = NDArray[np.float64]
 
 
 class Crazyflie(ScriptCommands):
-    """One vehicle.
-
-    Attributes
-    ----------
-    id : int
-        Last byte of its radio address.
-    name, prefix : str
-        "cf1", "/cf1".
-    initialPosition : (3,) array
-        As the fleet file has it, m.
-    ledRGB : tuple, 3 components
-        What `setLEDColor` has set; before, Crazyswarm's colour in pictures.
-    """
+    """One vehicle."""
 
     def __init__(self, vehicle: VehicleBackend):
         super().__init__(vehicle.name, vehicle)
         self._vehicle = vehicle
-        self.id = vehicle.id
+        self.id = vehicle.id  #: Last byte of its radio address.
+        #: name, prefix: "cf1", "/cf1".
         self.name = vehicle.name
         self.prefix = f"/{vehicle.name}"
+        #: As the fleet file has it, m.
         self.initialPosition: Array = np.array(vehicle.initial_position)
+        #: What `setLEDColor` has set; before, Crazyswarm's colour in pictures.
         self.ledRGB = DEFAULT_COLOR
         self._group_mask = 0
 
@@ -249,17 +240,11 @@ class _Found(dict[Any, Crazyflie]):
 
 
 class CrazyflieServer(ScriptCommands):
-    """All vehicles; its commands are broadcast and concern all at the same moment.
-
-    Attributes
-    ----------
-    crazyflies : list of Crazyflie
-        In the order of the fleet file.
-    crazyfliesById, crazyfliesByName : dict
-    """
+    """All vehicles; its commands are broadcast and concern all at the same moment."""
 
     def __init__(self, backend: SwarmBackend):
         super().__init__("allcfs", backend)
+        #: In the order of the fleet file.
         self.crazyflies = [Crazyflie(vehicle) for vehicle in backend.vehicles]
         self.crazyfliesById = _Found({cf.id: cf for cf in self.crazyflies})
         self.crazyfliesByName = _Found({cf.name: cf for cf in self.crazyflies})

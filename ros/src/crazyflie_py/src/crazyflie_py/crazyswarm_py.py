@@ -67,12 +67,6 @@ class Crazyswarm:
         The script's own options, made with ``add_help=False``.
     args : str or sequence of str, optional
         The command line; that of the script by default. What is not known is ignored.
-
-    Attributes
-    ----------
-    allcfs : CrazyflieServer
-    timeHelper : TimeHelper
-    input : Input
     """
 
     def __init__(

@@ -15,31 +15,18 @@ from crazyflie_utils import ParameterError
 
 _LOG = logging.getLogger(__name__)
 
+#: Where Crazyswarm and crazyswarm2 have the file, from the script's folder.
 _PLACES = ("../launch/crazyflies.yaml", "../config/crazyflies.yaml")
-"""Where Crazyswarm and crazyswarm2 have the file, from the script's folder."""
-
-_SUFFIXES = (".yaml", ".yml")
-"""A text that ends so is the name of a file."""
+_SUFFIXES = (".yaml", ".yml")  #: A text that ends so is the name of a file.
 
 
 class FleetVehicle(NamedTuple):
-    """A vehicle.
-
-    Attributes
-    ----------
-    name : str
-    id : int
-        Last byte of the radio address, or else the number at the end of the name.
-    position : tuple, 3 components
-        Before takeoff, m.
-    buffer : float
-        Radius of the space that is the vehicle's own, m.
-    """
+    """A vehicle."""
 
     name: str
-    id: int
-    position: Triple
-    buffer: float = 0.15
+    id: int  #: Last byte of the radio address, or else the number at the end of the name.
+    position: Triple  #: Before takeoff, m.
+    buffer: float = 0.15  #: Radius of the space that is the vehicle's own, m.
 
 
 def load(crazyflies_yaml: str | Path | None) -> list[FleetVehicle]:

@@ -13,24 +13,18 @@ from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_py.ros_connection import Connection
 from crazyflie_py.setpoints import Attitude, MotorsOff, Position, Setpoint, led_to
 
-_HOLD_DURATION = 0.8
-"""In which a vehicle that is held stops, s."""
-
+_HOLD_DURATION = 0.8  #: In which a vehicle that is held stops, s.
+#: Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE).
 _SETPOINT_TIMEOUT = 0.5
-"""Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE)."""
 
 
 class HeldVehicle:
-    """One vehicle.
-
-    Attributes
-    ----------
-    is_landing, avoids : bool
-        Whether it lands, and whether its firmware avoids collisions; it is not held then.
-    """
+    """One vehicle."""
 
     def __init__(self, vehicle: RosVehicle, connection: Connection):
         self.name = vehicle.name
+        #: is_landing, avoids: Whether it lands, and whether its firmware avoids collisions; it is
+        #: not held then.
         self.is_landing = False
         self.avoids = False
         self._free_until = -math.inf

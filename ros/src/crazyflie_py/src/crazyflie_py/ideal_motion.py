@@ -36,10 +36,6 @@ class IdealMotion:
         m/s.
     disturbance : float
         Standard deviation of what is added to the velocity of velocity setpoints, m/s.
-
-    Attributes
-    ----------
-    now : Motion
     """
 
     def __init__(self, position: Triple, max_speed: float, disturbance: float):

@@ -30,14 +30,9 @@ from crazyflie_py.visualizer import NullVisualizer
 from crazyflie_utils.main import begin_script
 from crazyflie_utils.process import Process
 
-_FIND_LIMIT = 10.0
-"""For the vehicles of a file, s of the machine's clock."""
-
-_WATCH_PERIOD = 0.05
-"""Between two looks at the distances of vehicles, s; as a fleet's."""
-
-_LANDING_LIMIT = 15.0
-"""For landings of the script at its end, s."""
+_FIND_LIMIT = 10.0  #: For the vehicles of a file, s of the machine's clock.
+_WATCH_PERIOD = 0.05  #: Between two looks at the distances of vehicles, s; as a fleet's.
+_LANDING_LIMIT = 15.0  #: For landings of the script at its end, s.
 
 
 class RosBackend(EachVehicle, SwarmBackend):

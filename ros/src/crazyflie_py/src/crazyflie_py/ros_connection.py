@@ -13,11 +13,8 @@ from crazyflie_mission_api.mission_vehicle import never
 from crazyflie_mission_api.ros_vehicle import CALL_TIMEOUT
 from crazyflie_utils import NodeHandle
 
-_SEARCH_LIMIT = 5.0
-"""For vehicles, s of the machine's clock."""
-
-_ANSWER_LIMIT = 15.0
-"""For the answer to a command, s of the machine's clock."""
+_SEARCH_LIMIT = 5.0  #: For vehicles, s of the machine's clock.
+_ANSWER_LIMIT = 15.0  #: For the answer to a command, s of the machine's clock.
 
 
 class CommandRefusedError(RuntimeError):
@@ -25,20 +22,12 @@ class CommandRefusedError(RuntimeError):
 
 
 class Connection:
-    """What the vehicles of a script have in common.
-
-    Attributes
-    ----------
-    handle : NodeHandle
-    fleet : Fleet
-    is_unchecked : bool
-        Whether what is refused is a warning.
-    """
+    """What the vehicles of a script have in common."""
 
     def __init__(self, handle: NodeHandle, fleet: Fleet, is_unchecked: bool):
         self.handle = handle
         self.fleet = fleet
-        self.is_unchecked = is_unchecked
+        self.is_unchecked = is_unchecked  #: Whether what is refused is a warning.
 
     def call(self, service: str, service_type: Any, *arguments: Any) -> "Future[Any]":
         """Call a service by its absolute name; return the future of the answer."""

@@ -26,8 +26,8 @@ from crazyflie_py.setpoints import (
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.topics import Publisher
 
+#: For the first setpoint, until the vehicle is connected, s of the machine's clock.
 _CONNECTION_LIMIT = 2.0
-"""For the first setpoint, until the vehicle is connected, s of the machine's clock."""
 
 _TOPICS: dict[type, tuple[str, Any]] = {
     FullState: ("cmd_full_state", FullStateMessage),

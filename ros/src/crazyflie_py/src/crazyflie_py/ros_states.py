@@ -9,11 +9,8 @@ from crazyflie_mission_api.vehicle_state import Pose, velocity_between
 from crazyflie_model.angles import Triple, rpy_from_quaternion
 from crazyflie_py.backend import VehicleState
 
-_STATE_TIMEOUT = 10.0
-"""For a pose, s of the vehicles' time."""
-
-_VELOCITY_SPAN = 0.2
-"""Longest time between two poses from which a velocity follows, s."""
+_STATE_TIMEOUT = 10.0  #: For a pose, s of the vehicles' time.
+_VELOCITY_SPAN = 0.2  #: Longest time between two poses from which a velocity follows, s.
 
 _UNKNOWN: Triple = (math.nan, math.nan, math.nan)
 

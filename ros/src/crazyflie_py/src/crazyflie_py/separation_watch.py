@@ -10,17 +10,10 @@ from crazyflie_mission_api.vehicle_state import Pose, velocity_between
 from crazyflie_py.held_vehicle import HeldVehicle
 from crazyflie_py.ros_connection import Connection
 
-_SHORTEST_SPAN = 0.02
-"""Between two poses from which a velocity follows, s."""
-
-_LONGEST_SPAN = 0.3
-"""After it the first pose says nothing about a velocity, s."""
-
-_LOWEST_SPEED = 0.05
-"""A slower vehicle hovers, m/s."""
-
-_REPEAT = 2.0
-"""Between two warnings of a vehicle, s."""
+_SHORTEST_SPAN = 0.02  #: Between two poses from which a velocity follows, s.
+_LONGEST_SPAN = 0.3  #: After it the first pose says nothing about a velocity, s.
+_LOWEST_SPEED = 0.05  #: A slower vehicle hovers, m/s.
+_REPEAT = 2.0  #: Between two warnings of a vehicle, s.
 
 
 class SeparationWatch:

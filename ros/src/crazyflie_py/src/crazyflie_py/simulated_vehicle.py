@@ -19,11 +19,10 @@ from crazyflie_virtual.firmware.states import Estimate
 
 _log = logging.getLogger(__name__)
 
+#: Height above the start from which motors are not stopped without a warning, m.
 _FALL_HEIGHT = 0.1
-"""Height above the start from which motors are not stopped without a warning, m."""
-
+#: Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE).
 _SETPOINT_TIMEOUT = 0.5
-"""Age of a setpoint at which the firmware levels out, s (commander.h, WDT_TIMEOUT_STABILIZE)."""
 
 
 class SimulatedVehicle:

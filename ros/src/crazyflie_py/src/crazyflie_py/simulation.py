@@ -16,8 +16,7 @@ from crazyflie_py.visualizer import visualizer_for
 
 _log = logging.getLogger(__name__)
 
-_ROUNDING = 1e-9
-"""Part of a step by which a sleep may be too short for it, due to rounding."""
+_ROUNDING = 1e-9  #: Part of a step by which a sleep may be too short for it, due to rounding.
 
 
 class Simulation(EachVehicle):

@@ -11,8 +11,7 @@ from crazyflie_virtual.firmware.planner import (
     Planner,
 )
 
-_ROOM = MEMORY_SIZE // PIECE_SIZE
-"""Pieces that the memory holds."""
+_ROOM = MEMORY_SIZE // PIECE_SIZE  #: Pieces that the memory holds.
 
 
 class TrajectoryMemory:

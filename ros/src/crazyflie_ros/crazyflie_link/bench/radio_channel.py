@@ -19,8 +19,8 @@ from crazyflie_virtual.link.radio import Load, RadioChannel, usage
 from crazyflie_virtual.link.radio_swarm import RadioSwarm
 
 TAKEOFF = bytes([8 << 4]) + struct.pack("<BBff?f", 7, 0, 1.0, 0.0, True, 2.0)
+#: Vehicles per packet, and bytes of it with its header.
 FRAMES = {"poses": (POSES_PER_PACKET, 25), "positions": (POSITIONS_PER_PACKET, 29)}
-"""Vehicles per packet, and bytes of it with its header."""
 
 LOSSES = (0.0, 0.1, 0.3)
 SEEDS = 5

@@ -25,37 +25,22 @@ from crazyflie_world.shapes import Box
 from crazyflie_world.world import World
 
 SIDES = ("front", "back", "left", "right")
-STEP = 0.05
-"""Between two moments, s."""
-
-SPREAD = 0.47
-"""Of the sensors' cones, rad."""
+STEP = 0.05  #: Between two moments, s.
+SPREAD = 0.47  #: Of the sensors' cones, rad.
 
 VEHICLE, OBJECT, CONE, GREY = "#0b62b0", "#e07b00", "#7fb2e5", "#7a7a7a"
 
 
 @dataclass(frozen=True)
 class Moment:
-    """What was seen at a moment.
+    """What was seen at a moment."""
 
-    Attributes
-    ----------
-    time : float
-        s since the takeoff.
-    x, y : float
-        Where the vehicle was, m.
-    ranges : dict
-        What each sensor said, m.
-    command : float
-        Velocity ahead that it was given, m/s.
-    world : World
-    """
-
-    time: float
+    time: float  #: s since the takeoff.
+    #: x, y: Where the vehicle was, m.
     x: float
     y: float
-    ranges: dict[str, float]
-    command: float
+    ranges: dict[str, float]  #: What each sensor said, m.
+    command: float  #: Velocity ahead that it was given, m/s.
     world: World
 
 

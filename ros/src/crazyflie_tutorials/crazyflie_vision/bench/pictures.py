@@ -21,8 +21,7 @@ from crazyflie_utils.main import NodeClasses
 from crazyflie_utils.testing import FakeProcess, launch_files
 from crazyflie_vision.images import to_array
 
-STEP = 0.1
-"""Between two moments, s."""
+STEP = 0.1  #: Between two moments, s.
 
 VEHICLE, TARGET, GREY = "#0b62b0", "#e07b00", "#7a7a7a"
 

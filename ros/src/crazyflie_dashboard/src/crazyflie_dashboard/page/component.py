@@ -8,8 +8,7 @@ from nicegui.element import Element
 class ListView(Element):
     """Shows a list; it is sent when it has changed."""
 
-    prop: str
-    """Name of the component's property."""
+    prop: str  #: Name of the component's property.
 
     def __init__(self) -> None:
         super().__init__()

@@ -7,8 +7,7 @@ from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.snapshot import Scene
 
 LEVELS = ("debug", "info", "warn", "error", "fatal")
-MAX_LINES = 200
-"""Lines of the log that are shown, the newest first."""
+MAX_LINES = 200  #: Lines of the log that are shown, the newest first.
 
 
 class MessagesPanel:

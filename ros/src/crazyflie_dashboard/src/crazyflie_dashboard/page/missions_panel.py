@@ -9,17 +9,11 @@ from crazyflie_dashboard.snapshot import Scene, Triple
 
 
 class MissionsPanel:
-    """A list of what can be flown; it flies after its dry run has passed.
-
-    Attributes
-    ----------
-    paths : dict of str to tuple of Triple
-        Of the last dry run, for the scene.
-    """
+    """A list of what can be flown; it flies after its dry run has passed."""
 
     def __init__(self, session: Session):
         self._session = session
-        self.paths: dict[str, tuple[Triple, ...]] = {}
+        self.paths: dict[str, tuple[Triple, ...]] = {}  #: Of the last dry run, for the scene.
         self._files: dict[str, MissionFile] = {}
         self._passed: tuple[str, tuple[str, ...]] | None = None
         self._choice = ui.label().classes("choice")

@@ -10,8 +10,7 @@ from crazyflie_dashboard.page.session import Session
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils.refusal import RefusalError
 
-MAX_ROWS = 30
-"""Parameters that are shown at once; a search finds the others."""
+MAX_ROWS = 30  #: Parameters that are shown at once; a search finds the others.
 
 
 class ParametersPanel:

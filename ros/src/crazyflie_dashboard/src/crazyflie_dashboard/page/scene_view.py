@@ -14,8 +14,7 @@ from nicegui.element import Element
 from crazyflie_dashboard.snapshot import Rotation, Scene, Triple, VehicleSnapshot
 
 FOLDER = Path(__file__).parent
-DIGITS = 4
-"""Of positions in m and of quaternions, for the browser."""
+DIGITS = 4  #: Of positions in m and of quaternions, for the browser.
 
 ui.scene  # noqa: B018  Registers three.js.
 

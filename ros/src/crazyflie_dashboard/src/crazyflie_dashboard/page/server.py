@@ -15,13 +15,12 @@ from crazyflie_dashboard.page.gate import Gate
 from crazyflie_dashboard.page.view import View
 
 FOLDER = Path(__file__).parent
+#: Styles, the clock of clicks, the emergency key, and a sentence for browsers that are too old.
 HEAD = (FOLDER / "head.html").read_text() + (
     f"<style>{(FOLDER / 'dashboard.css').read_text()}</style>"
 )
-"""Styles, the clock of clicks, the emergency key, and a sentence for browsers that are too old."""
 
-CLOSING_TIME = 3.0
-"""Longest time, s, that the server has to end."""
+CLOSING_TIME = 3.0  #: Longest time, s, that the server has to end.
 
 
 class Page:

@@ -11,33 +11,22 @@ from crazyflie_dashboard.dashboard import Command, Dashboard
 from crazyflie_dashboard.snapshot import Action, VehicleSnapshot
 from crazyflie_utils.refusal import RefusalError
 
+#: Handler in the browser that sends when a click was; see head.html.
 CLICKED = "(event) => emit(clickTime(event))"
-"""Handler in the browser that sends when a click was; see head.html."""
-
-REFUSAL_TIME = 12000
-"""Time for which a refusal is shown, ms."""
+REFUSAL_TIME = 12000  #: Time for which a refusal is shown, ms.
 
 Result = TypeVar("Result")
 
 
 class Session:
-    """One page that is open.
-
-    Attributes
-    ----------
-    page : int
-        Its number; 0 while it has no connection. A page that connects again is a new one.
-    chosen : set of str
-        Names of the vehicles that its buttons are for.
-    watched : str or None
-        The vehicle that was chosen last: its plots are shown.
-    """
+    """One page that is open."""
 
     def __init__(self, dashboard: Dashboard, client: Client):
         self.dashboard = dashboard
+        #: Its number; 0 while it has no connection. A page that connects again is a new one.
         self.page = 0
-        self.chosen: set[str] = set()
-        self.watched: str | None = None
+        self.chosen: set[str] = set()  #: Names of the vehicles that its buttons are for.
+        self.watched: str | None = None  #: The vehicle that was chosen last: its plots are shown.
         self._client = client
         client.on_connect(self._connect)
         client.on_disconnect(self._disconnect)

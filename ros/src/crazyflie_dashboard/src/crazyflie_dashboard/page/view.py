@@ -19,8 +19,7 @@ from crazyflie_dashboard.page.vehicles_panel import VehiclesPanel
 from crazyflie_dashboard.snapshot import Action
 
 SCENE_PERIOD = 0.05
-PANEL_PERIOD = 0.5
-"""Between two updates, s."""
+PANEL_PERIOD = 0.5  #: Between two updates, s.
 
 
 class View:

@@ -14,8 +14,7 @@ from crazyflie_utils import NodeHandle, ServiceError
 
 _GO_TO = ("go_to", "go_to_linear")
 
-LIMIT = 5.0
-"""Time in which vehicles answer, s; their own limits are shorter."""
+LIMIT = 5.0  #: Time in which vehicles answer, s; their own limits are shorter.
 
 
 class AllVehicles:

@@ -8,9 +8,10 @@ from crazyflie_driver import srv
 from crazyflie_link.broadcast import SharedCommand
 from crazyflie_link.high_level import ALL_GROUPS, HighLevel
 
+#: Commands that are not as all others, which move a vehicle in the air.
 TAKEOFF, LAND, STOP = "takeoff", "land", "stop"
-"""Commands that are not as all others, which move a vehicle in the air."""
 
+#: High-level command -> type of its service.
 SERVICE_TYPES = {
     "takeoff": srv.Takeoff,
     "land": srv.Land,
@@ -20,8 +21,8 @@ SERVICE_TYPES = {
     "go_to_linear": srv.GoTo,
     "spiral": srv.Spiral,
 }
-"""High-level command -> type of its service."""
 
+#: High-level command -> what sends a request of it.
 _SENDERS: dict[str, Callable[[HighLevel, Any], None]] = {
     "takeoff": lambda high_level, r: high_level.take_off(
         r.height, r.duration.to_sec(), r.groupMask
@@ -52,7 +53,6 @@ _SENDERS: dict[str, Callable[[HighLevel, Any], None]] = {
         r.groupMask,
     ),
 }
-"""High-level command -> what sends a request of it."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from crazyflie_link.crazyflie import Crazyflie, LinkState
 from crazyflie_link.errors import NoAnswerError
 from crazyflie_utils import NodeHandle, ServiceError
 
-PAUSE = 0.2
-"""Between two attempts, s."""
+PAUSE = 0.2  #: Between two attempts, s.
 
 
 def connect_within(

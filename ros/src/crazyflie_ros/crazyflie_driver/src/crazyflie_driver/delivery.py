@@ -8,8 +8,8 @@ from typing import Any
 
 from crazyflie_utils import NodeHandle
 
+#: Data that may be queued; more are dropped. A vehicle logs some 300 packets a second.
 MAX_WAITING = 1000
-"""Data that may be queued; more are dropped. A vehicle logs some 300 packets a second."""
 
 
 class Delivery:

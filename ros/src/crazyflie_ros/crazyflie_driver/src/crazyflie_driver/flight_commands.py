@@ -25,27 +25,22 @@ from crazyflie_utils.timers import Timer
 
 Result = TypeVar("Result")
 
+#: Time in which a notice that setpoints stop needs the command that it belongs to, s.
 NOTIFY_WINDOW = 0.5
-"""Time in which a notice that setpoints stop needs the command that it belongs to, s."""
+_WATCHDOG_PERIOD = 0.2  #: The firmware gives up after 1 s without being fed.
 
-_WATCHDOG_PERIOD = 0.2
-"""The firmware gives up after 1 s without being fed."""
-
+#: Time in which a vehicle arms itself, s. Firmware 2026.08 disarms and arms itself 3 s after a
+#: landing (0.16 s) and every 30 s on the ground (0.08 s).
 _REARMING = 0.5
-"""Time in which a vehicle arms itself, s. Firmware 2026.08 disarms and arms itself 3 s after a
-landing (0.16 s) and every 30 s on the ground (0.08 s)."""
 
 
 class Need(enum.Enum):
     """What a vehicle needs for a command."""
 
     COMMAND = enum.auto()
-    SETPOINTS_STOP = enum.auto()
-    """The notice that setpoints stop, right before the command."""
-    ON_GROUND = enum.auto()
-    """Nothing: it is to land, and the command would start its motors."""
-    NOT_ADDRESSED = enum.auto()
-    """Nothing: the command is for other groups."""
+    SETPOINTS_STOP = enum.auto()  #: The notice that setpoints stop, right before the command.
+    ON_GROUND = enum.auto()  #: Nothing: it is to land, and the command would start its motors.
+    NOT_ADDRESSED = enum.auto()  #: Nothing: the command is for other groups.
 
 
 @dataclass(eq=False)

@@ -10,14 +10,11 @@ from crazyflie_link.errors import LinkLostError, NoReplyError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle
 
+#: Parameter of the firmware, and its value for the extended Kalman filter.
 _ESTIMATOR, _KALMAN = "stabilizer.estimator", 2
-"""Parameter of the firmware, and its value for the extended Kalman filter."""
-
+#: How old a state may be, s: the firmware's supervisor runs at 25 Hz, and is logged at 10 Hz.
 _REPORT_LAG = 0.2
-"""How old a state may be, s: the firmware's supervisor runs at 25 Hz, and is logged at 10 Hz."""
-
-_LOGGED_STATE_LIMIT = 1.0
-"""Time limit of log data with the state, s; they come every 0.1 s."""
+_LOGGED_STATE_LIMIT = 1.0  #: Time limit of log data with the state, s; they come every 0.1 s.
 
 
 @dataclass(eq=False)

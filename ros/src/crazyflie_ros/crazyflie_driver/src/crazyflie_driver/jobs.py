@@ -12,8 +12,7 @@ from crazyflie_utils import ServiceError
 
 Result = TypeVar("Result")
 
-MOST_JOBS = 64
-"""Jobs that may be queued."""
+MOST_JOBS = 64  #: Jobs that may be queued.
 
 
 @dataclass(eq=False)

@@ -9,23 +9,12 @@ drives, is that of the flight.
 
 from typing import NamedTuple
 
-LIMIT = 2.0
-"""How long a vehicle may take to lift off, s."""
-
-MIN_CLIMB = 0.15
-"""Setpoints that are lower above the ground do not ask for a flight, m."""
-
-MAX_RISE, MAX_SPEED = 0.05, 0.1
-"""A vehicle on the ground estimates no more, m and m/s."""
-
-MAX_TURN = 10.0
-"""From the heading on the ground to the one that is commanded, degrees."""
-
-MAX_GAP = 0.5
-"""Setpoints older than this are levelled out by the firmware, s."""
-
-PAUSE = 1.0
-"""After silence of so long, s, setpoints are a new attempt."""
+LIMIT = 2.0  #: How long a vehicle may take to lift off, s.
+MIN_CLIMB = 0.15  #: Setpoints that are lower above the ground do not ask for a flight, m.
+MAX_RISE, MAX_SPEED = 0.05, 0.1  #: A vehicle on the ground estimates no more, m and m/s.
+MAX_TURN = 10.0  #: From the heading on the ground to the one that is commanded, degrees.
+MAX_GAP = 0.5  #: Setpoints older than this are levelled out by the firmware, s.
+PAUSE = 1.0  #: After silence of so long, s, setpoints are a new attempt.
 
 
 class NoLift(NamedTuple):

@@ -19,9 +19,10 @@ from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.topics import Publisher
 
+#: Period of the log block that the diagnostics rest on, ms; its absence shows a restart.
 STATUS_PERIOD_MS = 100
-"""Period of the log block that the diagnostics rest on, ms; its absence shows a restart."""
 
+#: What is in it, as far as the firmware has it: 24 of the 26 bytes of a packet.
 STATUS_VARIABLES = (
     "pm.vbat",
     "radio.rssi",
@@ -33,36 +34,18 @@ STATUS_VARIABLES = (
     "radio.numRxBc",
     "radio.numRxUc",
 )
-"""What is in it, as far as the firmware has it: 24 of the 26 bytes of a packet."""
 
 _MOST_DATA = 30
-_LINK = 3 << 2
-"""Bits of the header that belong to the link; cflib sets them."""
+_LINK = 3 << 2  #: Bits of the header that belong to the link; cflib sets them.
 
+#: Ports of console, parameters, memory, log, high-level commands, supervisor and pings: what comes
+#: from there is for the driver.
 _OWN_PORTS = frozenset({0, 2, 4, 5, 8, 9, 15})
-"""Ports of console, parameters, memory, log, high-level commands, supervisor and pings: what
-comes from there is for the driver."""
 
 
 @dataclass(eq=False)
 class LogTopics:
-    """Start a vehicle's log blocks and publish them.
-
-    Attributes
-    ----------
-    voltage, rssi : float or None
-        Latest values of the battery (V) and the vehicle's reception (-dBm).
-    power_state : int or None
-        The firmware's pm.state.
-    received_broadcasts, received_unicasts : int
-        Packets that the vehicle has counted, modulo 2^16.
-    height, vertical_speed, heading : float or None
-        Latest estimate of the vehicle: z (m, fixed frame), its derivative (m/s), yaw (degrees).
-    supervisor : SupervisorState or None
-        Latest state; None until it has come on the present link.
-    variances : Variances
-        Of the vehicle's Kalman filter, if it has one.
-    """
+    """Start a vehicle's log blocks and publish them."""
 
     _handle: NodeHandle
     _parameters: VehicleParameters
@@ -70,15 +53,21 @@ class LogTopics:
     _delivery: Delivery
     _fixed_frame: str
     _on_status: Callable[[], None]
+    #: voltage, rssi: Latest values of the battery (V) and the vehicle's reception (-dBm).
     voltage: float | None = None
     rssi: float | None = None
-    power_state: int | None = None
+    power_state: int | None = None  #: The firmware's pm.state.
+    #: received_broadcasts, received_unicasts: Packets that the vehicle has counted, modulo 2^16.
     received_broadcasts: int = 0
     received_unicasts: int = 0
+    #: height, vertical_speed, heading: Latest estimate of the vehicle: z (m, fixed frame), its
+    #: derivative (m/s), yaw (degrees).
     height: float | None = None
     vertical_speed: float | None = None
     heading: float | None = None
+    #: Latest state; None until it has come on the present link.
     supervisor: SupervisorState | None = None
+    #: Of the vehicle's Kalman filter, if it has one.
     variances: Variances = field(default_factory=Variances)
     _packets: Publisher | None = None
     _heading: Publisher = field(init=False)

@@ -11,8 +11,8 @@ from crazyflie_utils.parameters.types import ParameterType
 
 _XMLRPC_INTEGERS = range(-(2**31), 2**31)
 
+#: Parameters that do something once instead of keeping a value: not for a vehicle in the air.
 _COMMANDS = ("kalman.resetEstimation",)
-"""Parameters that do something once instead of keeping a value: not for a vehicle in the air."""
 
 
 @dataclass(eq=False)

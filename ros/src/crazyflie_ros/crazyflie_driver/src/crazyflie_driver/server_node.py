@@ -24,14 +24,13 @@ from crazyflie_link.emergency import BROADCAST_STOP
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_utils import Node, NodeHandle, ServiceError
 
-ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"
-"""Services of the server."""
+ADD, REMOVE = "/add_crazyflie", "/remove_crazyflie"  #: Services of the server.
 
 _DIAGNOSTICS_PERIOD = 1.0
 _FLIGHTS_PERIOD = 0.2
+#: How long, in s, the end of the server waits for its vehicles to be removed, and each of these for
+#: the end of a landing, which it flies without a link, too.
 _SHUTDOWN_LIMIT, _LANDING_LIMIT = 1.5, 0.5
-"""How long, in s, the end of the server waits for its vehicles to be removed, and each of these for
-the end of a landing, which it flies without a link, too."""
 
 
 class CrazyflieServerNode(Node):

@@ -14,14 +14,11 @@ from typing_extensions import override
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.parameters.types import ParameterType
 
+#: How often, and how long at most, in s, a controller that has parameters is waited for.
 PAUSE, LIMIT = 0.1, 3.0
-"""How often, and how long at most, in s, a controller that has parameters is waited for."""
-
+#: Below the vehicle's namespace: where services go whose names belong to other nodes.
 ASIDE = "driver"
-"""Below the vehicle's namespace: where services go whose names belong to other nodes."""
-
-_SHARED = {"takeoff", "land"}
-"""What controllers call their services, unless they are remapped."""
+_SHARED = {"takeoff", "land"}  #: What controllers call their services, unless they are remapped.
 
 
 @dataclass(eq=False)

@@ -5,13 +5,12 @@ import enum
 import threading
 from collections.abc import Iterator
 
-PAUSE = 1.0
-"""A stream that has been silent for so long, s, was begun anew on purpose."""
+PAUSE = 1.0  #: A stream that has been silent for so long, s, was begun anew on purpose.
 
+#: After a high-level command or cmd_stop, setpoints that were on their way, since each topic has a
+#: connection of its own, are not sent for so long, s: a single one would take the vehicle from its
+#: planner or start its motors, and lock it 2 s later.
 OVERLAP = 0.5
-"""After a high-level command or cmd_stop, setpoints that were on their way, since each topic has
-a connection of its own, are not sent for so long, s: a single one would take the vehicle from its
-planner or start its motors, and lock it 2 s later."""
 
 
 class Block(enum.Flag):
@@ -40,6 +39,7 @@ class Event(enum.Enum):
 _NONE = Block(0)
 _ON_TRIAL = Block.UNCONFIRMED | Block.NOT_LIFTED
 
+#: Event -> (blocks that have to hold, blocks that begin, blocks that end).
 TRANSITIONS = {
     Event.EMERGENCY_STOP: (_NONE, Block.EMERGENCY, _NONE),
     Event.REMOVAL: (_NONE, Block.REMOVAL, _NONE),
@@ -55,10 +55,10 @@ TRANSITIONS = {
     # After a pause, or with zero thrust.
     Event.STREAM_BEGUN: (_NONE, _NONE, _ON_TRIAL),
 }
-"""Event -> (blocks that have to hold, blocks that begin, blocks that end)."""
 
 _ADVICE = f"pause the stream for {PAUSE:g} s, send zero thrust or call a service"
 
+#: Block -> words of the warning; the first that holds is named.
 REASONS = {
     Block.EMERGENCY: "emergency stop",
     Block.REMOVAL: "the vehicle is being removed",
@@ -68,7 +68,6 @@ REASONS = {
     ),
     Block.NOT_LIFTED: f"the vehicle was commanded to fly and did not lift off: {_ADVICE}",
 }
-"""Block -> words of the warning; the first that holds is named."""
 
 
 class SetpointGate:

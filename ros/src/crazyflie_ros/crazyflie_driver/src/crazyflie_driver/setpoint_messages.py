@@ -37,6 +37,7 @@ def _external_pose(crazyflie, message):
     crazyflie.localization.pose(_xyz(pose.position), _xyzw(pose.orientation))
 
 
+#: Topic -> how its messages are sent.
 SETPOINTS = {
     "cmd_full_state": Sender(
         FullState, _full_state, lambda m: (m.pose.position.z, _yaw(m.pose.orientation))
@@ -53,13 +54,12 @@ SETPOINTS = {
         Position, lambda c, m: c.setpoints.position(m.x, m.y, m.z, m.yaw), lambda m: (m.z, m.yaw)
     ),
 }
-"""Topic -> how its messages are sent."""
 
+#: The same of measured positions.
 EXTERNAL = {
     "external_position": Sender(PointStamped, lambda c, m: c.localization.position(*_xyz(m.point))),
     "external_pose": Sender(PoseStamped, _external_pose),
 }
-"""The same of measured positions."""
 
 
 def _xyz(vector: Point | Vector3) -> tuple[float, float, float]:

@@ -26,8 +26,8 @@ CMD_VEL, CMD_STOP = "cmd_vel", "cmd_stop"
 _THROTTLE = 1.0
 _RATE_WINDOW = 1.0
 
+#: After zero thrust, silence of so long is the end of a stream, s; how often that is checked.
 _REST, _REST_PERIOD = 0.5, 0.1
-"""After zero thrust, silence of so long is the end of a stream, s; how often that is checked."""
 
 
 class Control(enum.Enum):
@@ -46,13 +46,6 @@ class SetpointTopics:
     Nothing is repeated: when messages stop coming, the firmware's watchdogs act, after 0.5 s and
     2 s. But when the last one had the motors stand still, "setpoints stop" is sent: otherwise the
     vehicle would be locked 2 s later.
-
-    Attributes
-    ----------
-    control : Control
-        What the vehicle was sent last: setpoints, or the notice that they stop.
-    ignored : int
-        Setpoints that were not sent.
     """
 
     _handle: NodeHandle
@@ -60,8 +53,9 @@ class SetpointTopics:
     _crazyflie: Crazyflie
     _log: LogTopics
     gate: SetpointGate
+    #: What the vehicle was sent last: setpoints, or the notice that they stop.
     control: Control = Control.HIGH_LEVEL
-    ignored: int = 0
+    ignored: int = 0  #: Setpoints that were not sent.
     _times: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
     _high_level_end: float | None = None
     _topic: str = ""

@@ -16,8 +16,7 @@ from crazyflie_link.crazyflie import Crazyflie
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import ParameterError, ServiceError
 
-_SOLID_COLOR = 7
-"""The firmware's ring.effect for a color of its own."""
+_SOLID_COLOR = 7  #: The firmware's ring.effect for a color of its own.
 
 
 @dataclass(eq=False)

@@ -12,12 +12,10 @@ from crazyflie_link.errors import AlreadyLandingError, CrazyflieError
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_utils import NodeHandle
 
-_EMERGENCY_LIMIT = 1.0
-"""Time limit of the vehicle's confirmation of an emergency stop, s."""
+_EMERGENCY_LIMIT = 1.0  #: Time limit of the vehicle's confirmation of an emergency stop, s.
 
 _LOOK_PERIOD = 0.1
-_REACTION_TIME = 0.3
-"""Time after which the vehicle has begun to land, s."""
+_REACTION_TIME = 0.3  #: Time after which the vehicle has begun to land, s.
 
 
 @dataclass(eq=False)

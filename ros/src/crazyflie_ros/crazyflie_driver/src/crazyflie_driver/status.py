@@ -9,8 +9,7 @@ from crazyflie_driver.server_parameters import LinkLimits
 from crazyflie_model.supervisor import SupervisorState
 from crazyflie_msgs.msg import VehicleStatus
 
-_FEW_PACKETS = 10
-"""Of so few packets in a second the share that is received means nothing."""
+_FEW_PACKETS = 10  #: Of so few packets in a second the share that is received means nothing.
 
 _DEFAULTS = LinkLimits.from_mapping({})
 

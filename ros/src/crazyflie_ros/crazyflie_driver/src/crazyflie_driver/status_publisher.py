@@ -22,29 +22,19 @@ from crazyflie_link.errors import LinkLostError
 from crazyflie_msgs.msg import VehicleStatus
 from crazyflie_utils import NodeHandle
 
-PERIOD = 1.0
-"""How often both are repeated, s: their absence shows that the driver is gone."""
+PERIOD = 1.0  #: How often both are repeated, s: their absence shows that the driver is gone.
 
 _LINKS = {name: value for value, name in status.LINK_NAMES.items()}
 
 
+#: Fields that are published when they change.
 _STATES = ("text", "link", "supervisor", "has_supervisor", "is_emergency", "battery", "is_streamed")
-"""Fields that are published when they change."""
-
-
-_MOST = 1 << 15
-"""Packets in a second. The vehicle counts in 16 bits; more is its restart."""
+_MOST = 1 << 15  #: Packets in a second. The vehicle counts in 16 bits; more is its restart.
 
 
 @dataclass(eq=False)
 class StatusPublisher:
-    """Publish the status of a vehicle, in words and typed, and whether it is connected.
-
-    Attributes
-    ----------
-    broadcaster : Broadcaster or None
-        Counts what is sent to all vehicles of its channel.
-    """
+    """Publish the status of a vehicle, in words and typed, and whether it is connected."""
 
     _handle: NodeHandle
     _prefix: str
@@ -53,7 +43,7 @@ class StatusPublisher:
     _setpoints: SetpointTopics
     _battery: Battery
     _connection: Connection
-    broadcaster: Broadcaster | None = None
+    broadcaster: Broadcaster | None = None  #: Counts what is sent to all vehicles of its channel.
     # Counts of received and sent broadcasts, received and sent unicasts; and in the last period.
     _counts: tuple[int, ...] = (0, 0, 0, 0)
     _in_period: tuple[int, ...] = (0, 0, 0, 0)

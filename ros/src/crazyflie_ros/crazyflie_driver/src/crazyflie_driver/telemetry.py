@@ -12,14 +12,10 @@ from std_msgs.msg import Float32, Header
 from crazyflie_link.log import quaternion_from_compressed
 from crazyflie_model.units import GRAVITY
 
+#: Periods of imu and pose, and of the rest, ms: those of the C++ driver.
 FAST_MS, SLOW_MS = 10, 100
-"""Periods of imu and pose, and of the rest, ms: those of the C++ driver."""
-
-_MOST_VARIABLES = 6
-"""Variables of four bytes that fit in a log packet's 26 bytes."""
-
-_UNKNOWN = -1.0
-"""First element of a covariance: there is no such measurement (sensor_msgs/Imu)."""
+_MOST_VARIABLES = 6  #: Variables of four bytes that fit in a log packet's 26 bytes.
+_UNKNOWN = -1.0  #: First element of a covariance: there is no such measurement (sensor_msgs/Imu).
 
 
 class StandardTopic(NamedTuple):

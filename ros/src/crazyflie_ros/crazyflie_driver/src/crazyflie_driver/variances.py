@@ -2,20 +2,16 @@
 
 import threading
 
-VARIABLES = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")
-"""Log variables, m^2/s^2."""
+VARIABLES = ("kalman.varPX", "kalman.varPY", "kalman.varPZ")  #: Log variables, m^2/s^2.
 
 PERIOD_MS = 500
 WINDOW = 10
+#: Within `WINDOW` samples of this period a variance changes by less, m^2/s^2, once the filter has
+#: converged: as cflib.crazyflie.reset_estimator has it. A shorter window is held to the same rate.
 MAX_CHANGE = 0.001
-"""Within `WINDOW` samples of this period a variance changes by less, m^2/s^2, once the filter has
-converged: as cflib.crazyflie.reset_estimator has it. A shorter window is held to the same rate."""
 
-FEWEST = 3
-"""Samples that show it."""
-
-_LIMIT = 2.0
-"""Time in which so many come after the link has been set up, s."""
+FEWEST = 3  #: Samples that show it.
+_LIMIT = 2.0  #: Time in which so many come after the link has been set up, s.
 
 
 class Variances:

@@ -20,14 +20,10 @@ from crazyflie_utils.parameters.types import (
     ParameterType,
 )
 
-STATUS_TOPIC = "status"
-"""Topic with the state of a vehicle in words."""
-
+STATUS_TOPIC = "status"  #: Topic with the state of a vehicle in words.
+#: The same with more details, as crazyflie_msgs/VehicleStatus.
 VEHICLE_STATUS_TOPIC = "vehicle_status"
-"""The same with more details, as crazyflie_msgs/VehicleStatus."""
-
-CONNECTED_TOPIC = "connected"
-"""Topic with whether the driver is connected to a vehicle."""
+CONNECTED_TOPIC = "connected"  #: Topic with whether the driver is connected to a vehicle.
 
 
 class EachLogBlock(ListOf):
@@ -78,12 +74,12 @@ _VARIABLES = ListOf(TEXT)
 
 _VARIABLES_NAME = "genericLogTopic_NAME_Variables"
 
+#: Parameter -> field of LogBlock in which a request has it.
 _LOG_BLOCK_FIELDS = {
     "genericLogTopics": "topic_name",
     "genericLogTopicFrequencies": "frequency",
     _VARIABLES_NAME: "variables",
 }
-"""Parameter -> field of LogBlock in which a request has it."""
 
 
 class VehicleParameters(Parameters):
@@ -198,12 +194,12 @@ class VehicleParameters(Parameters):
 
 _SWITCH = "enable_logging_"
 
+#: Topics that are switched by ``enable_logging_NAME``.
 STANDARD_TOPICS = tuple(
     declaration.name.removeprefix(_SWITCH)
     for declaration in VehicleParameters.declarations()
     if declaration.name.startswith(_SWITCH)
 )
-"""Topics that are switched by ``enable_logging_NAME``."""
 
 
 _OWN_TOPICS = (*STANDARD_TOPICS, "rssi", STATUS_TOPIC, VEHICLE_STATUS_TOPIC, CONNECTED_TOPIC)

@@ -14,16 +14,16 @@ from crazyflie_link.link import Link
 from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.transmit_queue import TransmitQueue
 
+#: How often a command is sent, and how long after each other, s: a vehicle that receives only the
+#: last one begins 4 ms after the others.
 REPEATS, REPEAT_PERIOD = 5, 0.001
-"""How often a command is sent, and how long after each other, s: a vehicle that receives only the
-last one begins 4 ms after the others."""
 
+#: How long the first vehicle of a shared command waits for the last, s; after 0.2 s without an
+#: answer each is sent its own command.
 READY_TIME = 0.15
-"""How long the first vehicle of a shared command waits for the last, s; after 0.2 s without an
-answer each is sent its own command."""
 
+#: Bits of the header that belong to the link. Over UDP they are cleared in a broadcast packet.
 _LINK_BITS = 3 << 2
-"""Bits of the header that belong to the link. Over UDP they are cleared in a broadcast packet."""
 
 _log = logging.getLogger(__name__)
 
@@ -38,11 +38,6 @@ class Broadcaster:
 
     The address is that of any vehicle of the channel; ``links()`` returns those of the vehicles
     that are connected. Commands are sent ``repeats`` times, ``period`` (s) after each other.
-
-    Attributes
-    ----------
-    sent : int
-        Packets that were broadcast.
     """
 
     def __init__(
@@ -56,7 +51,7 @@ class Broadcaster:
         self._repeats, self._period = repeats, period
         self._radio = RadioBroadcast(address.uri) if address.is_radio else None
         self._queue = TransmitQueue()
-        self.sent = 0
+        self.sent = 0  #: Packets that were broadcast.
 
     def send(self, packets: Sequence[CRTPPacket], urgent: bool = False) -> None:
         """Have packets sent again and again; does not block.

@@ -20,6 +20,7 @@ from cflib.crtp.radiodriver import RadioDriver, RadioManager
 from cflib.drivers.crazyradio import Crazyradio
 from typing_extensions import override
 
+#: MODULE:CLASS.ATTRIBUTE; an attribute of the class, or one that its constructor sets.
 PRIVATE_NAMES = (
     "cflib.crazyflie:Crazyflie._link_error_cb",
     "cflib.crazyflie:Crazyflie._platform_info_fetched",
@@ -41,17 +42,16 @@ PRIVATE_NAMES = (
     "cflib.crtp.radiodriver:_SharedRadioInstance._instance_id",
     "cflib.crtp.radiodriver:_SharedRadioInstance._rsp_queue",
 )
-"""MODULE:CLASS.ATTRIBUTE; an attribute of the class, or one that its constructor sets."""
 
+#: Every vehicle listens to it, beside its own address (crazyflie2-nrf-firmware).
 BROADCAST_ADDRESS = (0xFF, 0xE7, 0xE7, 0xE7, 0xE7)
-"""Every vehicle listens to it, beside its own address (crazyflie2-nrf-firmware)."""
 
+#: Between two broadcast packets, s: a vehicle hands one on to its main processor at 1 Mbit/s, with
+#: 37 bytes of 10 bits in 0.37 ms; crazyflie_cpp keeps the same distance.
 PACKET_GAP = 0.0005
-"""Between two broadcast packets, s: a vehicle hands one on to its main processor at 1 Mbit/s, with
-37 bytes of 10 bits in 0.37 ms; crazyflie_cpp keeps the same distance."""
 
+#: How long, in s, the dongle may take for a broadcast; cflib gives it 1 s for a packet.
 _DONGLE_LIMIT = 2.0
-"""How long, in s, the dongle may take for a broadcast; cflib gives it 1 s for a packet."""
 
 
 def check_private_names(names: Iterable[str] = PRIVATE_NAMES) -> None:

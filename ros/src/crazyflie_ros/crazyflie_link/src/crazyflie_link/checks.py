@@ -4,8 +4,8 @@ import math
 
 from crazyflie_link.errors import ValueRangeError
 
+#: Numbers go over the link in single precision; a smaller one may arrive as 0.
 SMALLEST_FLOAT, LARGEST_FLOAT = 1.2e-38, 3.4e38
-"""Numbers go over the link in single precision; a smaller one may arrive as 0."""
 
 
 def check_finite(what: str, *values: float) -> None:

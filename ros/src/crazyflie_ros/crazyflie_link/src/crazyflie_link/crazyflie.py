@@ -26,8 +26,7 @@ from crazyflie_link.setpoints import Setpoints
 from crazyflie_link.supervisor import Supervisor
 from crazyflie_link.trajectory import Trajectories
 
-_STAMP_END = 4
-"""A log packet begins with the number of its block and three bytes of time."""
+_STAMP_END = 4  #: A log packet begins with the number of its block and three bytes of time.
 
 
 class Crazyflie:
@@ -59,17 +58,6 @@ class Crazyflie:
         Folder for log and parameter tables; by default in the user's cache.
     limits : Limits, optional
         Time limits.
-
-    Attributes
-    ----------
-    setpoints, high_level, trajectories, localization, lighthouse, parameters, log, supervisor
-        Parts of the firmware; see their classes.
-    restarts : int
-        How many times the vehicle's clock was seen to begin anew.
-    sent : int
-        Packets that were sent to this vehicle alone.
-    rssi : float or None
-        Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere.
     """
 
     def __init__(
@@ -93,6 +81,8 @@ class Crazyflie:
             reconnect,
         )
         link = self.link
+        #: setpoints, high_level, trajectories, localization, lighthouse, parameters, log,
+        #: supervisor: Parts of the firmware; see their classes.
         self.setpoints = Setpoints(link)
         self.high_level = HighLevel(link)
         self.trajectories = Trajectories(link, self.high_level)
@@ -101,12 +91,13 @@ class Crazyflie:
         self.parameters = FirmwareParameters(link)
         self.log = Log(link)
         self.supervisor = Supervisor(link, self._emergency)
-        self.restarts = self.sent = 0
+        self.restarts = self.sent = 0  #: Packets that were sent to this vehicle alone.
         self._uptime = Uptime()
         self._on_packet = on_packet
         self._blocks: list[LogBlock] = []
         self._blocks_lock = threading.Lock()
         self._console = Console(on_console) if on_console is not None else None
+        #: Strength of the vehicle's reception (-dBm), as the Crazyradio has it; None elsewhere.
         self.rssi: float | None = None
 
     def __enter__(self) -> "Crazyflie":

@@ -19,17 +19,12 @@ from crazyflie_link.link import Link
 from crazyflie_link.safe_crazyflie import packet
 from crazyflie_model.supervisor import SupervisorState
 
+#: The first protocol version in which the supervisor has a port of its own.
 SUPERVISOR_PROTOCOL = 12
-"""The first protocol version in which the supervisor has a port of its own."""
-
-ANSWER = 0x80
-"""Is added to the number of a command in the supervisor's answer."""
-
-PERIOD = 0.05
-"""Between two repetitions, s."""
-
+ANSWER = 0x80  #: Is added to the number of a command in the supervisor's answer.
+PERIOD = 0.05  #: Between two repetitions, s.
+#: How many repetitions are sent to a vehicle that is heard, but does not report its state.
 BLIND_REPEATS = 5
-"""How many repetitions are sent to a vehicle that is heard, but does not report its state."""
 
 _STREAM = "emergency"
 _STOP_SETPOINT = packet(CRTPPort.COMMANDER_GENERIC, 0, b"\0")
@@ -39,8 +34,8 @@ _OLD_STOP = packet(
 )
 _ASK_STATE = packet(CRTPPort.SUPERVISOR, SUPERVISOR_CH_INFO, bytes([CMD_GET_STATE_BITFIELD]))
 
+#: Stops the motors of vehicles with any firmware.
 BROADCAST_STOP = (_STOP, _OLD_STOP, _STOP_SETPOINT)
-"""Stops the motors of vehicles with any firmware."""
 
 
 @dataclass(eq=False)

@@ -53,8 +53,8 @@ UDEV_HINT = (
     "yourself to the group plugdev, log in again and plug the dongle in again"
 )
 
+#: Lower-case text of an error after which the radio driver continues.
 UNANSWERED = "too many packets lost"
-"""Lower-case text of an error after which the radio driver continues."""
 
 _CAUSES = (
     # Text of a driver (lower case), error, advice to the operator.

@@ -18,15 +18,13 @@ from crazyflie_link.link import Link
 from crazyflie_link.request_reply import REPLY_LIMIT, Request
 from crazyflie_link.subsystem import Subsystem
 
-ALL_GROUPS = 0
-"""Group mask that every vehicle obeys."""
+ALL_GROUPS = 0  #: Group mask that every vehicle obeys.
 
 # The first protocol versions with the present forms of two commands.
 _GO_TO_2_PROTOCOL = 8
 _START_2_PROTOCOL = 10
 
-_BUSY = 1
-"""Reply to a takeoff while the planner flies, and to a landing while it lands."""
+_BUSY = 1  #: Reply to a takeoff while the planner flies, and to a landing while it lands.
 
 
 @dataclass

@@ -12,8 +12,7 @@ from crazyflie_link.supervisor import read_state
 from crazyflie_link.transmit_queue import Send
 from crazyflie_model.supervisor import SupervisorState
 
-REPORT_LAG = 0.1
-"""Time in which the supervisor, at 25 Hz, has taken note of a takeoff, s."""
+REPORT_LAG = 0.1  #: Time in which the supervisor, at 25 Hz, has taken note of a takeoff, s.
 
 
 def request_after_broadcast(link: Link, transmit: Send, request: Request) -> bytes:

@@ -20,14 +20,12 @@ from crazyflie_link.parameters import FirmwareParameters
 from crazyflie_link.request_reply import Request
 from crazyflie_link.subsystem import Subsystem
 
-STATIONS = 16
-"""As many as the firmware can be built for."""
+STATIONS = 16  #: As many as the firmware can be built for.
 
 _TYPE = "lighthouse.systemType"
 _STORE = bytes([Localization.LH_PERSIST_DATA])
 
-_FLASH_LIMIT = 3.0
-"""Time limit of storing, s: the vehicle may tidy its flash memory up."""
+_FLASH_LIMIT = 3.0  #: Time limit of storing, s: the vehicle may tidy its flash memory up.
 
 
 class Lighthouse(Subsystem):

@@ -25,16 +25,14 @@ from crazyflie_link.request_reply import Request, RequestReply
 from crazyflie_link.safe_crazyflie import SafeCrazyflie, init_drivers, packet
 from crazyflie_link.transmit_queue import Send, TransmitQueue
 
-LOG_DATA = (CRTPPort.LOGGING, CHAN_LOGDATA)
-"""Port and channel of log data."""
+LOG_DATA = (CRTPPort.LOGGING, CHAN_LOGDATA)  #: Port and channel of log data.
 
 _PING = (CRTPPort.LINKCTRL, ECHO_CHANNEL)
 _SOURCE_PERIOD = 0.1
 
 _log = logging.getLogger(__name__)
 
-OnPacket = Callable[[int, int, bytes], None]
-"""Is called with port, channel and data."""
+OnPacket = Callable[[int, int, bytes], None]  #: Is called with port, channel and data.
 
 
 class Link:

@@ -9,29 +9,20 @@ any more: so the log data, too, have to come.
 import enum
 import threading
 
+#: Age of the last packet, in s, at which a link is lost; noticed before 0.5 s, when the firmware
+#: gives up on a setpoint.
 LOST_AFTER = 0.45
-"""Age of the last packet, in s, at which a link is lost; noticed before 0.5 s, when the
-firmware gives up on a setpoint."""
 
-_PERIODS_MISSED = 4
-"""Log packets that may be missing one after the other."""
-
-_HEARD_FOR = 0.25
-"""After a silence log data may come a little later than answers to pings, s."""
-
-_WINDOW = 20
-"""Pings that the link quality is computed from; cflib sends 10 a second."""
-
-_LATEST, _FEW = 5, 3
-"""A link is poor when so few of the latest pings have been answered."""
-
-_TICKS = 1 << 24
-"""The vehicle counts ms in 24 bits."""
+_PERIODS_MISSED = 4  #: Log packets that may be missing one after the other.
+_HEARD_FOR = 0.25  #: After a silence log data may come a little later than answers to pings, s.
+_WINDOW = 20  #: Pings that the link quality is computed from; cflib sends 10 a second.
+_LATEST, _FEW = 5, 3  #: A link is poor when so few of the latest pings have been answered.
+_TICKS = 1 << 24  #: The vehicle counts ms in 24 bits.
 
 _REORDERED_MS = 100
 
+#: How late the quickest packet may have come, ms: this machine may have been busy.
 _LATEST_FIRST_MS = 60_000.0
-"""How late the quickest packet may have come, ms: this machine may have been busy."""
 
 
 class LinkHealth(enum.Enum):

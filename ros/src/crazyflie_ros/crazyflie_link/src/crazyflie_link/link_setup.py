@@ -11,8 +11,7 @@ from cflib.crtp.crtpstack import CRTPPort
 from crazyflie_link.errors import NoAnswerError, SetupError
 from crazyflie_link.link_monitor import LOST_AFTER
 
-OLDEST_PROTOCOL = 4
-"""The first protocol version with tables of more than 255 items."""
+OLDEST_PROTOCOL = 4  #: The first protocol version with tables of more than 255 items.
 
 _TABLES = {CRTPPort.LOGGING: "log table", CRTPPort.PARAM: "parameter table"}
 

@@ -17,8 +17,8 @@ from crazyflie_link.errors import (
 from crazyflie_link.request_reply import REPLY_LIMIT
 from crazyflie_link.subsystem import Subsystem, elements
 
+#: The firmware counts periods in 10 ms, in one byte of which 255 is not allowed.
 SHORTEST_PERIOD_MS, LONGEST_PERIOD_MS, PERIOD_STEP_MS = 10, 2540, 10
-"""The firmware counts periods in 10 ms, in one byte of which 255 is not allowed."""
 
 
 def quaternion_from_compressed(number: int) -> tuple[float, ...]:

@@ -11,14 +11,10 @@ from cflib.utils.encoding import compress_quaternion
 from crazyflie_link.broadcast import Broadcaster
 from crazyflie_link.safe_crazyflie import packet
 
+#: How long the poses of one frame of the motion capture wait for each other, s.
 FRAME_WINDOW = 0.005
-"""How long the poses of one frame of the motion capture wait for each other, s."""
-
-MAX_POSITION = 32.767
-"""Largest coordinate in a packed pose, m: 16 bits of mm."""
-
-POSES_PER_PACKET, POSITIONS_PER_PACKET = 2, 4
-"""As many as fit in 30 bytes."""
+MAX_POSITION = 32.767  #: Largest coordinate in a packed pose, m: 16 bits of mm.
+POSES_PER_PACKET, POSITIONS_PER_PACKET = 2, 4  #: As many as fit in 30 bytes.
 
 # Channel and type of packed poses and positions (crtp_localization_service.c).
 _POSITIONS_CHANNEL = 2
@@ -27,8 +23,8 @@ _POSES_TYPE = 9
 _POSE, _POSITION = struct.Struct("<B3hI"), struct.Struct("<B3h")
 _STREAM = "poses"
 
+#: Position (x, y, z, m) and unit quaternion (x, y, z, w), None if it is not known.
 Pose = tuple[Sequence[float], Sequence[float] | None]
-"""Position (x, y, z, m) and unit quaternion (x, y, z, w), None if it is not known."""
 
 
 def pack(poses: Mapping[int, Pose]) -> list[CRTPPacket]:
@@ -55,16 +51,11 @@ def pack(poses: Mapping[int, Pose]) -> list[CRTPPacket]:
 
 
 class PackedPoses:
-    """Broadcasts the poses of the vehicles of a channel, those of a frame together.
-
-    Attributes
-    ----------
-    vehicles : int
-        Vehicles whose poses are expected; those of a frame are sent when all have come, or
-        `FRAME_WINDOW` after the first.
-    """
+    """Broadcasts the poses of the vehicles of a channel, those of a frame together."""
 
     def __init__(self, broadcaster: Broadcaster):
+        #: Vehicles whose poses are expected; those of a frame are sent when all have come, or
+        #: `FRAME_WINDOW` after the first.
         self.vehicles = 0
         self._broadcaster = broadcaster
         self._waiting: dict[int, Pose] = {}

@@ -8,6 +8,8 @@ from crazyflie_link.address import Address
 from crazyflie_link.errors import RefusedError, explain
 from crazyflie_link.safe_crazyflie import init_drivers
 
+#: What can be done -> cflib's name of it: restart into the firmware or the boot loader, switch the
+#: main processor and the decks off or on again, switch everything off.
 MODES = {
     "firmware": "reboot_to_fw",
     "bootloader": "reboot_to_bootloader",
@@ -15,8 +17,6 @@ MODES = {
     "syson": "stm_power_up",
     "alloff": "platform_power_down",
 }
-"""What can be done -> cflib's name of it: restart into the firmware or the boot loader, switch
-the main processor and the decks off or on again, switch everything off."""
 
 
 def reboot(

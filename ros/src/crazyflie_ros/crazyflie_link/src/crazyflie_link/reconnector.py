@@ -11,19 +11,18 @@ from crazyflie_link.link import Link
 from crazyflie_link.link_monitor import LinkHealth
 from crazyflie_link.safe_crazyflie import CLOSE_LIMIT
 
-CHECK_PERIOD = 0.05
-"""Period of the watch, s."""
+CHECK_PERIOD = 0.05  #: Period of the watch, s.
 
 _JOIN_LIMIT = 0.3
 
+#: How long, in s, a silent link is kept: one on which the vehicle is heard again needs no set-up.
+#: Silence of up to 1.4 s ends that way before 2 s, when the firmware locks; setting up a new link
+#: can take a second on a busy machine.
 SILENCE_LIMIT = 1.0
-"""How long, in s, a silent link is kept: one on which the vehicle is heard again needs no set-up.
-Silence of up to 1.4 s ends that way before 2 s, when the firmware locks; setting up a new link can
-take a second on a busy machine."""
 
+#: Pause after the first failed attempt to connect again, and the longest one, s; each is twice the
+#: one before.
 FIRST_PAUSE, LONGEST_PAUSE = 0.1, 5.0
-"""Pause after the first failed attempt to connect again, and the longest one, s; each is
-twice the one before."""
 
 
 class LinkState(enum.Enum):

@@ -12,11 +12,8 @@ from dataclasses import dataclass, field
 from crazyflie_link.errors import LinkLostError, NoReplyError
 from crazyflie_link.transmit_queue import Send
 
-REPLY_LIMIT = 1.0
-"""Time limit of a reply, s."""
-
-RESEND_PERIOD = 0.2
-"""Time after which a request is sent again, s; as cflib does."""
+REPLY_LIMIT = 1.0  #: Time limit of a reply, s.
+RESEND_PERIOD = 0.2  #: Time after which a request is sent again, s; as cflib does.
 
 
 @dataclass(frozen=True)

@@ -20,11 +20,9 @@ _init_lock = threading.Lock()
 
 _UDP_RECEIVE_LIMIT = 0.1
 
+#: How long, in s, the end of a link waits for a callback that is at work, or for other dongles.
 _JOIN_LIMIT = 0.3
-"""How long, in s, the end of a link waits for a callback that is at work, or for other dongles."""
-
-CLOSE_LIMIT = 1.0
-"""How long, in s, the end of a link waits for a driver."""
+CLOSE_LIMIT = 1.0  #: How long, in s, the end of a link waits for a driver.
 
 _log = logging.getLogger(__name__)
 

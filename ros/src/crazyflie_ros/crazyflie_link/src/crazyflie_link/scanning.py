@@ -9,8 +9,7 @@ from cflib.crtp.radiodriver import DEFAULT_ADDR
 from crazyflie_link.errors import AddressError, CrazyflieError, explain
 from crazyflie_link.safe_crazyflie import init_drivers
 
-DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"
-"""Radio address that vehicles have when they are new."""
+DEFAULT_ADDRESS = f"{DEFAULT_ADDR:X}"  #: Radio address that vehicles have when they are new.
 
 
 def scan(address: str = DEFAULT_ADDRESS) -> tuple[list[str], list[CrazyflieError]]:

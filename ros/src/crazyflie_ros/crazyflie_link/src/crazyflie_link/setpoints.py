@@ -20,8 +20,7 @@ from crazyflie_link.safe_crazyflie import packet
 from crazyflie_link.subsystem import Subsystem
 from crazyflie_model.limits import FULL_PWM
 
-ZEROS = 100
-"""Setpoints of zero thrust after connecting and before leaving."""
+ZEROS = 100  #: Setpoints of zero thrust after connecting and before leaving.
 
 _ZERO_PERIOD, _SENT_LIMIT = 0.001, 1.0
 _STREAM = "setpoint"

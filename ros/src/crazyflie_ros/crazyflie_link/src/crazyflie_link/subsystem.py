@@ -8,8 +8,8 @@ from crazyflie_link.link import Link
 from crazyflie_link.request_reply import Request
 from crazyflie_link.transmit_queue import Send
 
+#: Is called in the thread that sends, right before each packet: whether it is sent.
 MaySend = Callable[[], bool]
-"""Is called in the thread that sends, right before each packet: whether it is sent."""
 
 
 class _GuardedLink:

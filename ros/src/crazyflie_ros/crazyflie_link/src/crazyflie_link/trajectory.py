@@ -15,8 +15,8 @@ from crazyflie_link.memory import find_memory, write_memory
 from crazyflie_link.subsystem import MaySend, Subsystem
 from crazyflie_model.polynomials import COEFFICIENTS, PIECE_SIZE, PolynomialPiece
 
+#: Duration (s), and control points of x, y, z (m) and yaw (rad).
 Segment = tuple[float, Sequence[float], Sequence[float], Sequence[float], Sequence[float]]
-"""Duration (s), and control points of x, y, z (m) and yaw (rad)."""
 
 _POINTS = (0, 1, 3, 7)
 _MOST_METRES, _MOST_RADIANS = 32.767, math.radians(3276.7)

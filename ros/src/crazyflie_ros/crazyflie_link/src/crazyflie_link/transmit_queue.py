@@ -15,8 +15,7 @@ _MOST_COMMANDS = 256
 
 _log = logging.getLogger(__name__)
 
-Send = Callable[[], None]
-"""Sends something."""
+Send = Callable[[], None]  #: Sends something.
 
 
 class TransmitQueue:

@@ -8,6 +8,7 @@ from crazyflie_references.velocity_reference import Velocity
 from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.types import DURATION, Number
 
+#: Direction -> component of a velocity, and its sign there.
 AXES: dict[str, tuple[str, int]] = {
     "front": ("x", 1),
     "back": ("x", -1),
@@ -16,7 +17,6 @@ AXES: dict[str, tuple[str, int]] = {
     "up": ("z", 1),
     "down": ("z", -1),
 }
-"""Direction -> component of a velocity, and its sign there."""
 
 
 class ObstacleStop(Parameters):

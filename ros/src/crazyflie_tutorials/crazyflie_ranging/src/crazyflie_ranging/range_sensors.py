@@ -20,9 +20,9 @@ from crazyflie_utils.parameters.types import (
     Text,
 )
 
-LASER, ULTRASONIC = "laser", "ultrasonic"
-"""Types of sensors."""
+LASER, ULTRASONIC = "laser", "ultrasonic"  #: Types of sensors.
 
+#: Where sensors look: roll, pitch, yaw that turn the body's x axis there, rad.
 DIRECTIONS: dict[str, Triple] = {
     "front": (0.0, 0.0, 0.0),
     "back": (0.0, 0.0, math.pi),
@@ -31,7 +31,6 @@ DIRECTIONS: dict[str, Triple] = {
     "up": (0.0, -math.pi / 2.0, 0.0),
     "down": (0.0, math.pi / 2.0, 0.0),
 }
-"""Where sensors look: roll, pitch, yaw that turn the body's x axis there, rad."""
 
 
 class RangeSensor(Parameters):

@@ -18,8 +18,7 @@ from crazyflie_tutorial_msgs.srv import (
 from crazyflie_utils import Node, NodeHandle, Parameters, ServiceError, parameter
 from crazyflie_utils.parameters.types import FRAME, SERVICE, TEXT, TIME_STEP, Number, Text
 
-PERIOD = 0.2
-"""Between two checks of the vehicles, s of the machine's clock."""
+PERIOD = 0.2  #: Between two checks of the vehicles, s of the machine's clock.
 
 
 class SpawnerParameters(Parameters):
@@ -41,37 +40,20 @@ class SpawnerParameters(Parameters):
 
 @dataclass
 class Vehicle:
-    """A vehicle that was spawned.
-
-    Attributes
-    ----------
-    process : VehicleProcess
-    ticks_left : int
-        Timer periods left until it has to be ready.
-    spawning : Future
-        Reply of the spawn service.
-    is_ready : bool
-        Whether its takeoff service is offered.
-    removing : list of Future
-        Replies of the remove service.
-    """
+    """A vehicle that was spawned."""
 
     process: VehicleProcess
-    ticks_left: int
-    spawning: "Future[SpawnVehicleResponse]"
-    is_ready: bool = False
+    ticks_left: int  #: Timer periods left until it has to be ready.
+    spawning: "Future[SpawnVehicleResponse]"  #: Reply of the spawn service.
+    is_ready: bool = False  #: Whether its takeoff service is offered.
+    #: Replies of the remove service.
     removing: "list[Future[RemoveVehicleResponse]]" = field(default_factory=list)
 
 
 class SpawnerNode(Node):
-    """Start and end simulated vehicles, each in a namespace of its own, by service.
+    """Start and end simulated vehicles, each in a namespace of its own, by service."""
 
-    Attributes
-    ----------
-    start_process : callable
-        ``start_process(arguments of roslaunch)`` returns a `VehicleProcess`.
-    """
-
+    #: ``start_process(arguments of roslaunch)`` returns a `VehicleProcess`.
     start_process: Callable[[list[str]], VehicleProcess] = VehicleProcess
 
     def __init__(self) -> None:

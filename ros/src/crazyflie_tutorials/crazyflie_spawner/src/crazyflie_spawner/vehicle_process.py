@@ -5,8 +5,7 @@ import signal
 import subprocess
 import time
 
-END_LIMIT = 15.0
-"""How long, in s, roslaunch has to end its nodes; then they are killed."""
+END_LIMIT = 15.0  #: How long, in s, roslaunch has to end its nodes; then they are killed.
 
 
 class VehicleProcess:

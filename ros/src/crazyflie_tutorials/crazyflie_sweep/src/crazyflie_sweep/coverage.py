@@ -19,17 +19,12 @@ class Coverage:
         Largest width of a cell, m.
     swath : float
         Diameter of the disc, m.
-
-    Attributes
-    ----------
-    cell_size : tuple of float
-        Width of the cells along x and y, m.
     """
 
     def __init__(self, area: Area, cell: float, swath: float):
         xs, width = _middles(area.x_min, area.x_max, cell)
         ys, height = _middles(area.y_min, area.y_max, cell)
-        self.cell_size = (width, height)
+        self.cell_size = (width, height)  #: Width of the cells along x and y, m.
         self._radius = swath / 2.0
         self._x, self._y = np.meshgrid(xs, ys, indexing="ij")
         self._is_covered = np.zeros(self._x.shape, dtype=bool)

@@ -10,8 +10,7 @@ from typing_extensions import override
 
 from crazyflie_sweep.sweep_parameters import Area
 
-Point = tuple[float, float, float]
-"""x, y, z in m."""
+Point = tuple[float, float, float]  #: x, y, z in m.
 
 _SLACK = 1e-9
 

@@ -12,8 +12,7 @@ COVERED_COLOUR = ColorRGBA(0.15, 0.65, 0.35, 0.75)
 UNCOVERED_COLOUR = ColorRGBA(0.75, 0.78, 0.82, 0.6)
 LANE_COLOUR = ColorRGBA(0.9, 0.45, 0.05, 1.0)
 
-_SPACING = 0.05
-"""Between the points with which lanes and arcs are drawn, m."""
+_SPACING = 0.05  #: Between the points with which lanes and arcs are drawn, m.
 
 _LINE_WIDTH = 0.015
 _TEXT_SIZE = 0.2

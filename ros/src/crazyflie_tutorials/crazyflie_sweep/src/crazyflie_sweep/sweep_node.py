@@ -18,23 +18,13 @@ from crazyflie_tutorial_msgs.msg import SweepReport, Vel
 from crazyflie_tutorial_msgs.srv import VelocityAt, VelocityAtRequest
 from crazyflie_utils import Node, NodeHandle, flight_status
 
-TIME_STEP = 0.02
-"""Between two references, s."""
-
-ASK_PERIOD = 0.1
-"""Between two questions for a velocity, s."""
-
-REPORT_PERIOD = 0.5
-"""Between two reports, and pictures for RViz, s."""
-
-STATE_LIMIT = 0.5
-"""Without a state for so long, s, the reference stands still."""
-
-FLIGHT_LIMIT = 120.0
-"""The longest that takeoff or landing may take, s of the machine's clock."""
-
+TIME_STEP = 0.02  #: Between two references, s.
+ASK_PERIOD = 0.1  #: Between two questions for a velocity, s.
+REPORT_PERIOD = 0.5  #: Between two reports, and pictures for RViz, s.
+STATE_LIMIT = 0.5  #: Without a state for so long, s, the reference stands still.
+FLIGHT_LIMIT = 120.0  #: The longest that takeoff or landing may take, s of the machine's clock.
+#: States in which a sweep may begin.
 IDLE = (SweepReport.WAITING, SweepReport.DONE, SweepReport.FAILED)
-"""States in which a sweep may begin."""
 
 
 class SweepNode(Node):

@@ -7,8 +7,7 @@ from crazyflie_sweep.lanes import LanePath, Line, Point, reversed_path, sweep
 from crazyflie_sweep.sweep_parameters import Plan
 from crazyflie_sweep.velocities import OSCILLATOR_BEGIN, OSCILLATOR_END, OSCILLATOR_LENGTH
 
-_NEAR = 0.01
-"""A vehicle that is nearer to the first lane, m, is there."""
+_NEAR = 0.01  #: A vehicle that is nearer to the first lane, m, is there.
 
 
 class Sweeper:
@@ -22,30 +21,21 @@ class Sweeper:
     plan : Plan
     start : Point
         Position of the vehicle.
-
-    Attributes
-    ----------
-    coverage : Coverage
-    lanes : LanePath
-        Through the area, without the path to its begin.
-    is_done : bool
-        Whether the reference is at rest at the end: the area is covered, or cannot be.
-    max_lane_distance : float
-        The largest distance of the vehicle from the lane that it was on, m.
-    speed : float
-        Of the reference, m/s.
     """
 
     def __init__(self, plan: Plan, start: Point):
         self._plan = plan
+        #: Through the area, without the path to its begin.
         self.lanes = sweep(plan.area, plan.lane_width, plan.height)
         self._scale = (plan.area.x_max - plan.area.x_min) / OSCILLATOR_LENGTH
         self.coverage = Coverage(plan.area, plan.coverage.cell, plan.coverage.swath)
+        #: The largest distance of the vehicle from the lane that it was on, m.
         self.max_lane_distance = 0.0
-        self.speed = 0.0
+        self.speed = 0.0  #: Of the reference, m/s.
         self._passes = 1
         self._s = 0.0
         self._path = self._with_approach(start)
+        #: Whether the reference is at rest at the end: the area is covered, or cannot be.
         self.is_done = False
 
     @property

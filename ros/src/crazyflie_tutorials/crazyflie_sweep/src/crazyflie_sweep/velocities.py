@@ -6,8 +6,7 @@ import random
 from crazyflie_utils.refusal import RefusalError
 
 OSCILLATOR_BEGIN = 2.0
-OSCILLATOR_END = 9.0
-"""Where the oscillator has a velocity: from begin to end, both included."""
+OSCILLATOR_END = 9.0  #: Where the oscillator has a velocity: from begin to end, both included.
 
 OSCILLATOR_LENGTH = OSCILLATOR_END - OSCILLATOR_BEGIN
 

@@ -12,11 +12,6 @@ class VelocitySource:
         A velocity that is not > 0 and <= this is nonsense.
     start : float
         When the service is asked for the first time, s.
-
-    Attributes
-    ----------
-    reason : str
-        Why there is no velocity; empty while the first answer may still come in time.
     """
 
     def __init__(self, limit: float, most: float, start: float):
@@ -25,6 +20,7 @@ class VelocitySource:
         self._velocity: float | None = None
         self._time = start
         self._failure = ""
+        #: Why there is no velocity; empty while the first answer may still come in time.
         self.reason = ""
 
     def answer(self, velocity: float, time: float) -> None:

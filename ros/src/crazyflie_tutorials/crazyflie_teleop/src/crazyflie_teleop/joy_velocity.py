@@ -7,8 +7,7 @@ from crazyflie_utils import Parameters, parameter
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import Integer, Number
 
-AXIS_NUMBER = Integer(0, 63)
-"""Of an axis or a button of sensor_msgs/Joy."""
+AXIS_NUMBER = Integer(0, 63)  #: Of an axis or a button of sensor_msgs/Joy.
 
 
 class AxisParameters(Parameters):

@@ -11,8 +11,7 @@ from crazyflie_teleop.joy_velocity import AXIS_NUMBER, JoyVelocity
 from crazyflie_utils import Node, NodeHandle, parameter
 from crazyflie_utils.parameters.types import SERVICE, TOPIC
 
-FLIGHT_LIMIT = 120.0
-"""The longest that takeoff or landing may take, s of the machine's clock."""
+FLIGHT_LIMIT = 120.0  #: The longest that takeoff or landing may take, s of the machine's clock.
 
 
 class JoyVelocityParameters(JoyVelocity):

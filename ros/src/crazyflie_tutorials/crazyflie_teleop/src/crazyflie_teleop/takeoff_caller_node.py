@@ -6,11 +6,8 @@ from typing_extensions import override
 from crazyflie_utils import Node, NodeHandle, Parameters, parameter
 from crazyflie_utils.parameters.types import SERVICE
 
-PERIOD = 0.5
-"""Between two checks whether the service is offered, s of the machine's clock."""
-
-FLIGHT_LIMIT = 120.0
-"""The longest that a takeoff may take, s of the machine's clock."""
+PERIOD = 0.5  #: Between two checks whether the service is offered, s of the machine's clock.
+FLIGHT_LIMIT = 120.0  #: The longest that a takeoff may take, s of the machine's clock.
 
 
 class TakeoffCallerParameters(Parameters):

@@ -25,8 +25,7 @@ class OddInteger(Integer):
         return f"an odd integer from {self.minimum} to {self.maximum} ({self.unit})"
 
 
-KERNEL = OddInteger(1, 99, "pixels")
-"""Size of a square with a pixel in its middle."""
+KERNEL = OddInteger(1, 99, "pixels")  #: Size of a square with a pixel in its middle.
 
 
 class BlurParameters(FilterParameters):

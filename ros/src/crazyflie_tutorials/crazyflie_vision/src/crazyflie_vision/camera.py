@@ -17,8 +17,8 @@ from crazyflie_utils.parameters import yaml_file
 from crazyflie_utils.parameters.declaration import group
 from crazyflie_utils.parameters.types import DURATION, METRES, Integer, Number
 
+#: Takes the optical frame of a camera that looks ahead to forward, left, up.
 OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""Takes the optical frame of a camera that looks ahead to forward, left, up."""
 
 
 class MountParameters(Parameters):
@@ -66,19 +66,12 @@ def load(path: str | Path) -> CameraParameters:
 
 @dataclass(frozen=True)
 class Pinhole:
-    """The projection x = f X / Z + cx, y = f Y / Z + cy of the optical frame's X, Y, Z.
+    """The projection x = f X / Z + cx, y = f Y / Z + cy of the optical frame's X, Y, Z."""
 
-    Attributes
-    ----------
-    width, height : int
-        Of the image, pixels.
-    focal_length : float
-        f, pixels.
-    """
-
+    #: width, height: Of the image, pixels.
     width: int
     height: int
-    focal_length: float
+    focal_length: float  #: f, pixels.
 
     @classmethod
     def with_fov(cls, width: int, height: int, fov: float) -> "Pinhole":
@@ -99,17 +92,10 @@ class Pinhole:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a frame is: R and p of x' = R x + p.
+    """Where a frame is: R and p of x' = R x + p."""
 
-    Attributes
-    ----------
-    rotation : ndarray, shape (3, 3)
-    position : ndarray, shape (3,)
-        m.
-    """
-
-    rotation: NDArray[np.float64]
-    position: NDArray[np.float64]
+    rotation: NDArray[np.float64]  #: Shape (3, 3).
+    position: NDArray[np.float64]  #: Shape (3,); m.
 
     def __matmul__(self, inner: "Pose") -> "Pose":
         """Return the pose of a frame that has the pose ``inner`` in this one."""

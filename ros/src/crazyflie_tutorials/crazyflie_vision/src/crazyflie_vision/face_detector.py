@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from crazyflie_vision.target import Target
 
+#: Trained for faces from the front; where Debian's opencv-data has it.
 CASCADE = "/usr/share/opencv4/haarcascades/haarcascade_frontalface_default.xml"
-"""Trained for faces from the front; where Debian's opencv-data has it."""
 
 
 class FaceDetector:

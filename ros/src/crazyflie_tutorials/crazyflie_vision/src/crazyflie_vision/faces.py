@@ -11,19 +11,13 @@ from numpy.typing import NDArray
 from crazyflie_world.shapes import Box, Colour, Cylinder, Shape
 from crazyflie_world.world import Floor
 
-Image = NDArray[np.uint8]
-"""Rows, columns and, for colour, blue, green, red."""
-
-LIGHT = np.array([-0.36, 0.28, 0.89])
-"""Where the light comes from, length 1."""
-
-AMBIENT = 0.6
-"""Share of the brightness that a face has when no light falls on it."""
+Image = NDArray[np.uint8]  #: Rows, columns and, for colour, blue, green, red.
+LIGHT = np.array([-0.36, 0.28, 0.89])  #: Where the light comes from, length 1.
+AMBIENT = 0.6  #: Share of the brightness that a face has when no light falls on it.
 
 CYLINDER_SIDES = 20
 
-TILE = 0.5
-"""Side of the checkers of a floor, m."""
+TILE = 0.5  #: Side of the checkers of a floor, m.
 
 _TEXELS_PER_METRE = 80
 _LARGEST_TEXTURE = 2048
@@ -31,21 +25,13 @@ _LARGEST_TEXTURE = 2048
 
 @dataclass(frozen=True)
 class Face:
-    """A flat convex polygon that is seen from one side.
+    """A flat convex polygon that is seen from one side."""
 
-    Attributes
-    ----------
-    corners : ndarray, shape (n, 3)
-        Counter-clockwise as seen from outside, m, world frame.
-    colour : ndarray, shape (3,)
-        Blue, green, red, from 0 to 255.
-    texture : Image or None
-        What is to be seen on it, if it has four corners: they are those at the lower left, lower
-        right, upper right and upper left.
-    """
-
+    #: Shape (n, 3). Counter-clockwise as seen from outside, m, world frame.
     corners: NDArray[np.float64]
-    colour: NDArray[np.float64]
+    colour: NDArray[np.float64]  #: Shape (3,). Blue, green, red, from 0 to 255.
+    #: What is to be seen on it, if it has four corners: they are those at the lower left, lower
+    #: right, upper right and upper left.
     texture: Image | None = None
     normal: NDArray[np.float64] = field(init=False)
 
@@ -100,6 +86,7 @@ def load_picture(path: str) -> Image:
     return picture
 
 
+#: Of a box: the direction out of each, and which one is up on it. The first is the front.
 _SIDES = (
     ((1, 0, 0), (0, 0, 1)),
     ((-1, 0, 0), (0, 0, 1)),
@@ -108,7 +95,6 @@ _SIDES = (
     ((0, 0, 1), (0, 1, 0)),
     ((0, 0, -1), (0, 1, 0)),
 )
-"""Of a box: the direction out of each, and which one is up on it. The first is the front."""
 
 
 def _faces_of_box(box):

@@ -10,15 +10,13 @@ from typing_extensions import override
 
 from crazyflie_vision.faces import load_picture
 
-SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")
-"""Of pictures in a folder."""
+SUFFIXES = (".bmp", ".jpeg", ".jpg", ".png")  #: Of pictures in a folder.
 
 
 class FrameSource:
     """Images, one after the other."""
 
-    is_live: ClassVar[bool] = False
-    """Whether images come in their own time."""
+    is_live: ClassVar[bool] = False  #: Whether images come in their own time.
 
     def read(self) -> NDArray[Any]:
         """Return the next image, shape (height, width, 3): blue, green, red.

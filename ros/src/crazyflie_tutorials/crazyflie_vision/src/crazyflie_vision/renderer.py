@@ -24,11 +24,8 @@ from crazyflie_vision.faces import (
 from crazyflie_world.shapes import Ball, Shape
 from crazyflie_world.world import World
 
-NEAR = 0.02
-"""What is nearer to the camera's plane is not seen, m."""
-
-SKY = (225.0, 215.0, 205.0)
-"""Blue, green, red of where nothing is."""
+NEAR = 0.02  #: What is nearer to the camera's plane is not seen, m.
+SKY = (225.0, 215.0, 205.0)  #: Blue, green, red of where nothing is.
 
 _SUBPIXEL_BITS = 4
 

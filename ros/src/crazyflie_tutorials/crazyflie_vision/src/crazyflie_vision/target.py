@@ -12,15 +12,9 @@ _SUBPIXEL_BITS = 4
 
 @dataclass(frozen=True)
 class Target:
-    """A round thing in an image; all in pixels.
+    """A round thing in an image; all in pixels."""
 
-    Attributes
-    ----------
-    x, y : float
-        Its centre, from the middle of the upper left pixel, to the right and down.
-    radius : float
-    """
-
+    #: x, y: Its centre, from the middle of the upper left pixel, to the right and down.
     x: float
     y: float
     radius: float

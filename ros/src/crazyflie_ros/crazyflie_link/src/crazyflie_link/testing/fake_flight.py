@@ -13,14 +13,10 @@ from collections.abc import Callable
 
 from crazyflie_model.supervisor import SupervisorState
 
-REFUSED = 1
-"""Reply to a takeoff while the planner flies, and to a landing while it lands."""
-
-FLYING_HOLDS = 2.0
-"""How long FLYING is reported after the motors have stopped, s."""
-
+REFUSED = 1  #: Reply to a takeoff while the planner flies, and to a landing while it lands.
+FLYING_HOLDS = 2.0  #: How long FLYING is reported after the motors have stopped, s.
+#: The first protocol whose supervisor has a port, and reports the high-level commander.
 SUPERVISOR_PROTOCOL = 12
-"""The first protocol whose supervisor has a port, and reports the high-level commander."""
 
 _SET_GROUPS, _STOP, _DEFINE, _TAKEOFF, _LAND, _GO_TO = 0, 3, 6, 7, 8, 12
 _HIGH_LEVEL_BITS = (

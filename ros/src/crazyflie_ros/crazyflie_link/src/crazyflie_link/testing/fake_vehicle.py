@@ -16,14 +16,12 @@ LOG_TYPES = {"B": 1, "H": 2, "I": 3, "b": 4, "h": 5, "i": 6, "f": 7, "e": 8}
 PARAMETER_TYPES = {"B": 8, "H": 9, "I": 10, "Q": 11, "b": 0, "h": 1, "i": 2, "f": 6}
 READ_ONLY, EXTENDED = 0x40, 0x10
 
-TRAJECTORY_MEMORY = (1, 0x12, 4096)
-"""Number, type and size in bytes of the only memory."""
+TRAJECTORY_MEMORY = (1, 0x12, 4096)  #: Number, type and size in bytes of the only memory.
 
 _ATTITUDE = struct.Struct("<fffH")
 _EMERGENCY_STOP = 0x03
 _LINK_BITS = 3 << 2
-_NULL_PACKET = (15, 3)
-"""Port and channel of the packet by which vehicles are searched."""
+_NULL_PACKET = (15, 3)  #: Port and channel of the packet by which vehicles are searched.
 
 
 class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
@@ -31,26 +29,6 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
 
     Log variables are "group.name" -> (struct format of the type, value), parameters "group.name" ->
     (struct format of the type, value, flags); ``clock()`` returns the time of the flight, s.
-
-    Attributes
-    ----------
-    flight : FakeFlight
-        Answers commands and reports the supervisor's state, also as the log variable
-        supervisor.info if ``log`` has it.
-    received : list of (port, channel, bytes)
-        All packets, oldest first.
-    broadcasts : list of (port, channel, bytes)
-        Those that came as a broadcast.
-    hears_broadcasts : bool
-        Whether broadcasts arrive.
-    deaf : set of (port, channel, bytes)
-        Packets that begin like this get no answer.
-    answers : dict
-        (port, channel, first byte) -> data to answer with, in the place of its own.
-    lose : callable
-        ``lose(count)`` returns whether the reply with this number is lost.
-    is_frozen : bool
-        Whether it neither receives nor sends anything.
     """
 
     def __init__(
@@ -61,17 +39,22 @@ class FakeVehicle(contextlib.AbstractContextManager["FakeVehicle"]):
         port: int = 0,
         clock: Callable[[], float] = time.monotonic,
     ):
+        #: Answers commands and reports the supervisor's state, also as the log variable
+        #: supervisor.info if ``log`` has it.
         self.flight = FakeFlight(protocol, clock)
         self.log = log if log is not None else {"pm.vbat": ("f", 3.9)}
         self.parameters = parameters if parameters is not None else {"ring.effect": ("B", 1, 0)}
         self.protocol = protocol
-        self.received: list[tuple[int, int, bytes]] = []
-        self.broadcasts: list[tuple[int, int, bytes]] = []
-        self.hears_broadcasts = True
+        self.received: list[tuple[int, int, bytes]] = []  #: All packets, oldest first.
+        self.broadcasts: list[tuple[int, int, bytes]] = []  #: Those that came as a broadcast.
+        self.hears_broadcasts = True  #: Whether broadcasts arrive.
+        #: Packets that begin like this get no answer.
         self.deaf: set[tuple[int, int, bytes]] = set()
+        #: (port, channel, first byte) -> data to answer with, in the place of its own.
         self.answers: dict[tuple[int, int, int | None], bytes] = {}
+        #: ``lose(count)`` returns whether the reply with this number is lost.
         self.lose: Callable[[int], bool] = lambda count: False
-        self.is_frozen = False
+        self.is_frozen = False  #: Whether it neither receives nor sends anything.
         self._changed = threading.Condition()
         self._replies = 0
         self._blocks: dict[int, list[str]] = {}

@@ -183,7 +183,7 @@ def test_the_list_has_all_that_its_packages_pull_in(name):
         needed, _, condition = requirement.partition(";")
         if "extra ==" not in condition and "python_version" not in condition:
             # Raises PackageNotFoundError when it is neither locked nor from Debian.
-            assert importlib.metadata.version(re.split("[<>=!~ (]", needed)[0])
+            assert importlib.metadata.version(re.split("[<>=!~ ([]", needed)[0])
 
 
 @pytest.mark.parametrize("module", ["cv2", "cv_bridge", "cv_bridge.boost.cv_bridge_boost"])

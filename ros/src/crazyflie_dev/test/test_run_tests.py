@@ -66,9 +66,10 @@ def run(tmp_path):
     return call
 
 
-def test_what_passes_alone_is_flaky_and_no_pass(run, tmp_path):
-    status, lines = run(flaky=FLAKY)
-    assert status == 1
+@pytest.mark.parametrize(("arguments", "expected"), [((), 0), (("--all",), 1)])
+def test_what_passes_alone_is_flaky_and_no_pass(run, tmp_path, arguments, expected):
+    status, lines = run(*arguments, flaky=FLAKY)
+    assert status == expected
     assert lines[-2:] == [
         "1 passed, 0 failed, 1 flaky",
         "FLAKY: package/pytest-flaky.xml: test_flaky.test_shy",

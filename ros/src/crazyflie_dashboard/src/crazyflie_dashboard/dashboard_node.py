@@ -37,6 +37,10 @@ class DashboardParameters(Parameters):
 class DashboardNode(Node):
     """Show vehicles in a browser, and command them."""
 
+    def __init__(self) -> None:
+        # Closes what has been opened, also if the page cannot be.
+        self._open = contextlib.ExitStack()
+
     @override
     def load_parameters(self, handle: NodeHandle) -> None:
         parameters = self._parameters = handle.load(DashboardParameters)
@@ -52,25 +56,24 @@ class DashboardNode(Node):
     @override
     def register_callbacks(self, handle: NodeHandle) -> None:
         folders = [path for path in self._parameters.folders.split(":") if path]
-        self._dashboard = LiveDashboard(
+        dashboard = LiveDashboard(
             handle,
             lambda: master.read(handle.name),
             partial(master.is_answering, handle.name),
             folders or example_folders(),
         )
+        self._open.callback(dashboard.close)
         # NiceGUI takes a second to import: not for what only reads the parameters' declaration.
         from crazyflie_dashboard.page import open_page
 
-        self._page = open_page(
-            self._dashboard, self._access, self._parameters.host, self._parameters.port
-        )
+        page = open_page(dashboard, self._access, self._parameters.host, self._parameters.port)
+        self._open.callback(page.close)
         # Not into the log: the token is for those who see this terminal.
         print(f"the dashboard is at {self._access.url}", flush=True)
 
     @override
     def shutdown(self) -> None:
-        self._page.close()
-        self._dashboard.close()
+        self._open.close()
 
 
 def example_folders() -> list[str]:

@@ -76,8 +76,11 @@ def results_of_node(case: Case) -> Path:
     return case.report.with_name(f"rosunit-{case.name.removeprefix('test')}.xml")
 
 
-def summarize(folder: Path, results: Iterable[Case]) -> bool:
-    """Print failed and flaky tests and the sums; tell whether some ran and all passed."""
+def summarize(folder: Path, results: Iterable[Case], is_strict: bool = True) -> bool:
+    """Print failed and flaky tests and the sums; tell whether some passed and none failed.
+
+    If it is strict, a flaky one has failed.
+    """
     results = list(results)
     for case in results:
         if case.verdict == "failed":
@@ -89,7 +92,7 @@ def summarize(folder: Path, results: Iterable[Case]) -> bool:
     for case in results:
         if case.verdict == "flaky":
             print(f"FLAKY: {case.label(folder)}")
-    return count["passed"] > 0 and not count["failed"] and not count["flaky"]
+    return count["passed"] > 0 and not count["failed"] and not (is_strict and count["flaky"])
 
 
 def main() -> int:

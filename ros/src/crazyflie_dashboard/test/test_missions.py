@@ -100,6 +100,19 @@ def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
         missions.stop()
 
 
+def test_a_mission_that_is_stopped_while_python_starts_has_not_failed(tmp_path, script):
+    program = tmp_path / "python"
+    program.write_text(
+        '#!/bin/sh\ncase "$*" in *mission_runner*) echo \'{"dry_run": {"passed": true, "text": "",'
+        ' "duration": 1.0, "paths": {}}}\';; *) echo "Fatal Python error: init_import_site: ..."'
+        "; exit 1;; esac\n"
+    )
+    program.chmod(0o755)
+    missions, mission = Missions(str(program)), script("one.py")
+    missions.dry_run(mission, ("cf1",)).result(LIMIT)
+    assert missions.fly(mission, ("cf1",)).result(LIMIT) == ""
+
+
 def test_why_a_mission_has_failed_is_what_it_said_last(missions, script):
     mission = script("fails.py")
     missions.dry_run(mission, ("cf1",)).result(LIMIT)

@@ -106,7 +106,9 @@ class Missions:
             output, _ = process.communicate()
             with self._lock:
                 self._flying = None
-            if process.returncode in (0, 130, 143, -signal.SIGINT):
+            # Stopped while Python itself still started: nothing has flown.
+            is_early = output.startswith("Fatal Python error: init_import_site")
+            if is_early or process.returncode in (0, 130, 143, -signal.SIGINT):
                 end.set_result("")
             else:
                 end.set_exception(RefusalError(_last(output, process.returncode)))

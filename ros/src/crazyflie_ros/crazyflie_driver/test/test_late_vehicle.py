@@ -12,7 +12,11 @@ from crazyflie_utils import ServiceError
 from crazyflie_utils.testing.programs import free_port
 from crazyflie_utils.testing.waiting import wait_until
 
-DEFAULT_LIMIT = CrazyflieServerParameters().connect_limit
+DEFAULT_LIMIT = next(
+    each.default
+    for each in CrazyflieServerParameters.declarations()
+    if each.name == "connect/limit"
+)
 
 
 class Vehicle:

@@ -77,6 +77,17 @@ def test_one_that_is_not_renewed_becomes_a_place_to_rest_at():
     assert reference.value(1.0, HERE)[3:6] == [0.0, 0.0, 0.0]
 
 
+def test_one_that_a_descent_has_ended_needs_no_report():
+    reports = []
+    reference = guarded(reports)
+    reference.update([0.1, 0.0, 1.0, 0.5, 0.0, 0.2, 0.7], time=10.0)
+    for k in range(100):
+        reference.descend([0.1, 0.0, 1.0 - 0.01 * k, 0.0, 0.0, -0.2, 0.7], 10.02 + 0.05 * k)
+    # The descent is over.
+    assert reference.value(20.0, HERE) == [0.1, 0.0, 1.0, 0.0, 0.0, 0.0, 0.7]
+    assert reports == []
+
+
 def test_one_at_rest_is_for_ever_and_needs_no_report():
     reports = []
     reference = guarded(reports)

@@ -120,10 +120,12 @@ class GuardedReference:
     def _resting(self, x_ref):
         if self._rest is None:
             self._rest = at_rest(x_ref, self._yaw_index)
-            self._report(
-                f"the reference has a velocity and has been the last for {VELOCITY_LIMIT:g} s; "
-                "resting where it is"
-            )
+            # A landing ends a stream of references as it should.
+            if self._descent is None or self._descent_time < self._time:
+                self._report(
+                    f"the reference has a velocity and has been the last for {VELOCITY_LIMIT:g} s; "
+                    "resting where it is"
+                )
         return self._rest
 
     def _within_reach(self, x_ref, x):

@@ -140,7 +140,8 @@ class MatplotlibVisualizer(NullVisualizer):
         self._axes.set_title(f"{t:.2f} s")
         self._artists = [
             self._axes.scatter(*positions.T, c=colors, s=_POINT_SIZE, depthshade=False),
-            self._axes.add_collection3d(Line3DCollection(lines, colors=_LINE_COLOR)),
+            # add_collection3d of matplotlib 3.10 fails without lines or with different lengths.
+            self._axes.add_collection(Line3DCollection(lines, colors=_LINE_COLOR), autolim=False),
         ]
 
 

@@ -236,7 +236,7 @@ def is_installed(name, version):
 @pytest.mark.parametrize("name", sorted(locked_versions()))
 def test_the_list_has_all_that_its_packages_pull_in(name):
     if name == "motioncapture" and importlib.util.find_spec(name) is None:
-        pytest.skip("no binary of motioncapture for this processor")
+        pytest.skip("no binary of motioncapture for this processor or Python")
     for requirement in importlib.metadata.requires(name) or []:
         needed, _, condition = requirement.partition(";")
         if "extra ==" not in condition and "python_version" not in condition:

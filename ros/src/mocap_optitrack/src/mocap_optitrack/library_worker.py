@@ -39,6 +39,9 @@ def main() -> int:
     except BrokenPipeError:
         # Who reads the lines has ended.
         return 0
+    except ImportError as error:
+        text = "the motioncapture package (from PyPI; for x86-64 and Python up to 3.13) is missing"
+        lines.write_last({"error": f"{text}: {error}"})
     except Exception as error:
         lines.write_last({"error": str(error)})
     return 1

@@ -2,6 +2,7 @@
 
 import os
 import sys
+import time
 
 import pytest
 
@@ -13,23 +14,24 @@ LIMIT = 30.0
 
 STAND_IN = """#!{python}
 import json, sys, time
-if "crazyflie_mission_api.mission_runner" in sys.argv:
-    path = sys.argv[4]
+_, _, runner, word, path, *vehicles = sys.argv
+assert runner == "crazyflie_mission_api.mission_runner"
+if word == "dry_run":
     passed = "bad" not in path
     result = dict(passed=passed, text="far" if passed else "cf1: y is 3 m", duration=4.0)
     result["paths"] = dict(cf1=[[0, 0, 0], [0, 0, 1]])
     print("from crazyflie_mission_api: loading")
     print(json.dumps(dict(dry_run=result)))
     sys.exit(0 if passed else 1)
-if "waits" in sys.argv[1]:
-    print("flies", flush=True)
+if "waits" in path:
+    print("    1.5 s  takeoff: cf1", flush=True)
     try:
         time.sleep({limit})
     except KeyboardInterrupt:
         print("has landed")
         sys.exit(130)
 print("cf1 is lost")
-sys.exit(1 if "fails" in sys.argv[1] else 0)
+sys.exit(1 if "fails" in path else 0)
 """
 
 
@@ -90,7 +92,11 @@ def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
     mission = script("waits.py")
     missions.dry_run(mission, ("cf1",)).result(LIMIT)
     end = missions.fly(mission, ("cf1",))
-    assert missions.running == ("waits.py",)
+    assert missions.running[0].startswith("waits.py")
+    until = time.monotonic() + LIMIT
+    while missions.running != ("waits.py takeoff: cf1",) and time.monotonic() < until:
+        time.sleep(0.01)
+    assert missions.running == ("waits.py takeoff: cf1",)
     with pytest.raises(RefusalError, match=r"waits.py flies; expected it to have ended"):
         missions.fly(mission, ("cf1",))
     missions.stop()
@@ -103,7 +109,7 @@ def test_one_mission_flies_at_a_time_until_it_is_stopped(missions, script):
 def test_a_mission_that_is_stopped_while_python_starts_has_not_failed(tmp_path, script):
     program = tmp_path / "python"
     program.write_text(
-        '#!/bin/sh\ncase "$*" in *mission_runner*) echo \'{"dry_run": {"passed": true, "text": "",'
+        '#!/bin/sh\ncase "$*" in *dry_run*) echo \'{"dry_run": {"passed": true, "text": "",'
         ' "duration": 1.0, "paths": {}}}\';; *) echo "Fatal Python error: init_import_site: ..."'
         "; exit 1;; esac\n"
     )

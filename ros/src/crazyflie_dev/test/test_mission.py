@@ -1,10 +1,8 @@
-"""A mission script's vehicles, and what is printed of its commands."""
+"""The vehicles of a mission script, and what its command line refuses."""
 
 import pytest
 
-import crazyflie_mission_api
 from crazyflie_dev import mission
-from crazyflie_dev.mission_script import AnnouncingFleet
 
 
 @pytest.mark.parametrize(
@@ -29,19 +27,3 @@ def test_bad_input_is_named(arguments, complaint, monkeypatch, capsys):
         mission.main()
     assert end.value.code == 2
     assert complaint in capsys.readouterr().err
-
-
-def test_commands_are_printed_once(monkeypatch, capsys):
-    fleet = object.__new__(AnnouncingFleet)
-    fleet._vehicles = dict.fromkeys(["cf1", "cf2"])
-    clock = iter((100.0, 102.5))
-    monkeypatch.setattr(AnnouncingFleet, "time", lambda _: next(clock))
-    monkeypatch.setattr(AnnouncingFleet, "_first", None)
-    for command in ("takeoff", "formation"):
-        # A command that is made of another one: only the first is printed.
-        with pytest.raises(crazyflie_mission_api.MissionError):
-            getattr(fleet, command)("nonsense")
-    assert capsys.readouterr().out.splitlines() == [
-        "    0.0 s  takeoff: cf1, cf2",
-        "    2.5 s  formation: cf1, cf2",
-    ]

@@ -1,6 +1,7 @@
 """The figures of a flight, on flights that are known in closed form."""
 
 import csv
+import math
 
 import numpy as np
 import pytest
@@ -32,7 +33,22 @@ def flight(hover_offset=0.0, sink=0.3, overshoot=0.0):
 def test_time_to_hover():
     assert flight().time_to_hover(HOVER, 0.01) == pytest.approx(1.98, abs=0.02)
     assert flight(overshoot=0.1).time_to_hover(HOVER, 0.01) == pytest.approx(2.5, abs=0.02)
-    assert flight(hover_offset=0.1).time_to_hover(HOVER, 0.01) == float("inf")
+    assert math.isnan(flight(hover_offset=0.1).time_to_hover(HOVER, 0.01))
+
+
+def test_references_of_a_climb_are_no_departure():
+    record = flight()
+    # The goal of the takeoff, the climb, and later a move.
+    for time, height in ((10.0, 1.0), (10.1, 0.1), (11.0, 0.6), (12.0, 1.0), (17.0, 1.5)):
+        record.reference.append(time, [0.0, 0.0, height, 0.0, 0.0, 0.0])
+    assert record.hover_end(HOVER) == 17.0
+    assert record.time_to_hover(HOVER, 0.01) == pytest.approx(1.98, abs=0.02)
+
+
+def test_what_was_not_reached_is_a_dash():
+    record = flight(hover_offset=0.1, sink=0.01)
+    table = FlightReport.of(record, HOVER).table()
+    assert [line.split()[-1] for line in table.splitlines()][::4] == ["-", "-"]
 
 
 def test_overshoot():

@@ -168,7 +168,11 @@ FLIGHTS = {
     ),
     "sw_swarm": (
         ["demo", "vehicles"],
-        ["crazyflie_dev.mission", "crazyflie_dev.mission_script", "crazyflie_fleet.fleet_process"],
+        [
+            "crazyflie_dev.mission",
+            "crazyflie_mission_api.mission_runner",
+            "crazyflie_fleet.fleet_process",
+        ],
     ),
 }
 """A launch file -> sections of debian.txt that suffice, modules of the flight beside its nodes."""

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,8 +15,11 @@ from pathlib import Path
 from crazyflie_dashboard.dashboard import DryRunResult, MissionFile
 from crazyflie_utils.refusal import RefusalError
 
-#: How the line with the result of `crazyflie_mission_api.mission_runner` begins.
+#: Flies missions, and makes dry runs; how the line with the result of a dry run begins, and what
+#: a line about a command is.
+_RUNNER = ("-m", "crazyflie_mission_api.mission_runner")
 _RESULT = '{"dry_run": '
+_COMMAND = re.compile(r" *[0-9.]+ s  (\w+: .+)")
 _DRY_RUN_TIMEOUT = 60.0  #: s.
 _LAND_TIMEOUT = 60.0  #: From the end of a mission that is stopped until its process is killed, s.
 _MAX_OUTPUT = 2000  #: Of the text of a failure, characters.
@@ -52,19 +56,20 @@ class Missions:
         self._lock = threading.Lock()
         self._flying: subprocess.Popen[str] | None = None
         self._passed: set[tuple[str, float, tuple[str, ...]]] = set()
-        self._title = ""
+        self._title = self._command = ""
 
     @property
     def running(self) -> tuple[str, ...]:
-        """Titles of what flies."""
+        """Titles of what flies, each with its last command if that is known."""
         with self._lock:
-            return (self._title,) if self._flying is not None else ()
+            if self._flying is None:
+                return ()
+            return (f"{self._title} {self._command}".strip(),)
 
     def dry_run(self, mission: MissionFile, vehicles: tuple[str, ...]) -> "Future[DryRunResult]":
         """Fly a mission with ideal vehicles."""
         result: Future[DryRunResult] = Future()
-        module = "-m", "crazyflie_mission_api.mission_runner", "dry_run"
-        command = [self._python, *module, mission.path, *vehicles]
+        command = [self._python, *_RUNNER, "dry_run", mission.path, *vehicles]
         if not mission.is_trajectory and _is_crazyswarm(mission.path):
             command = [self._python, mission.path, "--sim"]
         key = _key(mission, vehicles)
@@ -88,11 +93,8 @@ class Missions:
             Its dry run has not passed with these vehicles, it has changed since, or one flies.
         """
         end: Future[str] = Future()
-        command = [self._python, mission.path, *vehicles]
-        if mission.is_trajectory:
-            module = "-m", "crazyflie_mission_api.mission_runner", "fly"
-            command = [self._python, *module, mission.path, *vehicles]
-        elif _is_crazyswarm(mission.path):
+        command = [self._python, *_RUNNER, "fly", mission.path, *vehicles]
+        if not mission.is_trajectory and _is_crazyswarm(mission.path):
             command = [self._python, mission.path]
         with self._lock:
             if self._flying is not None:
@@ -100,10 +102,15 @@ class Missions:
             if _key(mission, vehicles) not in self._passed:
                 raise RefusalError(f"{mission.title}: expected a dry run of it that has passed")
             process = self._flying = _start(command)
-            self._title = mission.title
+            self._title, self._command = mission.title, ""
 
         def work():
-            output, _ = process.communicate()
+            output = ""
+            for line in process.stdout:
+                output = (output + line)[-_MAX_OUTPUT:]
+                if match := _COMMAND.match(line):
+                    self._command = match[1]
+            process.wait()
             with self._lock:
                 self._flying = None
             # Stopped while Python itself still started: nothing has flown.

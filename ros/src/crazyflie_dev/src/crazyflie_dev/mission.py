@@ -49,7 +49,7 @@ def fly(script: list[str], n: int, folder: Path, launch_arguments: list[str]) ->
     begin = time.monotonic()
     with roslaunch(arguments, log):
         wait_for_recording(f"/cf{n}/state")
-        command = [sys.executable, "-m", "crazyflie_dev.mission_script", *script]
+        command = [sys.executable, "-m", "crazyflie_mission_api.mission_runner", "fly", *script]
         with subprocess.Popen(command) as process:
             try:
                 status = process.wait()

@@ -23,8 +23,9 @@ _STEP = 0.05  #: Of time, s.
 class DryRunClock(Clock):
     """Time that passes during waits only."""
 
-    def __init__(self) -> None:
+    def __init__(self, on_step: Callable[[], None] = lambda: None):
         self._time = 0.0
+        self._on_step = on_step
 
     @override
     def time(self) -> float:
@@ -33,6 +34,7 @@ class DryRunClock(Clock):
     @override
     def wait_until(self, condition: Callable[[], bool], deadline: float) -> bool:
         while not (is_met := condition()) and self._time < deadline:
+            self._on_step()
             self._time = min(self._time + _STEP, deadline)
         return is_met
 
@@ -114,7 +116,8 @@ class DryRun(VehicleGroup):
     """A group of ideal vehicles.
 
     By the names of vehicles: ``starts``, positions before takeoff, m; fences (``bounds``);
-    ``headings``, rad, 0 by default; ``start_skews``, s, 0 by default.
+    ``headings``, rad, 0 by default; ``start_skews``, s, 0 by default. ``on_step(group)`` is called
+    whenever time passes.
     """
 
     def __init__(
@@ -124,8 +127,9 @@ class DryRun(VehicleGroup):
         bounds: Mapping[str, Bounds] | None = None,
         headings: Mapping[str, float] | None = None,
         start_skews: Mapping[str, float] | None = None,
+        on_step: Callable[[VehicleGroup], None] = lambda group: None,
     ):
-        clock = DryRunClock()
+        clock = DryRunClock(lambda: on_step(self))
         fences, yaws, skews = bounds or {}, headings or {}, start_skews or {}
         vehicles = []
         for name, position in starts.items():
@@ -154,6 +158,7 @@ def dry_run(group: VehicleGroup, mission: Callable[[VehicleGroup], Any]) -> floa
         {name: group.fence(name) for name in group.names},
         {name: vehicle.heading() for name, vehicle in group._vehicles.items()},
         {name: vehicle.start_skew for name, vehicle in group._vehicles.items()},
+        group.observer.step,
     )
     with run:
         mission(run)

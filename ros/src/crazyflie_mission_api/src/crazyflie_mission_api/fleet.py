@@ -17,6 +17,7 @@ from crazyflie_fleet import fleet_file
 from crazyflie_fleet.high_level_node import HighLevelNode
 from crazyflie_fleet.mission_watch import MISSION_PERIOD, MISSION_TOPIC
 from crazyflie_fleet.vehicle_nodes import BUFFER
+from crazyflie_mission_api import observer
 from crazyflie_mission_api.dry_run import dry_run
 from crazyflie_mission_api.group_state import Rules
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError
@@ -110,6 +111,7 @@ class Fleet(VehicleGroup):
                 limits or Limits(), bounds, separation, tolerance, arrival_timeout, buffers
             )
             super().__init__(vehicles, clock, rules)
+            self.observer = observer.of_process
             self._mission = f"mission_{uuid.uuid4().hex[:8]}"
             self._in_flight = self._handle.publisher(MISSION_TOPIC, String)
             self._handle.timer(MISSION_PERIOD, self._publish_flying, steady=True)
@@ -121,6 +123,7 @@ class Fleet(VehicleGroup):
 
     def vehicle(self, name: str) -> RosVehicle:
         """Return a vehicle."""
+        self.observer.check()
         self._check_names([name])
         vehicle = self._vehicles[name]
         assert isinstance(vehicle, RosVehicle)
@@ -129,6 +132,7 @@ class Fleet(VehicleGroup):
     @override
     def adopt(self, name: str) -> None:
         """Note that a vehicle flies by other commands: it is landed at the end."""
+        self.observer.check()
         is_new = name not in self.flying
         super().adopt(name)
         if is_new:
@@ -147,6 +151,7 @@ class Fleet(VehicleGroup):
     def fly(self, mission: Callable[[VehicleGroup], Any]) -> None:
         """Check ``mission(fleet)`` by a dry run, then fly it."""
         duration = self.dry_run(mission)
+        self.observer.passed(self.names, duration)
         self._handle.info(f"{', '.join(self.names)}: dry run passed, a mission of {duration:.0f} s")
         mission(self)
 

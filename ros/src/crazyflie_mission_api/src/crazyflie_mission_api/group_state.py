@@ -11,6 +11,7 @@ from typing import Self
 from crazyflie_mission_api.clearance import Clearance
 from crazyflie_mission_api.limits import EVERYWHERE, Bounds, Limits, MissionError, number
 from crazyflie_mission_api.mission_vehicle import Clock, MissionVehicle, never
+from crazyflie_mission_api.observer import MissionObserver, command
 from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_apart
 from crazyflie_mission_api.trajectories import within_limits
 from crazyflie_model import trajectory
@@ -52,6 +53,7 @@ class GroupState:
         self.rules = rules or Rules()
         # Of all vehicles in flight; shared with subgroups.
         self._commanded: dict[str, TimedTrajectory] = {}
+        self.observer = MissionObserver()  #: Called at each command.
 
     def __getitem__(self, names: str | tuple[str, ...]) -> Self:
         """Return a subgroup."""
@@ -104,6 +106,7 @@ class GroupState:
         """Return the box that a vehicle may fly in."""
         return self.rules.bounds.within(self._vehicles[name].bounds)
 
+    @command
     def wait(self, seconds: float) -> None:
         """Let time pass, s, while the vehicles fly on."""
         self._wait(never, self.time() + number(seconds, "wait", 0.0))
@@ -124,6 +127,7 @@ class GroupState:
                 f"planned; expected {self.rules.tolerance:g} m at most"
             )
 
+    @command
     def emergency(self) -> None:
         """Stop all motors at once, wherever the vehicles are: they fall."""
         failures = self._answers(lambda name: self._vehicles[name].emergency())

@@ -8,6 +8,7 @@ import numpy as np
 from crazyflie_fleet.landing import next_round
 from crazyflie_mission_api.group_state import GroupState, raise_failures
 from crazyflie_mission_api.mission_vehicle import never
+from crazyflie_mission_api.observer import command
 from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_with_skew
 from crazyflie_mission_api.trajectories import straight
 
@@ -27,6 +28,7 @@ Point = tuple[float, float, float]
 class LandingGroup(GroupState):
     """Vehicles that land; see `crazyflie_fleet.landing`."""
 
+    @command
     def land(self) -> None:
         """Land, and wait until all vehicles are on the ground with their motors off.
 

@@ -1,100 +1,116 @@
-"""The program that flies a trajectory, or makes the dry run of a mission.
+"""The program that runs a mission: a dry run of it, or the flight.
 
-    python3 -m crazyflie_mission_api.mission_runner dry_run|fly FILE VEHICLE...
+    python3 -m crazyflie_mission_api.mission_runner dry_run|fly FILE [ARGUMENT...]
 
-A dry run is made where the script says ``fleet.fly(mission)``; nothing moves. Its last line of
-output is the result as JSON: {"dry_run": {"passed": bool, "text": str, "duration": s, "paths":
+FILE is a script with its arguments, or a trajectory (CSV) and the names of vehicles. ``fly`` prints
+each command as it begins. ``dry_run`` goes as far as ``fleet.fly(mission)``, and no vehicle moves.
+Its result is a line of JSON: {"dry_run": {"passed": bool, "text": str, "duration": s, "paths":
 {vehicle: [[x, y, z], ...]}}}.
 """
 
 import json
+import os
 import runpy
 import sys
-from collections.abc import Callable
 from typing import Any
 
+from typing_extensions import override
+
 from crazyflie_demo import trajectory_file
-from crazyflie_mission_api import Fleet, Limits, MissionError
-from crazyflie_mission_api.dry_run import dry_run
-from crazyflie_mission_api.vehicle_group import VehicleGroup
+from crazyflie_mission_api import Fleet, Limits, MissionError, observer
+from crazyflie_mission_api.group_state import GroupState
+from crazyflie_mission_api.observer import NO_DRY_RUN, MissionObserver
+from crazyflie_utils import ParameterError
 
 _HEIGHT = 1.0  #: Of a trajectory's takeoff, m.
 #: Of trajectories in files: they are flown as they are, or not at all.
 _LIMITS = Limits(speed=1.5, acceleration=2.5)
 _PERIOD = 0.2  #: From one point of a path that is shown to the next, s.
-
-_COMMANDS = ("takeoff", "go_to", "follow", "formation", "land", "emergency", "adopt")
+_SHOWN_NAMES = 4  #: More vehicles than these are counted, not named.
 
 
 class Done(BaseException):
     """The dry run has been made: the script is to go no further."""
 
 
+class _Printer(MissionObserver):
+    """Prints commands as they begin: time (s) since the first, command, vehicles."""
+
+    _first: float | None = None
+
+    @override
+    def begin(self, command: str, vehicles: list[str], time: float) -> None:
+        self._first = time if self._first is None else self._first
+        count = len(vehicles)
+        names = ", ".join(vehicles) if count <= _SHOWN_NAMES else f"{count} vehicles"
+        print(f"{time - self._first:7.1f} s  {command}: {names}", flush=True)
+
+
+class _DryRunReport(MissionObserver):
+    """Prints the result of the first dry run, and ends the script."""
+
+    dry_runs_only = True
+
+    def __init__(self) -> None:
+        self._paths: dict[str, list[list[float]]] = {}
+        self._last = -_PERIOD
+
+    @override
+    def step(self, group: GroupState) -> None:
+        if group.time() - self._last >= _PERIOD:
+            self._last = group.time()
+            for name in group.names:
+                point = [round(each, 3) for each in group.position(name)]
+                self._paths.setdefault(name, []).append(point)
+
+    @override
+    def passed(self, vehicles: list[str], duration: float) -> None:
+        text = f"passed: {', '.join(vehicles)} fly for {duration:.0f} s"
+        _print_result(True, text, duration, self._paths)
+        raise Done
+
+
 def main(arguments: list[str]) -> int:
     """Fly, or make a dry run; return the exit status."""
-    what, path, *names = arguments
-    fly = (lambda fleet, mission: fleet.fly(mission)) if what == "fly" else _rehearse
-    if what == "dry_run":
-        _forbid_flights()
-    sys.argv = [path, *names]
+    what, path, *others = arguments
+    is_dry = what == "dry_run"
+    observer.of_process = _DryRunReport() if is_dry else _Printer()
+    # As for a program that is started by its own name.
+    sys.argv, sys.path[0] = [path, *others], os.path.dirname(os.path.abspath(path))
     try:
         if path.endswith(".csv"):
-            pieces = trajectory_file.load(path)
-            with Fleet(names, limits=_LIMITS) as fleet:
-                fly(fleet, lambda group: _follow(group, pieces))
+            _fly_trajectory(path, others)
         else:
             runpy.run_path(path, run_name="__main__")
-            _report(False, "the script does not call fleet.fly(mission): there is no dry run of it")
     except Done:
         return 0
-    except (MissionError, trajectory_file.TrajectoryError) as error:
-        _report(False, str(error))
+    except (MissionError, ParameterError, trajectory_file.TrajectoryError) as error:
+        if is_dry:
+            _print_result(False, str(error))
+        else:
+            print(f"the mission failed: {error}", file=sys.stderr)
         return 1
-    return 0 if what == "fly" else 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return 130
+    if is_dry:
+        _print_result(False, NO_DRY_RUN)
+    return int(is_dry)
 
 
-def _follow(group, pieces):
-    group.takeoff(_HEIGHT)
-    group.follow(pieces, relative=True)
-    group.land()
+def _fly_trajectory(path: str, names: list[str]) -> None:
+    pieces = trajectory_file.load(path)
+
+    def mission(group: Any) -> None:
+        group.takeoff(_HEIGHT)
+        group.follow(pieces, relative=True)
+        group.land()
+
+    with Fleet(names, limits=_LIMITS) as fleet:
+        fleet.fly(mission)
 
 
-def _forbid_flights():
-    """Have commands to real vehicles fail, and `Fleet.fly` make the dry run only."""
-
-    def refuse(fleet, *_, **__):
-        raise MissionError("the script does not call fleet.fly(mission): there is no dry run of it")
-
-    for name in _COMMANDS:
-        setattr(Fleet, name, refuse)
-    setattr(Fleet, "fly", _rehearse)  # noqa: B010
-
-
-def _rehearse(fleet: Fleet, mission: Callable[[VehicleGroup], Any]) -> None:
-    paths: dict[str, list[tuple[float, ...]]] = {name: [] for name in fleet.names}
-
-    def watched(group: Any) -> None:
-        wait_until, seen = group.clock.wait_until, [-_PERIOD]
-
-        def record() -> bool:
-            if group.time() - seen[0] >= _PERIOD:
-                seen[0] = group.time()
-                for name, path in paths.items():
-                    path.append(tuple(round(each, 3) for each in group.position(name)))
-            return False
-
-        def recorded(condition: Callable[[], bool], deadline: float) -> bool:
-            return wait_until(lambda: record() or condition(), deadline)
-
-        group.clock.wait_until = recorded
-        mission(group)
-
-    duration = dry_run(fleet, watched)
-    _report(True, f"passed: {', '.join(fleet.names)} fly for {duration:.0f} s", duration, paths)
-    raise Done
-
-
-def _report(passed, text, duration=0.0, paths=None):
+def _print_result(passed, text, duration=0.0, paths=None):
     result = {"passed": passed, "text": text, "duration": duration, "paths": paths or {}}
     print(json.dumps({"dry_run": result}), flush=True)
 

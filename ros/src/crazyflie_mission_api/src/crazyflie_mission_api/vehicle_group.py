@@ -11,6 +11,7 @@ from crazyflie_mission_api import formations, trajectories
 from crazyflie_mission_api.group_state import raise_failures, text
 from crazyflie_mission_api.landing import LandingGroup
 from crazyflie_mission_api.limits import Array, MissionError, number, point
+from crazyflie_mission_api.observer import command
 from crazyflie_mission_api.timed_trajectory import TimedTrajectory, check_with_skew
 from crazyflie_mission_api.trajectories import moved, straight, stretched
 from crazyflie_model.trajectory import Pieces, duration
@@ -30,6 +31,7 @@ class VehicleGroup(LandingGroup):
     ``wait=False`` when it has begun, and `arrive` waits.
     """
 
+    @command
     def takeoff(self, height: float = 1.0, wait: bool = True) -> None:
         """Climb straight up to a height, m."""
         height = number(height, "takeoff: height", _MIN_CLIMB)
@@ -65,6 +67,7 @@ class VehicleGroup(LandingGroup):
         if wait:
             self.arrive()
 
+    @command
     def go_to(
         self,
         goals: Point | Mapping[str, Point],
@@ -115,6 +118,7 @@ class VehicleGroup(LandingGroup):
 
         self._fly(moves, "go_to", command, wait)
 
+    @command
     def follow(
         self,
         paths: Pieces | Mapping[str, Pieces],
@@ -161,6 +165,7 @@ class VehicleGroup(LandingGroup):
         self._prepare(flown, "upload", stream)
         self._fly(flown, "follow", lambda name: self._vehicles[name].start(), wait)
 
+    @command
     def formation(
         self, places: Array | Sequence[Point], duration: float | None = None, wait: bool = True
     ) -> dict[str, tuple[float, float, float]]:

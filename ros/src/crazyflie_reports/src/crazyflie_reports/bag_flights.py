@@ -146,6 +146,7 @@ def _series(rows, fields, first, last):
     rows = _between(rows, first, last)
     # Positions, or controls, that are no numbers, which every node rejects, too.
     rows = rows[np.isfinite(rows[:, :4]).all(axis=1)]
+    rows = np.where(np.isinf(rows), np.nan, rows)
     return Series.of(fields, rows[:, 0], rows[:, 1:])
 
 

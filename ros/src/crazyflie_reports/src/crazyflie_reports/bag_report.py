@@ -104,7 +104,7 @@ class Report:
             }
             for entry, found in self._flights
         ]
-        (folder / DATA).write_text(json.dumps(tables, indent=1))
+        (folder / DATA).write_text(json.dumps(tables, indent=1, allow_nan=False))
 
     def table(self) -> str:
         """Return a line for each flight, with the figures that are not normal."""

@@ -153,11 +153,14 @@ def _lost(rows: Rows) -> int | None:
 
 
 def _delays(controls: Rows, states: Rows) -> Rows:
-    """Return time of recording and delay of each control; none without stamps of this clock."""
+    """Return time of recording and delay of each control.
+
+    None without stamps of this clock. In simulated time messages may be recorded before their time.
+    """
     newest = np.searchsorted(states[:, _TIME], controls[:, _TIME], side="right") - 1
     controls = controls[newest >= 0]
     stamps = states[newest[newest >= 0], _STAMP]
     delays = controls[:, _TIME] - stamps
-    if not len(delays) or abs(np.median(delays)) > OTHER_CLOCK:
+    if not len(delays) or not 0.0 <= np.median(delays) <= OTHER_CLOCK:
         return np.empty((0, 2))
     return np.column_stack([controls[:, _TIME], delays])

@@ -89,13 +89,17 @@ class FlightRecord:
         return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
 
     def hover_end(self, point: ArrayLike) -> float:
-        """Return when references led away from a point (m), at the latest when /land was called."""
+        """Return when references led away from a point (m), at the latest when /land was called.
+
+        Those during the takeoff, of a climb, do not count.
+        """
         times = self.reference.times
         distances = np.linalg.norm(self.reference.values[:, :3] - np.asarray(point), axis=1)
         arrived = (times >= self.events["takeoff"]) & (distances < AT_POINT)
         if not arrived.any():
             return self.events["land"]
-        left = times[(times > times[arrived][0]) & (distances > AT_POINT)]
+        begin = max(times[arrived][0], self.events.get("flying", 0.0))
+        left = times[(times > begin) & (distances > AT_POINT)]
         return float(min([*left[:1], self.events["land"]]))
 
     def tracking_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -113,14 +117,14 @@ class FlightRecord:
     def time_to_hover(self, point: ArrayLike, tolerance: float) -> float:
         """Return how long after the call of /takeoff the vehicle was at a point to stay, s.
 
-        From then on until `hover_end` it is within ``tolerance`` of the point, m; infinity when it
-        never stayed.
+        From then on until `hover_end` it is within ``tolerance`` of the point, m; NaN when it never
+        stayed.
         """
         times, errors = self._hover(point)
         outside = np.flatnonzero(errors > tolerance)
         first = outside[-1] + 1 if outside.size else 0
         if first >= times.size:
-            return float("inf")
+            return float("nan")
         return float(times[first] - self.events["takeoff"])
 
     def overshoot(self, point: ArrayLike) -> float:

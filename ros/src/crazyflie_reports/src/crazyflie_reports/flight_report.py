@@ -13,7 +13,7 @@ TOUCHDOWN_LIMIT = 0.5  #: Fastest touchdown of a good flight, m/s.
 
 @dataclass(frozen=True)
 class FlightReport:
-    """Figures of one flight from /takeoff to /land."""
+    """Figures of one flight from /takeoff to /land; NaN if it has no hover or no touchdown."""
 
     time_to_hover: float  #: From the call of /takeoff until it stayed within `HOVER_TOLERANCE`, s.
     overshoot: float  #: Above the hover height, m.
@@ -36,7 +36,7 @@ class FlightReport:
         try:
             touchdown = record.touchdown_speed()
         except ValueError:
-            touchdown = float("inf")
+            touchdown = float("nan")
         return cls(
             time_to_hover=record.time_to_hover(point, HOVER_TOLERANCE),
             overshoot=record.overshoot(point),
@@ -61,7 +61,7 @@ class FlightReport:
                 f"(limit {OVERSHOOT_LIMIT * 1000:.0f} mm)",
             ),
             (
-                self.touchdown_speed <= TOUCHDOWN_LIMIT,
+                not self.touchdown_speed > TOUCHDOWN_LIMIT,
                 f"it touched down at {self.touchdown_speed:.2f} m/s "
                 f"(limit {TOUCHDOWN_LIMIT:g} m/s)",
             ),
@@ -82,4 +82,5 @@ class FlightReport:
             ("hover error, maximum", f"{self.hover_error_max * 1000:.2f} mm"),
             ("touchdown speed", f"{self.touchdown_speed:.2f} m/s"),
         ]
-        return "\n".join(f"{name:<22}{value:>12}" for name, value in rows)
+        known = ((name, "-" if value.startswith("nan") else value) for name, value in rows)
+        return "\n".join(f"{name:<22}{value:>12}" for name, value in known)

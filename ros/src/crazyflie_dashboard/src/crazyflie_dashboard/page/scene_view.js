@@ -1,10 +1,10 @@
 // The vehicles and what is around them in three dimensions.
 
 import { CSS2DRenderer, OrbitControls, THREE } from "nicegui-scene";
-import { Goal, Surroundings, Vehicles } from "dashboard-objects";
+import { FEW, Goal, Surroundings, Vehicles } from "dashboard-objects";
 
 const LABEL_PERIOD = 0.2;  // Between two layouts of more names than FEW, s: they cost more than all else.
-const FEW = 20;
+const FLOOR = "void main() { gl_FragColor = vec4(0.106, 0.133, 0.173, 1.0); }";  // It is most of the picture.
 const CLICK = 5;  // A pointer that has moved further, px, has turned the view.
 
 export default {
@@ -14,9 +14,8 @@ export default {
   props: { model: Array },
 
   mounted() {
-    this.canvas = this.$el.children[0];
     try {
-      this.renderer = new THREE.WebGLRenderer({ antialias: true, canvas: this.canvas });
+      this.setRenderer(true);
     } catch (error) {
       this.$el.children[2].textContent =
         "This browser offers no WebGL 2: the scene cannot be drawn. All else works.";
@@ -29,13 +28,13 @@ export default {
     this.camera = new THREE.PerspectiveCamera(45, 1, 0.02, 500);
     this.camera.up.set(0, 0, 1);
     this.camera.position.set(-2.6, -3.2, 2.6);
-    this.controls = new OrbitControls(this.camera, this.canvas);
+    this.controls = new OrbitControls(this.camera, this.$el);
     this.controls.target.set(0, 0, 0.4);
     this.controls.maxPolarAngle = 1.55;
     const sun = new THREE.DirectionalLight("#ffffff", 1.6);
     sun.position.set(3, -5, 8);
     const floor = new THREE.Mesh(new THREE.CircleGeometry(14, 64),
-      new THREE.MeshBasicMaterial({ color: "#1b222c" }));
+      new THREE.ShaderMaterial({ fragmentShader: FLOOR }));
     floor.position.z = -0.004;
     const grid = new THREE.GridHelper(20, 20, "#56657a", "#2f3947").rotateX(Math.PI / 2);
     this.surroundings = new Surroundings();
@@ -47,7 +46,6 @@ export default {
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.$el);
     this.controls.addEventListener("change", () => { this.isOld = true; });
-    this.renderer.setAnimationLoop((time) => this.draw(time / 1000));
     // The connection is made after all parts of the page.
     this.waiting = setInterval(() => {
       if (!window.socket) return;
@@ -65,6 +63,23 @@ export default {
   },
 
   methods: {
+    // Draw on a new canvas: whether edges are smooth cannot be changed on an old one.
+    setRenderer(isSmooth) {
+      const canvas = document.createElement("canvas");
+      const renderer = new THREE.WebGLRenderer({ antialias: isSmooth, canvas });
+      this.renderer?.setAnimationLoop(null);
+      this.renderer?.forceContextLoss();
+      this.$el.children[0].replaceWith(canvas);
+      Object.assign(this, { canvas, renderer, isSmooth });
+      renderer.setAnimationLoop((time) => this.draw(time / 1000));
+    },
+
+    // Tell whether pictures are drawn without a graphics card.
+    isSoftware() {
+      const gl = this.renderer.getContext(), names = gl.getExtension("WEBGL_debug_renderer_info");
+      return /swiftshader|llvmpipe|software/i.test(gl.getParameter(names?.UNMASKED_RENDERER_WEBGL ?? gl.RENDERER));
+    },
+
     resize() {
       const { clientWidth: width, clientHeight: height } = this.$el;
       this.renderer.setSize(width, height);
@@ -92,6 +107,10 @@ export default {
     },
 
     setVehicles(names) {
+      if (names.length > FEW && this.isSmooth && this.isSoftware()) {
+        this.setRenderer(false);
+        this.resize();
+      }
       this.vehicles?.dispose();
       this.vehicles = new Vehicles(names, this.model);
       this.scene.add(this.vehicles);

@@ -1,2 +1,2 @@
-export { Vehicles } from "./vehicles.js";
+export { FEW, Vehicles } from "./vehicles.js";
 export { Goal, Surroundings } from "./surroundings.js";

@@ -5,10 +5,10 @@ import { CSS2DObject, THREE } from "nicegui-scene";
 const SMALLEST = 0.045;     // Smallest size of a vehicle, as a fraction of its distance.
 const LENGTH = 0.13;        // Of a vehicle with its propellers, m.
 const SPIN = 25;            // Turning of drawn propellers, rad/s: real ones are too fast to be seen.
-const SAMPLES = 120;        // Points of a trail.
-const TRAIL_PERIOD = 0.25;  // Between two of them, s.
-const DETAILED = 20;        // Vehicles that are drawn with all details; more have only the large parts.
-const DETAIL = 0.008;       // Size of a part that is a detail, m.
+const TRAIL = 30;           // Length of a trail, s.
+const DETAIL = 0.0205;      // Size of a part that is a detail, m: only FEW vehicles have them.
+const FLAT = 0.002;         // Height of a box that is a rectangle then, m.
+export const FEW = 20;      // More vehicles are drawn with fewer triangles, trails with fewer points.
 const CONDITIONS = ["ground", "flight", "stale", "emergency"];
 // By a vehicle's condition, its number in the list above.
 const TINTS = ["#ffffff", "#ffffff", "#5b6068", "#ff4040"].map((text) => new THREE.Color(text));
@@ -23,16 +23,20 @@ export function label(text, kind) {
   return new CSS2DObject(element);
 }
 
+// Return the geometry of a primitive.
+function primitive(shape, size, isDetailed) {
+  if (shape === "sphere") return new THREE.SphereGeometry(size[0], 6, 4);
+  if (shape === "cylinder") return new THREE.CylinderGeometry(size[0], size[0], size[1], 10).rotateX(Math.PI / 2);
+  return isDetailed || size[2] > FLAT ? new THREE.BoxGeometry(...size) : new THREE.PlaneGeometry(size[0], size[1]);
+}
+
 // Return one geometry with the colors of several primitives: [shape, size, position, rpy, color].
-function merged(parts, sides) {
+function merged(parts, isDetailed) {
   const arrays = { position: [], normal: [], color: [] };
   for (const [shape, size, position, rpy, color] of parts) {
-    const made = shape === "box" ? new THREE.BoxGeometry(...size)
-      : shape === "cylinder" ? new THREE.CylinderGeometry(size[0], size[0], size[1], sides).rotateX(Math.PI / 2)
-      : new THREE.SphereGeometry(size[0], 6, 4);
-    made.applyMatrix4(new THREE.Matrix4().makeRotationFromEuler(new THREE.Euler(...rpy, "ZYX"))
+    const geometry = primitive(shape, size, isDetailed).toNonIndexed(), tint = new THREE.Color(...color.slice(0, 3));
+    geometry.applyMatrix4(new THREE.Matrix4().makeRotationFromEuler(new THREE.Euler(...rpy, "ZYX"))
       .setPosition(...position));
-    const geometry = made.toNonIndexed(), tint = new THREE.Color(...color.slice(0, 3));
     for (const name of ["position", "normal"]) arrays[name].push(...geometry.attributes[name].array);
     for (let k = 0; k < geometry.attributes.position.count; k++) arrays.color.push(tint.r, tint.g, tint.b);
   }
@@ -45,16 +49,15 @@ function merged(parts, sides) {
 // Return the body and the propellers of a vehicle's model: parts with the number of a propeller in
 // front (0 for the body), those of a propeller around the center of its hub.
 function bodyParts(model, isDetailed) {
-  const sides = isDetailed ? 10 : 4;
-  const of = (number) => model.filter((part) => part[0] === number).map((part) => part.slice(1))
-    .filter(([, size]) => isDetailed || Math.max(...size) > DETAIL);
-  const propellers = [1, 2, 3, 4].filter((number) => of(number).length).map((number) => {
-    const parts = of(number), center = parts[0][2];
-    const moved = parts.map(([shape, size, position, ...rest]) =>
-      [shape, size, position.map((value, k) => value - center[k]), ...rest]);
-    return { center: new THREE.Vector3(...center), geometry: merged(moved, sides) };
+  const of = (number, center) => merged(model
+    .filter(([each, , size]) => each === number && (isDetailed || Math.max(...size) > DETAIL))
+    .map(([, shape, size, position, ...rest]) =>
+      [shape, size, position.map((value, k) => value - center[k]), ...rest]), isDetailed);
+  const propellers = [1, 2, 3, 4].map((number) => {
+    const center = model.find(([each]) => each === number)[3];
+    return { center: new THREE.Vector3(...center), geometry: of(number, center) };
   });
-  return { body: merged(of(0), sides), propellers };
+  return { body: of(0, [0, 0, 0]), propellers };
 }
 
 // Where vehicles have been in the last half minute, as one object: it is drawn at once.
@@ -62,7 +65,8 @@ class Trails extends THREE.LineSegments {
   constructor(number) {
     super(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ vertexColors: true }));
     this.points = Array.from({ length: number }, () => []);
-    const vertices = Math.max(1, number) * (SAMPLES - 1) * 2;
+    this.samples = number > FEW ? 60 : 120;
+    const vertices = Math.max(1, number) * (this.samples - 1) * 2;
     this.geometry.setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(vertices * 3), 3));
     this.geometry.setAttribute("color", new THREE.Float32BufferAttribute(new Float32Array(vertices * 3), 3));
     this.frustumCulled = false;
@@ -72,13 +76,13 @@ class Trails extends THREE.LineSegments {
   extend(poses) {
     const now = performance.now() / 1000;
     if (now < this.next) return;
-    this.next = now + TRAIL_PERIOD;
+    this.next = now + TRAIL / this.samples;
     const { position, color } = this.geometry.attributes;
     let vertex = 0;
     poses.forEach((pose, i) => {
       const points = this.points[i];
       if (pose[0] !== null && pose[7] !== 2) points.push(pose.slice(0, 3));
-      if (points.length > SAMPLES) points.shift();
+      if (points.length > this.samples) points.shift();
       for (let k = 1; k < points.length; k++) {
         for (const point of [points[k - 1], points[k]]) {
           const fade = 0.25 + 0.75 * k / points.length;
@@ -99,12 +103,13 @@ export class Vehicles extends THREE.Group {
     super();
     this.names = names;
     this.poses = [];
-    const parts = bodyParts(model, names.length <= DETAILED);
-    const look = new THREE.MeshLambertMaterial({ vertexColors: true });
+    const isDetailed = names.length <= FEW;
+    const parts = bodyParts(model, isDetailed);
+    const look = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide });
     this.body = this.instances(parts.body, look);
     this.propellers = parts.propellers.map(({ center, geometry }) =>
       Object.assign(this.instances(geometry, look), { center }));
-    this.rings = this.instances(new THREE.RingGeometry(0.085, 0.1, 32),
+    this.rings = this.instances(new THREE.RingGeometry(0.085, 0.1, isDetailed ? 32 : 16),
       new THREE.MeshBasicMaterial({ side: THREE.DoubleSide }));
     this.references = this.instances(new THREE.OctahedronGeometry(0.018),
       new THREE.MeshBasicMaterial({ color: "#ffc857", wireframe: true, transparent: true, opacity: 0.5 }));
@@ -133,6 +138,7 @@ export class Vehicles extends THREE.Group {
     if (poses.length !== this.names.length) return;
     this.poses = poses;
     this.isTurning = poses.some((pose) => pose[7] === 1);
+    this.references.visible = poses.some((pose) => pose.length > 10);
     poses.forEach((pose, i) => {
       const element = this.tags[i].element;
       const text = pose[9] ? `${this.names[i]} · ${pose[9]}` : this.names[i];

@@ -1,5 +1,6 @@
 """The runner of missions: dry runs and flights of scripts and trajectories on a fake process."""
 
+import io
 import json
 import sys
 
@@ -98,6 +99,18 @@ def test_a_flight_prints_its_commands_once(run):
     # The formation, too, is made of moves; the last command is that of the with block.
     assert commands == ["takeoff: cf1", "go_to: cf1", "formation: cf1", "land: cf1"]
     assert output.startswith("    0.0 s  takeoff")
+
+
+def test_a_mission_goes_on_when_nothing_reads_its_output_any_more(run, monkeypatch, vehicle):
+    class Closed(io.StringIO):
+        def write(self, text):
+            raise BrokenPipeError
+
+    monkeypatch.setattr(sys, "stdout", Closed())
+    # Only the runner prints here.
+    status, _, errors = run("fly", "fleet.fly(mission)")
+    assert (status, errors) == (0, "")
+    assert vehicle.position == pytest.approx([0.5, 0.0, 0.0], abs=0.05)
 
 
 def test_why_a_flight_fails(run):

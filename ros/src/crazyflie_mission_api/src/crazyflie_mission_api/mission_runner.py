@@ -8,6 +8,7 @@ Its result is a line of JSON: {"dry_run": {"passed": bool, "text": str, "duratio
 {vehicle: [[x, y, z], ...]}}}.
 """
 
+import contextlib
 import json
 import os
 import runpy
@@ -43,7 +44,9 @@ class _Printer(MissionObserver):
         self._first = time if self._first is None else self._first
         count = len(vehicles)
         names = ", ".join(vehicles) if count <= _SHOWN_NAMES else f"{count} vehicles"
-        print(f"{time - self._first:7.1f} s  {command}: {names}", flush=True)
+        # Where the output leads to a program that has ended; the vehicles still have to land.
+        with contextlib.suppress(OSError):
+            print(f"{time - self._first:7.1f} s  {command}: {names}", flush=True)
 
 
 class _DryRunReport(MissionObserver):

@@ -14,6 +14,9 @@ if [ -f ~/my_workspace/devel/setup.bash ]; then source ~/my_workspace/devel/setu
 # in RViz and in real time, make it empty: QUICK=
 QUICK="rviz:=false sim_time:=true real_time_factor:=5 composed:=true simulator_dt:=0.01"
 
+# CMake 4 refuses Debian's catkin without it.
+export CMAKE_POLICY_VERSION_MINIMUM=3.5
+
 # build: ~/my_workspace, and this terminal knows what is new in it.
 build() { catkin_make -C ~/my_workspace && source ~/my_workspace/devel/setup.bash; }
 

@@ -10,29 +10,8 @@ from crazyflie_simulator.quadrotor_simulator_node import QuadrotorSimulatorNode
 from crazyflie_simulator.simulator_node import NearHoverSimulatorNode
 from crazyflie_utils.node import Node
 from crazyflie_utils.process import Process
-from crazyflie_utils.testing.fake_process import FakeProcess, FakeTransport
-from crazyflie_utils.timers import Timer
-
-
-class ClockedProcess(FakeProcess):
-    """A fake process whose simulator sets the clock, one tick per call of `tick`."""
-
-    def __init__(self):
-        super().__init__(start=0.0)
-        self.steady_timers = []
-
-    def add_timer(self, period, work, steady=False, stagger=False, align_phase=False):
-        """Keep timers by the machine's clock, to be fired by `tick`."""
-        if not steady:
-            return super().add_timer(period, work)
-        timer = Timer(period, work, now=0.0)
-        self.steady_timers.append((period, timer.fire))
-        return timer
-
-    def tick(self):
-        """Fire the timers by the machine's clock."""
-        for _, work in self.steady_timers:
-            self.executor.submit(work)
+from crazyflie_utils.testing import FakeProcess
+from crazyflie_utils.testing.fake_transport import FakeTransport
 
 
 class ThrustProfile(Node):
@@ -52,8 +31,11 @@ class ThrustProfile(Node):
 
 
 def clocked(node_class=NearHoverSimulatorNode, **changes):
-    """Return a process in which a thrust profile flies a simulator that sets the clock."""
-    process = ClockedProcess()
+    """Return a process in which a thrust profile flies a simulator that sets the clock.
+
+    Only the machine's time is moved by hand.
+    """
+    process = FakeProcess(start=0.0)
     parameters = {**PARAMETERS, "clock/publish": True, **changes}
     assert process.launch(node_class(), "/simulator", parameters)
     assert process.launch(ThrustProfile(), "/thrust_profile")
@@ -65,8 +47,7 @@ def clocked(node_class=NearHoverSimulatorNode, **changes):
 def test_two_runs_with_the_same_controls_are_the_same_to_the_bit(node_class, time_step):
     def fly():
         process = clocked(node_class, time_step=time_step, **{"mocap/position_noise": 1e-3})
-        for _ in range(round(2.0 / time_step)):
-            process.tick()
+        process.advance_machine(2.0)
         return transforms(process)
 
     first = fly()
@@ -77,8 +58,7 @@ def test_two_runs_with_the_same_controls_are_the_same_to_the_bit(node_class, tim
 def test_the_clock_s_rate_does_not_change_the_flight():
     def poses(**changes):
         process = clocked(QuadrotorSimulatorNode, **changes)
-        while process.clock.time() < 1.9995:
-            process.tick()
+        process.advance_machine(2.0)
         return {transform.header.stamp: transform for transform in transforms(process)}
 
     fine, coarse = poses(time_step=0.001), poses(time_step=0.01)
@@ -88,8 +68,7 @@ def test_the_clock_s_rate_does_not_change_the_flight():
 
 def test_every_tick_moves_the_clock_by_a_time_step():
     process = clocked()
-    for _ in range(250):
-        process.tick()
+    process.advance_machine(2.5)
     times = [message.clock.to_sec() for message in process.published("/clock")]
     assert times == pytest.approx([0.01 * k for k in range(1, 251)], abs=1e-9)
     assert process.clock.time() == pytest.approx(2.5)
@@ -100,15 +79,21 @@ def test_a_pose_is_out_before_its_time():
     process = clocked()
     poses_at = {}
     process.clock.on_change(lambda now, _: poses_at.update({now: len(transforms(process))}))
-    for _ in range(5):
-        process.tick()
+    process.advance_machine(0.05)
     assert list(poses_at.values()) == [1, 2, 3, 4, 5]
 
 
-@pytest.mark.parametrize(("factor", "period"), [(1.0, 0.01), (4.0, 0.0025), (0.5, 0.02), (0, 0.0)])
-def test_the_real_time_factor_is_how_often_the_clock_ticks(factor, period):
-    ((actual, _),) = clocked(**{"clock/real_time_factor": factor}).steady_timers
-    assert actual == pytest.approx(period)
+@pytest.mark.parametrize(("factor", "count"), [(1.0, 10), (4.0, 40), (0.5, 5)])
+def test_the_real_time_factor_is_how_often_the_clock_ticks(factor, count):
+    process = clocked(**{"clock/real_time_factor": factor})
+    process.advance_machine(0.1)
+    assert len(process.published("/clock")) == count
+
+
+def test_without_a_real_time_factor_the_clock_ticks_as_fast_as_the_machine_can():
+    process = clocked(**{"clock/real_time_factor": 0})
+    process.advance_machine(0.01)
+    assert process.clock.time() > 0.1
 
 
 def test_a_clock_needs_simulated_time():
@@ -122,8 +107,7 @@ def test_lives_by_the_clock_of_another():
     process = clocked()
     parameters = {**PARAMETERS, "frames/robot": "other", "topics/control": "/other/control"}
     assert process.launch(QuadrotorSimulatorNode(), "/other", parameters)
-    for _ in range(10):
-        process.tick()
+    process.advance_machine(0.1)
     stamps = {}
     for transform in transforms(process):
         stamps.setdefault(transform.child_frame_id, []).append(transform.header.stamp)

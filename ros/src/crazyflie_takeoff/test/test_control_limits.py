@@ -3,7 +3,7 @@
 import math
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUST
@@ -11,7 +11,7 @@ from crazyflie_takeoff.callers import MEMORY, Callers
 from crazyflie_takeoff.control_limits import ClimbLimit, RunGaps, in_range
 from crazyflie_takeoff.limits import Box, Limits, Walls
 from crazyflie_takeoff.motion import Delay, Motion
-from crazyflie_takeoff.safe_control import Setpoint
+from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_SUBSTITUTE, Setpoint
 
 G = 9.81
 ANY = st.floats(allow_nan=False, allow_infinity=False)
@@ -61,6 +61,23 @@ def test_speeds_do_not_add_up_over_long_gaps():
     )
     assert gaps.apply(Setpoint(0.0, 0.0, 0.0, MAX_THRUST), G, climb=0.8).thrust < G
     assert gaps.apply(Setpoint(0.0, 0.0, 0.0, MIN_THRUST), G, climb=-0.8).thrust > G
+
+
+@given(
+    st.floats(0.01, 1.0),
+    st.floats(-20.0, 20.0),
+    st.floats(0.75 * G, 1.25 * G),
+    st.floats(MIN_THRUST, MAX_THRUST),
+)
+@example(0.25, -3.0, G, 11.0)  # Within the gap the fall would end with 2 g,
+@example(0.25, 3.0, G, 11.0)  # and the climb with less than no thrust.
+def test_no_speed_is_ended_with_a_thrust_that_the_filter_does_not_give(gap, climb, hover, thrust):
+    gaps = RunGaps()
+    gaps.run(1.0)
+    gaps.run(1.0 + gap)
+    result = gaps.apply(Setpoint(0.0, 0.0, 0.0, thrust), hover, climb).thrust
+    assert MIN_THRUST <= result <= max(thrust, MAX_SUBSTITUTE)
+    assert result >= min(thrust, hover - MAX_BRAKING)
 
 
 @pytest.mark.parametrize(

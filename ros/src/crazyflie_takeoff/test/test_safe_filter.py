@@ -131,6 +131,7 @@ EVENTS = st.lists(
 @given(EVENTS)
 @example([DESCENDING, (0.0, 1.0), "commanded"])
 @example(["toggle", (0.0, 0.0), (0.0, -2.0), 6, 0.5])
+@example(["toggle", (0.0, 0.0), 1, 0.5, (0.0, -2.0), "commanded"])
 def test_whatever_happens_when(events):
     """Random messages, services and clocks: what must hold of all that is published."""
     control_filter = SafeFilter(TIMEOUTS, LIMITS)

@@ -1,5 +1,7 @@
 """The fake process against what a real one would do."""
 
+from concurrent.futures import Future
+
 import genpy
 import pytest
 from std_msgs.msg import Float64, String
@@ -92,11 +94,64 @@ def test_log_by_level(process):
     assert process.logged("error") == []
 
 
-def test_the_machines_time_is_moved_by_hand_too(process):
-    calls = []
-    process.handle("/node").timer(1.0, lambda: calls.append(process.clock.time()), steady=True)
+@pytest.fixture
+def ticks(process):
+    """Return the times at which a timer by each clock fires."""
+    fired = {"simulated": [], "machine": []}
+    for name, clock in (("simulated", process.clock), ("machine", process.machine_clock)):
+        process.handle("/node").timer(
+            1.0, lambda name=name, clock=clock: fired[name].append(clock.time()), name == "machine"
+        )
+    return fired
+
+
+def test_time_passes_by_both_clocks(process, ticks):
     process.advance(2.5)
-    assert calls == pytest.approx([101.0, 102.0])
+    assert ticks == {"simulated": [101.0, 102.0], "machine": [101.0, 102.0]}
+
+
+def test_the_machine_s_time_passes_while_simulated_time_stands(process, ticks):
+    process.advance_machine(2.5)
+    assert ticks == {"simulated": [], "machine": [101.0, 102.0]}
+    process.advance(0.5)
+    assert ticks == {"simulated": [], "machine": [101.0, 102.0, 103.0]}
+
+
+def test_simulated_time_that_jumps_or_is_reset_moves_no_machine_s_timer(process, ticks):
+    process.advance(0.9)
+    process.clock.set(150.0)
+    process.clock.set(0.0)
+    assert ticks == {"simulated": [150.0], "machine": []}
+    process.advance(0.2)
+    assert ticks == {"simulated": [150.0], "machine": [101.0]}
+
+
+def test_a_timer_as_fast_as_the_machine_ends_with_the_time(process):
+    fired = []
+    process.handle("/node").timer(0.0, lambda: fired.append(1), steady=True)
+    process.advance_machine(0.01)
+    assert len(fired) > 10
+
+
+def test_a_call_that_is_not_answered_fails_by_the_machine_s_time(process):
+    handle = process.handle("/node")
+    handle.advertise_service("/slow", Trigger, lambda request: Future())
+    answer = handle.call_service("/slow", Trigger, None, 2.0)
+    process.clock.set(200.0)
+    process.advance_machine(1.9)
+    assert not answer.done()
+    process.advance_machine(0.2)
+    assert str(answer.exception(0.0)) == "/slow has not answered within 2 s"
+
+
+def test_a_late_answer_comes_before_the_limit(process):
+    handle, slow = process.handle("/node"), Future()
+    handle.advertise_service("/slow", Trigger, lambda request: slow)
+    answer = handle.call_service("/slow", Trigger, None, 2.0)
+    process.advance(1.0)
+    slow.set_result(TriggerResponse(message="done"))
+    process.advance(5.0)
+    assert answer.result(0.0).message == "done"
 
 
 def test_time_never_steps_back(process):

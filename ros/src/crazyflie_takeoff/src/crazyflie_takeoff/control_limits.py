@@ -6,7 +6,7 @@ from crazyflie_model.limits import MAX_THRUST, MAX_TILT, MAX_YAW_RATE, MIN_THRUS
 from crazyflie_model.units import GRAVITY
 from crazyflie_takeoff.limits import Debounce
 from crazyflie_takeoff.motion import Motion
-from crazyflie_takeoff.safe_control import Setpoint, limited
+from crazyflie_takeoff.safe_control import MAX_BRAKING, MAX_SUBSTITUTE, Setpoint, limited
 
 CLIMB_RESPONSE = 0.1  #: Time constant at which a climb approaches its limit, s.
 CLIMB_BRAKING = 4.0  #: Deceleration below the highest place, m/s^2.
@@ -124,7 +124,8 @@ class RunGaps:
         """Return what is passed on of a control.
 
         ``hover`` is the thrust that carries the weight, m/s^2; ``climb`` is z_dot, m/s, which may
-        be ended within a gap; 0 if it is not known. Of a control that may be of a landing's ramp
+        be ended within a gap; 0 if it is not known. A fall is ended with `MAX_SUBSTITUTE` and a
+        climb with `MAX_BRAKING` at most. Of a control that may be of a landing's ramp
         (``is_ramp``), only what is above hover is limited.
         """
         if self._longest <= 0.0:
@@ -132,8 +133,9 @@ class RunGaps:
         tilt = math.atan(MAX_SPEED_CHANGE / self._longest / GRAVITY)
         is_busy = self._longest > BUSY_GAP
         rising, sinking = (climb, -climb) if is_busy else (min(climb, 0.0), min(-climb, 0.0))
-        most = hover + (MAX_SPEED_CHANGE - rising) / self._longest
-        least = hover - (MAX_SPEED_CHANGE - sinking) / self._longest
+        most = hover + max((MAX_SPEED_CHANGE - rising) / self._longest, -MAX_BRAKING)
+        most = max(most, MIN_THRUST)
+        least = min(hover - (MAX_SPEED_CHANGE - sinking) / self._longest, MAX_SUBSTITUTE)
         return Setpoint(
             limited(control.roll, tilt),
             limited(control.pitch, tilt),

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable
 from operator import attrgetter
 
-from crazyflie_utils.clock import SteadyClock
+from crazyflie_utils.clock import SimulatedClock, SteadyClock
 from crazyflie_utils.executor import Executor
 
 #: A timer is due this much early, s: more than the rounding of a float that holds the seconds since
@@ -230,7 +230,7 @@ class VaryingTimer:
 class SteadyTimers:
     """A thread that runs a queue of timers by a steady clock."""
 
-    def __init__(self, queue: TimerQueue, clock: SteadyClock):
+    def __init__(self, queue: TimerQueue, clock: SteadyClock | SimulatedClock):
         self._queue = queue
         self._clock = clock
         # Released when there is anything new. Waiting for a bare lock costs half of what it

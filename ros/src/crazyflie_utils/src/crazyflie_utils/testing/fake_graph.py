@@ -10,8 +10,9 @@ from typing import Any
 import genpy
 
 from crazyflie_utils.node import Node
-from crazyflie_utils.testing.fake_process import FakeProcess, FakeSubscriber, FakeTransport
-from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError
+from crazyflie_utils.testing.fake_process import FakeProcess, pass_time
+from crazyflie_utils.testing.fake_transport import FakeSubscriber, FakeTransport, refuse
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber
 
 Deliver = Callable[[Any], None]
 
@@ -61,7 +62,7 @@ class FakeGraph:
         """Let a frozen process go on, with the messages that have waited."""
         process = self._processes[name]
         process.is_frozen = False
-        process.clock.set(self.time)
+        process.move_to(self.time)
         while process.waiting:
             deliver, message = process.waiting.pop(0)
             deliver(message)
@@ -92,31 +93,30 @@ class FakeGraph:
             for name, service_type in process.transport.service_types.items()
         }
 
-    def call(self, service: str, request: genpy.Message) -> Future[Any]:
-        """Call a service; the future may never be done when its process dies."""
+    def find_service(self, service: str) -> Callable[[Any], Future[Any]]:
+        """Return what serves calls of a service, of any process that is not frozen."""
         for process in self._processes.values():
             if service in process.transport.services and not process.is_frozen:
-                return process.transport.services[service](request)
-        outcome: Future[Any] = Future()
-        outcome.set_exception(ServiceError(f"there is no service {service}"))
-        return outcome
+                return process.transport.services[service]
+        return refuse(service)
+
+    def call(self, service: str, request: genpy.Message) -> Future[Any]:
+        """Call a service; the future may never be done when its process dies."""
+        return self.find_service(service)(request)
 
     def advance(self, duration: float) -> None:
         """Let time pass (s), stopping at every timer's deadline."""
-        end = self.time + duration
-        while True:
-            awake = [each for each in self._processes.values() if not each.is_frozen]
-            deadline = min((each.next_simulated_deadline() for each in awake), default=math.inf)
-            if deadline > end + 1e-9:
-                break
-            self._move_to(max(deadline, self.time))
-        self._move_to(max(end, self.time))
+        pass_time(duration, lambda: self.time, self._next_deadline, self._move_to)
+
+    def _next_deadline(self):
+        awake = [each for each in self._processes.values() if not each.is_frozen]
+        return min((each.next_deadline() for each in awake), default=math.inf)
 
     def _move_to(self, time):
         self.time = time
         for process in list(self._processes.values()):
             if not process.is_frozen and process.name in self._processes:
-                process.clock.set(time)
+                process.move_to(time)
 
     # What the transports need.
 
@@ -183,7 +183,7 @@ class _GraphProcess(FakeProcess):
             return
         # Whose turn it is to wake up at this moment is chance.
         if self.clock.time() != self.transport.graph.time:
-            self.clock.set(self.transport.graph.time)
+            self.move_to(self.transport.graph.time)
         deliver(message)
 
 
@@ -228,10 +228,8 @@ class _GraphTransport(FakeTransport):
             lambda: self.graph.publishes(topic, self.name), lambda: subscribers.remove(deliver)
         )
 
-    def call_service(
-        self, name: str, service_type: type, request: Any, limit: float
-    ) -> Future[Any]:
-        return self.graph.call(name, request)
+    def find_service(self, name: str) -> Callable[[Any], Future[Any]]:
+        return self.graph.find_service(name)
 
     def log(self, level: str, text: str) -> None:
         super().log(level, text)

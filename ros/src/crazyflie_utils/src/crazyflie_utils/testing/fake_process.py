@@ -1,156 +1,30 @@
 """A process without ROS, for unit tests: parameters in a dict, time by hand."""
 
-import io
-import math
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Any
 
 import genpy
 from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.srv import ReconfigureRequest
-from typing_extensions import override
 
 from crazyflie_utils.clock import SimulatedClock
 from crazyflie_utils.node import Node
 from crazyflie_utils.process import Process
-from crazyflie_utils.timers import Timer
-from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
+from crazyflie_utils.testing.fake_transport import FakeTransport
+from crazyflie_utils.timers import SteadyTimers, TimerQueue
 
-
-class _Record(ExternalPublisher):
-    def __init__(self) -> None:
-        self.messages: list[genpy.Message] = []
-
-    def has_subscribers(self) -> bool:
-        return True
-
-    def publish(self, *messages: genpy.Message) -> None:
-        for message in messages:
-            # What cannot be sent must fail here as it would on a wire.
-            message.serialize(io.BytesIO())
-            self.messages.append(message)
-
-    def close(self) -> None:
-        pass
-
-
-class FakeSubscriber(ExternalSubscriber):
-    """A subscription that asks and closes by functions."""
-
-    def __init__(self, is_published: Callable[[], bool], close: Callable[[], None]):
-        self._is_published = is_published
-        self._close = close
-
-    @override
-    def has_publishers(self) -> bool:
-        return self._is_published()
-
-    @override
-    def close(self) -> None:
-        self._close()
-
-
-class FakeTransport(Transport):
-    """An outside world that remembers everything and does nothing by itself.
-
-    Every topic that is subscribed has publishers there, but for those in ``unpublished``.
-    ``foreign_services`` are those of other processes, name -> node.
-    """
-
-    def __init__(self, parameters: dict[str, object]):
-        self.parameters = dict(parameters)
-        self.publishers: dict[str, _Record] = {}
-        self.subscribers: dict[str, list[Callable[[Any], None]]] = {}
-        self.unpublished: set[str] = set()
-        self.services: dict[str, Callable[[Any], Future[Any]]] = {}
-        self.service_types: dict[str, type] = {}
-        self.foreign_services: dict[str, str] = {}
-        self.log_records: list[tuple[str, str]] = []
-
-    def remap(self, name: str) -> str:
-        """Return ``name``: nothing is remapped."""
-        return name
-
-    def get_param(self, name: str) -> Any:
-        """Return an entry of ``parameters``, or those below a namespace."""
-        if name in self.parameters:
-            return self.parameters[name]
-        below = {
-            key.removeprefix(f"{name}/"): value
-            for key, value in self.parameters.items()
-            if key.startswith(f"{name}/")
-        }
-        if not below:
-            raise KeyError(name)
-        return _tree(below)
-
-    def set_param(self, name: str, value: Any) -> None:
-        """Set an entry of ``parameters``; a dictionary is a namespace, as with ROS."""
-        if not isinstance(value, dict):
-            self.parameters[name] = value
-            return
-        for key, item in value.items():
-            self.set_param(f"{name}/{key}", item)
-
-    def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
-        """Return a publisher that keeps the messages."""
-        return self.publishers.setdefault(topic, _Record())
-
-    def subscribe(
-        self, topic: str, message_type: type, deliver: Callable[[Any], None]
-    ) -> ExternalSubscriber:
-        """Keep ``deliver`` for `FakeProcess.publish`."""
-        subscribers = self.subscribers.setdefault(topic, [])
-        subscribers.append(deliver)
-        return FakeSubscriber(
-            lambda: topic not in self.unpublished, lambda: subscribers.remove(deliver)
-        )
-
-    def advertise_service(
-        self,
-        name: str,
-        service_type: type,
-        serve: Callable[[Any], Future[Any]],
-        time: Callable[[], float],
-    ) -> Callable[[], None]:
-        """Keep ``serve`` for `FakeProcess.call`."""
-        self.services[name] = serve
-        self.service_types[name] = service_type
-
-        def withdraw() -> None:
-            del self.services[name], self.service_types[name]
-
-        return withdraw
-
-    def call_service(
-        self, name: str, service_type: type, request: Any, limit: float
-    ) -> Future[Any]:
-        """Call a service of this process; fail when there is none."""
-        if name in self.services:
-            return self.services[name](request)
-        future: Future[Any] = Future()
-        future.set_exception(ServiceError(f"there is no service {name}"))
-        return future
-
-    def service_nodes(self) -> dict[str, str]:
-        """Return the services of this process and ``foreign_services``."""
-        return dict.fromkeys(self.services, "/this_process") | self.foreign_services
-
-    def log(self, level: str, text: str) -> None:
-        """Keep the record."""
-        self.log_records.append((level, text))
-
-    def clock_was_set(self, stamp: genpy.Time) -> None:
-        """Do nothing."""
+#: How often a timer of period 0, which the machine fires as often as it can, fires here, s.
+_SHORTEST_PERIOD = 1e-4
 
 
 class FakeProcess(Process):
     """A process for tests: the real node handle, executor, timers and tf buffer.
 
     The parameters are full name to raw value, such as {"/simulator/time_step": 0.01}; a
-    ``transport`` takes the place of one with them. ``start`` is the simulated time at the
-    beginning, s.
+    ``transport`` takes the place of one with them. ``start`` is the time at the beginning, s, of
+    both clocks: ``clock`` is simulated time, and ``machine_clock`` that of the machine, by which
+    ``steady`` timers and the limits of calls go. `advance` moves both, `advance_machine` and
+    ``clock.set`` one of them.
     """
 
     transport: FakeTransport
@@ -164,6 +38,13 @@ class FakeProcess(Process):
     ):
         super().__init__(transport or FakeTransport(parameters or {}), use_sim_time=True)
         self.clock.set(start)
+        self.machine_clock = SimulatedClock()
+        self.machine_clock.set(start)
+        tf = self.transforms.gather, self.transforms.send_gathered
+        self._machine_queue = TimerQueue(self.executor, *tf)
+        self.machine_clock.on_change(lambda now, _: self._machine_queue.run_due(now))
+        self._steady = SteadyTimers(self._machine_queue, self.machine_clock)
+        self.transport.machine_timers = self._steady
         self.executor.start()
 
     def launch(self, node: Node, name: str, parameters: dict[str, object] | None = None) -> bool:
@@ -174,17 +55,6 @@ class FakeProcess(Process):
         # As work: a latched message must wait until the node is complete.
         self.executor.submit(lambda: outcome.append(node.initialize(self.handle(name))))
         return outcome[0]
-
-    def add_timer(
-        self,
-        period: float,
-        work: Callable[[], None],
-        steady: bool = False,
-        stagger: bool = False,
-        align_phase: bool = False,
-    ) -> Timer:
-        """Add a timer; the machine's time, too, is moved by hand here."""
-        return super().add_timer(period, work, stagger=stagger, align_phase=align_phase)
 
     def publish(self, topic: str, message: genpy.Message) -> None:
         """Publish from outside the process."""
@@ -212,26 +82,40 @@ class FakeProcess(Process):
         return [text for logged_at, text in self.transport.log_records if logged_at == level]
 
     def advance(self, duration: float) -> None:
-        """Let time pass (s), stopping at every timer's deadline."""
-        end = self.clock.time() + duration
-        while True:
-            deadline = self.next_simulated_deadline()
-            if math.isinf(deadline) or deadline > end + 1e-9:
-                break
-            self.clock.set(max(deadline, self.clock.time()))
-        # A deadline may be past the end by a rounding error: no step back then.
-        self.clock.set(max(end, self.clock.time()))
+        """Let time pass (s), by both clocks, stopping at every timer's deadline."""
+        pass_time(duration, self.clock.time, self.next_deadline, self.move_to)
+
+    def advance_machine(self, duration: float) -> None:
+        """Let the machine's time pass (s), while simulated time is not published."""
+        machine = self.machine_clock
+        pass_time(duration, machine.time, self._machine_queue.next_deadline, machine.set)
+
+    def next_deadline(self) -> float:
+        """Return when the next timer of either clock is due, in simulated time (s)."""
+        ahead = self.machine_clock.time() - self.clock.time()
+        return min(self.next_simulated_deadline(), self._machine_queue.next_deadline() - ahead)
+
+    def move_to(self, moment: float) -> None:
+        """Move both clocks, at once, until simulated time is ``moment`` (s)."""
+        ahead = self.machine_clock.time() - self.clock.time()
+        self.clock.set(moment)
+        self.machine_clock.set(moment + ahead)
 
 
-def _tree(leaves):
-    tree: dict[str, Any] = {}
-    for name, value in leaves.items():
-        *folders, leaf = name.split("/")
-        branch = tree
-        for folder in folders:
-            branch = branch.setdefault(folder, {})
-        branch[leaf] = value
-    return tree
+def pass_time(
+    duration: float,
+    time: Callable[[], float],
+    next_deadline: Callable[[], float],
+    move_to: Callable[[float], None],
+) -> None:
+    """Move ``time()`` on by a duration (s), with a stop at each deadline."""
+    end = time() + duration
+    while time() < end:
+        deadline = next_deadline()
+        if deadline <= time():
+            deadline = time() + _SHORTEST_PERIOD
+        # A deadline may be past the end by a rounding error: it is no step back then.
+        move_to(deadline if deadline < end + 1e-9 else end)
 
 
 def _named(things, name, kind):

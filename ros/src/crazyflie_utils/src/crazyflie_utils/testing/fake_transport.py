@@ -1,0 +1,183 @@
+"""The world outside a process, for unit tests."""
+
+import io
+from collections.abc import Callable
+from concurrent.futures import Future, InvalidStateError
+from contextlib import suppress
+from typing import Any
+
+import genpy
+from typing_extensions import override
+
+from crazyflie_utils.timers import SteadyTimers
+from crazyflie_utils.transport import ExternalPublisher, ExternalSubscriber, ServiceError, Transport
+
+
+class _Record(ExternalPublisher):
+    def __init__(self) -> None:
+        self.messages: list[genpy.Message] = []
+
+    def has_subscribers(self) -> bool:
+        return True
+
+    def publish(self, *messages: genpy.Message) -> None:
+        for message in messages:
+            # What cannot be sent must fail here as it would on a wire.
+            message.serialize(io.BytesIO())
+            self.messages.append(message)
+
+    def close(self) -> None:
+        pass
+
+
+class FakeSubscriber(ExternalSubscriber):
+    """A subscription that asks and closes by functions."""
+
+    def __init__(self, is_published: Callable[[], bool], close: Callable[[], None]):
+        self._is_published = is_published
+        self._close = close
+
+    @override
+    def has_publishers(self) -> bool:
+        return self._is_published()
+
+    @override
+    def close(self) -> None:
+        self._close()
+
+
+class FakeTransport(Transport):
+    """An outside world that remembers everything and does nothing by itself.
+
+    Every topic that is subscribed has publishers there, but for those in ``unpublished``.
+    ``foreign_services`` are those of other processes, name -> node. ``machine_timers`` measure how
+    long the calls of services take; without them, these have no limit.
+    """
+
+    machine_timers: SteadyTimers | None = None
+
+    def __init__(self, parameters: dict[str, object]):
+        self.parameters = dict(parameters)
+        self.publishers: dict[str, _Record] = {}
+        self.subscribers: dict[str, list[Callable[[Any], None]]] = {}
+        self.unpublished: set[str] = set()
+        self.services: dict[str, Callable[[Any], Future[Any]]] = {}
+        self.service_types: dict[str, type] = {}
+        self.foreign_services: dict[str, str] = {}
+        self.log_records: list[tuple[str, str]] = []
+
+    def remap(self, name: str) -> str:
+        """Return ``name``: nothing is remapped."""
+        return name
+
+    def get_param(self, name: str) -> Any:
+        """Return an entry of ``parameters``, or those below a namespace."""
+        if name in self.parameters:
+            return self.parameters[name]
+        below = {
+            key.removeprefix(f"{name}/"): value
+            for key, value in self.parameters.items()
+            if key.startswith(f"{name}/")
+        }
+        if not below:
+            raise KeyError(name)
+        return _tree(below)
+
+    def set_param(self, name: str, value: Any) -> None:
+        """Set an entry of ``parameters``; a dictionary is a namespace, as with ROS."""
+        if not isinstance(value, dict):
+            self.parameters[name] = value
+            return
+        for key, item in value.items():
+            self.set_param(f"{name}/{key}", item)
+
+    def advertise(self, topic: str, message_type: type, latch: bool) -> ExternalPublisher:
+        """Return a publisher that keeps the messages."""
+        return self.publishers.setdefault(topic, _Record())
+
+    def subscribe(
+        self, topic: str, message_type: type, deliver: Callable[[Any], None]
+    ) -> ExternalSubscriber:
+        """Keep ``deliver`` for `FakeProcess.publish`."""
+        subscribers = self.subscribers.setdefault(topic, [])
+        subscribers.append(deliver)
+        return FakeSubscriber(
+            lambda: topic not in self.unpublished, lambda: subscribers.remove(deliver)
+        )
+
+    def advertise_service(
+        self,
+        name: str,
+        service_type: type,
+        serve: Callable[[Any], Future[Any]],
+        time: Callable[[], float],
+    ) -> Callable[[], None]:
+        """Keep ``serve`` for `FakeProcess.call`."""
+        self.services[name] = serve
+        self.service_types[name] = service_type
+
+        def withdraw() -> None:
+            del self.services[name], self.service_types[name]
+
+        return withdraw
+
+    def call_service(
+        self, name: str, service_type: type, request: Any, limit: float
+    ) -> Future[Any]:
+        """Call a service; fail when there is none, or when it does not answer in time."""
+        answer = self.find_service(name)(request)
+        if answer.done() or self.machine_timers is None:
+            return answer
+        reply: Future[Any] = Future()
+        text = f"{name} has not answered within {limit:g} s"
+        timer = self.machine_timers.add(limit, lambda: _fail(reply, text))
+        reply.add_done_callback(lambda _: timer.stop())
+        answer.add_done_callback(lambda _: _copy(answer, reply))
+        return reply
+
+    def find_service(self, name: str) -> Callable[[Any], Future[Any]]:
+        """Return what serves calls of a service of this process."""
+        return self.services.get(name, refuse(name))
+
+    def service_nodes(self) -> dict[str, str]:
+        """Return the services of this process and ``foreign_services``."""
+        return dict.fromkeys(self.services, "/this_process") | self.foreign_services
+
+    def log(self, level: str, text: str) -> None:
+        """Keep the record."""
+        self.log_records.append((level, text))
+
+    def clock_was_set(self, stamp: genpy.Time) -> None:
+        """Do nothing."""
+
+
+def refuse(service: str) -> Callable[[Any], Future[Any]]:
+    """Return what answers the calls of a service that is not there."""
+    refusal: Future[Any] = Future()
+    refusal.set_exception(ServiceError(f"there is no service {service}"))
+    return lambda request: refusal
+
+
+def _fail(reply, text):
+    with suppress(InvalidStateError):
+        reply.set_exception(ServiceError(text))
+
+
+def _copy(answer, reply):
+    if reply.done():
+        return
+    if answer.exception() is None:
+        reply.set_result(answer.result())
+    else:
+        reply.set_exception(answer.exception())
+
+
+def _tree(leaves):
+    tree: dict[str, Any] = {}
+    for name, value in leaves.items():
+        *folders, leaf = name.split("/")
+        branch = tree
+        for folder in folders:
+            branch = branch.setdefault(folder, {})
+        branch[leaf] = value
+    return tree

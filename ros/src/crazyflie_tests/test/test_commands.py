@@ -5,6 +5,7 @@ import threading
 from concurrent.futures import ThreadPoolExecutor, wait
 
 import pytest
+import workspaces
 from pages import PAGES, Page
 from reader import Reader
 from workspaces import INSTALLATION, TOP
@@ -34,13 +35,14 @@ def length(path):
     return sum(len(block.commands) for block in blocks if block.comment.startswith("run"))
 
 
-def in_turns():
+def in_turns(paths):
     """Return lists of pages: two programs must not build one workspace at a time."""
-    pages = {path: Page(path) for path in sorted(PAGES_WITH_COMMANDS, key=length, reverse=True)}
+    pages = {path: Page(path) for path in sorted(paths, key=length, reverse=True)}
+    quick = [p for p in pages if p in QUICK]
     changing = [p for p in pages if any(b.comment == "apply" for b in pages[p].blocks)]
-    calling = [p for p in pages if p not in changing and calls_run(pages[p])]
-    others = [p for p in pages if p not in changing and p not in calling]
-    return [calling, *([path] for path in changing[:-1]), [*changing[-1:], *others]]
+    calling = [p for p in pages if p not in quick + changing and calls_run(pages[p])]
+    others = [p for p in pages if p not in quick + changing + calling]
+    return [quick + calling, *([path] for path in changing[:-1]), changing[-1:] + others]
 
 
 AT_A_TIME = 2
@@ -49,10 +51,11 @@ AT_A_TIME = 2
 QUICK = [
     TOP / "README.md",
     TOP / "docs" / "software_example.md",
-    min((TOP / "docs" / "course").glob("[0-9]*.md")),
+    TOP / "docs" / "course" / "02_a_package.md",
 ]
-"""Pages that are followed in each run of the tests, beside the one of the installation. What the
-others name is tested where it is made, and that they name it rightly, in test_pages.py."""
+"""Pages that are followed in each run of the tests, beside the one of the installation. They change
+nothing of the workspace, so they are followed in a view of it, and nothing is built for them. What
+the others name is tested where it is made, and that they name it rightly, in test_pages.py."""
 
 VIRTUAL_VEHICLE = "virtual_"
 """What pages type that launch it. Its ports can be used by one of them at a time."""
@@ -71,25 +74,32 @@ def cases():
     ]
 
 
+def chosen_pages(items):
+    """Return the pages that tests follow; all for the picture of the graph tested alone."""
+    name = test_commands_of_a_page.__name__
+    chosen = [item.callspec.params["path"] for item in items if item.originalname == name]
+    return chosen or PAGES_WITH_COMMANDS
+
+
 @pytest.fixture(scope="module")
-def followed(workspace, request, tmp_path_factory):
+def followed(request, tmp_path_factory):
     """Return the pages to test, each with a future that is done when it has been followed."""
     ports = threading.Lock()
-    params = [getattr(item, "callspec", None) for item in request.session.items]
-    # The picture of the graph, if it is tested alone, needs them all.
-    chosen = [spec.params["path"] for spec in params if spec and "path" in spec.params]
-    chosen = chosen or PAGES_WITH_COMMANDS
+    chosen = chosen_pages(request.session.items)
+    view = workspaces.view(tmp_path_factory.mktemp("view"))
+    copy = None if set(chosen) <= set(QUICK) else request.getfixturevalue("workspace")
 
     def follow(path):
         page = Page(path)
+        top = view if path in QUICK else copy
         if types(page, VIRTUAL_VEHICLE):
             with ports:
-                read(page)
+                read(page, top)
         else:
-            read(page)
+            read(page, top)
 
-    def read(page):
-        reader = Reader(workspace, tmp_path_factory.mktemp("home"))
+    def read(page, top):
+        reader = Reader(top, tmp_path_factory.mktemp("home"))
         try:
             reader.follow(page)
         finally:
@@ -97,16 +107,16 @@ def followed(workspace, request, tmp_path_factory):
 
     with ThreadPoolExecutor(AT_A_TIME) as executor:
         futures = {}
-        for pages in in_turns():
+        for pages in in_turns(chosen):
             wait(futures.values())
-            futures |= {path: executor.submit(follow, path) for path in pages if path in chosen}
+            futures |= {path: executor.submit(follow, path) for path in pages}
         yield futures
 
 
-def test_commands_of_the_installation(workspace):
-    # They are what has made the workspace.
-    for space in ("devel", "install"):
-        assert (workspace / "ros" / space / "setup.bash").is_file()
+def test_only_pages_whose_commands_are_tested_are_followed(request):
+    # Tests of other modules have pages as parameters, too.
+    tested = [item for item in request.session.items if "test_commands_of_a_page[" in item.name]
+    assert not tested or len(chosen_pages(request.session.items)) == len(tested)
 
 
 @pytest.mark.parametrize("path", cases())

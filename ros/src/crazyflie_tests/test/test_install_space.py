@@ -50,6 +50,12 @@ def terminal(workspace, install_space, shell):
         yield terminal
 
 
+def test_commands_of_the_installation(workspace):
+    # They are what has made the workspace.
+    for space in ("devel", "install"):
+        assert (workspace / "ros" / space / "setup.bash").is_file()
+
+
 def test_flies(terminal):
     terminal.run(f"{FLY} crazyflie_examples sw_hover.launch {FAST}")
 

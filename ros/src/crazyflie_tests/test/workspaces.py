@@ -36,6 +36,14 @@ def copy(folder: Path) -> Path:
     return folder
 
 
+def view(folder: Path) -> Path:
+    """Make a folder a view of the built workspace, with results of its own, and return it."""
+    for entry in TOP.iterdir():
+        if entry.name != "out":
+            (folder / entry.name).symlink_to(entry)
+    return folder
+
+
 def clean_environment(home: Path) -> dict[str, str]:
     """Return the environment of a user who has sourced nothing and prefers another Python.
 

@@ -79,7 +79,7 @@ class FakeDashboard(Dashboard):
     def set_vehicles(self, *vehicles, **details):
         """Show these vehicles."""
         known = {
-            "fence": ((-2.5, -2.5, 0.0), (2.5, 2.5, 2.2)),
+            "fences": (((-2.5, -2.5, 0.0), (2.5, 2.5, 2.2)),),
             "solids": (
                 Solid(
                     "pole",

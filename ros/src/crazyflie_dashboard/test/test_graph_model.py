@@ -2,9 +2,13 @@
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from dynamic_reconfigure.encoding import encode_config
+from dynamic_reconfigure.msg import Config
 from fake_fleet import FakeFleet
-from geometry_msgs.msg import PoseStamped
+from genpy.dynamic import generate_dynamic
+from geometry_msgs.msg import Point, PoseStamped
 from rosgraph_msgs.msg import Log
+from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.discovery import Graph
 from crazyflie_msgs.msg import FlightStatus
@@ -121,3 +125,58 @@ def test_without_frames_poses_come_from_the_topics_of_a_vehicle(fleet):
     fleet.process.advance(0.05)
     assert fleet.vehicles["bird"].position == pytest.approx((0.0, 0.0, 0.7))
     assert not fleet.vehicles["bird"].is_stale
+
+
+BOX = {f"box/{side}/{axis}": x for side, x in (("min", -1.0), ("max", 2.0)) for axis in "xyz"}
+
+
+def add_topic(fleet, topic, kind):
+    """Have the dashboard see a topic more."""
+    fleet.graph = Graph({**fleet.graph.topics, topic: kind}, services=fleet.graph.services)
+    fleet.process.advance(2.1)
+
+
+def test_geofences_are_drawn_as_long_as_they_are_there(fleet):
+    for name in ("cf1", "cf2"):
+        topic = f"/{name}/geofence/parameter_updates"
+        add_topic(fleet, topic, Config._type)
+        fleet.process.publish(topic, encode_config({**BOX, "margin": 0.5}))
+    fleet.process.advance(0.05)
+    assert fleet.dashboard.scene().fences == (((-1.0,) * 3, (2.0,) * 3),)
+    assert len(fleet.process.transport.subscribers[topic]) == 1
+    fleet.process.publish(topic, encode_config({"box/max/x": 3.0}))
+    fleet.process.advance(0.05)
+    assert fleet.dashboard.scene().fences[1] == ((-14.0,) * 3, (3.0, 14.0, 14.0))
+    topics = {k: v for k, v in fleet.graph.topics.items() if k != topic}
+    fleet.graph = Graph(topics, services=fleet.graph.services)
+    fleet.process.advance(2.1)
+    assert fleet.dashboard.scene().fences == (((-1.0,) * 3, (2.0,) * 3),)
+
+
+def test_lines_of_markers_are_planned_paths(fleet):
+    add_topic(fleet, "/sweep/markers", MarkerArray._type)
+    points = [Point(0.0, 0.0, 1.0), Point(1.0, 0.0, 1.0), Point(float("nan"), 0.0, 1.0)]
+    lanes = Marker(ns="lanes", type=Marker.LINE_STRIP, points=points)
+    lanes.header.frame_id = "world"
+    fleet.process.publish("/sweep/markers", MarkerArray([lanes]))
+    fleet.process.advance(0.05)
+    (path,) = fleet.dashboard.scene().paths.values()
+    assert path == ((0.0, 0.0, 1.0), (1.0, 0.0, 1.0))
+    fleet.process.publish("/sweep/markers", MarkerArray([]))
+    fleet.process.advance(0.05)
+    assert fleet.dashboard.scene().paths == {}
+
+
+def test_paths_of_planners_are_in_the_fixed_frame(fleet, monkeypatch):
+    # The type may be installed where its publisher is, and is not needed here.
+    text = "Header header\ngeometry_msgs/PoseStamped[] poses\n" + 80 * "="
+    text += f"\nMSG: geometry_msgs/PoseStamped\n{PoseStamped._full_text}"
+    kind = generate_dynamic("nav_msgs/Path", text)["nav_msgs/Path"]
+    monkeypatch.setattr("roslib.message.get_message_class", lambda name: kind)
+    add_topic(fleet, "/planner/plan", "nav_msgs/Path")
+    plan = kind(poses=[PoseStamped(), PoseStamped()])
+    plan.header.frame_id = "cf3"
+    plan.poses[1].pose.position.y = 0.5
+    fleet.process.publish("/planner/plan", plan)
+    fleet.send_poses()
+    assert fleet.dashboard.scene().paths["/planner/plan"] == ((2.0, 0.0, 1.0), (2.0, 0.5, 1.0))

@@ -7,18 +7,17 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import Executor, Future
-from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 from rosgraph_msgs.msg import Log
-from visualization_msgs.msg import MarkerArray
 
 from crazyflie_dashboard.discovery import Graph, Vehicle, vehicles
 from crazyflie_dashboard.frames import Frames
+from crazyflie_dashboard.messages import Diagnostics, log_line
 from crazyflie_dashboard.page_state import IMAGES
 from crazyflie_dashboard.plots import VehiclePlots
-from crazyflie_dashboard.scene_parts import WORLD_MARKERS, Diagnostics, log_line, solids
 from crazyflie_dashboard.snapshot import Frame, LogLine, Scene, Sentence, Triple
+from crazyflie_dashboard.surroundings import Surroundings
 from crazyflie_dashboard.vehicle_model import VehicleModel, frame_of
 from crazyflie_utils import NodeHandle
 from crazyflie_utils.tf.poses import RawTransforms
@@ -58,14 +57,12 @@ class GraphModel:
         self.paths: Mapping[str, tuple[Triple, ...]] = {}
         self.sentences: tuple[Sentence, ...] = ()
         self.missions: Callable[[], tuple[str, ...]] = tuple
-        self.fence: tuple[Triple, Triple] | None = None
         self._parent, self._workers, self._read_graph = handle, workers, read_graph
         self._clock = clock
         self._handle: NodeHandle | None = None
         self._frames = Frames(clock, handle.nanoseconds)
         self._diagnostics = Diagnostics(clock)
-        self._markers: dict[str, Any] = {}
-        self._subscribed: set[str] = set()
+        self._surroundings = Surroundings(handle)
         self._log: deque[LogLine] = deque(maxlen=_MAX_LINES)
         self._lines = 0
         self._seen: dict[str, float] = {}
@@ -79,6 +76,7 @@ class GraphModel:
             return
         handle = self._handle = self._parent.child()
         self._frames = Frames(self._clock, handle.nanoseconds)
+        self._surroundings = Surroundings(handle)
         self._poll_at = 0.0
         for topic in ("/tf", "/tf_static"):
             handle.subscribe(topic, RawTransforms, lambda message: self._frames.read(message.raw))
@@ -94,9 +92,8 @@ class GraphModel:
             model.close()
         self._handle.close()
         self._handle = None
-        for known in (self.models, self.plots, self._seen, self._markers):
+        for known in (self.models, self.plots, self._seen):
             known.clear()
-        self._subscribed.clear()
         self.scene, self.graph = Scene(), Graph()
 
     def watch(self, names: set[str]) -> None:
@@ -133,11 +130,7 @@ class GraphModel:
             return
         self.graph = done.result()
         self._update_vehicles(vehicles(self.graph), now)
-        for topic, kind in self.graph.topics.items():
-            if topic.endswith(WORLD_MARKERS) and topic not in self._subscribed:
-                if kind == MarkerArray._type:
-                    self._subscribed.add(topic)
-                    self._handle.subscribe(topic, MarkerArray, self._on_markers)
+        self._surroundings.follow(self.graph)
 
     def _update_vehicles(self, found: list[Vehicle], now: float) -> None:
         for vehicle in found:
@@ -179,9 +172,6 @@ class GraphModel:
         self._lines += 1
         self._log.append(log_line(self._lines, message))
 
-    def _on_markers(self, message):
-        self._markers[message._connection_header["topic"]] = message.markers
-
     def _make_scene(self) -> Scene:
         frames = self._frames
         own = {model.frame for model in self.models.values()} - {None}
@@ -201,10 +191,10 @@ class GraphModel:
             time=self._parent.nanoseconds() * 1e-9,
             fixed_frame=fixed,
             vehicles=snapshots,
-            solids=solids(self._markers, frames, fixed, self.scene.solids),
-            fence=self.fence,
+            solids=self._surroundings.solids(frames, fixed),
+            fences=self._surroundings.fences,
             frames=tuple(others),
-            paths=self.paths,
+            paths={**self._surroundings.paths(frames, fixed), **self.paths},
             sentences=self._diagnostics.sentences() + self.sentences,
             log=tuple(self._log) if self._lines != _last(self.scene.log) else self.scene.log,
             images=tuple(sorted(t for t, kind in self.graph.topics.items() if kind in IMAGES)),

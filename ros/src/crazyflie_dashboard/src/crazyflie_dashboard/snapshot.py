@@ -149,9 +149,9 @@ class Scene:
     #: By name, in the order in which they are shown.
     vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)
     solids: tuple[Solid, ...] = ()  #: Changes rarely: compare it by ``is``.
-    fence: tuple[Triple, Triple] | None = None  #: Lower and upper corner of the geofence.
+    fences: tuple[tuple[Triple, Triple], ...] = ()  #: Lower and upper corners of geofences.
     frames: tuple[Frame, ...] = ()
-    #: Planned trajectories, by the vehicle's name. Changes rarely.
+    #: Planned trajectories, by the vehicle's name or by topic. Changes rarely.
     paths: Mapping[str, tuple[Triple, ...]] = field(default_factory=dict)
     sentences: tuple[Sentence, ...] = ()  #: Of the doctor and of /diagnostics, errors first.
     log: tuple[LogLine, ...] = ()  #: The newest ones, oldest first.

@@ -130,7 +130,7 @@ export default {
       this.change(() => this.setVehicles(names));
       if (this.poses) this.update(this.poses);
     },
-    setWorld(solids, fence) { this.change(() => this.surroundings.setWorld(solids, fence)); },
+    setWorld(solids, fences) { this.change(() => this.surroundings.setWorld(solids, fences)); },
     setPaths(paths) { this.change(() => this.surroundings.setPaths(paths)); },
     setFrames(frames) { this.change(() => this.surroundings.setFrames(frames)); },
     setGoal(goal) { this.change(() => this.goal.show(goal)); },

@@ -76,7 +76,7 @@ class SceneView(
     async def show(self, scene: Scene, chosen: set[str], extra_paths: Mapping[str, Any]) -> None:
         """Draw a scene; what has not changed since the last one is not sent."""
         self._send("setNames", [list(scene.vehicles)])
-        self._send("setWorld", [[_solid(each) for each in scene.solids], scene.fence])
+        self._send("setWorld", [[_solid(each) for each in scene.solids], scene.fences])
         self._send("setPaths", [[*scene.paths.values(), *extra_paths.values()]])
         frames = [[each.name, *_pose(each.position, each.rotation)] for each in scene.frames]
         self._send("setFrames", [frames])

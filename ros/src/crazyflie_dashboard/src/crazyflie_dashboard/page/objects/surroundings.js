@@ -24,8 +24,8 @@ export class Surroundings extends THREE.Group {
     this.add(this.world, this.paths);
   }
 
-  // Replace walls, obstacles and fence; a solid is [shape, position, rotation, size, color, opacity].
-  setWorld(solids, fence) {
+  // Replace walls, obstacles and fences; a solid is [shape, position, rotation, size, color, opacity].
+  setWorld(solids, fences) {
     empty(this.world);
     for (const [shape, position, rotation, size, color, opacity] of solids) {
       const solid = new THREE.Mesh(SHAPES[shape](), new THREE.MeshLambertMaterial(
@@ -35,7 +35,7 @@ export class Surroundings extends THREE.Group {
       solid.scale.set(...size);
       this.world.add(solid);
     }
-    if (fence) {
+    for (const fence of fences) {
       const box = new THREE.Box3(...fence.map((corner) => new THREE.Vector3(...corner)));
       this.world.add(new THREE.Box3Helper(box, "#e0a030"));
     }

@@ -223,6 +223,11 @@ def test_messages_and_plots(browser):
     browser.has("<b>link</b> at 40 %")
     browser.tab("Plots")
     wait_for(lambda: browser.find(".chart canvas"), "plots")
+    browser.enter("input[aria-label^='another field']", "/cf1/imu/x")
+    browser.press("Add")
+    browser.has("/cf1/imu/x", ".q-chip")
+    browser.find(".q-chip__icon--remove").click()
+    wait_for(lambda: "/cf1/imu" not in browser.text(".panels"), "the field is gone")
     browser.press("Stop")
     browser.has("height, m", ".q-table")
     browser.has("0.599", ".q-table")  # The height has risen by so much.

@@ -70,6 +70,7 @@ class FakeDashboard(Dashboard):
         self.commands = []
         self.flown = []
         self.fields = []
+        self.picture = None
         self.refusals = {}
         self.gain = ParameterInfo(
             "cf1/controller", "K/gain", "float", 0.5, "1/s", "gain of the height", 0.0, 2.0
@@ -91,6 +92,7 @@ class FakeDashboard(Dashboard):
                     (0.6, 0.7, 0.8, 1.0),
                 ),
             ),
+            "images": ("/cf1/image_raw",),
             "frames": (Frame("wand", (-1.5, 1.2, 0.3), (0, 0, 0, 1), 0.01),),
             "sentences": (Sentence("warn", "doctor", "cf2 has a weak link", "move the antenna"),),
             "log": (
@@ -215,4 +217,4 @@ class FakeDashboard(Dashboard):
         return done(None)
 
     def image(self, page):
-        return None
+        return self.picture

@@ -69,6 +69,8 @@ class FakeDashboard(Dashboard):
         """Begin again with three vehicles on the ground, the third of them stale."""
         self.commands = []
         self.flown = []
+        self.fields = []
+        self.picture = None
         self.refusals = {}
         self.gain = ParameterInfo(
             "cf1/controller", "K/gain", "float", 0.5, "1/s", "gain of the height", 0.0, 2.0
@@ -90,6 +92,7 @@ class FakeDashboard(Dashboard):
                     (0.6, 0.7, 0.8, 1.0),
                 ),
             ),
+            "images": ("/cf1/image_raw",),
             "frames": (Frame("wand", (-1.5, 1.2, 0.3), (0, 0, 0, 1), 0.01),),
             "sentences": (Sentence("warn", "doctor", "cf2 has a weak link", "move the antenna"),),
             "log": (
@@ -120,15 +123,17 @@ class FakeDashboard(Dashboard):
             Series("error", "m", times, tuple(0.1 for _ in range(600))),
             Series("roll", "rad", times, tuple(0.0 for _ in range(600))),
             Series("battery", "V", times, tuple(4.0 - 0.0005 * k for k in range(600))),
+            *(Series(path, "", (-1.0, 0.0), (1.0, 2.0)) for path in self.fields),
         )
 
     def add_field(self, page, path):
         if not path.startswith("/"):
             return failed(RefusalError(f"{path!r} is no topic; expected /topic/field"))
+        self.fields.append(path)
         return done(None)
 
     def remove_field(self, page, path):
-        pass
+        self.fields.remove(path)
 
     def command(self, page, command):
         age = time.monotonic() - command.clicked
@@ -212,4 +217,4 @@ class FakeDashboard(Dashboard):
         return done(None)
 
     def image(self, page):
-        return None
+        return self.picture

@@ -2,6 +2,7 @@
 
 import contextlib
 import socket
+import sys
 import time
 
 from fake_dashboard import FakeDashboard
@@ -122,18 +123,31 @@ class Browser:
 
     def click_scene(self, x, y, z):
         """Click on what is at a point of the scene, m."""
-        script = (
-            "const e = document.querySelector('.scene');"
-            "return getElement(e.id.slice(1)).screen(...arguments)"
-        )
-        place = wait_for(lambda: self.driver.execute_script(script, x, y, z), "the scene")
+        self._pointer_at((x, y, z)).click().perform()
+
+    def drag_scene(self, start, end):
+        """Drag what is at a point of the scene, m, to another one."""
+        x, y = (b - a for a, b in zip(self._place(start), self._place(end), strict=True))
+        chain = self._pointer_at(start).click_and_hold().move_by_offset(x // 2, y // 2)
+        chain.move_by_offset(x - x // 2, y - y // 2).release().perform()
+
+    def in_scene(self, what):
+        """Return the value of an expression of the scene's component in the browser."""
+        find = "const e = document.querySelector('.scene'); return getElement(e.id.slice(1))."
+        return self.driver.execute_script(find + what)
+
+    def _place(self, point):
+        return [round(each) for each in wait_for(lambda: self._screen(point), "the scene")]
+
+    def _screen(self, point):
+        return self.in_scene("screen({}, {}, {})".format(*point))
+
+    def _pointer_at(self, point):
         scene = self.find(".scene canvas")
+        x, y = self._place(point)
         rect = scene.rect
-        offset = (
-            int(place[0] - rect["x"] - rect["width"] / 2),
-            int(place[1] - rect["y"] - rect["height"] / 2),
-        )
-        ActionChains(self.driver).move_to_element_with_offset(scene, *offset).click().perform()
+        offset = int(x - rect["x"] - rect["width"] / 2), int(y - rect["y"] - rect["height"] / 2)
+        return ActionChains(self.driver).move_to_element_with_offset(scene, *offset)
 
     def type(self, *keys):
         """Press keys."""
@@ -149,9 +163,19 @@ class Browser:
 class Server:
     """The page of a dashboard, of a `FakeDashboard` by default."""
 
-    def __init__(self, dashboard=None, token=""):
+    def __init__(self, dashboard=None, host="127.0.0.1", token=""):
         self.port = free_port()
         self.dashboard = dashboard or FakeDashboard()
-        access = Access("127.0.0.1", self.port, token)
+        access = Access(host, self.port, token)
         self.url = access.url
-        self.page = open_page(self.dashboard, access, "127.0.0.1", self.port)
+        self.page = open_page(self.dashboard, access, host, self.port)
+
+    def actions(self):
+        """Return the commands that have come: actions and vehicles."""
+        return [(each.action, each.vehicles) for each in self.dashboard.commands]
+
+
+if __name__ == "__main__":
+    # HOST TOKEN: serve until the end of stdin.
+    print(Server(host=sys.argv[1], token=sys.argv[2]).url, flush=True)
+    sys.stdin.read()

@@ -11,7 +11,7 @@ from rosgraph_msgs.msg import Log
 from visualization_msgs.msg import Marker, MarkerArray
 
 from crazyflie_dashboard.discovery import Graph
-from crazyflie_msgs.msg import FlightStatus
+from crazyflie_msgs.msg import ControlStamped, FlightStatus
 
 
 @pytest.fixture
@@ -81,7 +81,7 @@ def test_nothing_is_received_without_a_page():
     assert list(fleet.vehicles) == ["cf1", "cf2", "cf3"]
 
 
-def test_states_and_controls_are_received_of_watched_vehicles_only(fleet):
+def test_states_are_received_of_watched_vehicles_only(fleet):
     def states():
         subscribers = fleet.process.transport.subscribers
         return [name for name in fleet.names if subscribers.get(f"/{name}/state")]
@@ -93,6 +93,21 @@ def test_states_and_controls_are_received_of_watched_vehicles_only(fleet):
     assert states() == ["cf1"]
     fleet.dashboard.pages.close(fleet.page)
     assert states() == []
+
+
+@pytest.mark.parametrize(("count", "received"), [(3, 3), (11, 1)])
+def test_the_age_of_the_control_is_that_of_few_vehicles_and_of_watched_ones(count, received):
+    fleet = FakeFleet(count)
+    topics = {f"/{name}/control/final": ControlStamped._type for name in fleet.names}
+    fleet.graph = Graph({**fleet.graph.topics, **topics}, services=fleet.graph.services)
+    fleet.find()
+    fleet.dashboard.watch(fleet.page, "cf2")
+    for topic in topics.keys() & fleet.process.transport.subscribers.keys():
+        fleet.process.publish(topic, ControlStamped())
+    fleet.process.advance(0.4)
+    ages = {name: each.control_age for name, each in fleet.vehicles.items()}
+    assert ages["cf2"] == pytest.approx(0.4, abs=0.06)
+    assert sum(age is not None for age in ages.values()) == received
 
 
 def test_diagnostics_are_sentences_and_the_log_has_levels(fleet):

@@ -1,43 +1,16 @@
 """The page in headless Chromium, with vehicles that are only numbers."""
 
-import threading
-from functools import partial
-from http.server import HTTPServer, SimpleHTTPRequestHandler
+import base64
+import math
 
+import cv2
+import numpy as np
 import pytest
 from fake_dashboard import vehicle
-from pages import Browser, Server, chromium, wait_for
+from pages import wait_for
 from selenium.webdriver.common.keys import Keys
 
 from crazyflie_dashboard.snapshot import Action
-
-
-@pytest.fixture(scope="module")
-def server():
-    server = Server()
-    yield server
-    server.page.close()
-
-
-@pytest.fixture(scope="module")
-def driver():
-    with chromium() as driver:
-        yield driver
-
-
-@pytest.fixture
-def browser(server, driver):
-    server.dashboard.reset()
-    browser = Browser(driver, server.url)
-    browser.open()
-    yield browser
-    # Only files of the page itself are loaded, and nothing fails.
-    errors = [each["message"] for each in driver.get_log("browser") if each["level"] == "SEVERE"]
-    assert errors == []
-
-
-def actions(server):
-    return [(each.action, each.vehicles) for each in server.dashboard.commands]
 
 
 def test_vehicles_take_off_go_where_the_floor_is_clicked_and_land(browser, server):
@@ -54,12 +27,43 @@ def test_vehicles_take_off_go_where_the_floor_is_clicked_and_land(browser, serve
     assert goals[1] == pytest.approx((1.0, -0.5, 1.0), abs=0.02)
     browser.press("Land")
     browser.has("on the ground", browser.card("cf1"))
-    assert actions(server) == [
+    assert server.actions() == [
         (Action.TAKEOFF, ("cf1", "cf2")),
         (Action.GO_TO, ("cf1",)),
         (Action.GO_TO, ("cf2",)),
         (Action.LAND, ("cf1", "cf2")),
     ]
+
+
+def test_the_handle_of_a_goal_is_dragged_and_has_height_and_yaw(browser, server):
+    browser.take_control()
+    browser.choose("cf1")
+    browser.press("Take off")
+    browser.click_floor(0.5, -0.5)
+    for label, text in (("z, m", "1.3"), ("yaw, °", "90")):
+        browser.enter(f'input[aria-label="{label}"]', text)
+    wait_for(lambda: browser.in_scene("goal.height") == 1.3, "the handle at its height")
+    browser.drag_scene((0.5, -0.5, 1.3), (-0.3, -0.2, 1.3))
+    wait_for(
+        lambda: browser.find('input[aria-label="x, m"]').get_attribute("value")[:2] == "-0", "x"
+    )
+    browser.press("Go")
+    wait_for(lambda: len(server.dashboard.commands) == 2, "a command")
+    command = server.dashboard.commands[1]
+    assert command.goal == pytest.approx((-0.3, -0.2, 1.3), abs=0.02)
+    assert command.yaw == pytest.approx(math.pi / 2)
+
+
+def test_the_image_of_a_camera_appears(browser, server):
+    picture = np.full((48, 64, 3), 128, np.uint8)
+    server.dashboard.picture = cv2.imencode(".jpg", picture)[1].tobytes()
+    browser.tab("Cameras")
+    browser.select("topic", "/cf1/image_raw")
+    image = (
+        "const i = document.querySelector('.camera img'); return i?.naturalWidth === 64 && i.src"
+    )
+    source = wait_for(lambda: browser.driver.execute_script(image), "a picture")
+    assert base64.b64decode(source.partition(",")[2]) == server.dashboard.picture
 
 
 def test_a_stale_vehicle_says_how_old_its_pose_is(browser):
@@ -81,7 +85,7 @@ def test_the_key_of_the_emergency_works_without_control(browser, server):
     server.dashboard.change("cf1", is_in_flight=True, position=(-1.0, 0.0, 1.0))
     browser.type(Keys.ESCAPE, Keys.ESCAPE)
     browser.has("emergency", browser.card("cf1") + " .state")
-    assert actions(server) == [(Action.EMERGENCY, ("cf1", "cf2", "cf3"))]
+    assert server.actions() == [(Action.EMERGENCY, ("cf1", "cf2", "cf3"))]
 
 
 def test_one_escape_is_no_emergency(browser, server):
@@ -90,7 +94,7 @@ def test_one_escape_is_no_emergency(browser, server):
     browser.choose("cf1")
     browser.press("Take off")
     browser.has("hovering", browser.card("cf1"))
-    assert actions(server) == [(Action.TAKEOFF, ("cf1",))]
+    assert server.actions() == [(Action.TAKEOFF, ("cf1",))]
 
 
 def test_boxes_show_what_is_chosen(browser):
@@ -124,61 +128,6 @@ def test_texts_are_shown_as_text(browser, server):
     browser.press("Take off")
     browser.has("<u>not now</u>")
     assert "taken" not in browser.driver.title
-
-
-def test_two_pages_and_control(browser, server, driver):
-    first = driver.current_window_handle
-    browser.take_control()
-    driver.switch_to.new_window("window")
-    try:
-        second = Browser(driver, server.url)
-        second.open()
-        second.choose("cf1")
-        second.press("Take off")
-        second.has("this page only looks")
-        assert server.dashboard.commands == []
-        second.press("Take control")
-        second.has("Take over")
-        second.press("Take over")
-        second.has("this page has taken over control")
-        second.press("Take off")
-        second.has("hovering", second.card("cf1"))
-        driver.switch_to.window(first)
-        browser.has("has taken over control: this page only looks now")
-        # The first page's emergency works all the same.
-        browser.press("Emergency")
-        browser.has("emergency", browser.card("cf1") + " .state")
-        driver.switch_to.window(driver.window_handles[-1])
-    finally:
-        driver.close()
-        driver.switch_to.window(first)
-
-
-def test_a_page_that_is_loaded_again_in_flight_moves_nothing_and_has_no_control(browser, server):
-    browser.take_control()
-    browser.choose("cf1")
-    browser.press("Take off")
-    browser.has("hovering", browser.card("cf1"))
-    browser.open()
-    browser.has("hovering", browser.card("cf1"))
-    browser.has("no page has control", ".control")
-    browser.choose("cf1")
-    browser.press("Land")
-    browser.has("this page only looks")
-    assert actions(server) == [(Action.TAKEOFF, ("cf1",))]
-
-
-def test_a_click_that_has_waited_moves_nothing(browser, server, driver):
-    browser.take_control()
-    browser.choose("cf1")
-    # A click waits while the browser is busy.
-    driver.execute_script(
-        "const event = new MouseEvent('click', { bubbles: true });"
-        "setTimeout(() => arguments[0].dispatchEvent(event), 1500)",
-        browser.button("Take off"),
-    )
-    browser.has("s old")
-    assert server.dashboard.commands == []
 
 
 def test_parameters_right_and_wrong(browser, server):
@@ -223,38 +172,11 @@ def test_messages_and_plots(browser):
     browser.has("<b>link</b> at 40 %")
     browser.tab("Plots")
     wait_for(lambda: browser.find(".chart canvas"), "plots")
+    browser.enter("input[aria-label^='another field']", "/cf1/imu/x")
+    browser.press("Add")
+    browser.has("/cf1/imu/x", ".q-chip")
+    browser.find(".q-chip__icon--remove").click()
+    wait_for(lambda: "/cf1/imu" not in browser.text(".panels"), "the field is gone")
     browser.press("Stop")
     browser.has("height, m", ".q-table")
     browser.has("0.599", ".q-table")  # The height has risen by so much.
-
-
-HOSTILE = """<script>
-const seen = [], url = "127.0.0.1:PORT/_nicegui_ws/socket.io/?EIO=4&transport=";
-const socket = new WebSocket("ws://" + url + "websocket");
-socket.onopen = () => seen.push("open");
-socket.onclose = () => fetch("http://" + url + "polling").then(
-  () => seen.push("answer"), () => {}).finally(() => { document.title = "tried:" + seen; });
-</script>"""
-
-
-def test_a_hostile_page_in_the_same_browser_opens_no_websocket(browser, server, driver, tmp_path):
-    (tmp_path / "index.html").write_text(HOSTILE.replace("PORT", str(server.port)))
-    files = partial(SimpleHTTPRequestHandler, directory=tmp_path)
-    with HTTPServer(("127.0.0.1", 0), files) as other:
-        threading.Thread(target=other.serve_forever, daemon=True).start()
-        driver.get(f"http://127.0.0.1:{other.server_port}/")
-        wait_for(lambda: driver.title.startswith("tried:"), "the attack")
-        assert driver.title == "tried:"
-        other.shutdown()
-    driver.get_log("browser")
-
-
-def test_an_old_browser_is_told_so(browser, driver, server):
-    script = {"source": "delete HTMLScriptElement.supports"}
-    added = driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", script)
-    try:
-        driver.get(server.url)
-        browser.has("This browser is too old")
-    finally:
-        driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", added)
-        driver.get_log("browser")

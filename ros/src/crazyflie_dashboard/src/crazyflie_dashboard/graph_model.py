@@ -26,7 +26,7 @@ SCENE_PERIOD = 0.05  #: From one scene to the next, s.
 _POLL_PERIOD = 2.0  #: From one look at the master to the next, s; longer where it takes long:
 _POLL_SHARE = 0.02  #: of the time at most.
 _FORGET_AFTER = 30.0  #: A vehicle whose topics are gone is shown for so long, s.
-_MAX_REFERENCES = 10  #: With more vehicles the references of watched ones are shown only.
+_FEW = 10  #: With more vehicles references and controls of watched ones are received only.
 _MAX_LINES = 500  #: Of the log.
 
 
@@ -100,11 +100,16 @@ class GraphModel:
         """Receive what comes often for these vehicles only."""
         for name in self.plots.keys() - names:
             del self.plots[name]
+        for name in self.models.keys() & names - self.plots.keys():
+            self.plots[name] = VehiclePlots(self._clock)
+        self._receive()
+
+    def _receive(self):
+        """Receive of each vehicle what is shown of it."""
+        is_few = len(self.models) <= _FEW
         for name, model in self.models.items():
-            if name in names and name not in self.plots:
-                self.plots[name] = VehiclePlots(self._clock)
-            model.watch(name in names, self.graph.topics)
-            model.show_reference(name in names or len(self.models) <= _MAX_REFERENCES)
+            model.frame = frame_of(model.vehicle, self._frames, len(self.models) == 1)
+            model.receive(name in self.plots, is_few, self.graph.topics)
 
     def _on_timer(self):
         if self._clock() >= self._poll_at and not self._is_polling:
@@ -115,7 +120,8 @@ class GraphModel:
             )
         self._frames.update()
         if len(self._frames.poses) != self._known_frames:
-            self._find_frames()
+            self._known_frames = len(self._frames.poses)
+            self._receive()
         self.scene = self._make_scene()
 
     def _on_graph(self, done: "Future[Graph]", began: float) -> None:
@@ -152,13 +158,7 @@ class GraphModel:
         self.models = {v.name: self.models[v.name] for v in found} | self.models
         for model in self.models.values():
             model.kind = self._diagnostics.kind(model.vehicle)
-        self._find_frames()
         self.watch(set(self.plots))
-
-    def _find_frames(self):
-        self._known_frames = len(self._frames.poses)
-        for model in self.models.values():
-            model.follow_frame(frame_of(model.vehicle, self._frames, len(self.models) == 1))
 
     def _row_taker(self, name):
         def take(role, row):

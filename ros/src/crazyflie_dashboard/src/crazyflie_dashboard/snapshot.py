@@ -69,7 +69,7 @@ class VehicleSnapshot:
     is_stale: bool = True  #: The pose is older than `STALE_AGE`, or there is none.
     #: Of all vehicles if there are few, otherwise of watched ones.
     reference: Reference | None = None
-    control: Control | None = None  #: Of watched vehicles, as the rates of state and control.
+    control: Control | None = None  #: As references.
     control_age: float | None = None  #: s.
     #: state, reason: State of the flight in words, and why it is what it is; "" for an ordinary
     #: one.

@@ -1,4 +1,4 @@
-"""What is drawn around the vehicles: solids, planned paths and geofences, of topics that are there."""
+"""What is drawn around the vehicles: solids, planned paths and geofences of the graph."""
 
 import math
 

@@ -3,6 +3,7 @@
 import math
 from collections import Counter, defaultdict
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import roslib.message
@@ -25,7 +26,6 @@ for _role in ROLES:
     _ROWS[_role.name].update(_role.rows)
 
 _SLOW = ("flight_status", "filter_status", "flight_state", "vehicle_status", "battery")
-_FAST = ("state", "final_control", "cmd_vel")
 
 _FILTER_WORDS = {
     FilterStatus.HOLDING: "held by the filter",
@@ -70,11 +70,10 @@ class VehicleModel:
     ):
         self.vehicle = vehicle
         self.kind = Kind.REAL if vehicle.has_driver else Kind.SIMULATED
+        #: Of /tf, where its poses come from; without one they come from its own topics.
         self.frame: str | None = None
         self._handle, self._time, self._on_row = handle, time, on_row
-        self._watched: NodeHandle | None = None
-        self._references: NodeHandle | None = None
-        self._poses: NodeHandle | None = None
+        self._received: dict[str, NodeHandle] = {}
         self._since = time()
         self._rows: dict[str, Any] = {}
         self._arrivals: dict[str, float] = {}
@@ -89,59 +88,34 @@ class VehicleModel:
         for role in _SLOW:
             self._subscribe(handle, role)
 
-    def follow_frame(self, frame: str | None) -> None:
-        """Take poses from a frame of /tf; without one, from the vehicle's topic."""
-        self.frame = frame
-        if frame is not None and self._poses is not None:
-            self._poses.close()
-            self._poses = None
-            self._forget("pose")
-        is_late = self._time() - self._since > _FRAME_TIMEOUT
-        if frame is None and self._poses is None and is_late:
-            self._poses = self._handle.child()
-            self._subscribe(self._poses, "pose" if "pose" in self.vehicle.topics else "state")
+    def receive(self, is_watched: bool, is_one_of_few: bool, topics: Mapping[str, str]) -> None:
+        """Receive what comes often as far as it is shown, and nothing else of it.
 
-    def watch(self, is_watched: bool, topics: Mapping[str, str]) -> None:
-        """Begin or end to receive what comes often: states, controls, what the driver logs.
-
-        ``topics`` are all that are published -> type.
+        That is states and what the driver logs of a watched vehicle; references and controls of
+        one of few, too. ``topics`` are all that are published -> type.
         """
-        if is_watched == (self._watched is not None):
-            return
-        if self._watched is not None:
-            self._watched.close()
-            self._watched = None
-            self._forget("state", "final_control", "cmd_vel")
-        else:
-            self._watched = self._handle.child()
-            # What is sent to a radio says nothing that the control does not.
-            fast = [role for role in _FAST if role in self.vehicle.topics]
-            for role in fast[:2]:
-                self._subscribe(self._watched, role)
-            for topic, kind in topics.items():
-                folder, _, name = topic.rpartition("/")
-                if folder == self.vehicle.driver and kind in _LOGS and name != "battery":
-                    self._subscribe_log(self._watched, topic, *_LOGS[kind])
-
-    def show_reference(self, is_shown: bool) -> None:
-        """Begin or end to receive references."""
-        if is_shown == (self._references is not None):
-            return
-        if self._references is not None:
-            self._references.close()
-            self._references = None
-            self._forget("reference")
-        else:
-            self._references = self._handle.child()
-            self._subscribe(self._references, "reference")
+        # What is sent to a radio says nothing that the control does not.
+        control = "final_control" if "final_control" in self.vehicle.topics else "cmd_vel"
+        wanted = {"reference", control} if is_watched or is_one_of_few else set()
+        if is_watched:
+            wanted |= {"state", "log"}
+        if self.frame is None and self._time() - self._since > _FRAME_TIMEOUT:
+            wanted.add("pose" if "pose" in self.vehicle.topics else "state")
+        for role in self._received.keys() - wanted:
+            self._received.pop(role).close()
+            for known in (self._rows, self._arrivals, self._rates, self._counts):
+                known.pop(role, None)
+        for role in wanted - self._received.keys():
+            handle = self._received[role] = self._handle.child()
+            if role == "log":
+                self._subscribe_logs(handle, topics)
+            else:
+                self._subscribe(handle, role)
 
     def close(self) -> None:
         """Receive nothing any more."""
-        self.watch(False, {})
-        self.show_reference(False)
-        if self._poses is not None:
-            self._poses.close()
-        self._handle.close()
+        for handle in (*self._received.values(), self._handle):
+            handle.close()
 
     def snapshot(self, frames: Frames, fixed: str) -> VehicleSnapshot:
         """Return what is known now; poses are those in the frame ``fixed``."""
@@ -200,21 +174,22 @@ class VehicleModel:
 
         handle.subscribe(topic, message_type, take)
 
-    def _subscribe_log(self, handle, topic, message_type, values):
-        name = topic.rpartition("/")[2]
-        on_message = lambda message: self._on_row(f"log {name}", values(message))  # noqa: E731
-        handle.subscribe(topic, message_type, on_message)
+    def _subscribe_logs(self, handle, topics):
+        for topic, kind in topics.items():
+            folder, _, name = topic.rpartition("/")
+            if folder == self.vehicle.driver and kind in _LOGS and name != "battery":
+                message_type, values = _LOGS[kind]
+                take = partial(self._on_log, f"log {name}", values)
+                handle.subscribe(topic, message_type, take)
+
+    def _on_log(self, name, values, message):
+        self._on_row(name, values(message))
 
     def _note(self, role, row):
         self._rows[role] = row
         self._arrivals[role] = self._time()
         self._counts[role] += 1
         self._on_row(role, row)
-
-    def _forget(self, *roles):
-        for role in roles:
-            for known in (self._rows, self._arrivals, self._rates, self._counts):
-                known.pop(role, None)
 
     def _count_rates(self):
         elapsed = self._time() - self._counted_since

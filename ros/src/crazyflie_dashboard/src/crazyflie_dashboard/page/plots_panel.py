@@ -36,6 +36,8 @@ class PlotsPanel:
             self._field = ui.input("another field, as /cf1/pose/pose/position/x")
             self._field.props("dense outlined").classes("number")
             ui.button("Add", on_click=self._add).props("outline")
+        self._fields: list[str] = []
+        self._chips = ui.element("div")
         self._chart = ui.echart({"series": []}, theme=None).classes("chart")
         self._chart.on("chart:datazoom", self._zoom, ["batch", "start", "end"])
         self._figures = ui.table(
@@ -60,6 +62,21 @@ class PlotsPanel:
         self._name.text = self._session.watched or "Choose a vehicle to see its plots"
         self._series = self._session.dashboard.plots(self._session.page)
         self._draw()
+        # Only fields are called by the paths of topics; a page that connects again has none.
+        fields = [each.name for each in self._series if each.name.startswith("/")]
+        if fields != self._fields:
+            self._fields = fields
+            self._build_chips()
+
+    def _build_chips(self) -> None:
+        self._chips.clear()
+        with self._chips:
+            for path in self._fields:
+                chip = ui.chip(path, removable=True).props("dense outline")
+                chip.on_value_change(lambda path=path: self._remove(path))
+
+    def _remove(self, path: str) -> None:
+        self._session.dashboard.remove_field(self._session.page, path)
 
     def _draw(self) -> None:
         options = chart(self._series, self.is_stopped)

@@ -1,0 +1,124 @@
+"""Runs single tests of pytest in forks of the process that has collected them."""
+
+import os
+import pickle
+import resource
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from types import CodeType, FrameType, FunctionType
+from typing import Any, Self
+
+import pytest
+from _pytest.runner import runtestprotocol
+from tqdm import tqdm
+
+_LONGEST = 120.0  #: s, of a test without a mutant.
+_PATIENCE = 10.0  #: Times as long as without a mutant a test may take, and 5 s.
+_MEMORY = 4 << 30  #: Bytes that a fork may take.
+
+Function = tuple[str, str]  #: Path of its module and qualified name.
+
+
+class CallRecorder:
+    """Within a ``with``: notes the Python functions that are called, in all threads to come."""
+
+    def __init__(self) -> None:
+        self._codes: dict[int, CodeType] = {}
+
+    def __enter__(self) -> Self:
+        sys.setprofile(self._note)
+        threading.setprofile(self._note)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        sys.setprofile(None)
+        threading.setprofile(None)
+
+    def _note(self, frame: FrameType, event: str, _: Any) -> None:
+        if event == "call":
+            code = frame.f_code
+            self._codes[id(code)] = code
+
+    def functions(self, paths: set[str]) -> set[Function]:
+        """Return the functions of some modules; one within another counts as the outer one."""
+        return {
+            (code.co_filename, code.co_qualname.partition(".<locals>")[0])
+            for code in self._codes.values()
+            if code.co_filename in paths
+        }
+
+
+@dataclass(frozen=True)
+class Test:
+    """A test that passes, the functions that it calls, and how long it takes, s."""
+
+    item: pytest.Item
+    functions: set[Function]
+    duration: float
+
+
+def measured(items: Sequence[pytest.Item], paths: set[str]) -> tuple[list[Test], list[str]]:
+    """Run tests, each in a fork; return those that pass and start no program, and the others."""
+    tests, others = [], []
+    for item in tqdm(items, desc="tests", mininterval=2.0):
+        functions, duration, fault = forked(partial(_measure, item, paths)) or (set(), 0.0, "died")
+        if fault:
+            others.append(f"{item.nodeid}: it {fault}")
+        else:
+            tests.append(Test(item, functions, duration))
+    return tests, others
+
+
+def first_failure(functions: Sequence[FunctionType], code: CodeType, tests: Sequence[Test]) -> str:
+    """Give functions another code; return the node id of the first test that fails, "" if none."""
+    for function in functions:
+        function.__code__ = code
+    for test in tests:
+        signal.setitimer(signal.ITIMER_REAL, _PATIENCE * test.duration + 5.0)
+        if not _passes(test.item):
+            return test.item.nodeid
+    return ""
+
+
+def forked(work: Callable[[], Any]) -> Any:
+    """Return what a function returns in a fork without output; None if the fork dies."""
+    reader, writer = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            silence = os.open(os.devnull, os.O_RDWR)
+            os.dup2(silence, 1)
+            os.dup2(silence, 2)
+            resource.setrlimit(resource.RLIMIT_DATA, (_MEMORY, _MEMORY))
+            answer = pickle.dumps(work())
+            with os.fdopen(writer, "wb") as pipe:
+                pipe.write(answer)
+        finally:
+            os._exit(0)
+    os.close(writer)
+    with os.fdopen(reader, "rb") as pipe:
+        answer = pipe.read()
+    os.waitpid(child, 0)
+    return pickle.loads(answer) if answer else None
+
+
+def _measure(item, paths):
+    programs = []
+    sys.addaudithook(lambda event, _: programs.append(1) if event == "subprocess.Popen" else None)
+    signal.setitimer(signal.ITIMER_REAL, _LONGEST)
+    begin = time.monotonic()
+    with CallRecorder() as recorder:
+        passes = _passes(item)
+    duration = time.monotonic() - begin
+    fault = "starts programs" if programs else "" if passes else "fails"
+    return recorder.functions(paths), duration, fault
+
+
+def _passes(item):
+    # Nothing is kept for a next test: fixtures of modules are made, and noted, for each.
+    return not any(report.failed for report in runtestprotocol(item, log=False))

@@ -178,7 +178,7 @@ def test_nonsense_makes_it_hover(nonsense):
 def test_a_slow_service_makes_it_hover():
     flight = Flight(velocity=lambda _: Future())
     report = flight.until(SweepReport.HOVERING)
-    assert report.reason == "/oscillator: it has not answered for 0.5 s"
+    assert report.reason == "/oscillator has not answered within 0.5 s"
     flight.for_seconds(3.0)
     assert flight.speed == 0.0
 

@@ -26,3 +26,14 @@ def test_after_a_reset_of_the_clock_it_does_not_take_for_ever():
     assert guess.is_flying(0.0, 1.0, 1000.0)
     assert guess.is_flying(0.0, 1.0, 1.0)
     assert not guess.is_flying(0.0, 1.0, 4.1)
+
+
+def test_what_has_lifted_off_is_5_cm_above_the_lowest_height():
+    guess = GroundGuess()
+    guess.is_flying(0.25, 1.0, 0.0)
+    guess.is_flying(0.125, 1.0, 1.0)
+    assert not guess.is_flying(0.17, 1.0, 3.0)
+    assert guess.is_flying(0.18, 1.0, 3.0)
+    # 4 cm are no new height of the reference, 6 cm are.
+    assert not guess.is_flying(0.125, 1.04, 10.0)
+    assert guess.is_flying(0.125, 1.06, 10.0)

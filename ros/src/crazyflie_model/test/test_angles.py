@@ -139,3 +139,14 @@ def test_rotated_vectors(quaternion, vector):
     np.testing.assert_allclose(
         rotate_back(quaternion, rotate(quaternion, vector)), vector, atol=1e-12
     )
+
+
+def test_nose_straight_down_is_no_more_than_a_quarter_turn_in_spite_of_rounding():
+    # 2 w y / (w^2 + y^2) is 1.0000000000000002.
+    w, y = 2.0908031771193314, 2.090803183391741
+    assert rpy_from_quaternion(0.0, y, 0.0, w) == pytest.approx((0.0, math.pi / 2.0, 0.0))
+    assert rpy_from_quaternion(0.0, -y, 0.0, w) == pytest.approx((0.0, -math.pi / 2.0, 0.0))
+
+
+def test_a_float_stays_one():
+    assert type(wrap_to_pi(4.0)) is float

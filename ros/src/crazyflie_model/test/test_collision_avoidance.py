@@ -85,3 +85,71 @@ def test_a_velocity_leads_back_into_the_cell():
     )
     # From 0.15 m to 0.2 m apart, half of it by each.
     assert velocity == pytest.approx([-0.025, 0.0, 0.0], abs=1e-5)
+
+
+OFF = np.array([0.0, 0.0, 5.0])
+ONE = np.array([[1.0, 0.0, 0.0]])
+
+
+def moving(velocity, others=ONE, **settings):
+    """Return the velocity to fly instead of one along x, with radii of 0.1 m."""
+    avoidance = CollisionAvoidance(AvoidanceSettings(tuple(RADII), **settings))
+    return avoidance.velocity_setpoint(STILL, others, np.array([velocity, 0.0, 0.0])).tolist()
+
+
+@given(POINTS, POINTS, POINTS)
+def test_only_distances_count(origin, other, goal):
+    box = {"box_min": (-1.0, -1.5, -0.5), "box_max": (2.0, 1.0, 1.5)}
+    near = CollisionAvoidance(AvoidanceSettings(tuple(RADII), **box))
+    corners = {name: tuple(origin + corner) for name, corner in box.items()}
+    far = CollisionAvoidance(AvoidanceSettings(tuple(RADII), **corners))
+    other = other + np.sign(other)
+    expected, speed = near.position_setpoint(STILL, other[None], goal, STILL)
+    found, same = far.position_setpoint(origin, origin + other[None], origin + goal, STILL)
+    np.testing.assert_allclose(found - origin, expected, atol=1e-6)
+    np.testing.assert_allclose(same, speed, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "found"),
+    # In 2 s up to the wall at 0.5 - 0.1 m, and no more than 0.5 m/s where there is none.
+    [(0.05, 0.05), (0.5, 0.2), (-0.3, -0.3), (-0.9, -0.5)],
+)
+def test_a_velocity_ends_at_the_wall_within_the_horizon(velocity, found):
+    assert moving(velocity, horizon=2.0) == pytest.approx([found, 0.0, 0.0], abs=1e-5)
+
+
+def test_a_velocity_is_turned_to_the_right_before_a_wall():
+    # The wall is 0.2 m away; the sidestep is the square of 1 - 0.2 / 0.25.
+    other = np.array([[0.6, 0.0, 0.0]])
+    assert moving(0.1, other) == pytest.approx([0.1, -0.004, 0.0], abs=1e-5)
+    assert moving(0.1, other, sidestep_threshold=0.0) == pytest.approx([0.1, 0.0, 0.0])
+
+
+def test_a_position_within_the_cell_is_not_moved_however_near_the_wall():
+    avoidance = CollisionAvoidance(OPEN)
+    goal = np.array([0.399, 0.0, 0.0])
+    assert avoidance.position_setpoint(STILL, ONE, goal, STILL)[0].tolist() == [0.399, 0.0, 0.0]
+
+
+def test_without_a_cell_a_vehicle_does_not_move():
+    near = np.array([[0.15, 0.0, 0.0], [-0.15, 0.0, 0.0]])
+    assert moving(0.3, near) == [0.0, 0.0, 0.0]
+    avoidance = CollisionAvoidance(OPEN)
+    stay, _ = avoidance.position_setpoint(OFF, near + OFF, np.ones(3), STILL)
+    assert stay.tolist() == OFF.tolist()
+
+
+def test_a_wall_that_is_flown_along_does_not_count():
+    avoidance = CollisionAvoidance(OPEN)
+    goal = np.array([0.0, 0.3, 0.0])
+    with np.errstate(divide="raise", invalid="raise"):
+        found, velocity = avoidance.position_setpoint(STILL, ONE, goal, np.array([0.0, 0.4, 0.0]))
+    assert (found.tolist(), velocity.tolist()) == (goal.tolist(), [0.0, 0.4, 0.0])
+
+
+def test_it_comes_back_into_the_cell_no_faster_than_it_may():
+    # From 0.02 m to 0.2 m apart: 0.09 m of it.
+    other = np.array([[0.02, 0.0, 0.0]])
+    assert moving(0.3, other) == pytest.approx([-0.09, 0.0, 0.0], abs=1e-5)
+    assert moving(0.3, other, max_speed=0.05, horizon=4.0) == pytest.approx([-0.05, 0.0, 0.0])

@@ -17,6 +17,7 @@ from crazyflie_model.dynamics import (
     coupled_acceleration,
 )
 from crazyflie_model.elementwise import join, split
+from crazyflie_model.integrators import rk4_step
 from crazyflie_model.limits import MAX_TILT
 from crazyflie_model.units import GRAVITY
 
@@ -190,3 +191,14 @@ def test_roll_alone_is_a_rotation_of_the_thrust(roll, yaw, thrust):
         thrust * thrust_axis - [0.0, 0.0, GRAVITY],
         atol=1e-12,
     )
+
+
+@MODELS
+def test_it_begins_at_rest(dynamics):
+    assert dynamics.initial_state((1.0, 2.0, 3.0)) == [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]
+
+
+def test_rates_that_depend_on_the_time_are_integrated_as_by_simpson_s_rule():
+    # It is exact for a cubic.
+    (x,) = rk4_step(lambda t, x, u: [u[0] * t**3], 1.0, [7.0], [2.0], 0.5)
+    assert x == pytest.approx(7.0 + 2.0 * (1.5**4 - 1.0) / 4.0)

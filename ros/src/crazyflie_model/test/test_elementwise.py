@@ -46,3 +46,8 @@ def test_both_modules_have_the_functions(name):
     in_arrays = getattr(functions(np.array(0.3)), name)(*map(np.array, arguments))
     assert getattr(functions(0.3), name)(*arguments) == pytest.approx(float(in_arrays), rel=1e-15)
     assert functions(0.3) is math
+
+
+def test_a_limited_float_stays_one():
+    assert [clip(each, 0.0, 1.0) for each in (-2.0, 0.5, 2.0)] == [0.0, 0.5, 1.0]
+    assert type(clip(0.5, 0.0, 1.0)) is float

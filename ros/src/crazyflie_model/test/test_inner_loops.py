@@ -87,3 +87,7 @@ def test_batches_are_like_single_vehicles():
         )
         for whole, part in zip(batch, single, strict=True):
             np.testing.assert_allclose(join(whole)[k], part, rtol=1e-10, atol=1e-9)
+
+
+def test_the_least_thrust_turns_the_motors():
+    np.testing.assert_allclose(commands([0.0, 0.0, 0.0, 0.5]), 0.5 / GRAVITY * HOVER_PWM)

@@ -9,7 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.polynomial import Polynomial
 
-from crazyflie_model.polynomials import PIECE_SIZE, PolynomialPiece, bezier, evaluate, hermite
+from crazyflie_model.polynomials import (
+    PIECE_SIZE,
+    PolynomialPiece,
+    at_rest,
+    bezier,
+    evaluate,
+    hermite,
+)
 
 NUMBERS = st.floats(-2.0, 2.0)
 ENDS = st.tuples(NUMBERS, NUMBERS, NUMBERS, NUMBERS)
@@ -78,3 +85,14 @@ def test_derivatives():
     polynomial = Polynomial(coefficients)
     expected = [polynomial(0.7), *(polynomial.deriv(k)(0.7) for k in range(1, 5))]
     np.testing.assert_allclose(evaluate(coefficients, 0.7, 4), expected)
+
+
+def test_memory_that_was_never_written_is_a_piece_without_duration():
+    piece = PolynomialPiece.unpack(bytes(PIECE_SIZE))
+    assert piece.duration == 0.0
+    assert piece.axes == ([0.0] * 8,) * 4
+
+
+def test_a_goal_at_rest():
+    goal = at_rest((1.0, 2.0, 3.0), 0.5)
+    assert goal == ((1.0, 2.0, 3.0), (0.0,) * 3, (0.0,) * 3, 0.5, 0.0)

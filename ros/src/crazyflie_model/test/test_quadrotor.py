@@ -223,3 +223,19 @@ def test_a_vehicle_with_errors_hovers_with_other_thrust():
     other = CRAZYFLIE.with_errors(0.1, -0.05)
     thrust = 4.0 * other.thrust_constant * CRAZYFLIE.hover_speed**2 / other.mass
     assert thrust == pytest.approx(GRAVITY * 0.95 / 1.1)
+
+
+def test_at_the_beginning_rotors_turn_in_the_air_only():
+    level = [0.0] * 6 + [1.0] + [0.0] * 3
+    hover = CRAZYFLIE.hover_speed
+    assert AIRFRAME.initial_state((1.0, 2.0, 0.5)) == [1.0, 2.0, 0.5, *level, *[hover] * 4]
+    assert AIRFRAME.initial_state((1.0, 2.0, 0.0)) == [1.0, 2.0, 0.0, *level, *[0.0] * 4]
+
+
+@pytest.mark.parametrize("z", [0.0, -0.01])
+def test_what_climbs_leaves_the_ground_and_what_sinks_does_not(z):
+    rates, tilted = (1.0, 2.0, 3.0), (0.6, 0.0, 0.0, 0.8)
+    climbing = AIRFRAME.apply_ground_contact(split(state((1, 2, z), (1, 1, 0.7), tilted, rates)))
+    assert climbing == [1.0, 2.0, 0.0, 0.0, 0.0, 0.7, 0.0, 0.0, 0.0, 1.0] + [0.0] * 7
+    sinking = AIRFRAME.apply_ground_contact(split(state((1, 2, z), (1, 1, -0.7), tilted, rates)))
+    assert sinking[:6] == [1.0, 2.0, 0.0, 0.0, 0.0, 0.0]

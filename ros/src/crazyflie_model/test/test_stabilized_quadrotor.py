@@ -162,3 +162,28 @@ def test_derivative_is_that_of_the_airframe_between_samples():
     damping = 4.0 * 9.1785e-7 * dynamics.airframe.parameters.hover_speed / 0.027
     np.testing.assert_allclose(x_dot[3:6], [damping, 2.0 * damping, 0.0], atol=1e-12)
     np.testing.assert_array_equal(x_dot[17:], 0.0)
+
+
+def test_its_pose_is_the_airframe_s():
+    x = [float(each) for each in range(StabilizedQuadrotor.x_dim)]
+    assert StabilizedQuadrotor().pose(x, split(HOVER)) == ((0.0, 1.0, 2.0), (6.0, 7.0, 8.0, 9.0))
+
+
+@pytest.mark.parametrize(("count", "samples"), [(0, True), (1, False), (2, True), (3, False)])
+def test_the_loops_sample_every_second_step(count, samples):
+    dynamics = StabilizedQuadrotor()
+    x = dynamics.initial_state((0.0, 0.0, 0.5))
+    after = dynamics.step(count, x, [0.1, 0.0, 0.0, GRAVITY])
+    assert (after[17:] != x[17:]) == samples
+
+
+def test_on_the_ground_the_loops_are_reset_and_above_it_they_are_not():
+    dynamics = StabilizedQuadrotor()
+    control = [0.1, 0.2, 0.3, 4.0]
+    standing = dynamics.step(0, dynamics.initial_state((0.0, 0.0, 0.0)), control)
+    assert standing[17:26] == [0.0] * 9
+    assert len(set(standing[26:])) == 1
+    flying = dynamics.step(0, dynamics.initial_state((0.0, 0.0, 0.01)), control)
+    # Integrals of the errors over 2 ms, and 2 ms of the yaw rate.
+    assert flying[17:20] == pytest.approx([0.0002, 0.0004, 0.0006 * 0.002])
+    assert flying[25] == pytest.approx(0.0006)

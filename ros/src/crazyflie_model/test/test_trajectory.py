@@ -110,3 +110,11 @@ def test_trajectory_moved_and_turned():
     np.testing.assert_allclose(turned.position, (5.0, 7.0, 7.0), atol=1e-12)
     np.testing.assert_allclose(turned.velocity, (0.0, 0.0, 0.0), atol=1e-12)
     assert turned.yaw == pytest.approx(2.0 + math.pi / 2.0)
+
+
+def test_a_trajectory_that_is_over_is_at_rest():
+    trajectory = Trajectory(PIECES)
+    end = trajectory.evaluate(1.6)
+    assert end[1:3] == (ZERO, ZERO)
+    assert end.yaw_rate == 0.0
+    np.testing.assert_allclose(end.position, PIECES[-1].evaluate(0.3).position)

@@ -1,5 +1,7 @@
 """What the filter flies by itself: thrust of hover, braking."""
 
+import math
+
 import pytest
 from filter_flight import G, level
 
@@ -9,6 +11,8 @@ from crazyflie_takeoff.safe_control import (
     HoverThrust,
     SafeControl,
     Setpoint,
+    braking_time,
+    descent_time,
 )
 
 
@@ -54,3 +58,123 @@ def test_without_a_state_a_hover_thrust_that_is_too_high_hardly_lifts():
         highest = max(highest, z)
     assert highest < 1.65
     assert z < 0.0
+
+
+# Figures by hand: 0.25 g per m and 0.3 g per m/s, tilt at most 0.15 rad.
+
+
+@pytest.mark.parametrize(
+    ("yaw", "roll", "pitch"),
+    [(0.0, -math.atan(0.035), -math.atan(0.07)), (math.pi / 2, -math.atan(0.07), math.atan(0.035))],
+)
+def test_a_vehicle_is_stopped_at_the_place_that_it_reaches_in_half_a_second(yaw, roll, pitch):
+    motion = Motion((1.0, 2.0, 1.0), (0.4, -0.2, 0.0), yaw)
+    # The place is (0.2, -0.1) m ahead: 0.25 * 0.2 - 0.3 * 0.4 and -0.25 * 0.1 + 0.3 * 0.2.
+    control = SafeControl(G, motion).advance(0.0, motion, False)
+    assert control == pytest.approx((roll, pitch, 0.0, G))
+
+
+@pytest.mark.parametrize(
+    ("away", "speed", "pitch"),
+    [(0.2, 0.0, -math.atan(0.05)), (2.0, 0.0, -math.atan(0.125)), (-2.0, -0.5, 0.15)],
+)
+def test_the_place_counts_up_to_half_a_metre_and_tilt_is_limited(away, speed, pitch):
+    safe = SafeControl(G, None)
+    safe.advance(0.0, Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)), False)
+    control = safe.advance(0.0, Motion((away, 0.0, 1.0), (speed, 0.0, 0.0)), False)
+    assert control.pitch == pytest.approx(pitch)
+    sideways = safe.advance(0.0, Motion((0.0, away, 1.0), (0.0, speed, 0.0)), False)
+    assert sideways.roll == pytest.approx(-pitch)
+
+
+@pytest.mark.parametrize(
+    ("z", "z_dot", "thrust"),
+    [
+        # The target is 1 m/s per m, 0.3 m/s at most; the speed follows it in 0.3 s.
+        (0.9, 0.0, 0.1 / 0.3),
+        (1.1, 0.0, -0.1 / 0.3),
+        (0.2, 0.0, 1.0),
+        (0.9, 0.4, -1.0),
+        (0.9, -2.0, 0.2 * 9.81),
+        (0.9, 2.0, -0.4 * 9.81),
+    ],
+)
+def test_it_returns_to_the_height_of_the_beginning(z, z_dot, thrust):
+    safe = SafeControl(G, None)
+    safe.advance(0.0, Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)), False)
+    control = safe.advance(0.0, Motion((0.0, 0.0, z), (0.0, 0.0, z_dot)), False)
+    assert control.thrust - G == pytest.approx(thrust)
+
+
+@pytest.mark.parametrize(
+    ("z_dot", "thrust"),
+    [
+        # 0.3924 m/s are ended in 0.1 s with 0.4 g, within 19.62 mm; 0.1962 m/s with 0.2 g.
+        (0.3924, (0.01962 - 0.3924) / 0.3),
+        (-0.1962, (-0.00981 + 0.1962) / 0.3),
+    ],
+)
+def test_the_height_to_keep_is_where_the_vertical_speed_ends(z_dot, thrust):
+    motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, z_dot))
+    control = SafeControl(G, motion).advance(0.0, motion, False)
+    assert control.thrust - G == pytest.approx(thrust)
+
+
+def test_a_descent_gets_faster_up_to_its_speed():
+    motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    safe = SafeControl(G, motion)
+    thrusts = [safe.advance(0.05, motion._replace(yaw=0.0), True).thrust - G for _ in range(40)]
+    # 0.3 m/s^2 for 0.05 s; 0.4 m/s in the end.
+    assert thrusts[:2] == pytest.approx([-0.015 / 0.3, -0.03 / 0.3])
+    assert thrusts[-1] == pytest.approx(-0.4 / 0.3)
+    # A step that is too long counts as 0.05 s.
+    thrust = SafeControl(G, motion).advance(9.0, motion._replace(yaw=0.0), True).thrust
+    assert thrust - G == pytest.approx(-0.015 / 0.3)
+
+
+def test_without_a_state_the_velocity_is_reckoned_from_the_control():
+    motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0))
+    safe = SafeControl(G, motion, 0.1, Setpoint(0.1, 0.2, 0.0, G + 1.0))
+    assert safe.climb == pytest.approx(0.1)
+    control = safe.advance(0.0, None, False)
+    # g tan(0.2) for 0.1 s forward, g tan(0.1) to the right; 0.3 g per m/s against it.
+    assert math.tan(control.pitch) == pytest.approx(-0.03 * G * math.tan(0.2))
+    assert math.tan(control.roll) == pytest.approx(-0.03 * G * math.tan(0.1))
+    assert control.thrust - G == pytest.approx(-0.1 / 0.3)
+    turned = SafeControl(G, motion._replace(yaw=math.pi), 0.1, Setpoint(0.1, 0.2, 0.0, G))
+    assert turned.advance(0.0, None, False)[:2] == pytest.approx(control[:2])
+
+
+def test_a_heavy_vehicle_gets_no_more_thrust_than_the_most():
+    motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, -2.0))
+    assert SafeControl(1.2 * G, motion).advance(0.0, motion, False).thrust == 1.25 * G
+
+
+def test_how_long_braking_and_a_descent_take():
+    assert [braking_time(each * G) for each in (0.4, 0.0, -0.2)] == pytest.approx([1.0, 0.0, 1.0])
+    still, sinking, climbing = (
+        Motion((0.0, 0.0, 1.5), (0.0, 0.0, z_dot)) for z_dot in (0.0, -1.0, 0.4 * G)
+    )
+    assert descent_time(still, 0.5) == pytest.approx(2.5)
+    assert descent_time(sinking, 0.5) == pytest.approx(2.5)
+    # 1 s to end the climb, in which it rises by 0.2 g.
+    assert descent_time(climbing, 0.5) == pytest.approx(1.0 + (1.0 + 0.2 * G) / 0.4)
+    assert descent_time(still, 9.0) == 0.0
+
+
+def test_the_mean_of_hover_by_its_time_constant():
+    hover = HoverThrust()
+    hover.update(2.0, level(G + 2.0), None)
+    assert hover.value == pytest.approx(G + 1.0)
+    hover.update(2.0, level(G + 1.0), 1.0)
+    assert hover.value == pytest.approx(G + 1.0)
+    # The mean of the speed is 1.5 m/s; (2 - 1.5) / 2 s is the acceleration.
+    hover.update(2.0, level(G + 1.0), 2.0)
+    assert hover.value == pytest.approx(G + 0.75)
+    hover.update(2.0, level(G + 1.0), None)
+    assert hover.value == pytest.approx(G + 1.0)
+
+
+def test_a_mixture_of_controls():
+    mixed = Setpoint(0.0, 1.0, 2.0, 3.0).mixed(Setpoint(4.0, 3.0, 2.0, -1.0), 0.25)
+    assert mixed == (1.0, 1.5, 2.0, 2.0)

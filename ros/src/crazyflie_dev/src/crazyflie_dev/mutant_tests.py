@@ -1,5 +1,6 @@
 """Runs single tests of pytest in forks of the process that has collected them."""
 
+import itertools
 import os
 import pickle
 import resource
@@ -17,8 +18,11 @@ import pytest
 from _pytest.runner import runtestprotocol
 from tqdm import tqdm
 
-_LONGEST = 120.0  #: s, of a test without a mutant.
-_PATIENCE = 10.0  #: Times as long as without a mutant a test may take, and 5 s.
+#: Processor time that the tests of a mutant take in all, s; what is slower is left out.
+BUDGET = 5.0
+#: A test may take so many times the processor time that it takes without a mutant, and 1 s.
+_PATIENCE = 10.0
+_LONGEST = 120.0  #: That a test may wait for what does not come, s.
 _MEMORY = 4 << 30  #: Bytes that a fork may take.
 
 Function = tuple[str, str]  #: Path of its module and qualified name.
@@ -31,18 +35,18 @@ class CallRecorder:
         self._codes: dict[int, CodeType] = {}
 
     def __enter__(self) -> Self:
-        sys.setprofile(self._note)
-        threading.setprofile(self._note)
+        sys.settrace(self._note)
+        threading.settrace(self._note)
         return self
 
     def __exit__(self, *_: object) -> None:
-        sys.setprofile(None)
-        threading.setprofile(None)
+        sys.settrace(None)
+        threading.settrace(None)
 
-    def _note(self, frame: FrameType, event: str, _: Any) -> None:
-        if event == "call":
-            code = frame.f_code
-            self._codes[id(code)] = code
+    def _note(self, frame: FrameType, *_: object) -> None:
+        # Called for functions only: it returns None, so their lines are not traced.
+        code = frame.f_code
+        self._codes[id(code)] = code
 
     def functions(self, paths: set[str]) -> set[Function]:
         """Return the functions of some modules; one within another counts as the outer one."""
@@ -55,7 +59,7 @@ class CallRecorder:
 
 @dataclass(frozen=True)
 class Test:
-    """A test that passes, the functions that it calls, and how long it takes, s."""
+    """A test that passes, the functions that it calls, and its processor time, s."""
 
     item: pytest.Item
     functions: set[Function]
@@ -74,12 +78,19 @@ def measured(items: Sequence[pytest.Item], paths: set[str]) -> tuple[list[Test],
     return tests, others
 
 
+def within_budget(tests: Sequence[Test]) -> list[Test]:
+    """Return the first of some tests, as many as take `BUDGET` together."""
+    ends = itertools.accumulate(test.duration for test in tests)
+    return [test for test, end in zip(tests, ends, strict=True) if end <= BUDGET]
+
+
 def first_failure(functions: Sequence[FunctionType], code: CodeType, tests: Sequence[Test]) -> str:
     """Give functions another code; return the node id of the first test that fails, "" if none."""
     for function in functions:
         function.__code__ = code
     for test in tests:
-        signal.setitimer(signal.ITIMER_REAL, _PATIENCE * test.duration + 5.0)
+        signal.setitimer(signal.ITIMER_PROF, _PATIENCE * test.duration + 1.0)
+        signal.setitimer(signal.ITIMER_REAL, _LONGEST)
         if not _passes(test.item):
             return test.item.nodeid
     return ""
@@ -111,10 +122,10 @@ def _measure(item, paths):
     programs = []
     sys.addaudithook(lambda event, _: programs.append(1) if event == "subprocess.Popen" else None)
     signal.setitimer(signal.ITIMER_REAL, _LONGEST)
-    begin = time.monotonic()
+    begin = time.process_time()
     with CallRecorder() as recorder:
         passes = _passes(item)
-    duration = time.monotonic() - begin
+    duration = time.process_time() - begin
     fault = "starts programs" if programs else "" if passes else "fails"
     return recorder.functions(paths), duration, fault
 

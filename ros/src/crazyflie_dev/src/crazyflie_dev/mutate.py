@@ -3,8 +3,8 @@
 ``python3 -m crazyflie_dev.mutate PACKAGE [MODULE ...]`` collects the unit tests once, notes which
 functions each of them calls, and then, for each mutant, runs those that call the changed function
 in a fork of the process. There the code of the loaded function is replaced, so nothing is imported
-anew. Modules are by default those without ROS, see `uses_ros`; tests are those that are quick and
-start no program.
+anew. Modules are by default those without ROS, see `uses_ros`; tests are those that are quick, see
+`mutant_tests.BUDGET`, and start no program.
 
 A mutant is caught if a test fails, dies, or takes far longer than usual. One that changes nothing
 is explained in the package's test/equivalent_mutants.txt: a line with its text from the output,
@@ -31,7 +31,14 @@ import rospkg
 from hypothesis import Phase, settings
 from tqdm import tqdm
 
-from crazyflie_dev.mutant_tests import CallRecorder, Test, first_failure, forked, measured
+from crazyflie_dev.mutant_tests import (
+    CallRecorder,
+    Test,
+    first_failure,
+    forked,
+    measured,
+    within_budget,
+)
 from crazyflie_dev.mutants import Mutant, mutants
 from crazyflie_utils.testing import pytest_plugin
 
@@ -108,7 +115,7 @@ class MutationPlugin:
             callers = [test for test in tests if key in test.functions]
             # What has caught a neighbour often catches this one, too.
             callers.sort(key=lambda t: (-catches[mutant.function, t.item.nodeid], t.duration))
-            failed = forked(partial(first_failure, functions, code, callers))
+            failed = forked(partial(first_failure, functions, code, within_budget(callers)))
             failed = DIED if failed is None else failed
             catches[mutant.function, failed] += 1
             self.results.append((mutant, failed))

@@ -22,7 +22,9 @@ def test_answers_a_state():
     reference = PositionVelocityStateStamped(state=PositionVelocityState(z=1.0))
     state = PositionVelocityYawStateStamped(state=PositionVelocityYawState(x=0.2, z=0.8))
     state.header.stamp = rospy.Time(12, 345)
-    control = exchange({"/ref": reference, "/state": state}, "/control/lqr", ControlStamped)
+    control = exchange(
+        {"/lift/ref": reference, "/lift/state": state}, "/lift/control", ControlStamped
+    )
     assert control.header.stamp == state.header.stamp
     assert control.control.pitch == pytest.approx(-0.05)
     assert control.control.thrust == pytest.approx(9.81 + 0.3)

@@ -12,6 +12,14 @@ from crazyflie_dashboard.page.scene_view import SceneView, condition
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
 
+#: Names of the rates that are shown, by the topics' roles.
+RATES = {
+    "pose": "pose",
+    "state": "state",
+    "reference": "reference",
+    "final_control": "control",
+    "cmd_vel": "control",
+}
 LOOKS = ("ground", "flight", "stale", "emergency")
 
 
@@ -128,14 +136,15 @@ def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
         ["pose", _age(vehicle.pose_age), "warn" if vehicle.is_stale else ""],
         ["control", _age(vehicle.control_age), ""],
     ]
-    if rates := ", ".join(f"{what} {rate:.0f}" for what, rate in vehicle.rates.items() if rate):
+    known = {RATES[role]: rate for role, rate in vehicle.rates.items() if role in RATES and rate}
+    if rates := ", ".join(f"{what} {rate:.0f}" for what, rate in known.items()):
         facts.append(["rates", f"{rates} Hz", "wide"])
     if vehicle.position is not None:
-        facts.insert(0, ["position", "{:.2f}  {:.2f}  {:.2f} m".format(*vehicle.position), "wide"])
-    # In the order of the enum: the ordinary ones first.
-    actions = [
-        each.value for each in Action if each in vehicle.actions and each is not Action.GO_TO
-    ]
+        place = "  ".join(f"{each:z.2f}" for each in vehicle.position)
+        facts.insert(0, ["position", f"{place} m", "wide"])
+    # In the order of the enum, the ordinary ones first; the emergency stands apart.
+    shown = [each for each in Action if each in vehicle.actions and each is not Action.GO_TO]
+    actions = [each.value for each in sorted(shown, key=lambda each: each is Action.EMERGENCY)]
     return {
         "name": vehicle.name,
         "kind": vehicle.kind.value,

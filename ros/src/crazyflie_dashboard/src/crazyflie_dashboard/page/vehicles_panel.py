@@ -130,9 +130,10 @@ def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
     """Return what cards.js shows of a vehicle; fact: what, value, how it looks."""
     battery = "" if vehicle.battery is None else f"{vehicle.battery:.2f} V"
     link = "" if vehicle.link_quality is None else f"{vehicle.link_quality:.0%}"
+    is_weak = vehicle.link_quality is not None and vehicle.link_quality < 0.5
     facts = [
         ["battery", battery, "warn" if vehicle.is_battery_low else ""],
-        ["link", link, "warn" if (vehicle.link_quality or 1.0) < 0.5 else ""],
+        ["link", link, "warn" if is_weak else ""],
         ["pose", _age(vehicle.pose_age), "warn" if vehicle.is_stale else ""],
         ["control", _age(vehicle.control_age), ""],
     ]
@@ -164,11 +165,6 @@ def _age(age: float | None) -> str:
     return "now" if age < 0.3 else f"{age:.1f} s ago" if age < 10 else f"{age:.0f} s ago"
 
 
-def _number(
-    label: str,
-    value: float | None = None,
-    minimum: float | None = None,
-    maximum: float | None = None,
-) -> ui.number:
-    field = ui.number(label, value=value, min=minimum, max=maximum, step=0.1)
+def _number(label: str, value: float | None = None) -> ui.number:
+    field = ui.number(label, value=value, step=0.1)
     return field.props("dense outlined hide-bottom-space").classes("number")

@@ -93,16 +93,14 @@ class FakeDashboard(Dashboard):
                 ),
             ),
             "images": ("/cf1/image_raw",),
-            "frames": (Frame("wand", (-1.5, 1.2, 0.3), (0, 0, 0, 1), 0.01),),
+            "frames": (Frame("wand", (-1.5, 1.2, 0.3), (0, 0, 0, 1)),),
             "sentences": (Sentence("warn", "doctor", "cf2 has a weak link", "move the antenna"),),
             "log": (
                 LogLine(1, 12.0, "info", "/cf1/takeoff_server", "ready"),
                 LogLine(2, 12.5, "warn", "/cf2/driver", "<b>link</b> at 40 %"),
             ),
         }
-        self._scene = Scene(
-            time=1.0, vehicles={each.name: each for each in vehicles}, **{**known, **details}
-        )
+        self._scene = Scene(vehicles={each.name: each for each in vehicles}, **{**known, **details})
 
     def change(self, name, **details):
         """Change a vehicle."""

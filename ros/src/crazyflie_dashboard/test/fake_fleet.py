@@ -88,11 +88,11 @@ class FakeFleet:
     def vehicles(self):
         return self.dashboard.scene().vehicles
 
-    def send_poses(self, names=None):
+    def send_poses(self, names=None, z=1.0):
         """Publish a pose of each vehicle on /tf, and let a scene be made."""
         self.stamp = self.process.clock.nanoseconds()
         poses = [
-            StampedPose("world", name, self.stamp, (float(k), 0.0, 1.0), (0.0, 0.0, 0.0, 1.0))
+            StampedPose("world", name, self.stamp, (float(k), 0.0, z), (0.0, 0.0, 0.0, 1.0))
             for k, name in enumerate(names or self.names)
         ]
         self.process.publish("/tf", PoseCodec().encode(poses))

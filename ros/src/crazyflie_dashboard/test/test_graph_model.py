@@ -195,3 +195,14 @@ def test_paths_of_planners_are_in_the_fixed_frame(fleet, monkeypatch):
     fleet.process.publish("/planner/plan", plan)
     fleet.send_poses()
     assert fleet.dashboard.scene().paths["/planner/plan"] == ((2.0, 0.0, 1.0), (2.0, 0.5, 1.0))
+
+
+def test_the_frame_of_a_vehicle_without_a_name_is_its_own_on_the_ground_too():
+    fleet = FakeFleet(0)
+    fleet.graph = Graph({"/state": "crazyflie_msgs/PositionVelocityYawStateStamped"})
+    fleet.process.advance(0.1)
+    fleet.send_poses(["crazyflie"], z=0.0)
+    fleet.process.advance(2.1)
+    fleet.send_poses(["crazyflie"], z=0.0)
+    assert fleet.vehicles["/"].frame == "crazyflie"
+    assert fleet.dashboard.scene().frames == ()

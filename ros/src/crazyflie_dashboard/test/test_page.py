@@ -180,3 +180,8 @@ def test_messages_and_plots(browser):
     browser.press("Stop")
     browser.has("height, m", ".q-table")
     browser.has("0.599", ".q-table")  # The height has risen by so much.
+
+
+def test_a_lost_link_is_marked(browser, server):
+    server.dashboard.change("cf1", link_quality=0.0)
+    browser.has("0%", f"{browser.card('cf1')} .warn")

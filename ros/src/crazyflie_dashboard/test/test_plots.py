@@ -31,6 +31,7 @@ def test_the_error_is_the_distance_from_the_reference():
     plots.take("state", (0.3, 0.4, 1.0, 0.0, 0.0, 0.0, 0.0))
     plots.take("final_control", (0.0, 0.0, 0.0, 9.81))
     plots.take("log pm", [3.9, 0.5])
+    assert [series.unit for series in plots.series()] == [*"mmmmm", *["m/s"] * 3, "m/s^2", "", ""]
     values = {series.name: (series.values[-1], series.unit) for series in plots.series()}
     assert values["error"] == (pytest.approx(0.5), "m")
     assert values["thrust"] == (9.81, "m/s^2")

@@ -7,6 +7,7 @@ import os
 import secrets
 import socket
 from collections.abc import Iterator, Mapping
+from http.cookies import SimpleCookie
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -58,15 +59,15 @@ class Access:
         host = f"[{host}]" if ":" in host else host
         return f"http://{host}:{self.port}/" + (f"?token={self.token}" if self.token else "")
 
-    def refusal(self, headers: Mapping[str, str], token: str | None = None) -> str:
+    def refusal(self, headers: Mapping[str, str], token: str = "") -> str:
         """Return why a request is refused; "" if it is not.
 
         Parameters
         ----------
         headers : dict
             Of the HTTP request, also of one that opens a websocket.
-        token : str or None
-            Of its address; by default of its cookie `COOKIE`.
+        token : str
+            Of its address; without one that of its cookie `COOKIE` counts.
         """
         fields = {name.lower(): value for name, value in headers.items()}
         host, origin = fields.get("host", ""), fields.get("origin")
@@ -97,8 +98,8 @@ class Access:
 
 
 def _cookie(text: str) -> str:
-    found = [each.strip().partition("=") for each in text.split(";")]
-    return next((value for name, _, value in found if name == COOKIE), "")
+    found = SimpleCookie(text).get(COOKIE)
+    return found.value if found else ""
 
 
 def is_loopback(host: str) -> bool:

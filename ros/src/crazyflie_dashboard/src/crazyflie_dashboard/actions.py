@@ -83,7 +83,7 @@ class Actions:
         RefusalError
             The command is too old, or makes no sense.
         """
-        self._expect_fresh(command)
+        expect_fresh(command.action.value, self._time() - command.clicked)
         _check(command)
         answers = self._land_all(command, targets, graph)
         for name in command.vehicles:
@@ -99,14 +99,6 @@ class Actions:
         """End the commanders that were started here; each lives until its vehicle has landed."""
         for process in self._commanders.values():
             process.terminate() if process.poll() is None else None
-
-    def _expect_fresh(self, command):
-        age = self._time() - command.clicked
-        if not -0.1 <= age <= MAX_COMMAND_AGE:
-            raise RefusalError(
-                f"{command.action.value}: the command is {age:.1f} s old; expected at most "
-                f"{MAX_COMMAND_AGE:g} s; nothing was done"
-            )
 
     def _land_all(self, command, targets, graph):
         """Return the answer of the fleet for its vehicles: it lands them in rounds."""
@@ -156,7 +148,7 @@ class Actions:
         def call(prepared):
             try:
                 has_yaw = prepared.result()
-                self._expect_fresh(command)
+                expect_fresh(command.action.value, self._time() - command.clicked)
                 request = _request(command, service, target, has_yaw)
             except Exception as error:
                 outcome.set_exception(error)
@@ -180,6 +172,15 @@ class Actions:
         # A process of its own, so that the vehicle keeps it when this one ends.
         arguments = [program, f"__ns:={vehicle.namespace or '/'}", "__name:=high_level"]
         self._commanders[name] = subprocess.Popen(arguments, start_new_session=True)
+
+
+def expect_fresh(what: str, age: float) -> None:
+    """Raise `RefusalError` for a command whose click is too old, s, or not yet."""
+    if not -0.1 <= age <= MAX_COMMAND_AGE:
+        raise RefusalError(
+            f"{what}: the command is {age:.1f} s old; expected at most {MAX_COMMAND_AGE:g} s; "
+            "nothing was done"
+        )
 
 
 def _check(command: Command) -> None:

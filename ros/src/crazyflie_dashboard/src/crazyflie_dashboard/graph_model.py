@@ -186,9 +186,8 @@ class GraphModel:
         for name in frames.poses.keys() - own:
             pose = frames.in_fixed(name, fixed)
             if pose is not None and frames.poses[name].parent not in own:
-                others.append(Frame(name, *pose, frames.age(name)))
+                others.append(Frame(name, *pose))
         return Scene(
-            time=self._parent.nanoseconds() * 1e-9,
             fixed_frame=fixed,
             vehicles=snapshots,
             solids=self._surroundings.solids(frames, fixed),

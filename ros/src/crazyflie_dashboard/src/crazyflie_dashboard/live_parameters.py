@@ -1,17 +1,19 @@
 """Parameters of the running graph: of nodes by dynamic_reconfigure, of firmware by the driver."""
 
 from concurrent.futures import Executor, Future
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config, ConfigDescription
-from dynamic_reconfigure.srv import Reconfigure
+from dynamic_reconfigure.srv import Reconfigure, ReconfigureRequest
 from typing_extensions import override
 
 from crazyflie_dashboard.answers import words
 from crazyflie_dashboard.dashboard import ParameterInfo
 from crazyflie_dashboard.graph_model import GraphModel
-from crazyflie_dashboard.parameters import confirmed, described, of_firmware, parsed, request
+from crazyflie_dashboard.parameters import described, of_firmware, parsed, values_of
 from crazyflie_driver.srv import UpdateParams, UpdateParamsRequest
 from crazyflie_utils import NodeHandle, ParameterError
 from crazyflie_utils.parameters.types import ParameterType
@@ -67,16 +69,17 @@ class LiveParameters:
                 lambda _: self._handle.submit(self._update_firmware, parameter, top, name, outcome)
             )
             return outcome
-        service = f"{parameter.owner}{_SERVICE}"
+        service, config = f"{parameter.owner}{_SERVICE}", encode_config({parameter.name: value})
         answer = self._handle.call_service(
-            service, Reconfigure, request(parameter, value), _CALL_TIMEOUT
+            service, Reconfigure, ReconfigureRequest(config), _CALL_TIMEOUT
         )
 
         def confirm(done):
             if done.exception() is not None:
                 outcome.set_exception(RefusalError(words(done.exception())))
             else:
-                outcome.set_result(confirmed(parameter, done.result().config))
+                back = values_of(done.result().config)
+                outcome.set_result(replace(parameter, value=back.get(parameter.name, value)))
 
         answer.add_done_callback(confirm)
         return outcome
@@ -99,7 +102,7 @@ class LiveParameters:
                 self._handle.set_param(f"{top}/{name}", parameter.value)
                 raise RefusalError(words(refusal))
             value = self._handle.get_param(f"{top}/{name}", _Raw())
-            return ParameterInfo(**{**vars(parameter), "value": value})
+            return replace(parameter, value=value)
 
         def finish(done):
             error = done.exception()

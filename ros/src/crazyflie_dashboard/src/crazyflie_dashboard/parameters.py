@@ -3,12 +3,9 @@
 import ast
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from typing import Any
 
-from dynamic_reconfigure.encoding import encode_config
 from dynamic_reconfigure.msg import Config, ConfigDescription
-from dynamic_reconfigure.srv import ReconfigureRequest
 
 from crazyflie_dashboard.dashboard import ParameterInfo
 from crazyflie_utils.refusal import RefusalError
@@ -89,28 +86,21 @@ def parsed(parameter: ParameterInfo, text: str) -> bool | int | float | str:
     if parameter.kind in ("int", "float") and not (
         (low is None or value >= low) and (high is None or value <= high) and math.isfinite(value)
     ):
-        raise RefusalError(f"{where} {_range(low, high)} {parameter.unit}".rstrip())
+        limits = range_of(parameter) or "a finite number"
+        raise RefusalError(f"{where} {limits} {parameter.unit}".rstrip())
     if parameter.choices and value not in parameter.choices:
         raise RefusalError(f"{where} one of {', '.join(parameter.choices)}")
     return value
 
 
-def request(parameter: ParameterInfo, value: bool | int | float | str) -> ReconfigureRequest:
-    """Return the request that sets a live parameter."""
-    return ReconfigureRequest(encode_config({parameter.name: value}))
-
-
-def confirmed(parameter: ParameterInfo, config: Config) -> ParameterInfo:
-    """Return a parameter with the value that came back."""
-    return replace(parameter, value=values_of(config).get(parameter.name, parameter.value))
-
-
-def _range(low, high):
-    if low is None and high is None:
-        return "a finite number"
-    if high is None:
+def range_of(parameter: ParameterInfo) -> str:
+    """Return the range of a number in words; nothing if it has none."""
+    low, high = parameter.minimum, parameter.maximum
+    if low is not None and high is not None:
+        return f"{low:g} to {high:g}"
+    if low is not None:
         return f"at least {low:g}"
-    return f"at most {high:g}" if low is None else f"{low:g} to {high:g}"
+    return "" if high is None else f"at most {high:g}"
 
 
 def _finite(value):

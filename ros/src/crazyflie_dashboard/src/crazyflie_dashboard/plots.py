@@ -21,6 +21,8 @@ _NUMBERS = {"bool", "byte", "char", "time", "duration", "float32", "float64"} | 
     f"{sign}int{size}" for sign in ("", "u") for size in (8, 16, 32, 64)
 }
 
+_UNITS = ["m", "m/s", "deg", "m/s^2", "V"]  #: In the order of their plots; others come last.
+
 _MAX_SERIES = 100  #: Of one vehicle: a log topic may have any number of values.
 
 
@@ -92,9 +94,10 @@ class VehiclePlots:
             self.take("state", (*now.position, *(now.velocity or ())))
 
     def series(self) -> tuple[Series, ...]:
-        """Return all plots."""
+        """Return all plots, those of a unit together."""
         now = self._time()
-        return tuple(ring.series(name, now) for name, ring in self._rings.items())
+        found = (ring.series(name, now) for name, ring in self._rings.items())
+        return tuple(sorted(found, key=lambda each: (*_UNITS, each.unit).index(each.unit)))
 
     def _add(self, name, unit, value):
         if name not in self._rings:

@@ -36,16 +36,6 @@ class Action(Enum):
 
 
 @dataclass(frozen=True)
-class Control:
-    """A control: roll, pitch (rad), yaw rate (rad/s), thrust (m/s^2, mass-normalised)."""
-
-    roll: float
-    pitch: float
-    yaw_rate: float
-    thrust: float
-
-
-@dataclass(frozen=True)
 class Reference:
     """Where a vehicle is to be: position (m), velocity (m/s), yaw (rad; NaN if it has none)."""
 
@@ -69,8 +59,7 @@ class VehicleSnapshot:
     is_stale: bool = True  #: The pose is older than `STALE_AGE`, or there is none.
     #: Of all vehicles if there are few, otherwise of watched ones.
     reference: Reference | None = None
-    control: Control | None = None  #: As references.
-    control_age: float | None = None  #: s.
+    control_age: float | None = None  #: s; as references.
     #: state, reason: State of the flight in words, and why it is what it is; "" for an ordinary
     #: one.
     state: str = "not known"
@@ -108,7 +97,6 @@ class Frame:
     name: str
     position: Triple
     rotation: Rotation
-    age: float
 
 
 @dataclass(frozen=True)
@@ -144,7 +132,6 @@ class LogLine:
 class Scene:
     """All that there is at one moment."""
 
-    time: float = 0.0  #: ROS time, s.
     fixed_frame: str = "world"
     #: By name, in the order in which they are shown.
     vehicles: Mapping[str, VehicleSnapshot] = field(default_factory=dict)

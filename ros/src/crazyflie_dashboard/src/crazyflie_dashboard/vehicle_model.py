@@ -11,7 +11,7 @@ from std_msgs.msg import Float32
 
 from crazyflie_dashboard.discovery import Vehicle
 from crazyflie_dashboard.frames import Frames
-from crazyflie_dashboard.snapshot import STALE_AGE, Control, Kind, Reference, VehicleSnapshot
+from crazyflie_dashboard.snapshot import STALE_AGE, Kind, Reference, VehicleSnapshot
 from crazyflie_driver.msg import GenericLogData
 from crazyflie_model.angles import quaternion_from_rpy
 from crazyflie_msgs.msg import FilterStatus, FlightStatus, VehicleStatus
@@ -121,7 +121,7 @@ class VehicleModel:
         """Return what is known now; poses are those in the frame ``fixed``."""
         self._count_rates()
         position, rotation, velocity, age = self._pose(frames, fixed)
-        reference, control = self._rows.get("reference"), self._control()
+        reference = self._rows.get("reference")
         control_at = self._arrivals.get("final_control", self._arrivals.get("cmd_vel"))
         state, reason = self._words()
         driver = self._driver
@@ -141,7 +141,6 @@ class VehicleModel:
             pose_age=age,
             is_stale=age is None or age > STALE_AGE,
             reference=reference and Reference(reference[:3], reference[3:6], reference[6]),
-            control=control and Control(*control),
             control_age=None if control_at is None else self._time() - control_at,
             state=state,
             reason=reason,
@@ -230,9 +229,6 @@ class VehicleModel:
         age = self._time() - self._arrivals[role]
         return row[:3], quaternion_from_rpy(*attitude), velocity, age
 
-    def _control(self):
-        return self._rows.get("final_control") or self._rows.get("cmd_vel")
-
     def _is_in_flight(self):
         if "flight_status" in self.vehicle.topics:
             return self._status.state not in _ON_GROUND
@@ -265,10 +261,13 @@ def _known(number: float) -> float | None:
 
 
 def frame_of(vehicle: Vehicle, frames: Frames, is_alone: bool) -> str | None:
-    """Return the frame of a vehicle: one that has its name, or the only one that moves."""
+    """Return the frame of a vehicle: one that has its name.
+
+    That of a vehicle that is alone may have any: one that is away from its origin, else any.
+    """
     name = vehicle.namespace.rpartition("/")[2] or vehicle.driver.rpartition("/")[2]
     named = [each for each in frames.poses if name and name in each.split("/")]
     moving = [each for each, pose in frames.poses.items() if any(pose.position)]
-    candidates = named or (moving if is_alone else [])
+    candidates = named or (moving or list(frames.poses) if is_alone else [])
     # The vehicle's own, and not that of its model.
     return min(candidates, key=lambda each: (each.endswith("base_link"), len(each)), default=None)

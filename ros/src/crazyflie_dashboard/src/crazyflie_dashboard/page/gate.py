@@ -1,14 +1,11 @@
 """Lets only requests in that may see the page, and tells browsers what the page may load."""
 
-from http.cookies import SimpleCookie
 from urllib.parse import parse_qs
 
 from starlette.responses import PlainTextResponse, RedirectResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from crazyflie_dashboard.access import Access
-
-COOKIE = "dashboard_token"
+from crazyflie_dashboard.access import COOKIE, Access
 
 HEADERS = (
     # Nothing from the internet, no frame around the page (a click could be meant for another one).
@@ -43,8 +40,7 @@ class Gate:
         if scope["type"] == "websocket":
             headers["upgrade"] = "websocket"
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
-        cookie = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
-        refusal = self._access.refusal(headers, given or (cookie.value if cookie else None))
+        refusal = self._access.refusal(headers, given)
         if refusal and scope["type"] == "websocket":
             await receive()
             await send({"type": "websocket.close", "code": 1008, "reason": refusal[:120]})

@@ -1,5 +1,7 @@
 """What the doctor and the diagnostics say, and the log."""
 
+import time
+
 from nicegui import ui
 
 from crazyflie_dashboard.page.component import Lines
@@ -37,7 +39,7 @@ class MessagesPanel:
         shown = LEVELS[LEVELS.index(self._level.value) :]
         part = (self._filter.value or "").lower()
         lines = [
-            [line.number, line.level, f"{line.time:.1f}  {line.node}", line.text, ""]
+            [line.number, line.level, f"{_clock(line.time)}  {line.node}", line.text, ""]
             for line in reversed(scene.log)
             if line.level in shown and part in f"{line.node} {line.text}".lower()
         ]
@@ -45,5 +47,12 @@ class MessagesPanel:
 
     async def _ask(self) -> None:
         self._examine.disable()
-        await self._session.result(self._session.dashboard.examine())
+        if await self._session.succeeds(self._session.dashboard.examine()):
+            self._session.say("The doctor has looked at everything.", "positive")
         self._examine.enable()
+
+
+def _clock(seconds: float) -> str:
+    """Return ROS time as a text: time of day, or s of simulated time."""
+    is_simulated = seconds < 1e9
+    return f"{seconds:.1f} s" if is_simulated else time.strftime("%X", time.localtime(seconds))

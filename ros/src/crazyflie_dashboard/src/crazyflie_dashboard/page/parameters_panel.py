@@ -7,6 +7,7 @@ from nicegui.elements.mixins.value_element import ValueElement
 
 from crazyflie_dashboard.dashboard import ParameterInfo
 from crazyflie_dashboard.page.session import Session
+from crazyflie_dashboard.parameters import range_of
 from crazyflie_dashboard.snapshot import Scene
 from crazyflie_utils.refusal import RefusalError
 
@@ -104,15 +105,7 @@ class ParameterRow:
 
 def description(parameter: ParameterInfo) -> str:
     """Return unit, range and help of a parameter as one text."""
-    low, high = parameter.minimum, parameter.maximum
-    limits = ""
-    if low is not None and high is not None:
-        limits = f"{low:g} to {high:g}"
-    elif low is not None:
-        limits = f"at least {low:g}"
-    elif high is not None:
-        limits = f"at most {high:g}"
-    parts = (parameter.kind, parameter.unit, limits, parameter.help)
+    parts = (parameter.kind, parameter.unit, range_of(parameter), parameter.help)
     return " · ".join(part for part in parts if part)
 
 

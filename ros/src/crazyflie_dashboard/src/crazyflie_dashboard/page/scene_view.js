@@ -125,6 +125,10 @@ export default {
     update(poses) {
       this.poses = poses;  // They may come before the names that they belong to.
       this.change(() => this.vehicles.update(poses));
+      const count = poses.filter(([x]) => x !== null).length;
+      if (this.isTouched || count <= (this.count ?? 0)) return;
+      this.count = count;
+      this.look("all");
     },
     setNames(names) {
       this.change(() => this.setVehicles(names));
@@ -171,7 +175,9 @@ export default {
       let start = null, isDragging = false;
       const on = (name, act) => this.$el.addEventListener(name, act, { capture: true });
       const tell = ({ x, y }) => this.$emit("goal", { x, y });
+      on("wheel", () => { this.isTouched = true; });
       on("pointerdown", (event) => {
+        this.isTouched = true;  // All vehicles that come are in the view until then.
         start = [event.clientX, event.clientY];
         isDragging = this.goal.visible && this.ray(event).intersectObject(this.goal.handle).length > 0;
         if (isDragging) event.stopPropagation();  // The view is not to turn.

@@ -75,14 +75,10 @@ class Session:
 
     async def result(self, future: "Future[Result]") -> Result | None:
         """Wait for what was asked for; None after showing why it was refused."""
-        try:
-            return await asyncio.wrap_future(future)
-        except RefusalError as error:
-            self.say(str(error), "negative")
-            return None
+        return future.result() if await self.succeeds(future) else None
 
-    async def succeeds(self, future: "Future[None]") -> bool:
-        """Wait for something without a result; False after showing why it was refused."""
+    async def succeeds(self, future: "Future[Any]") -> bool:
+        """Wait for what was asked for; False after showing why it was refused."""
         try:
             await asyncio.wrap_future(future)
         except RefusalError as error:
@@ -98,11 +94,7 @@ class Session:
         if not names:
             self.say(f"{action.value}: choose a vehicle first", "warning")
             return
-        try:
-            future = self.dashboard.command(self.page, Command(action, names, clicked, **details))
-        except RefusalError as error:
-            self.say(str(error), "negative")
-            return
+        future = self.dashboard.command(self.page, Command(action, names, clicked, **details))
         for outcome in await self.result(future) or ():
             if outcome.text:
                 self.say(f"{outcome.vehicle}: {outcome.text}", "negative")

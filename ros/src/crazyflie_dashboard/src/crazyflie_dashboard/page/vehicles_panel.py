@@ -12,6 +12,14 @@ from crazyflie_dashboard.page.scene_view import SceneView, condition
 from crazyflie_dashboard.page.session import CLICKED, Session
 from crazyflie_dashboard.snapshot import Action, Scene, VehicleSnapshot
 
+#: Names of the rates that are shown, by the topics' roles.
+RATES = {
+    "pose": "pose",
+    "state": "state",
+    "reference": "reference",
+    "final_control": "control",
+    "cmd_vel": "control",
+}
 LOOKS = ("ground", "flight", "stale", "emergency")
 
 
@@ -122,20 +130,22 @@ def card(vehicle: VehicleSnapshot, is_chosen: bool) -> dict[str, Any]:
     """Return what cards.js shows of a vehicle; fact: what, value, how it looks."""
     battery = "" if vehicle.battery is None else f"{vehicle.battery:.2f} V"
     link = "" if vehicle.link_quality is None else f"{vehicle.link_quality:.0%}"
+    is_weak = vehicle.link_quality is not None and vehicle.link_quality < 0.5
     facts = [
         ["battery", battery, "warn" if vehicle.is_battery_low else ""],
-        ["link", link, "warn" if (vehicle.link_quality or 1.0) < 0.5 else ""],
+        ["link", link, "warn" if is_weak else ""],
         ["pose", _age(vehicle.pose_age), "warn" if vehicle.is_stale else ""],
         ["control", _age(vehicle.control_age), ""],
     ]
-    if rates := ", ".join(f"{what} {rate:.0f}" for what, rate in vehicle.rates.items() if rate):
+    known = {RATES[role]: rate for role, rate in vehicle.rates.items() if role in RATES and rate}
+    if rates := ", ".join(f"{what} {rate:.0f}" for what, rate in known.items()):
         facts.append(["rates", f"{rates} Hz", "wide"])
     if vehicle.position is not None:
-        facts.insert(0, ["position", "{:.2f}  {:.2f}  {:.2f} m".format(*vehicle.position), "wide"])
-    # In the order of the enum: the ordinary ones first.
-    actions = [
-        each.value for each in Action if each in vehicle.actions and each is not Action.GO_TO
-    ]
+        place = "  ".join(f"{each:z.2f}" for each in vehicle.position)
+        facts.insert(0, ["position", f"{place} m", "wide"])
+    # In the order of the enum, the ordinary ones first; the emergency stands apart.
+    shown = [each for each in Action if each in vehicle.actions and each is not Action.GO_TO]
+    actions = [each.value for each in sorted(shown, key=lambda each: each is Action.EMERGENCY)]
     return {
         "name": vehicle.name,
         "kind": vehicle.kind.value,
@@ -155,11 +165,6 @@ def _age(age: float | None) -> str:
     return "now" if age < 0.3 else f"{age:.1f} s ago" if age < 10 else f"{age:.0f} s ago"
 
 
-def _number(
-    label: str,
-    value: float | None = None,
-    minimum: float | None = None,
-    maximum: float | None = None,
-) -> ui.number:
-    field = ui.number(label, value=value, min=minimum, max=maximum, step=0.1)
+def _number(label: str, value: float | None = None) -> ui.number:
+    field = ui.number(label, value=value, step=0.1)
     return field.props("dense outlined hide-bottom-space").classes("number")

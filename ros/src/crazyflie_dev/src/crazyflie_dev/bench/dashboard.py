@@ -1,4 +1,4 @@
-"""What the dashboard costs beside a hundred vehicles: without a page, and with one."""
+"""What the dashboard costs a hundred vehicles in flight: without a page, and with one."""
 
 import functools
 import shutil
@@ -8,28 +8,30 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from crazyflie_dev.bench import graph
+from crazyflie_dev.bench import graph, swarm
 from crazyflie_dev.bench.row import NotMeasuredError, Row
 from crazyflie_utils.testing.launching import roslaunch
 
 _VEHICLES = 100
-_DURATION = 15.0  #: Of each measurement, s.
 _START_LIMIT = 180.0
-_SETTLING = 10.0  #: From the start of the page until it has found and drawn all vehicles, s.
+_SETTLING = 10.0  #: Until vehicles have a position, hover, and are found and drawn by a page, s.
 _URL = "http://127.0.0.1:8642/"
 
 
 @dataclass(frozen=True)
 class DashboardFigures:
-    """Processor time of the dashboard's process, % of a core."""
+    """What is measured beside a flight."""
 
-    without_page: float
-    with_page: float
+    cpu: float  #: Processor time of the dashboard's process, % of a core.
+    #: period, latency: 99th percentiles of the final control, as it arrives outside, ms; the
+    #: latency is from the stamp of its pose on.
+    period: float
+    latency: float
 
 
 @functools.cache
-def measure() -> DashboardFigures:
-    """Return what the dashboard costs beside a fleet on the ground, whose poses come as in flight.
+def measure() -> tuple[DashboardFigures, DashboardFigures]:
+    """Return figures of a fleet that hovers: without a page, and with one.
 
     Raises `NotMeasuredError` without Chromium.
     """
@@ -42,8 +44,9 @@ def measure() -> DashboardFigures:
             graph.wait_for_service("/all/takeoff", _START_LIMIT)
             graph.wait_for_service("/dashboard/get_loggers", _START_LIMIT)
             time.sleep(_SETTLING)
-            process = graph.process_of("/dashboard")
-            without_page = _share(process)
+            graph.call("/all/takeoff")
+            time.sleep(_SETTLING)
+            without_page = _figures()
             page = subprocess.Popen(
                 ["nice", "-n", "19", browser, "--headless=new", "--no-sandbox"]
                 + ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
@@ -52,16 +55,25 @@ def measure() -> DashboardFigures:
             )
             try:
                 time.sleep(_SETTLING)
-                return DashboardFigures(without_page, _share(process))
+                return without_page, _figures()
             finally:
                 page.terminate()
                 page.wait(10.0)
 
 
-def _share(process):
+def _figures():
+    process = graph.process_of("/dashboard")
     used, began = graph.cpu_time([process]), time.monotonic()
-    time.sleep(_DURATION)
-    return 100.0 * (graph.cpu_time([process]) - used) / (time.monotonic() - began)
+    arrivals = swarm.listen(_VEHICLES)
+    cpu = 100.0 * (graph.cpu_time([process]) - used) / (time.monotonic() - began)
+    (period,) = swarm.percentiles(swarm.periods(arrivals), [99])
+    latencies = [arrival - stamp for _, arrival, stamp in arrivals]
+    return DashboardFigures(cpu, period, *swarm.percentiles(latencies, [99]))
+
+
+def _rise(figure: str) -> float:
+    without_page, with_page = (getattr(each, figure) for each in measure())
+    return float(with_page - without_page)
 
 
 ROWS = [
@@ -69,14 +81,28 @@ ROWS = [
         "dashboard_idle",
         f"dashboard beside {_VEHICLES} vehicles, no page open",
         "% of a core",
-        lambda: measure().without_page,
+        lambda: measure()[0].cpu,
         most=1.0,
     ),
     Row(
         "dashboard_page",
         f"dashboard beside {_VEHICLES} vehicles, a page open",
         "% of a core",
-        lambda: measure().with_page,
+        lambda: measure()[1].cpu,
         most=15.0,
+    ),
+    Row(
+        "dashboard_period",
+        f"{_VEHICLES} vehicles: p99 of the control's period with a page, minus without",
+        "ms",
+        lambda: _rise("period"),
+        most=1.0,
+    ),
+    Row(
+        "dashboard_latency",
+        f"{_VEHICLES} vehicles: p99 of pose -> control with a page, minus without",
+        "ms",
+        lambda: _rise("latency"),
+        most=1.0,
     ),
 ]

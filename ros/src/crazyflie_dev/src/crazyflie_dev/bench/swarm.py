@@ -62,28 +62,34 @@ def measure(n: int, arguments: Sequence[str] = (), core: int = 0) -> SwarmFigure
             graph.call("/all/takeoff")
             time.sleep(_SETTLING)
             used = graph.cpu_time([process])
-            arrivals = _listen(n)
+            arrivals = listen(n)
             used = graph.cpu_time([process]) - used
             memory = graph.memory([process])
     stamps = [stamp for _, _, stamp in arrivals]
-    periods = np.concatenate(
-        [
-            np.diff([arrival for topic, arrival, _ in arrivals if topic == each])
-            for each in {topic for topic, _, _ in arrivals}
-        ]
-    )
-    p50, p99, longest = (float(each) * 1e-6 for each in np.percentile(periods, (50, 99, 100)))
+    p50, p99, longest = percentiles(periods(arrivals), (50, 99, 100))
     cpu = 100.0 * used / ((max(stamps) - min(stamps)) * 1e-9)
     return SwarmFigures(n, start, cpu, p50, p99, longest, memory)
 
 
-def _listen(n):
+def listen(n: int) -> graph.Arrivals:
+    """Return the final controls of three of ``n`` vehicles within `DURATION`."""
     control = "crazyflie_msgs/ControlStamped"
     topics = (f"/cf{k}/control/final" for k in sorted({1, (n + 1) // 2, n}))
     arrivals = graph.listen(DURATION, *(("/fleet", topic, control) for topic in topics))
     if len(arrivals) < n:
         raise NotMeasuredError("no controls came")
     return arrivals
+
+
+def periods(arrivals: graph.Arrivals) -> list[float]:
+    """Return the periods of all topics, as they arrived, ns."""
+    by_topic = ([row[1] for row in arrivals if row[0] == each] for each in {r[0] for r in arrivals})
+    return [float(period) for times in by_topic for period in np.diff(times)]
+
+
+def percentiles(times: Sequence[float], percents: Sequence[float]) -> list[float]:
+    """Return percentiles of times in ns, ms."""
+    return [float(each) * 1e-6 for each in np.percentile(times, percents)]
 
 
 def vehicles_in_real_time() -> int:

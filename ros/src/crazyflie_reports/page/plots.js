@@ -7,7 +7,7 @@ const KINDS = {
   "refusal": "#d97706", "pose rejected": "#9333ea", "hold": "#0891b2", "emergency": "#b42318",
   "link": "#be185d", "battery": "#a16207", "parameter": "#2563eb", "warning": "#ca8a04", "error": "#b42318",
 };
-const LEFT = 52, RIGHT = 8, TOP = 22, BOTTOM = 20;
+const LEFT = 52, RIGHT = 16, TOP = 22, BOTTOM = 20;
 
 // Return the drawing context of a canvas whose pixels fit the screen's.
 function fitted(canvas) {

@@ -2,6 +2,7 @@
 
 const ARM = 0.046, ROTOR = 0.023;  // Of a Crazyflie, m: half of its diagonal, radius of a propeller.
 const SMALLEST = 0.055;            // Smallest arm that is drawn, as a fraction of what is seen.
+const MANY = 25;                   // More vehicles are drawn smaller; only the chosen one has its name.
 
 // Return the pose of a path at a time, between two rows, as [x, y, z, roll, pitch, yaw, ...].
 function poseAt(path, time) {
@@ -135,7 +136,8 @@ class Replay {
 
   // A Crazyflie: two arms, four propellers, of which those in front are red.
   vehicle(flight, pose, color) {
-    const arm = Math.max(ARM, SMALLEST * this.radius / this.zoom), size = arm / ARM * ROTOR;
+    const crowd = Math.max(1, this.others.length / MANY);
+    const arm = Math.max(ARM, SMALLEST * this.radius / this.zoom / Math.sqrt(crowd)), size = arm / ARM * ROTOR;
     const at = (vector) => rotated(vector, pose[3], pose[4], pose[5]).map((value, k) => value + pose[k]);
     for (const quarter of [1, 3, 5, 7]) {
       const angle = quarter * Math.PI / 4, [x, y] = [Math.cos(angle) * arm, Math.sin(angle) * arm];
@@ -147,6 +149,7 @@ class Replay {
       }
       this.line(ring, x > 0 && color === "#1c2330" ? "#dc2626" : color, 1.3);
     }
+    if (crowd > 1 && flight !== this.flight) return;
     const [left, top] = this.project(pose);
     this.context.fillStyle = color;
     this.context.fillText(flight.vehicle, left + 10, top - 10);

@@ -49,7 +49,8 @@ def test_a_bag_without_index(tmp_path):
     assert "crash.bag.active was not closed" in reason
 
 
-def test_a_chunk_that_was_not_closed(tmp_path):
+@pytest.mark.parametrize(("is_sized", "share"), [(False, 1.0), (False, 0.5), (True, 0.5)])
+def test_a_chunk_that_was_not_closed(tmp_path, is_sized, share):
     whole = bags.flight_bag(tmp_path / "whole.bag")
     every, _ = times(whole)
     data = bytearray(whole.read_bytes())
@@ -57,13 +58,14 @@ def test_a_chunk_that_was_not_closed(tmp_path):
     # Behind the header of the first chunk is its size; 0 while it is written.
     place = data.index(b"size=", place) + len(b"size=") + 4
     (size,) = struct.unpack_from("<I", data, place)
-    data[place : place + 4] = bytes(4)
+    if not is_sized:
+        data[place : place + 4] = bytes(4)
     part = tmp_path / "part.bag"
-    part.write_bytes(data[: place + 4 + size])
+    part.write_bytes(data[: place + 4 + round(share * size)])
     some, reason = times(part)
     assert some == every[: len(some)]
     assert some
-    assert "its last chunk was not closed" in reason
+    assert ("it ends within" if share < 1.0 else "its last chunk was not closed") in reason
 
 
 def test_damage(tmp_path):

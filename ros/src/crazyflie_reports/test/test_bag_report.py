@@ -112,6 +112,8 @@ def test_events_of_each_vehicle(run):
         for name in ("cf1", "cf2"):
             bags.write_flight(bag, name)
         bags.write_events(bag, "cf2")
+        log = bags.Log(header=bags.header(8.0), level=4, name="/fleet", msg="/cf2: is held")
+        bag.write("/rosout", log, bags.stamp(8.0))
     status, _, flights = run(run.folder / "a.bag")
     assert status == 0
     assert [each["vehicle"] for each in flights] == ["cf1", "cf2"]
@@ -123,6 +125,7 @@ def test_events_of_each_vehicle(run):
         (5.2, "parameter", "/cf2/lqr_controller/gain is now 2.0"),
         (5.3, "hold", "the filter is holding: no control"),
         (6.3, "emergency", "the filter is emergency: no control"),
+        (7.0, "warning", "/cf2: is held"),
     ]
     with (run.folder / "out" / "events.csv").open() as file:
         assert [row["kind"] for row in csv.DictReader(file)] == [kind for _, kind, _ in events]
@@ -145,6 +148,21 @@ def test_the_page_needs_nothing_else_and_shows_names_as_text(run):
     path = flight["path"]
     row = path["rows"][round((5.0 - path["start"]) / path["period"])]
     assert row[:3] == pytest.approx([0.0, 0.0, 1.0 + bags.OFFSET])
+
+
+def test_a_mission_that_goes_on_at_once_has_no_hover(run):
+    with bags.written(run.folder / "a.bag") as bag:
+        bags.write_flight(bag)
+        for number in range(400):
+            time = bags.FLYING + 0.01 * number
+            state = bags.PositionVelocityState(x=0.005 * number, z=1.0)
+            reference = bags.PositionVelocityStateStamped(bags.header(time), state)
+            bag.write("/ref", reference, bags.stamp(time))
+    _, output, (flight,) = run(run.folder / "a.bag")
+    found = values(flight)
+    names = ("time to hover", "overshoot", "hover error, mean", "hover error, maximum")
+    assert [found[name] for name in names] == [None] * 4
+    assert "hover" not in output
 
 
 def test_other_topics_and_other_names(run):

@@ -41,7 +41,7 @@ def test_references_of_a_climb_are_no_departure():
     # The goal of the takeoff, the climb, and later a move.
     for time, height in ((10.0, 1.0), (10.1, 0.1), (11.0, 0.6), (12.0, 1.0), (17.0, 1.5)):
         record.reference.append(time, [0.0, 0.0, height, 0.0, 0.0, 0.0])
-    assert record.hover_end(HOVER) == 17.0
+    assert record.hover_interval(HOVER) == (14.0, 17.0)
     assert record.time_to_hover(HOVER, 0.01) == pytest.approx(1.98, abs=0.02)
 
 

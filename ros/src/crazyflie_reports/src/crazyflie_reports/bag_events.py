@@ -171,9 +171,7 @@ class EventLog:
 def concerning(events: list[Event], name: str, others: set[str]) -> Iterator[Event]:
     """Yield the events of a vehicle, and those that are no other vehicle's, by namespaces."""
     for event in events:
-        words = {
-            word.split("/")[0] for word in re.findall(r"[\w/]+", event.text.replace(" /", " "))
-        }
+        words = {word.strip("/").split("/")[0] for word in re.findall(r"[\w/]+", event.text)}
         if event.namespace == name or not (event.namespace in others or words & others):
             yield event
 

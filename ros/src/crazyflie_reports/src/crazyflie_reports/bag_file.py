@@ -87,8 +87,10 @@ class BagFile:
                     yield from self._record(file, is_wanted)
                     progress(file.tell() - done)
                     done = file.tell()
-            except (_BrokenOffError, struct.error, KeyError, ValueError, EOFError) as error:
+            except _BrokenOffError as error:
                 self.interruption = self._broken_off(file.tell(), error)
+            except (struct.error, KeyError, ValueError, EOFError):
+                self.interruption = self._broken_off(file.tell(), "it is damaged")
 
     def _record(self, file, is_wanted):
         fields = _fields(_read_sized(file, _LARGEST_HEADER))
@@ -96,10 +98,9 @@ class BagFile:
         (size,) = _UINT32.unpack(_read(file, 4))
         if op == _CHUNK:
             # The size of a chunk that was not closed is 0: it is what remains.
-            is_open = size == 0
-            content = file.read() if is_open else _read(file, size)
+            content = file.read(size or -1)
             yield from self._messages_of(_decompressed(content, fields[b"compression"]), is_wanted)
-            if is_open:
+            if len(content) != size:
                 raise _BrokenOffError("its last chunk was not closed")
             return
         if op == _BAG_HEADER:
@@ -166,8 +167,9 @@ def _read_sized(file, largest):
 
 
 def _sized(data, offset):
-    (size,) = _UINT32.unpack_from(data, offset)
-    end = offset + 4 + size
+    end = offset + 4
+    if end <= len(data):
+        end += _UINT32.unpack_from(data, offset)[0]
     if end > len(data):
         raise _BrokenOffError("it ends within a message")
     return data[offset + 4 : end], end

@@ -45,15 +45,17 @@ class Spool:
         self.count += 1
         self.last_time = time
         if len(self._buffer) >= _BUFFER:
-            with self._path.open("ab") as file:
-                self._buffer.tofile(file)
-            del self._buffer[:]
+            self._flush()
+
+    def _flush(self):
+        with self._path.open("ab") as file:
+            self._buffer.tofile(file)
+        del self._buffer[:]
 
     def rows(self) -> NDArray[np.float64]:
         """Return all rows in the order of their times, shape (count, 3 + len(fields))."""
-        on_disk = np.fromfile(self._path) if self._path.exists() else np.empty(0)
-        numbers = np.concatenate([on_disk, np.array(self._buffer)])
-        rows = numbers.reshape(-1, 3 + len(self.fields))
+        self._flush()
+        rows = np.fromfile(self._path).reshape(-1, 3 + len(self.fields))
         # Bags that were merged may be in another order.
         is_sorted = (np.diff(rows[:, 0]) >= 0.0).all()
         return rows if is_sorted else rows[np.argsort(rows[:, 0], kind="stable")]
@@ -127,7 +129,8 @@ def read(
     log.remarks += reader.remarks()
     connections = [each for file in files for each in file.connections]
     if not connections:
-        raise BagError(f"{path} has no messages; expected {expected()}")
+        text = f"{path} has no messages; expected {expected()}"
+        raise BagError("\n".join([text, *log.remarks]))
     if not log.sources and not log.frames:
         there = sorted({f"{each.topic} ({each.datatype})" for each in connections})
         raise BagError(

@@ -24,6 +24,8 @@ from crazyflie_reports.figures import Figure, figures
 
 PAGE, FIGURES, EVENTS, DATA = "report.html", "figures.csv", "events.csv", "report.json"
 
+SIMULATED = 1e8  #: Times of ROS before this one, of 1973, count from the start of a simulation, s.
+
 
 class ReportError(Exception):
     """There is nothing to report on, or nowhere to write it; the text says why."""
@@ -62,11 +64,11 @@ class Report:
                 ],
             }
             self._flights.append((entry, found))
-        start = datetime.fromtimestamp(log.start, UTC)
+        start = f"{datetime.fromtimestamp(log.start, UTC):%Y-%m-%d %H:%M:%S} UTC"
         self.recordings.append(
             {
                 "name": log.name,
-                "start": f"{start:%Y-%m-%d %H:%M:%S} UTC",
+                "start": start if log.start > SIMULATED else "in simulated time",
                 "duration": round(log.end - log.start, 3),
                 "remarks": log.remarks if data else [*log.remarks, *_why_there_is_no_flight(log)],
                 "flights": data,

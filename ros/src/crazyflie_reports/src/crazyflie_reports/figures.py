@@ -22,6 +22,7 @@ from crazyflie_reports.flight_report import (
 #: propellers are not ideal.
 HARDWARE_TOLERANCE = 0.05
 
+SHORTEST_HOVER = 1.0  #: A vehicle that leaves the hover point within this time, s, does not hover.
 HOVER_TIME_LIMIT = 8.0  #: The takeoff server's 1 s of open loop and 5 s of hover, and 2 s more, s.
 TRACKING_LIMIT = 0.2  #: Largest distance from a moving reference, m.
 DELAY_LIMIT = 0.02  #: 95 % of the controls follow the pose within this time, s.
@@ -73,14 +74,14 @@ def _hover(flight: Flight) -> Iterator[Figure]:
     record, point = flight.record, hover_point(flight)
     tolerance = HARDWARE_TOLERANCE if flight.is_driven else HOVER_TOLERANCE
     time = over = mean = largest = math.nan
-    if point is not None and len(record.state):
+    begin, end = record.hover_interval(point) if point is not None else (0.0, 0.0)
+    if point is not None and len(record.state) and end - begin >= SHORTEST_HOVER:
         time = record.time_to_hover(point, tolerance)
         over = record.overshoot(point)
         try:
-            hover = record.hover_end(point) - record.events["flying"]
-            mean, largest = record.hover_error(point, min(HOVER_WINDOW, hover))
+            mean, largest = record.hover_error(point, min(HOVER_WINDOW, end - begin))
         except ValueError:
-            pass  # The flight was too short.
+            pass  # The states had ended.
     yield Figure("time to hover", "s", time, maximum=HOVER_TIME_LIMIT)
     yield Figure("overshoot", "mm", 1e3 * over, maximum=1e3 * OVERSHOOT_LIMIT)
     yield Figure("hover error, mean", "mm", 1e3 * mean, maximum=1e3 * tolerance)

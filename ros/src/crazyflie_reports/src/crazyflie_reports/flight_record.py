@@ -29,7 +29,7 @@ class Series:
     def of(cls, fields: tuple[str, ...], times: ArrayLike, values: ArrayLike) -> "Series":
         """Return a series of times (s), shape (n,), and rows, shape (n, len(fields))."""
         series = cls(fields)
-        series._times, series._rows = np.asarray(times).tolist(), np.asarray(values)  # type: ignore[assignment]
+        series._times, series._rows = np.asarray(times), np.asarray(values)  # type: ignore[assignment]
         return series
 
     def append(self, time: float, row: ArrayLike) -> None:
@@ -44,12 +44,12 @@ class Series:
     @property
     def times(self) -> NDArray[np.float64]:
         """Times, s, shape (n,)."""
-        return np.array(self._times, dtype=float)
+        return np.asarray(self._times, dtype=float)
 
     @property
     def values(self) -> NDArray[np.float64]:
         """Rows, shape (n, len(fields)); more than `times` if some came since that was taken."""
-        return np.array(self._rows, dtype=float).reshape(-1, len(self.fields))
+        return np.asarray(self._rows, dtype=float).reshape(-1, len(self.fields))
 
     def column(self, name: str) -> NDArray[np.float64]:
         """Return one column, shape (n,)."""
@@ -88,19 +88,20 @@ class FlightRecord:
         """Return the distance of every recorded state from a point (m), shape (n,)."""
         return np.linalg.norm(self.state.values[:, :3] - np.asarray(point), axis=1)
 
-    def hover_end(self, point: ArrayLike) -> float:
-        """Return when references led away from a point (m), at the latest when /land was called.
+    def hover_interval(self, point: ArrayLike) -> tuple[float, float]:
+        """Return from when and until when references led to a point (m), s.
 
-        Those during the takeoff, of a climb, do not count.
+        From the end of the takeoff until /land was called at the latest.
         """
+        begin, end = self.events.get("flying", self.events["takeoff"]), self.events["land"]
         times = self.reference.times
         distances = np.linalg.norm(self.reference.values[:, :3] - np.asarray(point), axis=1)
         arrived = (times >= self.events["takeoff"]) & (distances < AT_POINT)
-        if not arrived.any():
-            return self.events["land"]
-        begin = max(times[arrived][0], self.events.get("flying", 0.0))
-        left = times[(times > begin) & (distances > AT_POINT)]
-        return float(min([*left[:1], self.events["land"]]))
+        if arrived.any():
+            begin = max(begin, float(times[arrived][0]))
+            left = times[(times > begin) & (distances > AT_POINT)]
+            end = float(min([*left[:1], end]))
+        return begin, end
 
     def tracking_errors(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Return times (s) and distances (m) of states from the references of then, shape (n,).
@@ -117,8 +118,8 @@ class FlightRecord:
     def time_to_hover(self, point: ArrayLike, tolerance: float) -> float:
         """Return how long after the call of /takeoff the vehicle was at a point to stay, s.
 
-        From then on until `hover_end` it is within ``tolerance`` of the point, m; NaN when it never
-        stayed.
+        From then on until the end of `hover_interval` it is within ``tolerance`` of the point, m;
+        NaN when it never stayed.
         """
         times, errors = self._hover(point)
         outside = np.flatnonzero(errors > tolerance)
@@ -128,18 +129,18 @@ class FlightRecord:
         return float(times[first] - self.events["takeoff"])
 
     def overshoot(self, point: ArrayLike) -> float:
-        """Return how far the vehicle rose above a hover point (m) until `hover_end`, at least 0."""
+        """Return how far the vehicle rose above a hover point (m) until it left it, at least 0."""
         times, height = self.state.times, np.asarray(point)[2]
-        until = self.state.column("z")[times <= self.hover_end(point)]
+        until = self.state.column("z")[times <= self.hover_interval(point)[1]]
         return max(0.0, float(until.max(initial=height)) - float(height))
 
     def hover_error(self, point: ArrayLike, duration: float) -> tuple[float, float]:
-        """Return mean and maximum distance (m) from a point for ``duration`` s until `hover_end`.
+        """Return mean and maximum distance (m) from a point in the last ``duration`` s of a hover.
 
         ValueError: no state was recorded in that time.
         """
         times, errors = self._hover(point)
-        errors = errors[times >= self.hover_end(point) - duration]
+        errors = errors[times >= self.hover_interval(point)[1] - duration]
         if not errors.size:
             raise ValueError("no state was recorded during the hover")
         return float(errors.mean()), float(errors.max())
@@ -172,5 +173,5 @@ class FlightRecord:
 
     def _hover(self, point):
         times = self.state.times
-        hover = (times >= self.events["takeoff"]) & (times <= self.hover_end(point))
+        hover = (times >= self.events["takeoff"]) & (times <= self.hover_interval(point)[1])
         return times[hover], self.position_error(point)[hover]

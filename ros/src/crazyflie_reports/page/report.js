@@ -39,8 +39,9 @@ class Column {
     const names = ["time to hover", "overshoot", "error in flight, rms", "error in flight, maximum", "touchdown speed"];
     const picked = names.map((name) => REPORT.figures.findIndex((each) => each[0] === name));
     const table = added(added(card, "div", "", "scroll"), "table"), head = added(table, "tr");
-    for (const name of ["flight", "begins", "lasts"]) added(head, "th", name);
-    for (const k of picked) if (k >= 0) added(head, "th", `${REPORT.figures[k][0]} (${REPORT.figures[k][1]})`);
+    added(head, "th", "flight");
+    for (const name of ["begins", "lasts"]) added(head, "th", name, "number");
+    for (const k of picked) if (k >= 0) added(head, "th", `${REPORT.figures[k][0]} (${REPORT.figures[k][1]})`, "number");
     this.rows = this.recording.flights.map((flight) => {
       const row = added(table, "tr", "", "choice");
       added(row, "td", `${flight.vehicle} ${flight.number}`);
@@ -98,7 +99,7 @@ function drawFigures() {
   const head = added(table, "tr");
   for (const name of ["figure", "unit"]) added(head, "th", name);
   for (const { recording, flight } of chosen) {
-    added(head, "th", `${recording.name}: ${flight.vehicle} ${flight.number}`);
+    added(head, "th", `${recording.name}: ${flight.vehicle} ${flight.number}`, "number");
     added(head, "th", "normal");
   }
   REPORT.figures.forEach(([name, unit], k) => {

@@ -112,8 +112,8 @@ def test_events_of_each_vehicle(run):
         for name in ("cf1", "cf2"):
             bags.write_flight(bag, name)
         bags.write_events(bag, "cf2")
-        log = bags.Log(header=bags.header(7.0), level=4, name="/fleet", msg="/cf2: is held")
-        bag.write("/rosout", log, bags.stamp(7.0))
+        log = bags.Log(header=bags.header(8.0), level=4, name="/fleet", msg="/cf2: is held")
+        bag.write("/rosout", log, bags.stamp(8.0))
     status, _, flights = run(run.folder / "a.bag")
     assert status == 0
     assert [each["vehicle"] for each in flights] == ["cf1", "cf2"]
@@ -124,8 +124,8 @@ def test_events_of_each_vehicle(run):
         (5.1, "pose rejected", "a pose is too far away (/cf2/state_estimator: poses)"),
         (5.2, "parameter", "/cf2/lqr_controller/gain is now 2.0"),
         (5.3, "hold", "the filter is holding: no control"),
-        (6.0, "warning", "/cf2: is held"),
         (6.3, "emergency", "the filter is emergency: no control"),
+        (7.0, "warning", "/cf2: is held"),
     ]
     with (run.folder / "out" / "events.csv").open() as file:
         assert [row["kind"] for row in csv.DictReader(file)] == [kind for _, kind, _ in events]

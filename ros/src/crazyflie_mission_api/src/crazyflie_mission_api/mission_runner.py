@@ -19,7 +19,6 @@ from typing_extensions import override
 
 from crazyflie_demo import trajectory_file
 from crazyflie_mission_api import Fleet, Limits, MissionError, observer
-from crazyflie_mission_api.group_state import GroupState
 from crazyflie_mission_api.observer import NO_DRY_RUN, MissionObserver
 from crazyflie_utils import ParameterError
 
@@ -59,7 +58,7 @@ class _DryRunReport(MissionObserver):
         self._last = -_PERIOD
 
     @override
-    def step(self, group: GroupState) -> None:
+    def step(self, group: Any) -> None:
         if group.time() - self._last >= _PERIOD:
             self._last = group.time()
             for name in group.names:

@@ -1,15 +1,10 @@
 """What the program that runs a user's mission is told of it, and allows it."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import Any, TypeVar, cast
 
 from crazyflie_mission_api.limits import MissionError
-
-if TYPE_CHECKING:
-    from crazyflie_mission_api.group_state import GroupState
 
 _Method = TypeVar("_Method", bound=Callable[..., Any])
 
@@ -28,8 +23,8 @@ class MissionObserver:
     def end(self, command: str, vehicles: list[str], time: float) -> None:
         """Hear that a command has ended or failed."""
 
-    def step(self, group: GroupState) -> None:
-        """Hear that time passes in the dry run of a group."""
+    def step(self, group: Any) -> None:
+        """Hear that time passes in a dry run, of a `DryRun`."""
 
     def passed(self, vehicles: list[str], duration: float) -> None:
         """Hear that `Fleet.fly` has made a dry run, which took a duration (s)."""
@@ -48,7 +43,7 @@ def command(method: _Method) -> _Method:
     name = method.__name__
 
     @functools.wraps(method)
-    def observed(group: GroupState, *arguments: Any, **options: Any) -> Any:
+    def observed(group: Any, *arguments: Any, **options: Any) -> Any:
         observer = group.observer
         observer.check()
         if observer.command:

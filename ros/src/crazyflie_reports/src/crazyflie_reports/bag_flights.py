@@ -146,9 +146,10 @@ def _series(rows, fields, first, last):
     rows = _between(rows, first, last)
     # Positions, or controls, that are no numbers, which every node rejects, too.
     rows = rows[np.isfinite(rows[:, :4]).all(axis=1)]
-    rows = np.where(np.isinf(rows), np.nan, rows)
+    rows[np.isinf(rows)] = np.nan
     return Series.of(fields, rows[:, 0], rows[:, 1:])
 
 
 def _between(rows, first, last):
-    return rows[(rows[:, 0] >= first) & (rows[:, 0] <= last)]
+    begin, end = np.searchsorted(rows[:, 0], first), np.searchsorted(rows[:, 0], last, "right")
+    return rows[begin:end]

@@ -1,19 +1,27 @@
 """Flights of the examples by a program."""
 
 import contextlib
+import threading
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from std_msgs.msg import Empty as EmptyMessage
 from std_srvs.srv import Empty, EmptyRequest
 
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_msgs.msg import (
+    ControlStamped,
+    PositionVelocityState,
+    PositionVelocityStateStamped,
+    PositionVelocityYawStateStamped,
+)
 from crazyflie_reports.flight_record import FlightRecord
-from crazyflie_reports.flight_recorder_node import FlightRecorderNode
 from crazyflie_utils.main import ros_process
 from crazyflie_utils.process import Process
 from crazyflie_utils.transport import ServiceError
+from crazyflie_utils.vectors import to_vector
 
 
 class FlightError(Exception):
@@ -31,35 +39,43 @@ class FlightOperator:
     def __init__(
         self, process: Process, namespace: str = "/", limit: float = 60.0, start: bool = True
     ):
-        self._handle = process.handle(f"{namespace.rstrip('/')}/flight_recorder")
+        self._handle = handle = process.handle(f"{namespace.rstrip('/')}/flight_recorder")
         self._limit = limit
-        self._recorder = FlightRecorderNode()
-        if not self._recorder.initialize(self._handle):
-            raise FlightError("the flight recorder could not be started; see the log")
-        self._reference = self._handle.publisher("ref", PositionVelocityStateStamped)
+        self._record = record = FlightRecord()
+        self._received = threading.Condition()  # Notified after every message.
+        self._is_finished = False
+        for topic, message_type, series in (
+            ("state", PositionVelocityYawStateStamped, record.state),
+            ("ref", PositionVelocityStateStamped, record.reference),
+            ("control/takeoff", ControlStamped, record.takeoff_control),
+            ("control/final", ControlStamped, record.final_control),
+        ):
+            handle.subscribe(topic, message_type, partial(self._on_message, series))
+        handle.subscribe("in_flight", EmptyMessage, self._on_toggle)
+        self._reference = handle.publisher("ref", PositionVelocityStateStamped)
         if start:
             process.start()
 
     @property
     def position(self) -> NDArray[np.float64]:
         """Where the vehicle was last, m, shape (3,)."""
-        return self._recorder.record.state.last[:3]
+        return self._record.state.last[:3]
 
     @property
     def time(self) -> float:
         """Of the latest state, s."""
-        return self._recorder.record.state.last_time
+        return self._record.state.last_time
 
     def finish(self) -> FlightRecord:
         """Stop recording and return the record."""
-        self._recorder.stop()
-        return self._recorder.record
+        with self._received:
+            self._is_finished = True
+        return self._record
 
     def wait_until_ready(self) -> None:
         """Wait for the first state and for the ground's zero thrust."""
-        record = self._recorder.record
-        self._wait_for(lambda: len(record.state), "no state was published")
-        self._wait_for(lambda: len(record.final_control), "no control was published")
+        self._wait_for(lambda: len(self._record.state), "no state was published")
+        self._wait_for(lambda: len(self._record.final_control), "no control was published")
 
     def takeoff(self) -> None:
         """Call takeoff and wait for its answer."""
@@ -67,7 +83,7 @@ class FlightOperator:
 
     def hover(self, duration: float) -> None:
         """Let ``duration`` seconds of flight pass."""
-        state = self._recorder.record.state
+        state = self._record.state
         end = state.last_time + duration
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")
 
@@ -92,7 +108,7 @@ class FlightOperator:
         return self.finish()
 
     def _call(self, service, answered):
-        record = self._recorder.record
+        record = self._record
         called_at = record.state.last_time
         future = self._handle.call_service(service, Empty, EmptyRequest(), self._limit)
         try:
@@ -102,11 +118,24 @@ class FlightOperator:
         record.events[service] = called_at
         record.events[answered] = record.state.last_time
 
+    def _on_message(self, series, message):
+        content = message.control if isinstance(message, ControlStamped) else message.state
+        self._note(series.append, message.header.stamp.to_sec(), to_vector(content))
+
+    def _on_toggle(self, _):
+        self._note(self._record.toggles.append, self._handle.stamp().to_sec())
+
+    def _note(self, append, *values):
+        with self._received:
+            if not self._is_finished:
+                append(*values)
+                self._received.notify_all()
+
     def _wait_for(self, condition, failure):
         deadline = time.monotonic() + self._limit
-        with self._recorder.received:
+        with self._received:
             while not condition():
-                if not self._recorder.received.wait(deadline - time.monotonic()):
+                if not self._received.wait(deadline - time.monotonic()):
                     raise FlightError(f"{failure} for {self._limit:g} s")
 
 

@@ -77,6 +77,10 @@ def test_a_vehicle_less_than_10_cm_above_the_ground_is_on_it():
     ground.z = 0.5
     assert [ground.is_below(at(z)) for z in (0.59, 0.61, 0.0)] == [True, False, True]
     assert ground.height(at(2.0)) == 1.5
+    ground.z = 0.0
+    assert not ground.is_below(at(0.1))
+    assert not ground.has_touched_down(at(0.05))
+    assert not ground.has_touched_down(at(0.0, -0.1))
     assert not ground.is_below(None)
     assert not ground.has_touched_down(None)
 

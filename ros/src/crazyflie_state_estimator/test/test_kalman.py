@@ -187,6 +187,6 @@ def test_the_plain_floats_are_the_textbook_s_matrices():
 
 
 def test_at_the_first_sample_rate_and_acceleration_are_as_uncertain_as_was_given():
-    subject = ConstantAccelerationFilter(0.5, WALK, 2.0, 3.0)
+    subject = ConstantAccelerationFilter(0.5, WALK, 3.0, 5.0)
     subject.start([1.0])
-    assert subject.covariance == [[0.25, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 9.0]]
+    assert subject.covariance == [[0.25, 0.0, 0.0], [0.0, 9.0, 0.0], [0.0, 0.0, 25.0]]

@@ -166,3 +166,9 @@ def test_gains_have_no_more_than_arrays(write):
         gains.gain  # noqa: B018
     assert not hasattr(gains, "__fspath__")
     assert list(copy.deepcopy(gains)) == [1.0]
+
+
+def test_a_zero_is_written_without_a_sign(tmp_path):
+    path = tmp_path / "K.txt"
+    save_matrix(str(path), [[-0.0, 1.0], [0.5, 0.0]], "gains\n\nof a test")
+    assert path.read_text() == "0 1\n0.5 0\n# gains\n#\n# of a test\n"

@@ -136,3 +136,32 @@ def test_another_one_that_is_far_away_is_another_direction():
     assert followed(reference, 0.0, np.zeros(7))[:3] == [3.0, 0.0, 0.0]
     reference.update(np.array([-50.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
     assert followed(reference, 0.0, np.zeros(7))[:3] == [-3.0, 0.0, 0.0]
+
+
+def test_stamps_of_the_first_second_count_also_after_a_reset_of_the_clock():
+    reference = GuardedReference(6)
+    assert reference.update(GOAL, stamp=0.5, now=2.0)
+    assert reference.update(GOAL, stamp=60.0, now=60.0)
+    assert reference.update(2.0 * GOAL, stamp=0.5, now=1.0)
+    assert not reference.update(GOAL, stamp=0.25, now=1.0)
+
+
+def test_a_descent_ends_after_three_tenths_of_a_second():
+    reference = GuardedReference(6)
+    reference.update(GOAL)
+    reference.descend(2.0 * GOAL, 0.0)
+    assert followed(reference, 0.0) == list(2.0 * GOAL)
+    assert followed(reference, 0.29) == list(2.0 * GOAL)
+    assert followed(reference, 0.3) == list(GOAL)
+
+
+def test_one_that_is_as_far_from_the_last_as_it_may_be_is_another():
+    reference = GuardedReference(6, max_jump=3.0)
+    goals = []
+    for far, here in ((50.0, 0.0), (52.5, 3.0), (53.0, 3.0)):
+        reference.update([far, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+        goals.append(reference.value(0.0, [here, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])[0])
+    np.testing.assert_allclose(goals, [3.0, 3.0, 6.0])
+    # One that is 3 m away is near enough.
+    reference.update([6.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])
+    assert reference.value(0.0, [3.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0])[0] == 6.0

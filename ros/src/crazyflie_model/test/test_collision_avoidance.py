@@ -128,8 +128,9 @@ def test_a_velocity_is_turned_to_the_right_before_a_wall():
 
 def test_a_position_within_the_cell_is_not_moved_however_near_the_wall():
     avoidance = CollisionAvoidance(OPEN)
-    goal = np.array([0.399, 0.0, 0.0])
-    assert avoidance.position_setpoint(STILL, ONE, goal, STILL)[0].tolist() == [0.399, 0.0, 0.0]
+    # The wall is 0.2 m away.
+    other, goal = np.array([[0.6, 0.0, 0.0]]), np.array([0.199, 0.0, 0.0])
+    assert avoidance.position_setpoint(STILL, other, goal, STILL)[0].tolist() == goal.tolist()
 
 
 def test_without_a_cell_a_vehicle_does_not_move():

@@ -237,3 +237,37 @@ def test_the_last_state_before_the_silence_is_the_predicted_one():
     assert last.header.stamp.to_sec() < process.clock.stamp().to_sec() - 1.0
     assert last.state.z_dot > 0.4
     assert last.state.z > 1.05
+
+
+def test_a_camera_that_goes_on_shows_the_vehicle_elsewhere_three_times_in_a_row():
+    monitor = FrozenPoseMonitor(True)
+    monitor._place = (0.0, 0.0, 1.0)
+    offsets = (0.031, 0.0, 0.031, 0.031, 0.029, 0.031, 0.031, 0.031, 0.031)
+    frozen = [
+        monitor.update(0.01 * k, (offset, 0.0, 1.0), (0.0, 0.0, 1e-3 * k, 1.0), STILL)
+        for k, offset in enumerate(offsets)
+    ]
+    assert frozen == [True] * 7 + [False] * 2
+    monitor._place = (0.0, 0.0, 1.0)
+    for time, is_frozen in ((0.2, True), (0.21, True), (0.22, False)):
+        assert monitor.update(time, (time, 0.0, 1.0), LEVEL, STILL) == is_frozen
+
+
+@pytest.mark.parametrize("knows_control", [True, False])
+def test_the_ground_is_the_lowest_place_only_where_controls_are_not_known(knows_control):
+    camera = Camera(knows_control=knows_control)
+    camera.show((0.0, 0.0, 1.0), None, 0.1)
+    camera.show((0.0, 0.0, 0.5), STILL, 0.1)
+    assert all(camera.show((0.0, 0.0, 0.8), STILL, 0.1)[1:]) != knows_control
+
+
+def test_a_vehicle_that_is_lifted_for_long_is_not_on_the_ground():
+    camera = Camera()
+    camera.time = 100.0
+    camera.show((0.0, 0.0, 0.0), None, 1.0)
+    # Beyond 3 m/s^2 for 2.5 s it has made 0.25 m/s; 0.3 m/s lift any vehicle.
+    assert not any(camera.show((0.0, 0.0, 0.0), (0.0, 0.0, 3.1), 2.5))
+    assert camera.show((0.0, 0.0, 0.0), (0.0, 0.0, 3.1), 1.0)[-1]
+    # Elsewhere it begins anew.
+    camera.show((0.0, 0.0, 0.001), (0.0, 0.0, 3.1))
+    assert not any(camera.show((0.0, 0.0, 0.001), (0.0, 0.0, 3.1), 2.5))

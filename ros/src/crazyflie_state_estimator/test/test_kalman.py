@@ -184,3 +184,9 @@ def test_the_plain_floats_are_the_textbook_s_matrices():
         value, rate = subject.step(dt, sample)
         np.testing.assert_allclose([value, rate], state[:2], rtol=1e-10, atol=1e-10)
         np.testing.assert_allclose(subject.covariance, covariance, rtol=1e-9, atol=1e-12)
+
+
+def test_at_the_first_sample_rate_and_acceleration_are_as_uncertain_as_was_given():
+    subject = ConstantAccelerationFilter(0.5, WALK, 3.0, 5.0)
+    subject.start([1.0])
+    assert subject.covariance == [[0.25, 0.0, 0.0], [0.0, 9.0, 0.0], [0.0, 0.0, 25.0]]

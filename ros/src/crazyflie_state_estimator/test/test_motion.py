@@ -152,3 +152,10 @@ def test_whatever_comes_every_motion_is_finite(sequence):
     for stamp, position, attitude in sequence:
         motion = subject.update(stamp * MS, position, attitude)
         assert motion is None or all(np.isfinite(part).all() for part in motion)
+
+
+def test_angles_end_within_half_a_turn():
+    motion = last_motion([(0, LEVEL, (4.0, -4.0, 7.0)), (MS, LEVEL, (4.0, -4.0, 7.0))])
+    full = 2.0 * math.pi
+    assert motion.attitude == pytest.approx([4.0 - full, full - 4.0, 7.0 - full])
+    assert motion.attitude_rate == pytest.approx([0.0] * 3, abs=1e-9)

@@ -124,3 +124,59 @@ def test_remembers_what_it_has_been_told(control_filter):
         control_filter.state = state
         control_filter.toggle()
         assert control_filter.remembered is state
+
+
+@pytest.mark.parametrize(
+    ("thrust", "state", "in_flight", "reports_ground"),
+    [
+        (0.0, None, False, True),
+        (0.0, ON_GROUND, False, True),
+        (-0.5, ON_GROUND, False, True),
+        (0.5, ON_GROUND, False, False),
+        (0.0, TAKING_OFF, False, False),
+        (0.0, FLYING, False, False),
+        (0.0, None, True, False),
+        (None, None, False, False),
+        (None, ON_GROUND, False, False),
+    ],
+)
+def test_the_server_reports_the_ground_by_zero_thrust(
+    control_filter, thrust, state, in_flight, reports_ground
+):
+    if thrust is not None:
+        control_filter.takeoff(0.0, "t", thrust)
+    if in_flight:
+        control_filter.toggle()
+    control_filter.state = state
+    assert control_filter.server_reports_ground == reports_ground
+
+
+@pytest.mark.parametrize(
+    ("thrust", "state", "on_ground"),
+    [
+        (0.0, None, True),
+        (0.5, None, False),
+        (0.0, TAKING_OFF, False),
+        (0.0, LANDING, True),
+        (0.0, FLYING, False),
+        (0.0, DESCENDING, False),
+    ],
+)
+def test_a_vehicle_is_on_the_ground_as_far_as_is_known(control_filter, thrust, state, on_ground):
+    control_filter.takeoff(0.0, "t", thrust)
+    control_filter.state = state
+    assert control_filter.is_on_ground == on_ground
+    control_filter.end_flight()
+    assert control_filter.is_on_ground == (state not in (TAKING_OFF, FLYING, DESCENDING))
+
+
+def test_the_controller_is_needed_between_takeoff_and_flight_after_half_a_second(control_filter):
+    assert not control_filter.selects_controller(9.0, 0.25)
+    control_filter.takeoff(1.0, "t", 0.5)
+    assert control_filter.takeoff_age(1.25) == 0.25
+    assert [control_filter.selects_controller(time, 0.25) for time in (1.5, 1.51)] == [False, True]
+    control_filter.toggle()
+    assert [control_filter.selects_controller(time, 0.25) for time in (1.25, 1.26)] == [False, True]
+    assert control_filter.remembered is FLYING
+    control_filter.state = ON_GROUND
+    assert control_filter.remembered is ON_GROUND

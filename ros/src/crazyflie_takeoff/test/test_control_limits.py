@@ -103,6 +103,82 @@ def test_a_filter_that_was_stopped_once_does_not_say_so():
     assert gaps.complaint == ""
 
 
+@pytest.mark.parametrize(
+    ("gap", "climb", "least", "most"),
+    [
+        # 0.5 m/s within the longest gap; the speed that there is counts after 0.2 s.
+        (0.25, 0.0, -2.0, 2.0),
+        (0.25, 0.25, -3.0, 1.0),
+        (0.25, -0.25, -1.0, 3.0),
+        (0.125, 0.0, -4.0, 4.0),
+        (0.125, 0.25, -6.0, 4.0),
+        (0.125, -0.25, -4.0, 6.0),
+    ],
+)
+def test_how_much_thrust_a_filter_passes_on_that_has_not_run(gap, climb, least, most):
+    gaps = RunGaps()
+    gaps.run(1.0)
+    assert gaps.longest == 0.0
+    gaps.run(1.0 + gap)
+    assert gaps.longest == gap
+    for asked, passed in ((-90.0, least), (0.5, 0.5), (90.0, most)):
+        control = gaps.apply(Setpoint(0.0, 0.0, 3.0, G + asked), G, climb)
+        assert control.thrust - G == pytest.approx(passed)
+        assert control.yaw_dot == 3.0
+    tilted = gaps.apply(Setpoint(1.0, -1.0, 0.0, G), G)
+    assert math.tan(tilted.roll) == pytest.approx(0.5 / gap / G)
+    assert tilted.pitch == -tilted.roll
+    ramp = gaps.apply(Setpoint(0.0, 0.0, 0.0, -90.0), G, climb, is_ramp=True)
+    assert ramp.thrust == -90.0
+
+
+def test_a_gap_is_forgotten_in_two_seconds():
+    gaps = RunGaps()
+    gaps.run(1.0)
+    gaps.run(9.0)
+    # A clock that steps further was set: it counts as 1 s.
+    assert gaps.longest == 1.0
+    gaps.run(9.0)
+    gaps.run(8.0)
+    gaps.run(8.5)
+    assert gaps.longest == pytest.approx(math.exp(-0.25))
+
+
+@pytest.mark.parametrize(
+    ("z", "z_dot", "is_landing", "most"),
+    [
+        (0.0, 0.0, False, 30.0),
+        (0.0, 2.5, False, 5.0),
+        (0.0, 0.0, True, 5.0),
+        # With 4 m/s^2 a climb of 2 m/s ends within 0.5 m; above, it returns at 0.5/s.
+        (9.5, 1.5, False, 5.0),
+        (11.0, 0.0, False, -5.0),
+        (10.0, 0.0, False, 0.0),
+        (10.0, 3.0, False, 4.0 - G),
+    ],
+)
+def test_the_most_thrust_of_a_climb(z, z_dot, is_landing, most):
+    motion = Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
+    limit = ClimbLimit(3.0)
+    assert limit.apply(99.0, G, motion, 10.0, is_landing) - G == pytest.approx(most)
+    assert limit.apply(4.0, G, motion, 10.0, is_landing) == 4.0
+    assert limit.apply(99.0, G, None, 10.0, is_landing) == 99.0
+
+
+def test_too_much_climb_is_complained_of_after_two_seconds_but_not_in_a_landing():
+    fast, landing = ClimbLimit(3.0), ClimbLimit(3.0)
+    said = []
+    for _ in range(9):
+        motion = Motion((0.0, 0.0, 0.0), (0.0, 0.0, 2.9))
+        fast.apply(MAX_THRUST, G, motion, 10.0, False)
+        landing.apply(MAX_THRUST, G, motion, 10.0, True)
+        said.append((fast.advance(0.25), landing.advance(0.25)))
+    assert said[:8] == [("", "")] * 8
+    assert said[8] == ("the controls climb faster than 3 m/s", "")
+    fast.apply(G, G, motion, 10.0, False)
+    assert fast.advance(0.25) == ""
+
+
 def climb(limit, z, z_dot, seconds, highest=10.0):
     """Fly full thrust for a while; return z, z_dot and what is said at last."""
     said = ""

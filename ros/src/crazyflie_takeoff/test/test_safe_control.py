@@ -178,3 +178,15 @@ def test_the_mean_of_hover_by_its_time_constant():
 def test_a_mixture_of_controls():
     mixed = Setpoint(0.0, 1.0, 2.0, 3.0).mixed(Setpoint(4.0, 3.0, 2.0, -1.0), 0.25)
     assert mixed == (1.0, 1.5, 2.0, 2.0)
+
+
+def test_without_any_state_it_is_level_and_sinks_slowly():
+    safe = SafeControl(G, None)
+    assert safe.climb == 0.0
+    assert safe.advance(0.0, None, False) == (0.0, 0.0, 0.0, G)
+    assert safe.advance(0.05, None, False).thrust - G == pytest.approx(-0.015 / 0.3)
+
+
+def test_a_state_from_the_future_is_not_reckoned_back():
+    motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.25))
+    assert SafeControl(G, motion, -0.1, Setpoint(0.0, 0.0, 0.0, 16.0)).climb == 0.25

@@ -33,6 +33,7 @@ _SWAPPED = {
 _DROPPED = {"radians", "degrees", "deg2rad", "rad2deg", "abs", "fabs", "clip", "wrap_to_pi"}
 
 _TEXTS = {"format", "debug", "info", "warn", "warning", "error", "exception", "critical"}
+_SHORT = (ast.expr, ast.keyword, ast.Return, ast.Assign, ast.AugAssign)
 _FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 
@@ -196,7 +197,7 @@ def _texts(container, key, parent, new):
     if isinstance(old, ast.Raise):
         return f"raise {_name(old.exc)}".strip(), "pass"
     is_little = isinstance(old, (ast.Constant, ast.Name, ast.Attribute)) or type(old) in _OPERATORS
-    if not (is_little and isinstance(parent, (ast.expr, ast.keyword, ast.Return, ast.Assign))):
+    if not (is_little and isinstance(parent, _SHORT)):
         return ast.unparse(old), ast.unparse(new)
     before = ast.unparse(parent)
     container[key] = new

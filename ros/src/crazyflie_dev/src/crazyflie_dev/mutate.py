@@ -181,16 +181,15 @@ def explanations(package: Path) -> dict[str, str]:
 def report(package: str, results: list[Result], explained: dict[str, str]) -> dict[str, Any]:
     """Print survivors, and what was caught of each module; return the same for a file."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
-    survivors = []
+    survivors, alive = [], {str(mutant) for mutant, test in results if not test}
     for mutant, test in results:
         is_explained = str(mutant) in explained
-        counts[mutant.path.name][
-            "caught" if test else "explained" if is_explained else "survived"
-        ] += 1
-        if not test and not is_explained:
+        fate = "caught" if test else "explained" if is_explained else "survived"
+        counts[mutant.path.name][fate] += 1
+        if fate == "survived":
             print(f"{mutant.path.name}:{mutant.line} {str(mutant).partition(' ')[2]}")
             survivors.append({"file": str(mutant.path), "line": mutant.line, "mutant": str(mutant)})
-        elif test and is_explained:
+        elif is_explained and str(mutant) not in alive:
             print(f"explained, but caught by {test}: {mutant}")
     counts[package] = sum(counts.values(), Counter())
     for name, count in counts.items():

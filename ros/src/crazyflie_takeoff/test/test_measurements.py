@@ -1,0 +1,191 @@
+"""Measured states, the ground, the walls and the battery: figures on both sides of each bound."""
+
+import math
+
+import pytest
+
+from crazyflie_takeoff.battery import Battery, Charge
+from crazyflie_takeoff.callers import Callers
+from crazyflie_takeoff.ground import Ground
+from crazyflie_takeoff.limits import Box, Debounce, Limits, Walls
+from crazyflie_takeoff.motion import Delay, MeasuredPosition, Measurement, Motion
+
+
+def at(z, z_dot=0.0):
+    return Motion((0.0, 0.0, z), (0.0, 0.0, z_dot))
+
+
+# The state.
+
+
+def test_a_state_is_fresh_for_a_fifth_of_a_second():
+    measurement = Measurement()
+    assert measurement.fresh is None
+    assert measurement.age == math.inf
+    measurement.update(at(1.0), 0.125)
+    measurement.advance(0.07)
+    assert measurement.fresh == at(1.0)
+    measurement.advance(0.01)
+    assert measurement.fresh is None
+    assert measurement.within(0.21) == at(1.0)
+    assert measurement.age == pytest.approx(0.205)
+
+
+def test_a_position_is_known_for_half_a_second():
+    position = MeasuredPosition()
+    assert not position.is_measured
+    assert position.value(0.0) is None
+    assert "no state has come on /state for 0.5 s" in position.explanation(0.0, "/state")
+    position.measure(10.0, (1.0, 2.0, 3.0), 0.25)
+    assert position.is_measured
+    assert position.value(10.125) == (1.0, 2.0, 3.0)
+    assert position.explanation(10.125, "/state") == ""
+    assert position.value(10.25) is None
+    assert "states on /state are 0.2 s old" in position.explanation(10.25, "/state")
+    assert "no state has come" in position.explanation(10.5, "/state")
+    # After a reset of the clock the age counts from there.
+    assert position.value(2.0) == (1.0, 2.0, 3.0)
+    assert position.value(2.25) is None
+
+
+def test_the_usual_age_grows_by_a_tenth():
+    delay = Delay()
+    assert delay.excess(1.0, 1.5) == 0.0
+    # 10 s later 1 s more is usual.
+    assert delay.excess(9.0, 11.5) == pytest.approx(2.5 - 1.5)
+    assert delay.excess(12.0, 12.5) == 0.0
+    # A clock that is set back makes nothing usual.
+    assert delay.excess(1.0, 3.0) == pytest.approx(1.5)
+
+
+# The ground.
+
+
+@pytest.mark.parametrize(
+    ("z", "z_dot", "has_touched_down"),
+    [(0.549, 0.0, True), (0.551, 0.0, False), (0.54, -0.099, True), (0.54, -0.101, False)],
+)
+def test_a_touchdown_is_low_and_slow(z, z_dot, has_touched_down):
+    ground = Ground()
+    assert ground.z == 0.0
+    ground.z = 0.5
+    assert ground.has_touched_down(at(z, z_dot)) == has_touched_down
+
+
+def test_a_vehicle_less_than_10_cm_above_the_ground_is_on_it():
+    ground = Ground()
+    ground.z = 0.5
+    assert [ground.is_below(at(z)) for z in (0.59, 0.61, 0.0)] == [True, False, True]
+    assert ground.height(at(2.0)) == 1.5
+    ground.z = 0.0
+    assert not ground.is_below(at(0.1))
+    assert not ground.has_touched_down(at(0.05))
+    assert not ground.has_touched_down(at(0.0, -0.1))
+    assert not ground.is_below(None)
+    assert not ground.has_touched_down(None)
+
+
+# The walls.
+
+BOX = Box((-1.0, -2.0, 0.0), (1.0, 2.0, 3.0))
+LIMITS = Limits(BOX, 0.5, -0.25, 3.0, 10.0)
+
+
+@pytest.mark.parametrize(
+    ("position", "excess"),
+    [
+        ((0.0, 0.0, 1.5), -1.0),
+        ((0.75, 0.0, 1.5), -0.25),
+        ((-1.5, 0.0, 1.5), 0.5),
+        ((0.0, 2.25, 1.5), 0.25),
+        ((1.25, -3.0, 4.0), 1.0),
+        ((0.0, 0.0, -0.5), 0.5),
+    ],
+)
+def test_how_far_outside_the_box_a_position_is(position, excess):
+    assert BOX.excess(position) == excess
+
+
+def test_a_box_without_a_floor():
+    box = BOX.without_floor()
+    assert box == Box((-1.0, -2.0, -math.inf), (1.0, 2.0, 3.0))
+
+
+def test_what_is_too_far_outside_or_below():
+    walls = Walls(LIMITS)
+    assert walls.complaint((1.5, 0.0, 1.0)) == ""
+    assert walls.complaint((1.75, 0.0, 1.0)) == "0.75 m outside the geofence"
+    assert walls.complaint((0.0, 0.0, -0.25)) == ""
+    assert walls.complaint((0.0, 0.0, -0.375)) == "0.38 m below the ground"
+
+
+def test_a_vehicle_that_a_new_box_leaves_outside_may_come_back_and_not_go_away():
+    walls = Walls(LIMITS)
+    assert walls.complaint((1.0, 0.0, 1.0)) == ""
+    walls.change(Box((-1.0, -2.0, 0.0), (0.0, 2.0, 3.0)))
+    # 1 m outside was granted, and 0.5 m are always.
+    assert walls.complaint((1.5, 0.0, 1.0)) == ""
+    assert walls.complaint((1.75, 0.0, 1.0)) == "1.75 m outside the geofence"
+    assert walls.complaint((0.25, 0.0, 1.0)) == ""
+    # On the way back the grant shrinks.
+    assert walls.complaint((0.75, 0.0, 1.0)) == ""
+    assert walls.complaint((0.875, 0.0, 1.0)) == "0.88 m outside the geofence"
+    inside = Walls(LIMITS)
+    inside.change(Box((-0.5, -2.0, 0.0), (0.5, 2.0, 3.0)))
+    assert inside.complaint((1.25, 0.0, 1.0)) == "0.75 m outside the geofence"
+
+
+def test_a_complaint_has_to_last():
+    debounce = Debounce(0.5)
+    assert [debounce.advance(0.25, "high") for _ in range(3)] == ["", "", "high"]
+    assert debounce.advance(0.25, "") == ""
+    assert [debounce.advance(0.25, "fast") for _ in range(3)] == ["", "", "fast"]
+
+
+# The battery.
+
+
+@pytest.mark.parametrize(
+    ("voltage", "charge"),
+    [(3.2, Charge.GOOD), (3.1, Charge.LOW), (3.0, Charge.LOW), (2.9, Charge.CRITICAL)],
+)
+def test_a_voltage_counts_when_it_has_lasted(voltage, charge):
+    battery = Battery(3.2, 3.0, 2.0)
+    assert math.isnan(battery.voltage)
+    battery.measure(10.0, voltage)
+    battery.measure(11.75, voltage)
+    assert battery.charge(11.75) is Charge.GOOD
+    # The 1.75 s without a voltage count as 1.5 s.
+    battery.measure(11.875, voltage)
+    battery.measure(12.25, voltage)
+    assert battery.charge(12.25) is charge
+    assert battery.voltage == voltage
+    # After a reset of the clock it goes on.
+    battery.measure(1.0, voltage)
+    assert battery.charge(1.0) is charge
+    assert battery.charge(5.875) is charge
+    assert battery.charge(6.0) is Charge.UNKNOWN
+    battery.measure(6.0, 4.0)
+    assert battery.charge(6.0) is Charge.GOOD
+
+
+# Publishers.
+
+
+def test_so_many_changes_as_tolerated_are_a_handover():
+    callers = Callers("controls", 2)
+    for k, name in enumerate("abab"):
+        assert callers.complaint == ""
+        callers.note(1.0 + 0.25 * k, name)
+    assert callers.complaint == "two nodes publish controls, a and b; expected one"
+    # Half a second later is none beside another; 5 s later it is forgotten.
+    callers.advance(6.25)
+    assert callers.complaint != ""
+    callers.advance(6.375)
+    assert callers.complaint == ""
+    slow = Callers("controls", 0)
+    slow.note(1.0, "a")
+    slow.note(1.5, "b")
+    assert slow.complaint == ""
+    slow.note(1.75, "")
+    assert slow.complaint == "two nodes publish controls, b and one of this process; expected one"

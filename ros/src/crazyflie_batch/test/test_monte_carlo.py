@@ -12,6 +12,7 @@ from distributed import LocalCluster
 from crazyflie_batch import figure, monte_carlo
 from crazyflie_batch.monte_carlo_command import main
 from crazyflie_batch.settings import read_settings
+from crazyflie_utils.testing.programs import free_port
 
 SAVE_FIGURE = figure.save_figure
 
@@ -40,13 +41,6 @@ def command(tmp_path, monkeypatch, capsys):
         return status, *capsys.readouterr()
 
     return run
-
-
-def free_port():
-    """Return a port without a listener."""
-    with socket.socket() as listener:
-        listener.bind(("127.0.0.1", 0))
-        return listener.getsockname()[1]
 
 
 def rows(folder):
@@ -208,7 +202,7 @@ def test_a_cluster_flies_the_same(command):
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:{}", "nonsense"])
 def test_a_scheduler_that_is_not_there_is_told(command, monkeypatch, address):
     monkeypatch.setattr("crazyflie_batch.monte_carlo_command.SCHEDULER_LIMIT", 0.3)
-    address = address.format(free_port())
+    address = address.format(free_port(socket.SOCK_STREAM))
     status, _, errors = command("--scheduler", address)
     assert status == 1
     assert f"no scheduler at {address}" in errors

@@ -1,60 +1,62 @@
-"""Vehicles that are held: for whom, and how they go on."""
+"""Who is held, by figures that are calculated by hand; heights count half (DOWNWASH is 2)."""
 
+import numpy as np
 import pytest
-from test_references_node import Flight, flight_status
 
-from crazyflie_msgs.msg import PositionVelocityState, PositionVelocityStateStamped
+from crazyflie_fleet.separation import Separation
 
-
-def held(flight):
-    """Return the names of the vehicles that are held."""
-    return "".join(message.data for message in flight.process.published("/fleet/waiting")[-1:])
-
-
-def test_one_on_the_ground_holds_no_vehicle():
-    flight = Flight()
-    flight.process.publish("/cf2/in_flight_flight_status", flight_status("ON_GROUND"))
-    flight.see("cf1", 0.8)
-    flight.want("cf1", 0.95)
-    flight.process.advance(0.2)
-    assert flight.followed("cf1")[-1].state.y == 0.95
-    assert held(flight) == ""
+STILL = np.zeros((2, 3))
+#: Far from the origin, 0.2 m apart in y and z; 0.1 m in z as it counts.
+FIRST = np.array([5.0, -3.0, 2.0])
+SECOND = FIRST + [0.0, 0.2, 0.2]
 
 
-def test_the_last_speed_of_one_that_is_not_seen_does_not_count():
-    flight = Flight()
-    flight.see("cf2", 1.0, y_dot=-1.6)
-    flight.silence("cf2")
-    flight.process.advance(1.5)
-    flight.see("cf1", 0.2)
-    flight.want("cf1", 0.3)
-    flight.process.advance(0.2)
-    assert held(flight) == ""
+def held(goals, positions=(FIRST, SECOND), buffers=(0.15, 0.15)):
+    """Return which of two vehicles at rest are held."""
+    return Separation(buffers).update(np.array(positions), STILL, np.array(goals))[0].tolist()
 
 
-def test_a_way_goes_on_after_a_hold_where_it_was():
-    flight = Flight()
-    flight.see("cf2", 0.55)
-    flight.go_to(goal=(0.0, 0.5, 1.0), seconds=2.0)
-    flight.see("cf1", 0.28)
-    flight.process.advance(5.0)
-    assert held(flight) == "cf1"
-    flight.see("cf2", 3.0)
-    flight.process.advance(0.1)
-    assert held(flight) == ""
-    assert flight.followed("cf1")[-1].state.y < 0.3
-    flight.process.advance(2.0)
-    assert flight.followed("cf1")[-1].state.y == pytest.approx(0.5)
+def test_the_distance_of_a_pair_counts_heights_half():
+    positions = np.array([[5.0, -3.0, 2.0], [5.03, -2.96, 2.24]])
+    ((first, second, distance, limit),) = Separation([0.2, 0.15]).update(
+        positions, STILL, positions
+    )[1]
+    assert (first, second) == (0, 1)
+    # sqrt(3^2 + 4^2 + (24/2)^2) = 13.
+    assert distance == pytest.approx(0.13)
+    assert limit == pytest.approx(0.35)
 
 
-def test_a_reference_that_moves_does_so_after_a_hold():
-    flight = Flight()
-    moving = PositionVelocityStateStamped(state=PositionVelocityState(y=0.9, z=1.0, y_dot=0.2))
-    moving.header.stamp = flight.process.clock.stamp()
-    flight.process.publish("/cf1/ref", moving)
-    flight.see("cf1", 0.8)
-    flight.process.advance(0.06)
-    assert flight.followed("cf1")[-1].state.y_dot == 0.0
-    flight.see("cf2", 2.0)
-    flight.process.advance(0.06)
-    assert flight.followed("cf1")[-1].state == moving.state
+def test_vehicles_that_stay_where_they_are_are_not_held():
+    assert held([FIRST, SECOND]) == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("step", "approaches"),
+    [
+        # 0.1 * 0.2 - 0.3/2 * 0.2/2 = 0.005; with heights in full or a quarter, it has other signs.
+        ([0.0, 0.1, -0.3], True),
+        ([0.0, 0.1, -0.5], False),
+        ([0.0, -0.1, 0.3], False),
+        ([0.0, -0.1, 0.5], True),
+        # At right angles, as it counts.
+        ([0.3, 0.0, 0.0], False),
+    ],
+)
+def test_a_step_approaches_the_other_by_its_part_along_the_line_between_them(step, approaches):
+    step = np.array(step)
+    assert held([FIRST + step, SECOND]) == [approaches, False]
+    assert held([FIRST, SECOND - step]) == [False, approaches]
+
+
+def test_only_a_vehicle_that_was_held_needs_more_distance():
+    apart = FIRST + np.array([[0.0, 0.0, 0.0], [0.0, 0.31, 0.0]])
+    assert held(apart[::-1], apart) == [False, False]
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_a_position_of_which_one_coordinate_is_unknown_is_none(axis):
+    unknown = SECOND.copy()
+    unknown[axis] = np.nan
+    separation = Separation([0.15, 0.15])
+    assert separation.update(np.array([FIRST, unknown]), STILL, np.array([SECOND, FIRST]))[1] == []

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from crazyflie_utils.parameters.declaration import ParameterError as ParameterError
     from crazyflie_utils.parameters.declaration import Parameters as Parameters
     from crazyflie_utils.parameters.declaration import parameter as parameter
+    from crazyflie_utils.program import run_program as run_program
     from crazyflie_utils.tf.buffer import TransformError as TransformError
     from crazyflie_utils.tf.poses import StampedPose as StampedPose
     from crazyflie_utils.transport import ServiceError as ServiceError
@@ -32,6 +33,7 @@ _HOME = {
     "run": "crazyflie_utils.main",
     "run_composed": "crazyflie_utils.main",
     "run_nodes": "crazyflie_utils.main",
+    "run_program": "crazyflie_utils.program",
 }
 
 

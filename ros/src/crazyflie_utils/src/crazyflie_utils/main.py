@@ -1,13 +1,11 @@
 """Main programs: one node in a process, or many."""
 
 import gc
-import importlib
 import io
 import signal
 import sys
 import threading
 import time
-import traceback
 from collections.abc import Callable
 from typing import Any
 
@@ -16,10 +14,11 @@ import rospy
 from typing_extensions import override
 
 from crazyflie_utils.handle import NodeHandle
-from crazyflie_utils.node import Node
+from crazyflie_utils.node import Node, initialization_failure
 from crazyflie_utils.parameters.declaration import ParameterError, Parameters, parameter
 from crazyflie_utils.parameters.types import BOOLEAN, GraphName, ParameterType
 from crazyflie_utils.process import Process
+from crazyflie_utils.program import load, missing_module
 from crazyflie_utils.ros1.master_watch import MasterWatch
 from crazyflie_utils.ros1.transport import RosTransport
 from crazyflie_utils.shutdown import FLUSH_TIME, Shutdown, catch_signals, exit_at_once, fail
@@ -58,12 +57,12 @@ def run_composed(default_name: str) -> None:
     run_nodes(default_name, make_nodes)
 
 
-def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, Node]]) -> None:
+def run_nodes(default_name: str, make_nodes: Callable[[NodeHandle], dict[str, Node]] | str) -> None:
     """Run the nodes that a function makes; does not return.
 
     ``make_nodes(handle)``, with the handle of the process's own node, returns all nodes by absolute
-    name. What it raises ends the process with status 1. The launch file may give another name than
-    ``default_name`` to the process's own node.
+    name; or it is named as "package.module:function". What it raises ends the process with status
+    1. The launch file may give another name than ``default_name`` to the process's own node.
     """
     signals = catch_signals()
     _run(begin(default_name, signals), make_nodes, signals)
@@ -102,11 +101,11 @@ def _flatten(tree, prefix=""):
 
 
 def _node_class(path):
-    module, _, name = str(path).partition(":")
     try:
-        found = getattr(importlib.import_module(module), name)
+        found = load(str(path))
     except Exception as error:
-        raise ValueError(f"no class {path!r}: {error!r}") from error
+        reason = missing_module(error) or repr(error)
+        raise ValueError(f"no class {path!r}: {reason}") from error
     if not (isinstance(found, type) and issubclass(found, Node)):
         raise ValueError(f"{path!r} is not a subclass of Node")
     return found
@@ -183,7 +182,8 @@ def _run(process, make_nodes, signals):
     handle = process.handle(rospy.get_name())
     try:
         with process.transport.starting():
-            nodes = make_nodes(handle)
+            make = load(make_nodes) if isinstance(make_nodes, str) else make_nodes
+            nodes = make(handle)
             for name, node in nodes.items():
                 if not node.initialize(process.handle(name)):
                     process.transport.log("fatal", f"{name}: not initialized; the process exits")
@@ -192,8 +192,8 @@ def _run(process, make_nodes, signals):
     except ParameterError as error:
         handle.error(str(error))
         fail()
-    except Exception:
-        handle.error(f"failed to initialize\n{traceback.format_exc()}")
+    except Exception as error:
+        handle.error(initialization_failure(error))
         fail()
     rospy.on_shutdown(shutdown.run)
     watch = MasterWatch()

@@ -5,6 +5,13 @@ from typing import ClassVar
 
 from crazyflie_utils.handle import NodeHandle
 from crazyflie_utils.parameters.declaration import ParameterError
+from crazyflie_utils.program import missing_module
+
+
+def initialization_failure(error: Exception) -> str:
+    """Return why a node cannot be initialized: what is to be installed, or the traceback."""
+    trace = "".join(traceback.format_exception(error))
+    return missing_module(error) or f"failed to initialize\n{trace}"
 
 
 class Node:
@@ -31,8 +38,8 @@ class Node:
         except ParameterError as error:
             handle.error(str(error))
             return False
-        except Exception:
-            handle.error(f"failed to initialize\n{traceback.format_exc()}")
+        except Exception as error:
+            handle.error(initialization_failure(error))
             return False
         handle.on_fault(self.enter_safe_state)
         return True

@@ -1,0 +1,66 @@
+"""Starts programs by name, and says in a sentence what installs a Python module that is missing."""
+
+import importlib
+import sys
+from pathlib import Path
+from typing import Any, NoReturn
+
+#: Modules that may be missing -> section of ros/debian.txt and ros/requirements.txt that brings
+#: them, and package. Those of PyPI are named as there, those of Debian begin with python3-.
+PACKAGES = {
+    "cflib": ("demo", "cflib"),
+    "control": ("demo", "control"),
+    "cv2": ("vision", "python3-opencv"),
+    "cv_bridge": ("vision", "python3-cv-bridge"),
+    "distributed": ("batch", "python3-distributed"),
+    "libusb_package": ("demo", "libusb-package"),
+    "llvmlite": ("batch", "python3-llvmlite"),
+    "matplotlib": ("vehicles", "python3-matplotlib"),
+    "motioncapture": ("demo", "motioncapture"),
+    "natnet": ("demo", "natnet"),
+    "nicegui": ("dashboard", "nicegui"),
+    "numpy": ("demo", "python3-numpy"),
+    "PIL": ("rviz", "python3-pil"),
+    "pytest": ("tests", "python3-pytest"),
+    "scipy": ("vehicles", "python3-scipy"),
+    "tqdm": ("demo", "python3-tqdm"),
+    "usb": ("vehicles", "python3-usb"),
+    "xacro": ("demo", "xacro"),
+}
+
+
+def missing_module(error: BaseException | None) -> str:
+    """Return in a sentence which module of `PACKAGES` is missing, and what installs it.
+
+    That is the cause of an error, or the cause of its cause; empty if there is none.
+    """
+    while error is not None:
+        name = ((isinstance(error, ModuleNotFoundError) and error.name) or "").partition(".")[0]
+        if name in PACKAGES:
+            section, package = PACKAGES[name]
+            manager = "apt install" if package.startswith("python3-") else "pip install"
+            return (
+                f"the Python module {name} is missing; ./run install {section} installs it, "
+                f"or {manager} {package}"
+            )
+        error = error.__cause__
+    return ""
+
+
+def load(path: str) -> Any:
+    """Import what is named as "package.module:name" and return it."""
+    module, _, name = path.partition(":")
+    return getattr(importlib.import_module(module), name)
+
+
+def run_program(path: str) -> NoReturn:
+    """Exit with what the function "package.module:function" returns.
+
+    The exit status is 1, with a sentence, if a module of `PACKAGES` is missing.
+    """
+    try:
+        sys.exit(load(path)())
+    except ImportError as error:
+        if text := missing_module(error):
+            sys.exit(f"{Path(sys.argv[0]).name}: {text}")
+        raise

@@ -28,6 +28,7 @@ else
   done
   echo "Launched: $launch"
   echo "Its output is in ~/course.log; exit ends it."
+  [ -z "${DISPLAY:-}" ] || echo "RViz begins near the vehicle: the mouse wheel zooms out, the left button turns the view."
 fi
 echo "The lesson: docs/course/${page##*/}"
 [ ! -d "$COURSE/skeletons/$LESSON" ] ||

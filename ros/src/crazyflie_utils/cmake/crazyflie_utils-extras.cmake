@@ -17,6 +17,10 @@ function(crazyflie_add_pytest path)
     crazyflie_add_pytest(${path}/${file})
   endforeach()
   catkin_run_tests_target("pytest" "${name}" "pytest-${name}.xml" COMMAND "${command}")
+  if(pytest_WORKERS)
+    # What waits is to begin early, beside what computes.
+    _crazyflie_set_tests_properties("pytest_${name}$" COST 2500)
+  endif()
 endfunction()
 
 # Say how many halves of a processor tests of this package take: 2 if they compute all the time,

@@ -10,7 +10,7 @@ page=$(compgen -G "$page")
 
 # The first command of the page that is awaited and launches something.
 launch=$(awk '/^<!-- run: until \//{awaited=1} awaited && /^roslaunch/{print; exit} /^```$/{awaited=0}' "$page")
-[ -z "${DISPLAY:-}" ] || launch=${launch/rviz:=false/}
+[ -z "${DISPLAY:-}" ] || launch=$(sed -E 's/ (rviz:=false|sim_time:=true|real_time_factor:=[0-9]+)//g' <<<"$launch")
 if [ -z "$launch" ]; then
   echo "This lesson launches nothing."
 elif rostopic list >/dev/null 2>&1; then
@@ -28,6 +28,7 @@ else
   done
   echo "Launched: $launch"
   echo "Its output is in ~/course.log; exit ends it."
+  [ -z "${DISPLAY:-}" ] || echo "RViz begins near the vehicle: the mouse wheel zooms out, the left button turns the view."
 fi
 echo "The lesson: docs/course/${page##*/}"
 [ ! -d "$COURSE/skeletons/$LESSON" ] ||

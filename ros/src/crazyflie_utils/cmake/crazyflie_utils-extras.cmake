@@ -3,20 +3,24 @@
 #
 # :param path: folder or file, relative to the package
 # :param APART: files of this folder that are tests of their own, which may run beside it
-# :param WORKERS: number of processes that share the tests, if these mostly wait
+# :param WORKERS: number of processes that share the files, if their tests mostly wait
 function(crazyflie_add_pytest path)
   cmake_parse_arguments(pytest "" "WORKERS" "APART" ${ARGN})
   string(REPLACE "/" "_" name "${path}")
   set(report "${CATKIN_TEST_RESULTS_DIR}/${PROJECT_NAME}/pytest-${name}.xml")
   set(command "${PYTHON_EXECUTABLE} -m pytest ${CMAKE_CURRENT_SOURCE_DIR}/${path} -q -p no:cacheprovider -p crazyflie_utils.testing.pytest_plugin --junit-xml=${report}")
   if(pytest_WORKERS)
-    string(APPEND command " -n ${pytest_WORKERS}")
+    string(APPEND command " -n ${pytest_WORKERS} --dist loadfile")
   endif()
   foreach(file ${pytest_APART})
     string(APPEND command " --ignore=${CMAKE_CURRENT_SOURCE_DIR}/${path}/${file}")
     crazyflie_add_pytest(${path}/${file})
   endforeach()
   catkin_run_tests_target("pytest" "${name}" "pytest-${name}.xml" COMMAND "${command}")
+  if(pytest_WORKERS)
+    # What waits is to begin early, beside what computes.
+    _crazyflie_set_tests_properties("pytest_${name}$" COST 2500)
+  endif()
 endfunction()
 
 # Say how many halves of a processor tests of this package take: 2 if they compute all the time,

@@ -41,7 +41,8 @@ def test_a_program_is_compiled_and_calculates_as_the_nodes_do(tmp_path):
     packages = ("crazyflie_utils", "crazyflie_msgs", "eigen3")
     command = ["pkg-config", "--cflags", *packages]
     flags = subprocess.run(command, check=True, capture_output=True, text=True, timeout=60)
-    compiler = ["g++", "-std=c++11", *flags.stdout.split(), str(source), "-o", str(program)]
+    # C++14 is what newer versions of Eigen need.
+    compiler = ["g++", "-std=c++14", *flags.stdout.split(), str(source), "-o", str(program)]
     subprocess.run(compiler, check=True, timeout=300)
     output = subprocess.run([program], check=True, capture_output=True, text=True, timeout=60)
     expected = [

@@ -153,7 +153,9 @@ class _Cell:
         normals, excess = -self._normals[bounded], excess[bounded]
         target = np.array([0.0, 0.0, 0.0, 1.0])
         try:
-            weights, _ = nnls(np.vstack([normals.T, excess]), target, self._settings.max_iterations)
+            weights, _ = nnls(
+                np.vstack([normals.T, excess]), target, maxiter=self._settings.max_iterations
+            )
         except RuntimeError:
             return None
         residual = np.vstack([normals.T, excess]) @ weights - target

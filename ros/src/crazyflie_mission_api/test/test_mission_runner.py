@@ -127,8 +127,20 @@ def test_a_trajectory(vehicle, tmp_path, capsys):
     assert result(capsys.readouterr().out)["duration"] == pytest.approx(20.0, abs=5.0)
     assert main(["fly", path, "cf1"]) == 0
     assert "follow: cf1" in capsys.readouterr().out
-    assert main(["fly", str(tmp_path / "none.csv"), "cf1"]) == 1
-    assert "none.csv" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["flight", "one.py"], "invalid choice: 'flight'"),
+        (["fly", "none.py"], "there is no file none.py; expected a script, or a trajectory"),
+        ([], "the following arguments are required: word, file"),
+    ],
+)
+def test_bad_arguments(arguments, text, capsys):
+    with pytest.raises(SystemExit):
+        main(arguments)
+    assert text in capsys.readouterr().err
 
 
 def test_more_than_four_vehicles_are_counted(run, capsys):

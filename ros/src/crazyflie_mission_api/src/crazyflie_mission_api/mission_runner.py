@@ -8,6 +8,7 @@ Its result is a line of JSON: {"dry_run": {"passed": bool, "text": str, "duratio
 {vehicle: [[x, y, z], ...]}}}.
 """
 
+import argparse
 import contextlib
 import json
 import os
@@ -74,8 +75,14 @@ class _DryRunReport(MissionObserver):
 
 def main(arguments: list[str]) -> int:
     """Fly, or make a dry run; return the exit status."""
-    what, path, *others = arguments
-    is_dry = what == "dry_run"
+    parser = argparse.ArgumentParser(prog="mission_runner", description=__doc__)
+    parser.add_argument("word", choices=("dry_run", "fly"))
+    parser.add_argument("file", help="script, or trajectory (CSV)")
+    parser.add_argument("others", nargs=argparse.REMAINDER, help="of the script, or vehicles")
+    options = parser.parse_args(arguments)
+    path, others, is_dry = options.file, options.others, options.word == "dry_run"
+    if not os.path.isfile(path):
+        parser.error(f"there is no file {path}; expected a script, or a trajectory (CSV)")
     observer.of_process = _DryRunReport() if is_dry else _Printer()
     # As for a program that is started by its own name.
     sys.argv, sys.path[0] = [path, *others], os.path.dirname(os.path.abspath(path))

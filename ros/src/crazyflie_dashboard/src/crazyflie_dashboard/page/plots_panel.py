@@ -125,7 +125,7 @@ def figures(series: Series, start: float, end: float) -> dict[str, str] | None:
         "deviation": part.std(),
     }
     name = f"{series.name}, {series.unit}" if series.unit else series.name
-    return {"name": name, **{what: f"{number:.3g}" for what, number in numbers.items()}}
+    return {"name": name, **{what: f"{round(number, 6):z.3g}" for what, number in numbers.items()}}
 
 
 def points(series: Series) -> list[tuple[float, float | None]]:

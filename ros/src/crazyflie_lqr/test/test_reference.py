@@ -144,6 +144,8 @@ def test_stamps_of_the_first_second_count_also_after_a_reset_of_the_clock():
     assert reference.update(GOAL, stamp=60.0, now=60.0)
     assert reference.update(2.0 * GOAL, stamp=0.5, now=1.0)
     assert not reference.update(GOAL, stamp=0.25, now=1.0)
+    assert reference.update(GOAL, stamp=1.0, now=1.0)
+    assert not reference.update(GOAL, stamp=0.75, now=1.0)
 
 
 def test_a_descent_ends_after_three_tenths_of_a_second():

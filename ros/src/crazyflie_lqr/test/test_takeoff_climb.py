@@ -59,3 +59,10 @@ def test_the_ground_ends_all_integrals():
     feedback.enable_integrator()
     u = feedback.law(x, GROUND, 1.5)
     assert u == pytest.approx([0.01, -0.0025, 0.0, 9.81 - 0.225])
+
+
+@pytest.mark.parametrize(("limit", "climbs"), [(0.0, False), (0.25, True), (2.0, True)])
+def test_with_an_integral_also_a_height_loop_that_is_well_damped_climbs(limit, climbs):
+    feedback = controller(4.0, 2.85, (0.0, 0.0, -1.0), (0.0, 0.0, limit))
+    feedback.take_off()
+    assert feedback.law(GROUND, ABOVE, 0.0)[3] == pytest.approx(9.81 + (0.0 if climbs else 4.0))

@@ -150,3 +150,11 @@ def test_nose_straight_down_is_no_more_than_a_quarter_turn_in_spite_of_rounding(
 
 def test_a_float_stays_one():
     assert type(wrap_to_pi(4.0)) is float
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_firmware_s_pitch_ends_at_a_quarter_turn_in_spite_of_rounding(sense):
+    # 2 w y is 1.0000000000000002.
+    half = 0.7071067811865476
+    _, pitch, _ = zyx_from_quaternion((0.0, sense * half, 0.0, half))
+    assert pitch == pytest.approx(sense * math.pi / 2.0)

@@ -137,8 +137,11 @@ def test_without_a_cell_a_vehicle_does_not_move():
     near = np.array([[0.15, 0.0, 0.0], [-0.15, 0.0, 0.0]])
     assert moving(0.3, near) == [0.0, 0.0, 0.0]
     avoidance = CollisionAvoidance(OPEN)
-    stay, _ = avoidance.position_setpoint(OFF, near + OFF, np.ones(3), STILL)
-    assert stay.tolist() == OFF.tolist()
+    stay, velocity = avoidance.position_setpoint(OFF, near + OFF, np.ones(3), np.ones(3))
+    assert (stay.tolist(), velocity.tolist()) == (OFF.tolist(), [0.0, 0.0, 0.0])
+    # Nor does one that is led to a wall keep its velocity there.
+    _, velocity = CollisionAvoidance(OPEN).position_setpoint(STILL, ONE, np.ones(3), np.ones(3))
+    assert velocity.tolist() == [0.0, 0.0, 0.0]
 
 
 def test_a_wall_that_is_flown_along_does_not_count():

@@ -118,3 +118,11 @@ def test_a_trajectory_that_is_over_is_at_rest():
     assert end[1:3] == (ZERO, ZERO)
     assert end.yaw_rate == 0.0
     np.testing.assert_allclose(end.position, PIECES[-1].evaluate(0.3).position)
+
+
+def test_turned_by_any_angle():
+    pieces = turned(PIECES, (1.0, 2.0, 0.0), 0.5)
+    for before, after in zip(PIECES, pieces, strict=True):
+        was, now = before.evaluate(0.2).position, after.evaluate(0.2).position
+        way = complex(was[0] - 1.0, was[1] - 2.0) * complex(math.cos(0.5), math.sin(0.5))
+        np.testing.assert_allclose(now, (1.0 + way.real, 2.0 + way.imag, was[2]))

@@ -248,6 +248,7 @@ def test_a_camera_that_goes_on_shows_the_vehicle_elsewhere_three_times_in_a_row(
         for k, offset in enumerate(offsets)
     ]
     assert frozen == [True] * 7 + [False] * 2
+    monitor.restart()
     monitor._place = (0.0, 0.0, 1.0)
     for time, is_frozen in ((0.2, True), (0.21, True), (0.22, False)):
         assert monitor.update(time, (time, 0.0, 1.0), LEVEL, STILL) == is_frozen

@@ -48,10 +48,11 @@ def test_a_pose_may_be_as_far_away_as_noise_brings_it_at_once():
     ("time", "classification"), [(0.029, Classification.GOOD), (0.03, Classification.BAD)]
 )
 def test_after_an_outlier_a_single_pose_counts_for_30_ms(time, classification):
-    gate = PoseGate(5.0)
-    gate.classify(0.0, (0.0, 0.0, 1.0))
-    assert gate.classify(0.01, (3.0, 0.0, 1.0)) is Classification.BAD
-    assert gate.classify(time, (0.0, 0.0, 1.0)) is classification
+    for begin in (0.0, 64.0):
+        gate = PoseGate(5.0)
+        gate.classify(begin, (0.0, 0.0, 1.0))
+        assert gate.classify(begin + 0.01, (3.0, 0.0, 1.0)) is Classification.BAD
+        assert gate.classify(begin + time, (0.0, 0.0, 1.0)) is classification
 
 
 def test_a_vehicle_that_was_carried_is_found_again_after_three_tenths_of_a_second():

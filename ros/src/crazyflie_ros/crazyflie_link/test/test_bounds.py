@@ -106,7 +106,7 @@ def test_the_quickest_log_block_counts():
 def test_a_log_block_counts_from_its_start():
     monitor = LinkMonitor(4.9)
     monitor.expect_log(0.2, 5.0)
-    assert states(monitor, 5.1, 5.3, 5.5, 5.7) is LinkHealth.ALIVE
+    assert states(monitor, 5.1, 5.3, 5.5, 5.6, 5.75) is LinkHealth.ALIVE
     assert states(monitor, 5.85) is LinkHealth.RESTARTED
 
 

@@ -1,0 +1,202 @@
+"""Bounds, bytes and moments that are calculated by hand, on both sides."""
+
+import struct
+
+import pytest
+
+from crazyflie_link.address import Address
+from crazyflie_link.checks import (
+    LARGEST_FLOAT,
+    SMALLEST_FLOAT,
+    check_byte,
+    check_finite,
+    check_positive,
+)
+from crazyflie_link.errors import ValueRangeError
+from crazyflie_link.link_monitor import LinkHealth, LinkMonitor, Uptime
+from crazyflie_link.packed_poses import PackedPoses, pack
+
+# Addresses and numbers.
+
+
+@pytest.mark.parametrize(
+    ("uri", "vehicle_id"),
+    [
+        ("radio://0/25/2M/E7E7E7E7A1", 0xA1),
+        ("radio://0/25/2M/E7E7E7E7A1?rate_limit=100", 0xA1),
+        ("radio://0/25/2M", 0xE7),
+        ("udp://127.0.0.1:19850", None),
+    ],
+)
+def test_the_id_of_a_vehicle_is_the_last_byte_of_its_radio_address(uri, vehicle_id):
+    assert Address.parse(uri).vehicle_id == vehicle_id
+
+
+def test_the_largest_and_the_smallest_numbers_are_sent():
+    check_finite("x", LARGEST_FLOAT, -LARGEST_FLOAT)
+    check_positive("x", LARGEST_FLOAT)
+    check_positive("x", SMALLEST_FLOAT)
+    check_byte("x", 0)
+    check_byte("x", 255)
+
+
+@pytest.mark.parametrize(
+    ("check", "value"),
+    [
+        (check_finite, 3.5e38),
+        (check_finite, -3.5e38),
+        (check_positive, 3.5e38),
+        (check_positive, 0.0),
+        (check_byte, -1),
+        (check_byte, 256),
+    ],
+)
+def test_the_next_ones_are_refused(check, value):
+    with pytest.raises(ValueRangeError, match="^x"):
+        check("x", value)
+
+
+# The vehicle's clock: it has restarted if it is more than 60 s ahead.
+
+
+@pytest.mark.parametrize(("time_ms", "has_restarted"), [(61_000, False), (61_001, True)])
+def test_a_clock_that_is_ahead_has_begun_anew(time_ms, has_restarted):
+    uptime = Uptime()
+    assert not uptime.has_restarted(0, 10.0)
+    assert uptime.has_restarted(time_ms, 11.0) == has_restarted
+
+
+@pytest.mark.parametrize(
+    ("arrival", "step_ms", "has_restarted"),
+    [
+        # The second packet is in time; or 10 s late, which the third one may make up for.
+        (11.0, 61_000, False),
+        (11.0, 61_001, True),
+        (21.0, 71_000, False),
+        (21.0, 71_001, True),
+    ],
+)
+def test_a_packet_may_make_up_for_one_that_was_late(arrival, step_ms, has_restarted):
+    uptime = Uptime()
+    uptime.has_restarted(0, 10.0)
+    assert not uptime.has_restarted(1000, arrival)
+    assert uptime.has_restarted(1000 + step_ms, arrival + 1.0) == has_restarted
+
+
+# Log packets of a vehicle that answers pings: four periods may be missing.
+
+
+def states(monitor, *times, pings=True):
+    """Return what the monitor says last, of a vehicle that answers a ping at each time (s)."""
+    for time in times:
+        if pings:
+            monitor.received(time)
+        state = monitor.state(time)
+    return state
+
+
+def test_the_quickest_log_block_counts():
+    monitor = LinkMonitor(0.0)
+    for period in (1.0, 0.2, 1.0):
+        monitor.expect_log(period, 0.0)
+    assert states(monitor, 0.2, 0.4, 0.6, 0.8) is LinkHealth.ALIVE
+    assert states(monitor, 0.9) is LinkHealth.RESTARTED
+
+
+def test_a_log_block_counts_from_its_start():
+    monitor = LinkMonitor(4.9)
+    monitor.expect_log(0.2, 5.0)
+    assert states(monitor, 5.1, 5.3, 5.5, 5.6, 5.75) is LinkHealth.ALIVE
+    assert states(monitor, 5.85) is LinkHealth.RESTARTED
+
+
+def test_half_the_limit_between_log_packet_and_ping_is_a_restart():
+    monitor = LinkMonitor(0.0)
+    monitor.expect_log(0.2, 0.0)
+    states(monitor, 0.2, 0.42)
+    assert states(monitor, 0.6, 0.81, pings=False) is LinkHealth.RESTARTED
+
+
+def test_after_a_busy_time_log_packets_get_half_a_limit_more():
+    monitor = LinkMonitor(0.0)
+    monitor.expect_log(0.2, 0.0)
+    # Due from 5.0 - 0.45 / 2 + 0.8 = 5.575 on.
+    assert states(monitor, 5.0, 5.2, 5.4, 5.57) is LinkHealth.ALIVE
+    assert states(monitor, 5.58) is LinkHealth.RESTARTED
+
+
+def test_a_packet_of_the_limit_s_age_is_not_too_old():
+    monitor = LinkMonitor(0.0)
+    assert states(monitor, 0.2, 0.4, 0.45, pings=False) is LinkHealth.ALIVE
+    assert states(monitor, 0.451, pings=False) is LinkHealth.SILENT
+
+
+def test_more_than_half_a_limit_between_two_looks_is_a_busy_machine():
+    monitor = LinkMonitor(0.0)
+    # The period begins at 0.23 - 0.45 / 2 = 0.005.
+    assert states(monitor, 0.23, 0.4, 0.453, pings=False) is LinkHealth.ALIVE
+    assert states(monitor, 0.456, pings=False) is LinkHealth.SILENT
+
+
+# Packed poses (crtp_localization_service.c): 16 bits of mm, and 32 of the quaternion, whose first
+# two name the largest component.
+
+
+def test_positions_are_packed_by_four():
+    poses = {k: ((1.0, -2.0, 0.5), None) for k in range(5)}
+    packets = pack(poses)
+    one = [struct.pack("<B3h", k, 1000, -2000, 500) for k in range(5)]
+    assert [bytes(each.data) for each in packets] == [b"".join(one[:4]), one[4]]
+    assert [(each.port, each.channel) for each in packets] == [(6, 2)] * 2
+
+
+def test_poses_are_packed_by_two():
+    poses = {k: ((1.0, -2.0, 0.5), (0.0, 0.0, 0.0, 1.0)) for k in range(3)}
+    packets = pack(poses)
+    one = [struct.pack("<B3hI", k, 1000, -2000, 500, 3 << 30) for k in range(3)]
+    assert [bytes(each.data) for each in packets] == [b"\x09" + one[0] + one[1], b"\x09" + one[2]]
+    assert [(each.port, each.channel) for each in packets] == [(6, 1)] * 2
+
+
+class Streams:
+    """A broadcaster that keeps what it is to send."""
+
+    def __init__(self):
+        self.frames = []
+
+    def put_latest(self, stream, frame):
+        """Keep what makes the packets."""
+        self.frames.append(frame)
+
+
+def test_the_poses_of_a_frame_are_sent_once():
+    broadcaster = Streams()
+    poses = PackedPoses(broadcaster)
+    poses.vehicles = 2
+    for _ in range(2):
+        for vehicle_id in (1, 2):
+            poses.put(vehicle_id, ((0.0, 0.0, 0.0), None))
+        (frame,) = broadcaster.frames
+        (sent,) = frame()
+        assert [sent.data[0], sent.data[7]] == [1, 2]
+        broadcaster.frames.clear()
+
+
+# Setpoints.
+
+
+def test_setpoints_at_their_bounds(target, flying):
+    for count, thrust in enumerate((0, 65535), start=1):
+        flying.setpoints.attitude(0.0, 0.0, 0.0, thrust)
+        sent = target.wait_for_packets(3, 0, count)[-1]
+        assert sent[-2:] == struct.pack("<H", thrust)
+    flying.setpoints.notify_setpoints_stop(2**32 - 1)
+    for too_many in (-1, 2**32):
+        with pytest.raises(ValueRangeError, match="is not in 0 to"):
+            flying.setpoints.notify_setpoints_stop(too_many)
+    for thrust in (-1, 65536):
+        with pytest.raises(ValueRangeError, match="expected 0 to 65535 PWM"):
+            flying.setpoints.attitude(0.0, 0.0, 0.0, thrust)
+    zero = [0.0, 0.0, 0.0]
+    with pytest.raises(ValueRangeError, match=r"-33 is outside \+-32.767"):
+        flying.setpoints.full_state(zero, [-33.0, 0.0, 0.0], zero, [0.0, 0.0, 0.0, 1.0], zero)

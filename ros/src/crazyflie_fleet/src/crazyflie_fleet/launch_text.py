@@ -1,10 +1,12 @@
 """A launch file for a fleet on several computers."""
 
+import sys
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
 from crazyflie_fleet import fleet_file
 from crazyflie_fleet.settings import LOCAL
+from crazyflie_utils import ParameterError
 
 
 def launch_text(path: str | Path) -> str:
@@ -49,3 +51,16 @@ def launch_text(path: str | Path) -> str:
         ]
         lines.append("  </include>")
     return "\n".join([*lines, "</launch>", ""])
+
+
+def main() -> int:
+    """Print the launch file of the fleet file that the command line names."""
+    if len(sys.argv) != 2:
+        print("usage: rosrun crazyflie_fleet fleet_launch FILE > MY.launch", file=sys.stderr)
+        return 1
+    try:
+        print(launch_text(sys.argv[1]), end="")
+    except ParameterError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0

@@ -58,7 +58,10 @@ def clean_environment(home: Path) -> dict[str, str]:
         (other / name).chmod(0o755)
     inherited = os.environ["PATH"].split(os.pathsep)
     path = [str(other), *(entry for entry in inherited if not entry.startswith(str(TOP)))]
+    # docs/installation.md has users of CMake 4 set this; ./run does.
+    policy = "CMAKE_POLICY_VERSION_MINIMUM"
     return {
+        **({policy: os.environ[policy]} if policy in os.environ else {}),
         "HOME": str(home),
         "LANG": "C.UTF-8",
         "PATH": os.pathsep.join(path),

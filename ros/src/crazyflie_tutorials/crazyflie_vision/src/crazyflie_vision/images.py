@@ -35,7 +35,9 @@ def to_array(message: Image) -> NDArray[np.uint8]:
 def to_message(image: NDArray[np.uint8], header: Header) -> Image:
     """Return a message with an image, grey if its shape is (height, width), and a header."""
     encoding = GREY if image.ndim == 2 else COLOUR
-    return _BRIDGE.cv2_to_imgmsg(np.ascontiguousarray(image), encoding, header)
+    height, width = image.shape[:2]
+    # cv_bridge's cv2_to_imgmsg fails with NumPy 2.3, which Debian's sid has.
+    return Image(header, height, width, encoding, 0, image[0].nbytes, image.tobytes())
 
 
 def camera_info(camera: Pinhole, header: Header) -> CameraInfo:

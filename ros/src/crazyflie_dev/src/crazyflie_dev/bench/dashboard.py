@@ -97,13 +97,13 @@ ROWS = [
         f"{_VEHICLES} vehicles: p99 of the control's period with a page, minus without",
         "ms",
         lambda: _rise("period"),
-        most=2.0,
+        most=1.0,
     ),
     Row(
         "dashboard_latency",
         f"{_VEHICLES} vehicles: p99 of pose -> control with a page, minus without",
         "ms",
         lambda: _rise("latency"),
-        most=2.0,
+        most=1.0,
     ),
 ]

@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from pathlib import Path
 
 import pytest
 import yaml
@@ -85,6 +86,38 @@ def test_a_path_with_a_space_is_refused(command, tmp_path):
     )
     assert result.returncode == 1
     assert "catkin cannot build in a path with a space" in result.stderr
+
+
+FINDER = {
+    "package.xml": """<package format="3"><name>finder</name><version>1.0.0</version>
+<description>Finds a tool.</description><maintainer email="m@example.org">M</maintainer>
+<license>BSD</license><buildtool_depend>catkin</buildtool_depend></package>""",
+    "CMakeLists.txt": """cmake_minimum_required(VERSION 3.5)
+project(finder)
+find_package(catkin REQUIRED)
+catkin_package()
+find_file(TOOL tool PATHS ${CMAKE_SOURCE_DIR}/../tools NO_DEFAULT_PATH)
+file(WRITE ${CMAKE_BINARY_DIR}/found "${TOOL}")
+""",
+}
+
+
+def test_a_build_finds_what_was_installed_after_the_last_one(tmp_path):
+    # As rostest is, which ./run demo does not need and ./run tests does.
+    shutil.copy(TOP / "run", tmp_path)
+    ros = tmp_path / "ros"
+    (ros / "src" / "finder").mkdir(parents=True)
+    for name, text in FINDER.items():
+        (ros / "src" / "finder" / name).write_text(text)
+    found = []
+    for packages in ("# none\n", "# a tool\n"):
+        for name in ("debian.txt", "requirements.txt"):
+            (ros / name).write_text(packages)
+        subprocess.run(["./run", "build"], cwd=tmp_path, check=True, timeout=LIMIT)
+        found.append((ros / "build" / "found").read_text())
+        (ros / "tools").mkdir(exist_ok=True)
+        (ros / "tools" / "tool").touch()
+    assert [Path(each).name for each in found] == ["TOOL-NOTFOUND", "tool"]
 
 
 def test_words_used_elsewhere_exist():

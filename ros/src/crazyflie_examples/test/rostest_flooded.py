@@ -80,7 +80,7 @@ def flight():
     rates, floods = {}, {}
     with attackers() as ready, ready_operator() as operator:
         operator.takeoff()
-        record = operator._recorder.record
+        record = operator.record
 
         def measure():
             start = record.state.last_time

@@ -43,7 +43,7 @@ class Observer:
         self.takeoff, self.land = self._operator.takeoff, self._operator.land
         self.hover, self.refer_to = self._operator.hover, self._operator.refer_to
         self.record = self._operator.finish
-        self._state = self._operator._recorder.record.state
+        self._state = self._operator.record.state
 
     @property
     def height(self):

@@ -41,7 +41,7 @@ class FlightOperator:
     ):
         self._handle = handle = process.handle(f"{namespace.rstrip('/')}/flight_recorder")
         self._limit = limit
-        self._record = record = FlightRecord()
+        self.record = record = FlightRecord()  #: What has come so far.
         self._received = threading.Condition()  # Notified after every message.
         self._is_finished = False
         for topic, message_type, series in (
@@ -59,23 +59,23 @@ class FlightOperator:
     @property
     def position(self) -> NDArray[np.float64]:
         """Where the vehicle was last, m, shape (3,)."""
-        return self._record.state.last[:3]
+        return self.record.state.last[:3]
 
     @property
     def time(self) -> float:
         """Of the latest state, s."""
-        return self._record.state.last_time
+        return self.record.state.last_time
 
     def finish(self) -> FlightRecord:
         """Stop recording and return the record."""
         with self._received:
             self._is_finished = True
-        return self._record
+        return self.record
 
     def wait_until_ready(self) -> None:
         """Wait for the first state and for the ground's zero thrust."""
-        self._wait_for(lambda: len(self._record.state), "no state was published")
-        self._wait_for(lambda: len(self._record.final_control), "no control was published")
+        self._wait_for(lambda: len(self.record.state), "no state was published")
+        self._wait_for(lambda: len(self.record.final_control), "no control was published")
 
     def takeoff(self) -> None:
         """Call takeoff and wait for its answer."""
@@ -83,7 +83,7 @@ class FlightOperator:
 
     def hover(self, duration: float) -> None:
         """Let ``duration`` seconds of flight pass."""
-        state = self._record.state
+        state = self.record.state
         end = state.last_time + duration
         self._wait_for(lambda: state.last_time >= end, "states stopped coming")
 
@@ -108,7 +108,7 @@ class FlightOperator:
         return self.finish()
 
     def _call(self, service, answered):
-        record = self._record
+        record = self.record
         called_at = record.state.last_time
         future = self._handle.call_service(service, Empty, EmptyRequest(), self._limit)
         try:
@@ -123,7 +123,7 @@ class FlightOperator:
         self._note(series.append, message.header.stamp.to_sec(), to_vector(content))
 
     def _on_toggle(self, _):
-        self._note(self._record.toggles.append, self._handle.stamp().to_sec())
+        self._note(self.record.toggles.append, self._handle.stamp().to_sec())
 
     def _note(self, append, *values):
         with self._received:

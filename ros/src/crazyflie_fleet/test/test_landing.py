@@ -173,10 +173,64 @@ def test_who_descends_already_lands_where_it_is_or_beside_what_is_beneath():
     assert free_place(0, places, stands, limits) == (0.0, 0.0)
 
 
-def test_a_descent_at_once_goes_only_so_far_aside():
-    axis = 0.4 * np.arange(-10, 11)
+@pytest.mark.parametrize("direction", [(1, 0), (-1, 0), (0, 1), (0, -1)])
+@pytest.mark.parametrize(("spacing", "steps"), [(0.375, 8), (0.35, 9)])
+def test_a_descent_at_once_goes_only_so_far_aside(direction, spacing, steps):
+    # On a floor full of vehicles one place is free, 3.0 or 3.15 m aside.
+    axis = spacing * np.arange(-11, 12)
     floor = np.stack(np.meshgrid(axis, axis, [0.0]), axis=-1).reshape(-1, 3)
+    hole = spacing * steps * np.array(direction)
+    floor = floor[np.hypot(*(floor[:, :2] - hole).T) > 0.1]
     places = np.vstack([[(0.0, 0.0, 2.0)], floor])
     stands, limits = np.arange(len(places)) > 0, np.full((len(places),) * 2, 0.3)
-    assert abs(axis).max() > MAX_DETOUR
-    assert free_place(0, places, stands, limits) == (0.0, 0.0)
+    expected = hole if spacing * steps <= MAX_DETOUR else np.zeros(2)
+    assert free_place(0, places, stands, limits) == pytest.approx(tuple(expected))
+
+
+def test_a_descent_at_once_goes_straight_down_beside_a_vehicle():
+    places = np.array([(0.0, 0.0, 2.0), (0.305, 0.0, 0.0)])
+    assert free_place(0, places, np.array([False, True]), np.full((2, 2), 0.3)) == (0.0, 0.0)
+
+
+def test_without_a_vehicle_to_land_none_lands():
+    none, box = np.zeros(2, dtype=bool), np.full((2, 2), np.inf)
+    places = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 2.0)])
+    assert next_round(places, none, none, np.full((2, 2), 0.3), -box, box) == {}
+
+
+def test_a_small_vehicle_above_many_large_ones_finds_a_place_beside_them():
+    axis = 1.55 * np.arange(-2, 3)
+    floor = np.stack(np.meshgrid(axis, axis, [0.0]), axis=-1).reshape(-1, 3)
+    places = np.vstack([[(0.0, 0.0, 2.0)], floor])
+    radii = np.array([0.15, *[0.9] * 25])
+    is_down, box = np.arange(26) > 0, np.full((26, 2), np.inf)
+    found = next_round(places, ~is_down, is_down, radii[:, None] + radii, -box, box)
+    assert np.hypot(*(floor[:, :2] - found[0]).T).min() >= 1.05
+
+
+@pytest.mark.parametrize(("x", "is_free"), [(0.65, False), (0.66, True)])
+def test_a_place_below_a_vehicle_that_hovers_above_may_be_nearer(x, is_free):
+    # 0.48 m above, which is as 0.24 m aside: sqrt(0.315^2 - 0.24^2) = 0.204 m are enough.
+    places = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, 0.0), (x, 0.0, 1.48)])
+    lands, is_down = np.array([True, False, False]), np.array([False, True, False])
+    box = np.array([[-0.4, -0.02]] * 3), np.array([[2.0, 0.02]] * 3)
+    found = next_round(places, lands, is_down, np.full((3, 3), 0.3), *box)
+    assert (found[0] == pytest.approx((0.45, 0.0))) == is_free
+
+
+@pytest.mark.parametrize(
+    ("other", "goal", "is_reachable"),
+    [
+        # It stays in front of the goal, or the way ends too near to it.
+        ((0.81, 0.0), (0.5, 0.0), True),
+        ((0.79, 0.0), (0.5, 0.0), False),
+        # It is too near already: the vehicle may leave.
+        ((0.2, 0.0), (-1.0, 0.0), True),
+        ((0.2, 0.0), (1.0, 0.0), False),
+    ],
+)
+def test_a_goal_is_reachable_if_the_way_to_it_is(other, goal, is_reachable):
+    places = np.array([(0.0, 0.0, 1.0), (*other, 1.0)])
+    flags, box = np.zeros(2, dtype=bool), np.full((2, 2), np.inf)
+    scene = _Scene(places, ~flags, flags, np.full((2, 2), 0.3), -box, box)
+    assert scene.are_reachable(0, np.array([goal]), {}).tolist() == [is_reachable]

@@ -34,6 +34,26 @@ def test_who_is_led_nearer_waits():
     assert waiting(CLOSE, STILL, [CLOSE[1], CLOSE[0]]) == ([True, True], [(0, 1)])
 
 
+def test_a_pair_has_its_distance_and_the_least_one():
+    below = [CLOSE[0], [0.0, 0.1, 1.2]]
+    _, (pair,) = Separation((0.1, 0.2)).update(np.array(below), STILL, CLOSE)
+    assert pair == (0, 1, pytest.approx(np.hypot(0.1, 0.1)), pytest.approx(0.3))
+
+
+def test_without_a_reference_no_vehicle_is_held():
+    assert waiting(CLOSE, STILL, CLOSE) == ([False, False], [(0, 1)])
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize(("climb", "is_held"), [(-3.8, True), (-4.2, False)])
+def test_a_way_past_a_vehicle_above_counts_heights_for_half(axis, climb, is_held):
+    # 0.2 m aside and 0.2 m up, which is as 0.1 m: 4 m down make up for 1 m aside.
+    aside, up = np.eye(3)[axis], np.eye(3)[2]
+    places = np.array([np.zeros(3), 0.2 * aside + 0.2 * up])
+    way = aside + climb * up
+    assert waiting(places, STILL, places + [way, -way])[0] == [is_held] * 2
+
+
 def test_a_pair_may_part():
     assert waiting(CLOSE, STILL, [[0.0, -1.0, 1.0], [0.0, 1.0, 1.0]])[0] == [False, False]
 
@@ -55,6 +75,7 @@ def test_who_waits_goes_on_only_with_some_more_distance():
     wanted = CLOSE[::-1]
     assert separation.update(CLOSE, STILL, wanted)[0].all()
     just_apart = np.array([[0.0, 0.0, 1.0], [0.0, 0.31, 1.0]])
+    assert waiting(just_apart, STILL, just_apart[::-1])[0] == [False, False]
     assert separation.update(just_apart, STILL, just_apart[::-1])[0].all()
     far_enough = np.array([[0.0, 0.0, 1.0], [0.0, 0.34, 1.0]])
     assert not separation.update(far_enough, STILL, far_enough[::-1])[0].any()

@@ -7,6 +7,7 @@ import pytest
 from crazyflie_mission_api import Bounds, Limits, MissionError
 from crazyflie_mission_api.trajectories import (
     check,
+    check_numbers,
     demands,
     duration,
     excess,
@@ -133,3 +134,52 @@ def test_a_trajectory_is_as_slow_as_a_limit_demands(limits, seconds):
     wide = {"speed": 100.0, "acceleration": 100.0, "yaw_rate": 100.0, "tilt": 1.5}
     slow = within_limits(ALL_AXES, Limits(**{**wide, "max_thrust": 100.0, **limits}))
     assert duration(slow) == pytest.approx(seconds)
+
+
+def test_samples_are_of_all_pieces_one_after_the_other():
+    pieces = [PolynomialPiece(t, (x, 1.0), (), (2.0,), (3.0,)) for t, x in ((2.0, 0.0), (0.5, 2.0))]
+    times, values = sampled(pieces)
+    assert times[[0, 29, 30, 59]] == pytest.approx([0.0, 2.0, 2.0, 2.5])
+    assert values.shape == (3, 4, 60)
+    assert values[0, 0] == pytest.approx(times)
+    assert values[:, 2, 0].tolist() == [2.0, 0.0, 0.0]
+    assert values[0, 3, -1] == 3.0
+
+
+def test_the_moment_of_the_worst_demand_is_told():
+    slow = PolynomialPiece(1.0, (0.0, 0.1), NOWHERE, NOWHERE, NOWHERE)
+    (found,) = excess([slow, *ALL_AXES], Limits(**{**GENEROUS, "speed": 5.9})).values()
+    assert found == (pytest.approx(6.0), pytest.approx(3.0))
+
+
+@pytest.mark.parametrize("name", MEAN)
+def test_what_is_exactly_at_a_limit_is_flown(name):
+    at_limit = float(demands(sampled(ALL_AXES)[1])[name].max())
+    assert excess(ALL_AXES, Limits(**{**GENEROUS, name: at_limit})) == {}
+
+
+@pytest.mark.parametrize(
+    "piece",
+    [
+        PolynomialPiece(0.0, NOWHERE, NOWHERE, NOWHERE, NOWHERE),
+        PolynomialPiece(-1.0, NOWHERE, NOWHERE, NOWHERE, NOWHERE),
+        PolynomialPiece(math.inf, NOWHERE, NOWHERE, NOWHERE, NOWHERE),
+        PolynomialPiece(1.0, NOWHERE, NOWHERE, NOWHERE, (*NOWHERE[:7], math.nan)),
+    ],
+)
+def test_numbers_that_mean_nothing_are_refused(piece):
+    check_numbers(ALL_AXES, "it")
+    with pytest.raises(MissionError, match="it: piece 2 has numbers that are not finite"):
+        check_numbers([*ALL_AXES, piece], "it")
+
+
+def test_tilt_and_thrust_are_kept_by_more_time_and_hardly_more_than_needed():
+    wide = {"speed": 100.0, "acceleration": 100.0, "yaw_rate": 100.0}
+    limits = Limits(**wide, tilt=0.1, max_thrust=100.0, min_thrust=0.1)
+    slow = within_limits(ALL_AXES, limits)
+    assert 0.09 < demands(sampled(slow)[1])["tilt"].max() <= 0.1 + 1e-6
+
+
+def test_what_does_not_move_takes_a_moment():
+    still = [PolynomialPiece(2.0, NOWHERE, NOWHERE, NOWHERE, NOWHERE)]
+    assert duration(within_limits(still, Limits())) == pytest.approx(1e-3)

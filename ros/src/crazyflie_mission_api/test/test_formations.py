@@ -24,9 +24,12 @@ def test_places():
     assert box.shape == (24, 3)
     assert pdist(box).min() == pytest.approx(0.5)
     np.testing.assert_allclose(box.mean(axis=0), (1.0, 0.0, 2.0))
-    ring = circle(8, 1.0)
-    np.testing.assert_allclose(np.hypot(ring[:, 0], ring[:, 1]), 1.0)
-    assert len({tuple(place) for place in ring.round(6).tolist()}) == 8
+    pair = lattice((1, 2, 2), (3.0, 1.0, 0.5), (1.0, 0.0, 2.0))
+    assert pair.tolist() == [[1, -0.5, 1.75], [1, -0.5, 2.25], [1, 0.5, 1.75], [1, 0.5, 2.25]]
+    ring = circle(4, 2.0, (1.0, 0.0, 0.5))
+    np.testing.assert_allclose(
+        ring, [(3, 0, 0.5), (1, 2, 0.5), (-1, 0, 0.5), (1, -2, 0.5)], atol=1e-12
+    )
 
 
 @given(st.integers(0, 10**6))

@@ -113,7 +113,6 @@ class _Scene:
         order = np.lexsort((np.arange(len(places)), self._z)).argsort()
         is_below = order[None, :] < order[:, None]
         is_near = cdist(self._xy, self._xy) < limits - _ROUNDING
-        np.fill_diagonal(is_near, val=False)
         beneath = is_near & is_below
         # A vehicle on a table above is as much in the way of a landing.
         self.is_obstructed = (is_near & is_down | beneath & ~lands & ~is_down).any(axis=1)

@@ -1,5 +1,6 @@
 """Bounds, bytes and moments that are calculated by hand, on both sides."""
 
+import math
 import struct
 
 import pytest
@@ -12,8 +13,9 @@ from crazyflie_link.checks import (
     check_finite,
     check_positive,
 )
-from crazyflie_link.errors import ValueRangeError
+from crazyflie_link.errors import RefusedError, ValueRangeError
 from crazyflie_link.link_monitor import LinkHealth, LinkMonitor, Uptime
+from crazyflie_link.localization import Localization
 from crazyflie_link.packed_poses import PackedPoses, pack
 
 # Addresses and numbers.
@@ -182,7 +184,16 @@ def test_the_poses_of_a_frame_are_sent_once():
         broadcaster.frames.clear()
 
 
-# Setpoints.
+@pytest.mark.parametrize(("x", "is_packed"), [(32.767, True), (-32.767, True), (-32.768, False)])
+def test_a_pose_is_packed_if_it_fits_in_16_bits(target, flying, x, is_packed):
+    packed = PackedPoses(Streams())
+    localization = Localization(flying.link)
+    localization.broadcast_by(packed, 1)
+    localization.position(0.0, x, 0.0)
+    assert bool(packed._broadcaster.frames) == is_packed
+
+
+# Setpoints and commands.
 
 
 def test_setpoints_at_their_bounds(target, flying):
@@ -197,6 +208,44 @@ def test_setpoints_at_their_bounds(target, flying):
     for thrust in (-1, 65536):
         with pytest.raises(ValueRangeError, match="expected 0 to 65535 PWM"):
             flying.setpoints.attitude(0.0, 0.0, 0.0, thrust)
-    zero = [0.0, 0.0, 0.0]
+    zero, full_state = [0.0, 0.0, 0.0], flying.setpoints.full_state
     with pytest.raises(ValueRangeError, match=r"-33 is outside \+-32.767"):
-        flying.setpoints.full_state(zero, [-33.0, 0.0, 0.0], zero, [0.0, 0.0, 0.0, 1.0], zero)
+        full_state(zero, [-33.0, 0.0, 0.0], zero, [0.0, 0.0, 0.0, 1.0], zero)
+    full_state(zero, [32.767, -32.767, 0.0], zero, [0.0, 0.0, 0.0, 1.0], zero)
+    (data,) = target.wait_for_packets(7, 0)
+    assert struct.unpack_from("<3h", data, 7) == (32767, -32767, 0)
+
+
+def test_a_spiral_is_one_turn_at_most_between_radii_that_are_not_negative(target, flying):
+    spiral = flying.high_level.spiral
+    spiral(2.0 * math.pi, (0.0, 0.5), 0.25, 3.0, is_clockwise=True, group_mask=4)
+    assert target.packets(8, 0) == [
+        struct.pack("<4B5f", 11, 4, 0, 1, 2.0 * math.pi, 0.0, 0.5, 0.25, 3.0)
+    ]
+    spiral(-2.0 * math.pi, (0.5, 0.0), -0.25, 3.0)
+    for angle, radii, text in (
+        (6.3, (0.0, 0.5), "angle is 6.3 rad"),
+        (-6.3, (0.0, 0.5), "angle is -6.3 rad"),
+        (1.0, (-0.01, 0.5), "radius is -0.01 m"),
+        (1.0, (0.5, -0.01), "radius is -0.01 m"),
+    ):
+        with pytest.raises(ValueRangeError, match=text):
+            spiral(angle, radii, 0.25, 3.0)
+    assert len(target.packets(8, 0)) == 2
+
+
+@pytest.mark.parametrize(("protocol", "is_known"), [(7, False), (8, True)])
+def test_commands_that_older_firmware_does_not_know(make_vehicle, make_link, protocol, is_known):
+    target = make_vehicle(protocol=protocol)
+    link = make_link(target.uri)
+    link.connect()
+    for command in (
+        lambda h: h.go_to((0.0, 0.0, 1.0), 0.0, 2.0, linear=True),
+        lambda h: h.spiral(1.0, (0.5, 0.5), 0.0, 2.0),
+    ):
+        if is_known:
+            command(link.high_level)
+        else:
+            with pytest.raises(RefusedError, match="this firmware has no.* update it"):
+                command(link.high_level)
+    assert [data[0] for data in target.packets(8, 0)] == ([12, 11] if is_known else [])

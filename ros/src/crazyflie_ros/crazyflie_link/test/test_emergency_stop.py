@@ -6,6 +6,7 @@ import threading
 import pytest
 
 from crazyflie_link.crazyflie import LinkState
+from crazyflie_link.emergency import EmergencyStop
 from crazyflie_link.errors import CrazyflieError
 from crazyflie_link.link_setup import Limits
 from crazyflie_utils.testing.waiting import wait_until
@@ -187,6 +188,51 @@ def test_it_does_not_wait_for_a_pile_of_commands(vehicle, link):
     ports = [port for port, channel, _ in vehicle.received if (port, channel) in ((9, 1), (13, 3))]
     assert ports[0] == 9
     assert ports.count(9) < 5
+
+
+class HeardLink:
+    """A link to a vehicle that is heard after every packet."""
+
+    def __init__(self, protocol):
+        self.protocol, self.cflib = protocol, self
+        self.bursts = []
+        self.emergency = EmergencyStop(lambda: self)
+
+    def put(self, send, urgent=False):
+        self.bursts.append([])
+        send()
+        self.emergency.receive(15, 0, b"")
+
+    def put_latest(self, stream, send):
+        self.put(send)
+
+    def send_packet(self, packet):
+        self.bursts[-1].append((packet.port, packet.channel, bytes(packet.data)))
+
+
+@pytest.mark.parametrize("protocol", [0, 11])
+def test_firmware_that_does_not_tell_gets_it_once_and_five_times_more(protocol):
+    link = HeardLink(protocol)
+    link.emergency.begin()
+    assert link.emergency.wait(LIMIT)
+    link.emergency.close()
+    assert link.bursts == [[(6, 1, OLD_STOP), (7, 0, b"\0")]] * 6
+
+
+@pytest.mark.parametrize(
+    ("protocol", "first"), [(-1, [(9, 1, STOP), (6, 1, OLD_STOP)]), (12, [(9, 1, STOP)])]
+)
+def test_only_a_report_that_it_is_locked_ends_it(protocol, first):
+    link = HeardLink(protocol)
+    link.emergency.receive(9, 0, LOCKED)
+    link.emergency.begin()
+    for packet in ((9, 1, LOCKED), (9, 0, LOCKED[:2]), (9, 0, b"\x8d" + LOCKED[1:]), (9, 0, READY)):
+        link.emergency.receive(*packet)
+        assert not link.emergency.wait(0.0)
+    link.emergency.receive(9, 0, LOCKED)
+    assert link.emergency.wait(0.0)
+    link.emergency.close()
+    assert link.bursts[0] == [*first, (7, 0, b"\0"), (9, 0, b"\x0c")]
 
 
 def ignore_failure(work):

@@ -2,9 +2,12 @@
 
 import pytest
 
+from crazyflie_link import high_level_replies
 from crazyflie_link.errors import AlreadyLandingError, NoReplyError, RefusedError
+from crazyflie_model.supervisor import SupervisorState
 
-STATE, TAKEOFF, LAND = (9, 0, 0x0C), 7, 8
+TAKEOFF, LAND = 7, 8
+READY = SupervisorState(0x20E)
 
 
 @pytest.fixture
@@ -62,12 +65,45 @@ def test_a_refusal_without_a_repetition_is_one(vehicle, link):
         link.high_level.land(0.0, 2.0)
 
 
-def test_a_landing_that_may_have_ended_is_not_repeated(flying):
+@pytest.mark.parametrize("number", [TAKEOFF, LAND])
+def test_only_a_landing_that_is_refused_as_busy_is_one_already(vehicle, link, number):
+    busy, no_memory = b"\1", b"\x0c"
+    vehicle.answers[8, 0, number] = bytes([number, 0, 0]) + (no_memory if number == LAND else busy)
+    with pytest.raises(RefusedError) as caught:
+        (link.high_level.land if number == LAND else link.high_level.take_off)(0.5, 2.0)
+    assert type(caught.value) is RefusedError
+
+
+def test_a_repeated_landing_that_is_refused_is_under_way_whatever_the_state(flying):
+    vehicle, high_level = flying
+    vehicle.answers[8, 0, LAND] = b"\x08\x00\x00\x01"
+    vehicle.flight.pin(0x20E)
+    high_level.land(0.0, 2.0)
+    assert numbers(vehicle) == [LAND, LAND]
+
+
+@pytest.mark.parametrize("lag", [0, 1, 3])
+def test_the_supervisor_takes_note_of_a_takeoff_a_little_later(monkeypatch, lag):
+    states = [READY] * lag + [READY | SupervisorState.HIGH_LEVEL_ACTIVE]
+    monkeypatch.setattr(high_level_replies, "read_state", lambda link: states.pop(0))
+    assert high_level_replies.is_carried_out(None, TAKEOFF)
+    assert states == []
+
+
+@pytest.mark.parametrize("duration", [0.5, 1.0])
+def test_a_landing_that_may_have_ended_is_not_repeated(flying, duration):
     """On the ground the firmware obeys, and starts the motors."""
     vehicle, high_level = flying
     with pytest.raises(NoReplyError):
-        high_level.land(0.0, 0.5)
+        high_level.land(0.0, duration)
     assert numbers(vehicle) == [LAND]
+
+
+def test_a_relative_way_is_not_repeated(flying):
+    vehicle, high_level = flying
+    with pytest.raises(NoReplyError, match="it may or may not have been carried out"):
+        high_level.go_to((1.0, 0.0, 0.0), 0.0, 2.0, relative=True)
+    assert len(numbers(vehicle)) == 1
 
 
 def test_a_dry_run_refuses_the_same_and_sends_nothing(vehicle, link):

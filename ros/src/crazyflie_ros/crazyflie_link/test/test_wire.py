@@ -154,23 +154,32 @@ def test_high_level_commands(target, flying):
     ]
 
 
-def test_high_level_commands_of_older_firmware(make_vehicle, make_link):
-    target = make_vehicle(protocol=7)
+@pytest.mark.parametrize(
+    ("protocol", "go_to", "start"), [(7, 4, 5), (8, 12, 5), (9, 12, 5), (10, 12, 13)]
+)
+def test_high_level_commands_of_older_firmware(make_vehicle, make_link, protocol, go_to, start):
+    target = make_vehicle(protocol=protocol)
     link = make_link(target.uri)
     link.connect()
     link.high_level.go_to((1.0, -2.0, 0.5), 0.75, 4.0)
     link.high_level.define_trajectory(5, range(132), 1)
     link.high_level.start_trajectory(5, 1.5)
-    assert [data for data in target.packets(8, 0) if data[0] != 6] == [
-        struct.pack("<3B5f", 4, 0, 0, 1.0, -2.0, 0.5, 0.75, 4.0),
-        struct.pack("<5Bf", 5, 0, 0, 0, 5, 1.5),
-    ]
+    forms = {
+        4: struct.pack("<3B5f", 4, 0, 0, 1.0, -2.0, 0.5, 0.75, 4.0),
+        12: struct.pack("<4B5f", 12, 0, 0, 0, 1.0, -2.0, 0.5, 0.75, 4.0),
+        5: struct.pack("<5Bf", 5, 0, 0, 0, 5, 1.5),
+        13: struct.pack("<6Bf", 13, 0, 0, 0, 0, 5, 1.5),
+    }
+    assert [data for data in target.packets(8, 0) if data[0] != 6] == [forms[go_to], forms[start]]
 
 
 def test_a_refused_command_says_why(target, flying):
     target.answers[8, 0, 7] = b"\x07\x00\x00\x0c"
     with pytest.raises(RefusedError, match=r"takeoff command.*Cannot allocate memory, 12"):
         flying.high_level.take_off(1.0, 2.0)
+    # Without a code it is none.
+    target.answers[8, 0, 3] = b"\x03\x00\x00"
+    flying.high_level.stop()
 
 
 IMPOSSIBLE_COMMANDS = [

@@ -3,9 +3,11 @@
 import struct
 
 import pytest
+from cflib.crazyflie.mem import MemoryElement
 from wire_helpers import only_packet
 
 from crazyflie_link.errors import RefusedError, UnknownNameError, ValueRangeError
+from crazyflie_link.memory import find_memory, write_memory
 
 NAN = float("nan")
 
@@ -32,9 +34,18 @@ def test_arming_and_the_supervisor(target, flying):
     assert target.packets(9, 1) == [b"\x01\x01", b"\x01\x00", b"\x02"]
     target.answers[9, 0, 0x0C] = b"\x8c\x12\x00"
     assert flying.supervisor.read().words() == "armed, flying"
+    # 16 bits; what follows is not the state.
+    target.answers[9, 0, 0x0C] = b"\x8c\x12\x00\x01"
+    assert int(flying.supervisor.read()) == 0x12
     target.answers[9, 1, 1] = b"\x81\x00\x00"
     with pytest.raises(RefusedError, match="arming: .* its state is: armed, flying"):
         flying.supervisor.arm()
+    # One byte less says as much; without it nothing is refused.
+    target.answers[9, 1, 2] = b"\x82\x00"
+    with pytest.raises(RefusedError, match="recovering from a crash: "):
+        flying.supervisor.recover()
+    target.answers[9, 1, 2] = b"\x82"
+    flying.supervisor.recover()
 
 
 @pytest.mark.filterwarnings("ignore:The supervisor subsystem:UserWarning")
@@ -45,6 +56,8 @@ def test_arming_before_protocol_12(make_vehicle, make_link):
     assert link.supervisor.read() is None
     link.supervisor.arm()
     assert only_packet(target, 13, 0) == b"\x01\x01"
+    link.supervisor.recover()
+    assert target.wait_for_packets(13, 0, 2)[1] == b"\x02"
     link.supervisor.emergency_stop()
     assert set(target.wait_for_packets(6, 1, 5)) == {b"\x03"}
 
@@ -89,6 +102,16 @@ def test_parameters_that_cannot_be_written(target, flying):
         with pytest.raises(error, match=name):
             flying.parameters.write(name, value)
     assert target.packets(2, 2) == []
+
+
+def test_memories(target, flying):
+    link = flying.link()
+    with pytest.raises(RefusedError, match="no memory for base stations: update its firmware"):
+        find_memory(link, MemoryElement.TYPE_LH, "base stations")
+    # A reply without a status is no refusal.
+    target.answers[4, 2, 1] = struct.pack("<BI", 1, 0)
+    write_memory(link, 1, 0, b"data", "a test")
+    assert only_packet(target, 4, 2) == struct.pack("<BI", 1, 0) + b"data"
 
 
 def test_own_packets(target, flying):

@@ -37,7 +37,7 @@ class Battery:
         elapsed = time - self._time
         step = min(max(elapsed, 0.0), _LONGEST_STEP) if math.isfinite(elapsed) else 0.0
         self._lasted = [
-            max(lasted, 0.0) + step if voltage < level else _NOT_LOWER
+            max(lasted + step, 0.0) if voltage < level else _NOT_LOWER
             for lasted, level in zip(self._lasted, self._levels, strict=True)
         ]
         self.voltage, self._time = voltage, time

@@ -3,7 +3,15 @@
 import pytest
 from flight_words import states, thrusts, until_on_ground, word
 from std_srvs.srv import EmptyRequest
-from takeoff_helpers import BARE, SERVER, ControllerNode, HoverNetwork, control, filter_status, state
+from takeoff_helpers import (
+    BARE,
+    SERVER,
+    ControllerNode,
+    HoverNetwork,
+    control,
+    filter_status,
+    state,
+)
 
 from crazyflie_msgs.msg import FilterStatus
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode

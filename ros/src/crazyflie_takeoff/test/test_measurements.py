@@ -6,6 +6,7 @@ import pytest
 
 from crazyflie_takeoff.battery import Battery, Charge
 from crazyflie_takeoff.callers import Callers
+from crazyflie_takeoff.flight_watch import DescentWatch, FlightWatch
 from crazyflie_takeoff.ground import Ground
 from crazyflie_takeoff.limits import Box, Debounce, Limits, Walls
 from crazyflie_takeoff.motion import Delay, MeasuredPosition, Measurement, Motion
@@ -140,6 +141,52 @@ def test_a_complaint_has_to_last():
     assert [debounce.advance(0.25, "high") for _ in range(3)] == ["", "", "high"]
     assert debounce.advance(0.25, "") == ""
     assert [debounce.advance(0.25, "fast") for _ in range(3)] == ["", "", "fast"]
+
+
+# What ends a flight.
+
+
+def test_a_vehicle_that_is_to_land_has_to_come_down():
+    watch = DescentWatch()
+    said = [bool(watch.advance(0.25, 1.0)) for _ in range(8)]
+    assert said == [False] * 7 + [True]
+    # Slowly is enough, and one that was in flight meanwhile begins anew.
+    assert not any(watch.advance(0.25, 0.97 - 0.015 * k) for k in range(40))
+    assert not any(watch.advance(0.25, height) for height in [None, *[1.0] * 7])
+
+
+def test_a_vehicle_is_outside_only_while_states_say_so():
+    watch = FlightWatch(LIMITS)
+    watch.measure(Motion((9.0, 0.0, 1.0), (0.0, 0.0, 0.0)), 0.0)
+    crashes = [bool(watch.advance(0.0625 * k, 0.0625, None)[0]) for k in range(5)]
+    assert crashes == [False, True, True, False, False]
+
+
+@pytest.mark.parametrize("fault", ["climb", "busy", "stays"])
+def test_each_fault_alone_ends_a_flight(fault):
+    watch = FlightWatch(LIMITS)
+    for k in range(30):
+        if fault == "climb":
+            watch.climb.apply(99.0, 9.81, at(1.0), 10.0, False)
+        step = 0.3 if fault == "busy" else 0.1
+        crash, objection = watch.advance(step * k, step, 1.0 if fault == "stays" else None)
+    assert not crash
+    words = {"climb": "the controls climb", "busy": "too busy", "stays": "has not come down"}
+    assert words[fault] in objection
+
+
+def test_two_takeoff_servers_in_flight_are_noticed_at_once_and_two_controllers_soon():
+    watch = FlightWatch(LIMITS)
+    watch.note_takeoff(1.0, "/a", is_on_ground=True)
+    watch.note_takeoff(9.0, "/b", is_on_ground=True)
+    assert watch.contention == ""
+    watch.note_takeoff(17.0, "/a", is_on_ground=False)
+    assert watch.contention.startswith("two nodes publish takeoff controls")
+    watch = FlightWatch(LIMITS)
+    for k, name in enumerate("ababa"):
+        assert watch.contention == ""
+        watch.note_commanded(1.0 + 0.1 * k, name)
+    assert watch.contention.startswith("two nodes publish commanded controls")
 
 
 # The battery.

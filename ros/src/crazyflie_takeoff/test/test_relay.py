@@ -1,4 +1,4 @@
-"""What is passed on of one control: late ones, those of a landing, and what is learned from them."""
+"""What is passed on of one control: late ones, those of a landing, and what they teach."""
 
 import pytest
 from filter_flight import DESCENDING, FLYING, LANDING, LIMITS, ON_GROUND, TAKING_OFF, G, level

@@ -110,6 +110,9 @@ def test_what_the_last_control_has_done_is_ended_without_a_step():
     flight.run(1.0)
     assert flight.filter.state is FilterState.SINKING
     thrusts = flight.flown[held:]
+    # It rises by 0.7 m/s, which is led to zero in 0.3 s.
+    assert thrusts[0] - G == pytest.approx(-0.7 / 0.3, abs=0.2)
+    assert abs(thrusts[70] - G) < 0.5
     assert max(abs(b - a) for a, b in zip(thrusts, thrusts[1:], strict=False)) < 0.2
 
 

@@ -155,6 +155,12 @@ def off_diagonal(value):
     return q
 
 
+def lift_and_z(value):
+    n = NONE.copy()
+    n[2, 3] = value
+    return n
+
+
 @pytest.mark.parametrize(
     ("bad", "message"),
     [
@@ -167,6 +173,9 @@ def off_diagonal(value):
         (weights(n=NONE + 1.0), "N is too large"),
         (weights(q=np.diag([0.0, 1, 1, 1, 1, 1, 1])), "do not see x,"),
         (weights(q=np.diag([1.0, 1, 1, 1, 1, 1, 0])), "do not see yaw,"),
+        # (2 z + u)^2: u = -2 z, by which it oscillates.
+        (weights(np.diag([1, 1, 4, 1, 1, 0, 1]), np.eye(4), lift_and_z(2.0)), "see z, z_dot,"),
+        (weights(q=1e30 * Q), "the Riccati equation has no stabilising solution"),
     ],
 )
 def test_bad_weights_are_refused_by_name(bad, message):
@@ -190,10 +199,45 @@ def test_bad_times_are_refused(times, message):
         design_gains(MODEL, weights(), *times)
 
 
-def test_a_plant_that_no_control_reaches_is_refused():
-    B = MODEL.B.copy()
-    B[6] = 0.0
-    stuck = LinearModel("stuck", MODEL.states, MODEL.A, B)
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_the_unit_of_the_cost_changes_nothing(scale):
+    def design(joint):
+        x = MODEL.x_dim
+        return design_gains(
+            MODEL, Weights(*(scale * m for m in (joint[:x, :x], joint[x:, x:], joint[:x, x:])))
+        )
+
+    # Costs that vanish for some deviations, but for rounding.
+    rng = np.random.default_rng(5)
+    factor = rng.normal(size=(11, 9))
+    assert design(factor @ factor.T).poles.real.max() < 0.0
+    unseen = np.eye(11)
+    unseen[:2, :2] -= np.outer([0.6, 0.8], [0.6, 0.8])
+    free = np.diag([1.0] * 11)
+    free[7:, 7:] = np.ones((4, 4))
+    rewarded, coupled = np.eye(11), np.eye(11)
+    rewarded[0, 0] = -1e-6
+    coupled[2, 10] = coupled[10, 2] = 1.0 + 1e-6
+    for joint, message in (
+        (unseen, "do not see x, y,"),
+        (free, "R is not positive definite"),
+        (rewarded, "Q is not positive semidefinite"),
+        (coupled, "N is too large"),
+    ):
+        with pytest.raises(DesignError, match=message):
+            design(joint)
+
+
+def test_weights_that_ask_for_more_than_the_delay_allows_are_refused():
+    with pytest.raises(DesignError, match="the delay of 1 s allows; raise R or lower Q"):
+        design_gains(MODEL, weights(q=1e6 * Q), 0.5, 1.0)
+
+
+@pytest.mark.parametrize("pole", [0.0, 2.0])
+def test_a_plant_that_no_control_reaches_is_refused(pole):
+    A, B = MODEL.A.copy(), MODEL.B.copy()
+    A[6, 6], B[6] = pole, 0.0
+    stuck = LinearModel("stuck", MODEL.states, A, B)
     with pytest.raises(DesignError, match="stuck is not stabilisable: no control reaches yaw"):
         design_gains(stuck, weights())
 

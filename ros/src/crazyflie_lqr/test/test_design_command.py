@@ -53,6 +53,31 @@ def test_prints_gains_poles_and_margins(capsys):
     [yaw] = [line for line in output.splitlines() if line.startswith("yaw_dot ")][1:]
     assert yaw.split() == ["yaw_dot", "inf", "-inf", "90", "2", "785"]
     assert len(output.splitlines()) < 20
+    # Poles that are there twice, gains below the names of their states.
+    assert "(x2)" in poles
+    _, states, *gains = output.splitlines()[:6]
+    assert {len(line) for line in [states, *gains]} == {78}
+    assert gains[2].split() == ["yaw_dot", *"000000", "-2"]
+
+
+def test_margins_are_in_decibels(capsys):
+    # z - 1 + k = 0 is stable up to k = 2; without a cost of the control k is 1.
+    assert main(arguments(R="1 1 1e-6 1", sample_time=1.0)) == 0
+    [yaw] = [line for line in capsys.readouterr().out.splitlines() if line[:7] == "yaw_dot"][1:]
+    assert yaw.split()[1:3] == ["6.02", "-inf"]
+
+
+def test_the_command_in_the_comment_makes_the_same_gains(tmp_path):
+    Q = np.diag([1.0, 1, 4, 1, 1, 4, 100])
+    Q[0, 1] = Q[1, 0] = 0.5
+    N = np.zeros((7, 4))
+    N[2, 3] = 0.01
+    weights = {"Q": " ".join(map(str, Q.ravel())), "N": " ".join(map(str, N.ravel()))}
+    first, second = tmp_path / "first.txt", tmp_path / "second.txt"
+    assert main(arguments(**weights, sample_time=0.01, delay=0.025, out=first)) == 0
+    [command] = [line for line in first.read_text().splitlines() if "# design_gains" in line]
+    assert main([*shlex.split(command)[2:], "--out", str(second)]) == 0
+    assert second.read_text() == first.read_text()
 
 
 def test_sampled_design_says_so_and_keeps_it_in_the_comment(tmp_path, capsys):

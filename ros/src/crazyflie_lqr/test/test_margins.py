@@ -37,7 +37,13 @@ def test_a_sampled_integrator_has_its_closed_form():
     design = design_gains(MODEL, WEIGHTS, 0.01, 0.01)
     loop = CONTROLS.index("yaw_dot")
     k = -design.K[loop, 6] * 0.01
-    assert loop_margins(design, loop).gain_up == pytest.approx(1.0 / k, rel=1e-3)
+    margins = loop_margins(design, loop)
+    assert margins.gain_up == pytest.approx(1.0 / k, rel=1e-3)
+    assert margins.gain_down == 0.0
+    near = loop_margins(replace(design, K=0.95 * margins.gain_up * design.K), loop)
+    assert (near.gain_up, near.gain_down) == (pytest.approx(1.0 / 0.95, rel=1e-3), 0.0)
+    frequency, _ = loop_response(design, loop)
+    assert frequency.max() < math.pi / design.sample_time
 
 
 @pytest.mark.parametrize("seed", ALL)

@@ -77,6 +77,21 @@ def test_with_duration_zero_one_low_voltage_is_enough_and_a_good_one_is_good():
         assert battery.charge(float(time)) is charge
 
 
+def test_the_time_below_a_level_begins_with_the_first_voltage_that_is_below():
+    battery = Battery(low=3.2, critical=3.0, duration=1.0)
+    # Sags between good voltages, and one to critical from low, do not last.
+    for time, (voltage, charge) in enumerate(
+        [
+            *[(3.9, Charge.GOOD), (2.9, Charge.GOOD)] * 3,
+            (3.1, Charge.LOW),
+            (2.9, Charge.LOW),
+            (2.9, Charge.CRITICAL),
+        ]
+    ):
+        battery.measure(float(time), voltage)
+        assert battery.charge(float(time)) is charge
+
+
 # What people are told.
 
 

@@ -109,7 +109,7 @@ def test_on_the_ground_the_controller_stays_out_when_the_server_dies(control_fil
 def test_a_server_without_flight_state_may_take_over(control_filter):
     control_filter.state = ON_GROUND
     control_filter.takeoff(0.0, "zero", 0.0)
-    control_filter.takeoff(60.0, "lift", 10.01)
+    control_filter.takeoff(60.0, "lift", 0.5)
     assert control_filter.commanded(60.4, "c") == "lift"
     assert control_filter.commanded(60.6, "c") == "c"
 

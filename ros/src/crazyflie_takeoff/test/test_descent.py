@@ -190,6 +190,16 @@ def test_a_descent_under_way_is_made_faster(sees):
     assert last[2] == pytest.approx(3.7 - 0.99 * 3.7 / 7.0, abs=0.01)
 
 
+def test_a_descent_above_a_table_is_made_as_fast_as_it_has_to_be():
+    flight = grounded()
+    flight.tick(0.0, (0.0, 0.0, 0.75))
+    flight.request(Event.TAKEOFF)
+    Clock(flight, position=(0.0, 0.0, 2.75), start=1.0).run(6.01)
+    flight.request(Event.LAND)
+    flight.limit_descent(2.5)
+    assert flight.tick(8.0, (0.0, 0.0, 2.75)).reference[5] == pytest.approx(-2.0 / 2.5)
+
+
 def test_a_descent_that_is_fast_enough_is_not_made_slower():
     flight = flying()
     flight.request(Event.LAND)

@@ -3,7 +3,15 @@
 import pytest
 from flight_words import states, thrusts, until_on_ground, word
 from std_srvs.srv import EmptyRequest
-from takeoff_helpers import SERVER, ControllerNode, HoverNetwork, control, filter_status, state
+from takeoff_helpers import (
+    BARE,
+    SERVER,
+    ControllerNode,
+    HoverNetwork,
+    control,
+    filter_status,
+    state,
+)
 
 from crazyflie_msgs.msg import FilterStatus
 from crazyflie_takeoff.takeoff_server_node import TakeoffServerNode
@@ -206,6 +214,21 @@ def test_takeoff_without_a_controller_that_follows():
     until_on_ground(network)
     assert network.vehicle.touchdown_speed < 0.6
     assert "landing" in states(network)
+
+
+@pytest.mark.parametrize("gap", [0.3, 1.98])
+def test_takeoff_after_a_server_that_has_sent_no_reference(gap):
+    """Without a height the next server sends none, either; so the controller is silent."""
+    network = HoverNetwork(BARE)
+    network.advance(1.5)
+    network.call("/takeoff")
+    network.advance(0.5)
+    network.kill("server")
+    network.advance(gap)
+    network.start_server()
+    until_on_ground(network)
+    assert network.on("/control/lqr") == []
+    network.take_off()
 
 
 def test_takeoff_of_a_vehicle_that_cannot_fly():

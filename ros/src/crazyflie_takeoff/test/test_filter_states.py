@@ -2,6 +2,7 @@
 
 from random import Random
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -26,7 +27,7 @@ class World:
 
     def __init__(self):
         self.choice, self.measured, self.ground = ControlFilter(), Measurement(), Ground()
-        timeouts = LossTimeouts(0.1, 1.5, 5.0, 3.0)
+        timeouts = LossTimeouts(0.125, 1.5, 5.0, 3.0)
         self.machine = FilterMachine(timeouts, self.choice, self.measured, self.ground)
 
     def change(self, random):
@@ -87,6 +88,40 @@ def test_whatever_happens_the_table_decides(seed):
             assert machine.is_on_ground
         if machine.state is not FilterState.PASSING:
             assert machine.reason
+
+
+@pytest.mark.parametrize(
+    ("state", "event", "facts", "after"),
+    [
+        (FilterState.PASSING, Event.TICK, {"silence": 0.125}, FilterState.PASSING),
+        (FilterState.PASSING, Event.TICK, {"silence": 0.14}, FilterState.HOLDING),
+        (FilterState.HOLDING, Event.TICK, {"elapsed": 3.0}, FilterState.HOLDING),
+        (FilterState.HOLDING, Event.TICK, {"elapsed": 3.1}, FilterState.SINKING),
+        (FilterState.HOLDING, Event.TICK, {"elapsed": 2.0, "age": 1.5}, FilterState.HOLDING),
+        (FilterState.HOLDING, Event.TICK, {"elapsed": 2.0, "age": 1.6}, FilterState.SINKING),
+        (FilterState.EMERGENCY, Event.RESET, {"elapsed": 1.9}, FilterState.EMERGENCY),
+        (FilterState.EMERGENCY, Event.RESET, {"elapsed": 2.0}, FilterState.DOWN),
+    ],
+)
+def test_how_long_the_filter_waits(state, event, facts, after):
+    world = World()
+    machine, age = world.machine, facts.pop("age", 0.0)
+    world.choice.state = FlightState.FLYING
+    world.measured.update(Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0)), age)
+    machine.state, machine.is_needed = state, True
+    vars(machine).update(facts)
+    machine.handle(event)
+    assert machine.state is after
+    assert machine.takeovers == (after is FilterState.HOLDING is not state)
+
+
+@pytest.mark.parametrize("may_lack_reference", [True, False])
+def test_a_controller_that_does_not_answer_is_missing(may_lack_reference):
+    machine = World().machine
+    machine.state, machine.is_needed = FilterState.HOLDING, True
+    machine.elapsed, machine.may_lack_reference = 9.0, may_lack_reference
+    assert machine.handle(Event.TICK)
+    assert machine.lacks_controller == (not may_lack_reference)
 
 
 def test_each_row_can_be_taken():

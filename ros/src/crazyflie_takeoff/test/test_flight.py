@@ -51,6 +51,14 @@ def test_durations_may_be_zero(open_loop, settle):
     assert clock.toggles() == [open_loop + settle]
 
 
+@pytest.mark.parametrize(("settle", "state"), [(2.9, FLYING), (3.0, LANDING)])
+def test_a_vehicle_that_has_not_lifted_off_in_three_seconds_cannot_fly(settle, state):
+    flight = grounded(Plan((0.0, 0.0, 1.0), 0.5, settle, 0.3))
+    flight.request(Event.TAKEOFF)
+    Clock(flight, position=(0.0, 0.0, 0.0)).run(0.5 + settle + 0.1)
+    assert flight.flight_state is state
+
+
 def test_a_tick_that_is_very_late_skips_nothing():
     flight = grounded()
     flight.request(Event.TAKEOFF)

@@ -93,6 +93,29 @@ def test_comes_down_whatever_it_weighs_and_however_it_moved(height, hover, speed
     assert max(flight.flown[lost:]) <= 1.25 * G + 1e-9
 
 
+def test_it_holds_the_vehicle_with_the_thrust_that_was_learned():
+    flight = Flight(hover=10.8).run(10.0).lose(pose=False).run(0.3)
+    assert flight.filter.state is FilterState.HOLDING
+    assert flight.flown[-1] == pytest.approx(10.8, abs=0.1)
+
+
+def test_what_the_last_control_has_done_is_ended_without_a_step():
+    flight = Flight().run(1.0).lose()
+    flight.fly(flight.filter.commanded(flight.time, 16.0, level(16.0)))
+    begin = len(flight.flown)
+    flight.run(0.11)
+    assert flight.filter.state is FilterState.HOLDING
+    flight.flown = flight.flown[begin:]
+    held = len(flight.flown) - 1
+    flight.run(1.0)
+    assert flight.filter.state is FilterState.SINKING
+    thrusts = flight.flown[held:]
+    # It rises by 0.7 m/s, which is led to zero in 0.3 s.
+    assert thrusts[0] - G == pytest.approx(-0.7 / 0.3, abs=0.2)
+    assert abs(thrusts[70] - G) < 0.5
+    assert max(abs(b - a) for a, b in zip(thrusts, thrusts[1:], strict=False)) < 0.2
+
+
 def test_with_a_known_height_it_comes_down_at_a_known_speed_also_from_high_up():
     flight = Flight(2.9).run(2.0).lose(pose=False)
     duration = flight.run_until_off()
@@ -136,9 +159,11 @@ def test_a_foreign_server_that_only_toggles():
     assert flight.filter.takeoff(flight.time, "lift", level(G + 0.2)) == "lift"
     flight.run(1.0)
     flight.filter.toggle()
+    assert flight.filter.choice.in_flight
     flight.run(2.0).lose()
     flight.run_until_off()
     assert flight.flown[-1] == 0.0
+    flight.filter.toggle()
     assert flight.filter.choice.remembered is None
 
 

@@ -4,8 +4,12 @@ import math
 
 import pytest
 
+from crazyflie_model.supervisor import SupervisorState
 from crazyflie_takeoff.battery import Battery, Charge
 from crazyflie_takeoff.callers import Callers
+from crazyflie_takeoff.descent import DESCENT_MARGIN, Descent
+from crazyflie_takeoff.driver_connection import DriverConnection
+from crazyflie_takeoff.flight_watch import DescentWatch, FlightWatch
 from crazyflie_takeoff.ground import Ground
 from crazyflie_takeoff.limits import Box, Debounce, Limits, Walls
 from crazyflie_takeoff.motion import Delay, MeasuredPosition, Measurement, Motion
@@ -85,6 +89,19 @@ def test_a_vehicle_less_than_10_cm_above_the_ground_is_on_it():
     assert not ground.has_touched_down(None)
 
 
+# The driver.
+
+
+def test_what_a_driver_says_counts_for_three_seconds():
+    driver = DriverConnection()
+    assert driver.cannot_fly(0.0) == ""
+    assert driver.refusal(0.0, "/cf1/connected")
+    driver.update(1.0, is_connected=True)
+    assert [bool(driver.refusal(now, "/cf1/connected")) for now in (4.0, 4.1)] == [False, True]
+    driver.update_state(1.0, SupervisorState.CRASHED, is_emergency=False)
+    assert [bool(driver.cannot_fly(now)) for now in (4.0, 4.1)] == [True, False]
+
+
 # The walls.
 
 BOX = Box((-1.0, -2.0, 0.0), (1.0, 2.0, 3.0))
@@ -142,6 +159,52 @@ def test_a_complaint_has_to_last():
     assert [debounce.advance(0.25, "fast") for _ in range(3)] == ["", "", "fast"]
 
 
+# What ends a flight.
+
+
+def test_a_vehicle_that_is_to_land_has_to_come_down():
+    watch = DescentWatch()
+    said = [bool(watch.advance(0.25, 1.0)) for _ in range(8)]
+    assert said == [False] * 7 + [True]
+    # Slowly is enough, and one that was in flight meanwhile begins anew.
+    assert not any(watch.advance(0.25, 0.97 - 0.015 * k) for k in range(40))
+    assert not any(watch.advance(0.25, height) for height in [None, *[1.0] * 7])
+
+
+def test_a_vehicle_is_outside_only_while_states_say_so():
+    watch = FlightWatch(LIMITS)
+    watch.measure(Motion((9.0, 0.0, 1.0), (0.0, 0.0, 0.0)), 0.0)
+    crashes = [bool(watch.advance(0.0625 * k, 0.0625, None)[0]) for k in range(5)]
+    assert crashes == [False, True, True, False, False]
+
+
+@pytest.mark.parametrize("fault", ["climb", "busy", "stays"])
+def test_each_fault_alone_ends_a_flight(fault):
+    watch = FlightWatch(LIMITS)
+    for k in range(30):
+        if fault == "climb":
+            watch.climb.apply(99.0, 9.81, at(1.0), 10.0, False)
+        step = 0.3 if fault == "busy" else 0.1
+        crash, objection = watch.advance(step * k, step, 1.0 if fault == "stays" else None)
+    assert not crash
+    words = {"climb": "the controls climb", "busy": "too busy", "stays": "has not come down"}
+    assert words[fault] in objection
+
+
+def test_two_takeoff_servers_in_flight_are_noticed_at_once_and_two_controllers_soon():
+    watch = FlightWatch(LIMITS)
+    watch.note_takeoff(1.0, "/a", is_on_ground=True)
+    watch.note_takeoff(9.0, "/b", is_on_ground=True)
+    assert watch.contention == ""
+    watch.note_takeoff(17.0, "/a", is_on_ground=False)
+    assert watch.contention.startswith("two nodes publish takeoff controls")
+    watch = FlightWatch(LIMITS)
+    for k, name in enumerate("ababa"):
+        assert watch.contention == ""
+        watch.note_commanded(1.0 + 0.1 * k, name)
+    assert watch.contention.startswith("two nodes publish commanded controls")
+
+
 # The battery.
 
 
@@ -157,10 +220,12 @@ def test_a_voltage_counts_when_it_has_lasted(voltage, charge):
     assert battery.charge(11.75) is Charge.GOOD
     # The 1.75 s without a voltage count as 1.5 s.
     battery.measure(11.875, voltage)
+    assert battery.charge(11.875) is Charge.GOOD
     battery.measure(12.25, voltage)
     assert battery.charge(12.25) is charge
     assert battery.voltage == voltage
     # After a reset of the clock it goes on.
+    assert battery.charge(1.0) is Charge.UNKNOWN
     battery.measure(1.0, voltage)
     assert battery.charge(1.0) is charge
     assert battery.charge(5.875) is charge
@@ -189,3 +254,21 @@ def test_so_many_changes_as_tolerated_are_a_handover():
     assert slow.complaint == ""
     slow.note(1.75, "")
     assert slow.complaint == "two nodes publish controls, b and one of this process; expected one"
+
+
+def test_after_a_reset_of_the_clock_two_are_noticed_as_before():
+    callers = Callers("controls", 0)
+    callers.note(90.0, "a")
+    callers.advance(1.0)
+    callers.note(1.25, "b")
+    assert callers.complaint == "two nodes publish controls, a and b; expected one"
+
+
+# The way down.
+
+
+def test_a_descent_ends_at_its_ground():
+    descent = Descent(10.0, (1.0, 2.0, 3.0), ground=1.0, speed=0.5)
+    assert descent.reference(12.0) == (1.0, 2.0, 2.0, 0.0, 0.0, -0.5)
+    assert not descent.is_over(14.0 + DESCENT_MARGIN)
+    assert descent.is_over(14.1 + DESCENT_MARGIN)

@@ -85,6 +85,118 @@ def test_a_vehicle_that_is_carried_exceeds_no_limit():
     assert control_filter.state is FilterState.PASSING
 
 
+# Whose control it is.
+
+
+def test_a_controller_is_not_passed_on_while_the_server_sends_controls():
+    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    assert control_filter.takeoff(0.0, "zero", MOTORS_OFF) == "zero"
+    assert control_filter.commanded(0.1, "fly", level(12.0)) == "zero"
+
+
+def test_of_two_servers_on_the_ground_none_lifts_the_vehicle():
+    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    for k, caller in enumerate("ab"):
+        assert control_filter.takeoff(0.1 * k, "zero", MOTORS_OFF, caller) == "zero"
+    assert control_filter.takeoff(0.2, "lift", level(0.5), "a") == MOTORS_OFF
+    assert "two nodes publish takeoff controls" in control_filter.status.takeoff_refusal
+    control_filter.stop("it was called")
+    assert control_filter.status.takeoff_refusal == ""
+
+
+def test_two_controllers_in_flight_are_no_reason_to_refuse_takeoffs():
+    flight = Flight()
+    for k in range(8):
+        flight.filter.commanded(0.01 * k, "fly", level(G), "ab"[k % 2])
+    assert flight.filter.watch.contention
+    assert flight.filter.status.takeoff_refusal == ""
+
+
+@pytest.mark.parametrize(
+    ("z", "passed", "state"),
+    [(None, None, FilterState.PASSING), (0.0, None, FilterState.DOWN)]
+    + [(1.0, "fly", FilterState.PASSING)],
+)
+def test_a_filter_that_starts_in_flight_passes_on_what_is_seen_in_the_air(z, passed, state):
+    control_filter = SafeFilter(TIMEOUTS, LIMITS, sees=True)
+    control_filter.choice.state = FLYING
+    if z is not None:
+        control_filter.relay.measure(Motion((0.0, 0.0, z), (0.0, 0.0, 0.0)))
+    control_filter.tick(0.0)
+    assert control_filter.commanded(0.0, "fly", level(G)) == passed
+    assert control_filter.state is state
+
+
+@pytest.mark.parametrize("is_stopped", [True, False])
+@pytest.mark.parametrize("is_waiting", [True, False])
+def test_what_has_waited_while_the_filter_listened_is_passed_on(is_stopped, is_waiting):
+    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    if is_waiting:
+        assert control_filter.commanded(0.0, "fly", level(G)) is None
+    if is_stopped:
+        control_filter.stop("it was called")
+    control_filter.choice.state = FLYING
+    passes = is_waiting and not is_stopped
+    assert control_filter.stop_listening(0.2) == ("fly" if passes else None)
+
+
+def test_a_vehicle_that_its_controller_does_not_bring_down_is_brought_down():
+    flight = Flight().run(1.0)
+    flight.filter.choice.state = DESCENDING
+    assert flight.run(2.0).filter.state is FilterState.SINKING
+
+
+def test_on_a_busy_computer_a_control_that_has_come_back_fades_in_all_the_same():
+    flight = Flight().run(1.0).lose(pose=False).run(0.2)
+    flight.ticks += 20
+    own = flight.filter.tick(flight.time).thrust
+    # It may stay the last one for a while.
+    assert flight.filter.commanded(flight.time, "fly", level(G + 2.0)).thrust < own + 0.1
+    flight.ticks += 5
+    passed = flight.filter.tick(flight.time)
+    assert passed.thrust == pytest.approx(own + 0.25 * (G + 2.0 - own), abs=0.05)
+
+
+# How often the filter has to run.
+
+
+def test_a_filter_that_has_little_to_do_is_nominal():
+    flight = Flight().run(1.0)
+    assert flight.filter.is_nominal
+    flight.lose().run(0.04)
+    assert flight.filter.is_nominal
+    flight.run(0.02)
+    assert not flight.filter.is_nominal
+    flight.filter.machine.silence = 0.052
+    assert not flight.filter.is_nominal
+    flight.run(0.1)
+    flight.controls = flight.sees = True
+    flight.run(0.1)
+    # The filter's own control passes over to the one that has come back.
+    assert not flight.filter.is_nominal
+    flight.run(0.2)
+    assert flight.filter.is_nominal
+    flight.filter.watch.is_tilted = True
+    assert not flight.filter.is_nominal
+
+
+def test_on_the_ground_the_filter_is_nominal_without_a_controller():
+    control_filter = SafeFilter(TIMEOUTS, LIMITS)
+    control_filter.choice.state = ON_GROUND
+    for k in range(100):
+        control_filter.tick(k / 100)
+    assert control_filter.is_nominal
+    control_filter.stop("it was called")
+    assert not control_filter.is_nominal
+
+
+def test_a_filter_that_has_not_seen_yet_whether_the_vehicle_is_on_the_ground_is_not_nominal():
+    control_filter = SafeFilter(TIMEOUTS, LIMITS, sees=True)
+    assert not control_filter.is_nominal
+    control_filter.takeoff(0.0, "zero", MOTORS_OFF)
+    assert control_filter.is_nominal
+
+
 # Emergencies.
 
 

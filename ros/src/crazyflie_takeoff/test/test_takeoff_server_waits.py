@@ -8,7 +8,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import EmptyResponse
 from takeoff_helpers import SERVER, filter_status, state
 
-from crazyflie_msgs.msg import VehicleStatus
+from crazyflie_msgs.msg import FilterStatus, VehicleStatus
 from crazyflie_takeoff.driver_connection import MAX_CONNECTION_AGE
 from crazyflie_takeoff.takeoff_server_node import RECOVERY_LIMIT, START_LIMIT
 from crazyflie_utils.transport import ServiceError
@@ -251,6 +251,23 @@ def test_takeoff_of_a_vehicle_that_cannot_fly_is_refused_at_once(status, reason)
     call(process, "/takeoff")
     process.advance(0.02)
     assert states(process)[-1] == "taking_off"
+
+
+@pytest.mark.parametrize(
+    ("status", "reason"),
+    [
+        ({"takeoff_refusal": "two nodes publish"}, "/takeoff refused: two nodes publish"),
+        (
+            {"state": FilterStatus.EMERGENCY, "reason": "it was called"},
+            "/takeoff refused: emergency, it was called; it has to be reset first",
+        ),
+    ],
+)
+def test_takeoff_that_the_filter_would_not_pass_on_is_refused(status, reason):
+    process = on_ground()
+    process.publish("/in_flight_filter_status", filter_status("on_ground", **status))
+    with pytest.raises(ServiceError, match=reason):
+        call(process, "/takeoff")
 
 
 def test_a_driver_is_asked_for_only_if_there_is_one():

@@ -216,7 +216,7 @@ def _unreached(A, C, pole):
     """Return v with A v = pole v and C v = 0, or None."""
     pencil = np.vstack([A - pole * np.eye(A.shape[0]), C])
     _, values, modes = np.linalg.svd(pencil)
-    return modes[-1].conj() if values[-1] <= _ROUNDOFF * max(1.0, values[0]) else None
+    return modes[-1].conj() if values[-1] <= _ROUNDOFF * values[0] else None
 
 
 def _name(model, mode):
@@ -227,7 +227,7 @@ def _name(model, mode):
 def _solve(solver, A, B, weights):
     try:
         return np.asarray(solver(A, B, weights.Q, weights.R, weights.N)[0])
-    except (np.linalg.LinAlgError, control.ControlException, ValueError) as error:
+    except (np.linalg.LinAlgError, ValueError) as error:
         raise DesignError(f"the Riccati equation has no stabilising solution: {error}") from None
 
 

@@ -30,14 +30,13 @@ class Battery:
         self._duration = duration
         self._lasted = [_NOT_LOWER, _NOT_LOWER]
         self.voltage = math.nan
-        self._time = math.nan
+        self._time = math.inf  # s; infinite before the first voltage.
 
     def measure(self, time: float, voltage: float) -> None:
         """Take a voltage (V) that was measured at ``time`` (s)."""
-        elapsed = time - self._time
-        step = min(max(elapsed, 0.0), _LONGEST_STEP) if math.isfinite(elapsed) else 0.0
+        step = min(max(time - self._time, 0.0), _LONGEST_STEP)
         self._lasted = [
-            max(lasted, 0.0) + step if voltage < level else _NOT_LOWER
+            max(lasted + step, 0.0) if voltage < level else _NOT_LOWER
             for lasted, level in zip(self._lasted, self._levels, strict=True)
         ]
         self.voltage, self._time = voltage, time

@@ -81,6 +81,9 @@ class FilterMachine:
         self.is_needed = False  # Whether the vehicle would fall without the controller.
         # Whether a flight was ended because no control came, and none has come since.
         self.lacks_controller = False
+        # Whether there was no takeoff server for a while since the last control. If it has sent no
+        # reference, the controller is silent.
+        self.may_lack_reference = False
         self.takeoff_thrust = 0.0  # Of the takeoff control that has just come, m/s^2.
         self.takeovers = 0  # How often the filter has held the vehicle.
         self._last_motion: Motion | None = None
@@ -149,7 +152,7 @@ class FilterMachine:
         self.reason = "no control comes, the filter keeps the vehicle in place"
 
     def _give_up_waiting(self):
-        self.lacks_controller = True
+        self.lacks_controller = not self.may_lack_reference
         waited = self._timeouts.hold + self.elapsed
         self._descend("no control came", f"no control came for {waited:.1f} s")
 

@@ -129,7 +129,7 @@ class FlightStateMachine:
             self._plan_descent(is_seen_again)
         while self.accepts(Event.TICK):
             self.handle(Event.TICK)
-        if self.state is ServerState.DESCENDING and context.descent is not None:
+        if context.descent is not None:
             context.reference = context.descent.reference(context.elapsed)
             if position is None:
                 self._position = context.reference[:3]

@@ -111,6 +111,7 @@ class SafeFilter(Generic[Control]):
         self._land_if_contended()
         if self._refusal and setpoint.thrust > 0.0:
             return MOTORS_OFF
+        self.machine.may_lack_reference = False
         self.machine.takeoff_thrust = setpoint.thrust
         self.machine.handle(Event.TAKEOFF_CONTROL)
         if self.state is not FilterState.PASSING:
@@ -131,7 +132,7 @@ class SafeFilter(Generic[Control]):
         self.watch.note_commanded(time, caller)
         # The next tick adds all of its step.
         self.machine.silence = min(self.machine.silence, age - self._step_until(time))
-        self.machine.lacks_controller = False
+        self.machine.lacks_controller = self.machine.may_lack_reference = False
         chosen = self.relay.choose(time, control, setpoint)
         is_unchecked = self._ground_check_pending and self.choice.in_flight
         if is_unchecked and self._measured.fresh is not None:

@@ -200,8 +200,6 @@ class TakeoffControlFilterNode(Node):
 
     def _on_timer(self):
         self._publish(self._filter.tick(self._handle.time()), self._handle.stamp())
-        if self._filter.machine.lacks_controller:
-            self._publish_controller()
         gap = self._filter.longest_gap
         if gap > BUSY_GAP:
             self._handle.warn(
@@ -245,11 +243,13 @@ class TakeoffControlFilterNode(Node):
             self._final.publish(control)
 
     def _publish_controller(self):
-        is_there = self._commands.has_publishers()
-        if not (is_there and self._takeoffs.has_publishers()):
-            # The next one is new; or has been silent because no server sent a reference.
-            self._filter.machine.lacks_controller = False
-        has_controller = is_there and not self._filter.machine.lacks_controller
+        machine, is_there = self._filter.machine, self._commands.has_publishers()
+        if not is_there:
+            # The next one is new.
+            machine.lacks_controller = False
+        if not self._takeoffs.has_publishers():
+            machine.may_lack_reference = True
+        has_controller = is_there and not machine.lacks_controller
         if has_controller != self._published_controller:
             self._published_controller = has_controller
             self._controller.publish(Bool(has_controller))

@@ -81,6 +81,8 @@ class PlotsPanel:
     def _draw(self) -> None:
         options = chart(self._series, self.is_stopped)
         self._chart.style(f"height: {options.pop('height')}px")
+        if self._chart.options == options:
+            return
         self._chart.options.clear()
         self._chart.options.update(options)
         self._chart.update()
